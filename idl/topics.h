@@ -13,11 +13,12 @@
 #include "statePubSubTypes.h"
 #include "trainingPubSubTypes.h"
 
-/// Every topic: its name, its type, its largest sample (bytes). An operation has the topics `<name>_2_Request` and
-/// `<name>_2_Reply`, a state the topic `<name>_2`: the number is that of the contract (transport.h). A client reads
-/// replies in its own partition only. Permissions are given by topic: who may read (PredictError, CorrectTarget,
-/// ReadModels), submit (SubmitMeasurements, Diagnose, CheckHealth), change (Train, ManageModels), release
-/// (ReleaseBatches).
+/// Every topic: its name, its type, its largest sample (bytes). An operation has the topics
+/// `<name>_2_Request` and
+/// `<name>_2_Reply`, a state the topic `<name>_2`: the number is that of the contract
+/// (transport.h). A client reads replies in its own partition only. Permissions are given by topic:
+/// who may read (PredictError, CorrectTarget, ReadModels), submit (SubmitMeasurements, Diagnose,
+/// CheckHealth), change (Train, ManageModels), release (ReleaseBatches).
 namespace trammel::wire {
 
 using namespace v2;

@@ -1,4 +1,5 @@
-// trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
+// trammeld: creates the parts of the server, connects and runs them, and stops them in reverse
+// order.
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -85,7 +86,8 @@ int refuse_start(std::vector<Error> problems) {
   return refuse(all);
 }
 
-/// Prints what a start would meet on this host. Cells that would go dark are named whatever else is wrong.
+/// Prints what a start would meet on this host. Cells that would go dark are named whatever else is
+/// wrong.
 int check(const ServerReading& server, const std::string& path, StoreToCheck store) {
   const StartCheck found = check_start(server, path, store);
   for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
@@ -106,12 +108,13 @@ void log_progress(const JobProgress& progress) {
       if (progress.what.empty()) {
         tell(LogLevel::kInfo, "job_queued", job + " is queued", about);
       } else {
-        tell(LogLevel::kWarn, "job_queued", fmt::format("{} is queued: {}", job, progress.what), about);
+        tell(LogLevel::kWarn, "job_queued", fmt::format("{} is queued: {}", job, progress.what),
+             about);
       }
       break;
     case JobStage::kTraining:
-      tell(LogLevel::kDebug, "job_progress", fmt::format("{}: {}, {:.0f} %", job, progress.what, 100 * progress.share),
-           about);
+      tell(LogLevel::kDebug, "job_progress",
+           fmt::format("{}: {}, {:.0f} %", job, progress.what, 100 * progress.share), about);
       break;
     case JobStage::kStoring:
       tell(LogLevel::kDebug, "job_progress", job + " is being stored", about);
@@ -121,7 +124,8 @@ void log_progress(const JobProgress& progress) {
         tell(LogLevel::kInfo, "job_done", fmt::format("{} is done: {}", job, progress.what), about);
       } else {
         tell(LogLevel::kInfo, "job_done",
-             fmt::format("{} made version {}, {}", job, progress.model_version, progress.what), about);
+             fmt::format("{} made version {}, {}", job, progress.model_version, progress.what),
+             about);
       }
       break;
     case JobStage::kFailed:
@@ -130,21 +134,26 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-/// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are written.
+/// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are
+/// written.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
-  const LogAbout about = {{"cell", call.cell},       {"operation", call.operation}, {"who", call.client},
-                          {"request", call.request}, {"trace", call.trace},         {"result", call.result}};
-  const std::string what = fmt::format("{}: {} of request {}{}", call.cell, call.operation, call.request, trace);
+  const LogAbout about = {{"cell", call.cell},   {"operation", call.operation},
+                          {"who", call.client},  {"request", call.request},
+                          {"trace", call.trace}, {"result", call.result}};
+  const std::string what =
+      fmt::format("{}: {} of request {}{}", call.cell, call.operation, call.request, trace);
   if (!call.refused.empty()) {
-    tell(LogLevel::kInfo, "request_refused", fmt::format("{} is refused: {}", what, call.refused), about);
+    tell(LogLevel::kInfo, "request_refused", fmt::format("{} is refused: {}", what, call.refused),
+         about);
   } else {
     tell(LogLevel::kInfo, "request_done", what + " is done", about);
   }
 }
 
-/// What would end the process though it can go on: a pipe that nobody reads any more, a file that may grow no further.
-/// Both are errors of the call that met them. The processes that compute get the signals as they were.
+/// What would end the process though it can go on: a pipe that nobody reads any more, a file that
+/// may grow no further. Both are errors of the call that met them. The processes that compute get
+/// the signals as they were.
 void ignore_what_calls_report() {
   for (const int number : {SIGPIPE, SIGXFSZ}) {
     struct sigaction ignored {};
@@ -155,13 +164,15 @@ void ignore_what_calls_report() {
 
 /// Cells that are served already stay as they are.
 void add_cells(const ServedCells& cells, DdsService& service, Trainer& trainer) {
-  for (const std::string& notice : trainer.add_cells(cells)) tell(LogLevel::kWarn, "notice", notice);
+  for (const std::string& notice : trainer.add_cells(cells))
+    tell(LogLevel::kWarn, "notice", notice);
   service.cells_added();
 }
 
-/// Reads the server file again and takes on what can change while it serves. Of a file that is refused nothing is
-/// taken.
-void reload(const Arguments& arguments, ServerConfig& config, DdsService& service, Trainer& trainer) {
+/// Reads the server file again and takes on what can change while it serves. Of a file that is
+/// refused nothing is taken.
+void reload(const Arguments& arguments, ServerConfig& config, DdsService& service,
+            Trainer& trainer) {
   tell_manager_reloading();
   ServerReading read = read_server(arguments.config);
   put_over(read.config, arguments);
@@ -170,7 +181,8 @@ void reload(const Arguments& arguments, ServerConfig& config, DdsService& servic
   if (read.problems.empty()) {
     const ReloadPlan plan = plan_reload(config, read.config);
     for (const std::string& key : plan.later)
-      tell(LogLevel::kWarn, "reload_later", fmt::format("{} changes with the next start only", key), {{"key", key}});
+      tell(LogLevel::kWarn, "reload_later", fmt::format("{} changes with the next start only", key),
+           {{"key", key}});
     config = plan.config;
     change_log(config.log);
     service.set_limits(config.dds);
@@ -197,15 +209,17 @@ int watch(CaughtSignals& signals, const Serving& serving) {
   using std::chrono::milliseconds;
   constexpr milliseconds kTick{1000};
   const auto period = manager_watches_every();
-  const milliseconds tick = period ? std::min(kTick, std::chrono::duration_cast<milliseconds>(*period) / 3) : kTick;
+  const milliseconds tick =
+      period ? std::min(kTick, std::chrono::duration_cast<milliseconds>(*period) / 3) : kTick;
   std::string told;
   for (;;) {
     const CaughtSignals::News news = signals.wait(tick);
     if (news.ends != 0) return news.ends;
     if (news.reload) reload(serving.arguments, serving.config, serving.service, serving.trainer);
     if (serving.service.movement().still.empty()) tell_manager_alive();
-    const std::string status = fmt::format("{} of {} cells have a model, {} jobs wait", serving.registry.cells_served(),
-                                           serving.trainer.cells().size(), serving.trainer.queued_jobs());
+    const std::string status =
+        fmt::format("{} of {} cells have a model, {} jobs wait", serving.registry.cells_served(),
+                    serving.trainer.cells().size(), serving.trainer.queued_jobs());
     if (status != told) tell_manager_status(status);
     told = status;
   }
@@ -213,12 +227,16 @@ int watch(CaughtSignals& signals, const Serving& serving) {
 
 void tell_ready(const ServerConfig& config) {
   const std::string pages =
-      config.http.port == 0 ? "" : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
-  const std::string serves = config.serves ? fmt::format("serves {} cells on {}:{}, domain {}", config.cells.size(),
-                                                         config.dds.address, config.dds.port, config.dds.domain)
-                                           : fmt::format("trains {} cells", config.cells.size());
+      config.http.port == 0
+          ? ""
+          : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
+  const std::string serves =
+      config.serves ? fmt::format("serves {} cells on {}:{}, domain {}", config.cells.size(),
+                                  config.dds.address, config.dds.port, config.dds.domain)
+                    : fmt::format("trains {} cells", config.cells.size());
   tell(LogLevel::kInfo, "ready",
-       fmt::format("ready: {} {}, store {}{}", config.dds.server_id, serves, spoken_place(config.store), pages));
+       fmt::format("ready: {} {}, store {}{}", config.dds.server_id, serves,
+                   spoken_place(config.store), pages));
   tell_manager_ready("serves");
 }
 
@@ -238,12 +256,15 @@ void tell_record(const Store& store) {
   const RecordState record = store.record();
   if (record.kind != "postgresql" || record.survives.empty()) return;
   tell(record.worry.empty() ? LogLevel::kInfo : LogLevel::kWarn, "record",
-       fmt::format("record: {}; an acknowledged change survives {}{}", record.place, record.survives,
-                   record.worry.empty() ? "" : "; " + record.worry));
-  if (const std::string missing = missing_watchdog(); !missing.empty()) tell(LogLevel::kWarn, "watchdog", missing);
+       fmt::format("record: {}; an acknowledged change survives {}{}", record.place,
+                   record.survives, record.worry.empty() ? "" : "; " + record.worry));
+  if (const std::string missing = missing_watchdog(); !missing.empty())
+    tell(LogLevel::kWarn, "watchdog", missing);
 }
 
-void hangs() { end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n"); }
+void hangs() {
+  end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n");
+}
 
 /// Serves until a signal ends it.
 Status serve(ServerConfig config, const Arguments& arguments) {
@@ -256,11 +277,13 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
   HttpServer http(config.http,
-                  {config.dds.server_id, config.dds.program_version, spoken_place(config.store), trainer, **store,
-                   registry, [&service] { return service.figures(); }, [&service] { return service.movement(); }});
+                  {config.dds.server_id, config.dds.program_version, spoken_place(config.store),
+                   trainer, **store, registry, [&service] { return service.figures(); },
+                   [&service] { return service.movement(); }});
   TRY(http.start());
   service.set_call_listener(log_call);
-  service.set_packet_listener([](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
+  service.set_packet_listener(
+      [](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
   trainer.set_listeners(
       [&service, &http](const JobProgress& progress) {
         log_progress(progress);
@@ -306,11 +329,14 @@ Status serve(ServerConfig config, const Arguments& arguments) {
 int run(const Arguments& arguments) {
   ServerReading server = read_server(arguments.config);
   ServerConfig& config = server.config;
-  config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
+  config.trainer.compute.program = {"/proc/self/exe",
+                                    kComputeWord};  // this very file, also where it was replaced
   put_over(config, arguments);
-  config.trainer.self = ServerSelf::here(config.dds.program_version, config.serves, config.trainer.trains);
+  config.trainer.self =
+      ServerSelf::here(config.dds.program_version, config.serves, config.trainer.trains);
   if (arguments.check)
-    return check(server, arguments.config, arguments.store ? StoreToCheck::kCopy : StoreToCheck::kOwn);
+    return check(server, arguments.config,
+                 arguments.store ? StoreToCheck::kCopy : StoreToCheck::kOwn);
   if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config, arguments);
@@ -325,31 +351,41 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == trammel::kComputeWord)
     return trammel::compute_main({argv + 2, argv + argc});
-  CLI::App app("Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or SIGINT.",
-               "trammeld");
+  CLI::App app(
+      "Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or "
+      "SIGINT.",
+      "trammeld");
   app.footer(
-      "Exit codes: 0 stopped by a signal, or checked and good; 1 checked, and cells would go dark; 2 wrong usage, or\n"
-      "an address that this host does not have; 3 a file, the store or the port is refused; 70 the process hung and\n"
-      "ended itself (start it again: deploy/supervise does). Each problem is a line of its own on standard error.");
+      "Exit codes: 0 stopped by a signal, or checked and good; 1 checked, and cells would go dark; "
+      "2 wrong usage, or\n"
+      "an address that this host does not have; 3 a file, the store or the port is refused; 70 the "
+      "process hung and\n"
+      "ended itself (start it again: deploy/supervise does). Each problem is a line of its own on "
+      "standard error.");
   trammel::Arguments arguments;
   app.set_version_flag("--version", trammel::DdsOptions().program_version);
-  app.add_option("--config", arguments.config, "Server file (YAML); config/server.yaml has every key with its default")
+  app.add_option("--config", arguments.config,
+                 "Server file (YAML); config/server.yaml has every key with its default")
       ->required();
   app.add_flag("--check", arguments.check,
                "Only say all that a start or a first training would refuse, and change nothing");
   app.add_option("--store", arguments.store,
                  "Store (SQLite file, or URL of a PostgreSQL) instead of the server file's");
-  app.add_option("--port", arguments.port, "UDP port where clients look for it, instead of the server file's")
+  app.add_option("--port", arguments.port,
+                 "UDP port where clients look for it, instead of the server file's")
       ->check(CLI::Range(1024, 65535));
-  app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));
-  app.add_option("--http-port", arguments.http_port, "TCP port for metrics and pages, instead of the server file's")
+  app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")
+      ->check(CLI::Range(0, 232));
+  app.add_option("--http-port", arguments.http_port,
+                 "TCP port for metrics and pages, instead of the server file's")
       ->check(CLI::Range(1024, 65535));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     fmt::print(stderr,
-               "trammeld: {}; usage: trammeld --config SERVER.yaml [--check]; trammeld --help tells all options\n",
+               "trammeld: {}; usage: trammeld --config SERVER.yaml [--check]; trammeld --help "
+               "tells all options\n",
                trammel::shown(error.what()));
     return trammel::kExitUsage;
   }

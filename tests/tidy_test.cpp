@@ -14,9 +14,9 @@
 #include <string_view>
 #include <vector>
 
-// The rules of the house that a machine holds: who may include whom, who may start a thread, and that nobody sleeps.
-// Rooms, floors and doors are those of the table in server/README.md.
-// A source tree is a map from path to text, so that the checks themselves are tested on small made-up trees.
+// The rules of the house that a machine holds: who may include whom, who may start a thread, and
+// that nobody sleeps. Rooms, floors and doors are those of the table in server/README.md. A source
+// tree is a map from path to text, so that the checks themselves are tested on small made-up trees.
 
 namespace trammel {
 namespace {
@@ -59,9 +59,11 @@ struct Reserved {
   std::regex may_include;  // paths
 };
 const std::vector<Reserved> kReserved = {
-    {"Fast DDS", std::regex("^(fastdds|fastrtps|fastcdr)/.*"), std::regex("^(server/dds|clients/session|idl)/.*")},
+    {"Fast DDS", std::regex("^(fastdds|fastrtps|fastcdr)/.*"),
+     std::regex("^(server/dds|clients/session|idl)/.*")},
     {"Ceres", std::regex("^ceres/.*"), std::regex("^server/(calibrate|diagnose)/.*")},
-    {"yaml-cpp", std::regex("^yaml-cpp/.*"), std::regex("^server/config/.*|^(server|clients)/.*_file\\.(h|cpp)$")},
+    {"yaml-cpp", std::regex("^yaml-cpp/.*"),
+     std::regex("^server/config/.*|^(server|clients)/.*_file\\.(h|cpp)$")},
     {"the YAML reader", std::regex("^server/base/yaml_file\\.h$"),
      std::regex("^server/config/.*|^(server|clients)/.*_file\\.(h|cpp)$")},
     {"SQLite", std::regex("^(sqlite3\\.h|SQLiteCpp/.*)$"), std::regex("^server/store/.*")},
@@ -121,7 +123,8 @@ std::string code_of(std::string_view text) {
     if (end == at) {
       code += text[at++];
     } else {
-      code.append(static_cast<std::size_t>(std::count(text.begin() + at, text.begin() + end, '\n')), '\n');
+      code.append(static_cast<std::size_t>(std::count(text.begin() + at, text.begin() + end, '\n')),
+                  '\n');
       at = end;
     }
   }
@@ -153,7 +156,9 @@ std::vector<std::string> cells_of(const std::string& line) {
   std::getline(in, cell, '|');
   while (std::getline(in, cell, '|')) {
     const auto first = cell.find_first_not_of(' ');
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, cell.find_last_not_of(' ') - first + 1));
+    cells.push_back(first == std::string::npos
+                        ? ""
+                        : cell.substr(first, cell.find_last_not_of(' ') - first + 1));
   }
   return cells;
 }
@@ -162,12 +167,14 @@ std::vector<std::string> cells_of(const std::string& line) {
 std::set<std::string> quoted(const std::string& cell) {
   static const std::regex kQuoted("`([^`]+)`");
   std::set<std::string> words;
-  for (auto at = std::sregex_iterator(cell.begin(), cell.end(), kQuoted); at != std::sregex_iterator(); ++at)
+  for (auto at = std::sregex_iterator(cell.begin(), cell.end(), kQuoted);
+       at != std::sregex_iterator(); ++at)
     words.insert((*at)[1]);
   return words;
 }
 
-/// The rows `| floor | room | what is decided here | door |`; the floor of a subfolder is left empty.
+/// The rows `| floor | room | what is decided here | door |`; the floor of a subfolder is left
+/// empty.
 Rooms rooms_of(const std::string& readme) {
   Rooms rooms;
   std::istringstream lines(readme);
@@ -194,8 +201,10 @@ std::optional<int> floor_of(const Rooms& rooms, const std::string& room) {
   return found == rooms.end() ? std::nullopt : found->second.floor;
 }
 
-/// Why a file in `folder` may not include `header`, a path of our own tree; nothing when it may. By floors alone.
-std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder, const std::string& header) {
+/// Why a file in `folder` may not include `header`, a path of our own tree; nothing when it may. By
+/// floors alone.
+std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder,
+                                   const std::string& header) {
   const std::string target = room_of(folder_of(header)), room = room_of(folder);
   if (target == room) return std::nullopt;
   if (room == "server/config" && header.ends_with("_options.h")) return std::nullopt;
@@ -206,17 +215,19 @@ std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder
     return target + " is not for " + room;
   }
   if (target == "idl" || target.starts_with("idl/")) {
-    return room == "server/dds" ? std::nullopt : std::optional<std::string>(target + " is for server/dds");
+    return room == "server/dds" ? std::nullopt
+                                : std::optional<std::string>(target + " is for server/dds");
   }
   if (!target_floor) return target + " has no floor that the server knows";
   const int own = *floor_of(rooms, room);
   if (*target_floor < own) return std::nullopt;
-  return target + " is on floor " + std::to_string(*target_floor) + ", " + room + " on floor " + std::to_string(own);
+  return target + " is on floor " + std::to_string(*target_floor) + ", " + room + " on floor " +
+         std::to_string(own);
 }
 
 bool is_ours(const std::string& header) {
-  return header.starts_with("server/") || header.starts_with("clients/") || header.starts_with("idl/") ||
-         header.starts_with("tests/");
+  return header.starts_with("server/") || header.starts_with("clients/") ||
+         header.starts_with("idl/") || header.starts_with("tests/");
 }
 
 Complaints check_floors(const SourceTree& tree, const Rooms& rooms) {
@@ -224,8 +235,8 @@ Complaints check_floors(const SourceTree& tree, const Rooms& rooms) {
   for (const auto& [path, text] : tree) {
     if (!is_source(path) || is_under(path, "tests")) continue;
     const std::string folder = folder_of(path), room = room_of(folder);
-    const bool known =
-        kOutsiders.contains(room) || (floor_of(rooms, room) && (room == folder || rooms.contains(folder)));
+    const bool known = kOutsiders.contains(room) ||
+                       (floor_of(rooms, room) && (room == folder || rooms.contains(folder)));
     if (!known) {
       complaints.push_back(path + ": folder " + folder + " has no floor");
       continue;
@@ -233,7 +244,8 @@ Complaints check_floors(const SourceTree& tree, const Rooms& rooms) {
     for (const auto& [line, header] : includes_of(text)) {
       if (!is_ours(header)) continue;
       if (const auto reason = why_not(rooms, folder, header))
-        complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header + ": " + *reason);
+        complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header + ": " +
+                             *reason);
     }
   }
   return complaints;
@@ -250,11 +262,13 @@ bool is_door(const Rooms& rooms, const std::string& folder, const std::string& h
 std::string inside_of(const std::string& path) {
   const std::string folder = folder_of(path);
   if (!is_under(path, "tests")) return folder;
-  return folder == "tests/clients" ? "clients/cli" : "server" + room_of(folder).substr(std::string("tests").size());
+  return folder == "tests/clients" ? "clients/cli"
+                                   : "server" + room_of(folder).substr(std::string("tests").size());
 }
 
 /// The folder whose door keeps `header` from the file at `path`; nothing where the file may see it.
-std::optional<std::string> shut_by(const Rooms& rooms, const std::string& path, const std::string& header) {
+std::optional<std::string> shut_by(const Rooms& rooms, const std::string& path,
+                                   const std::string& header) {
   const std::string inside = inside_of(path), target = folder_of(header), room = room_of(target);
   const bool same_room = room_of(inside) == room;
   if (same_room && (is_under(path, "tests") || target == inside)) return std::nullopt;
@@ -263,16 +277,18 @@ std::optional<std::string> shut_by(const Rooms& rooms, const std::string& path, 
   return shut;
 }
 
-/// Complains of headers that are inside another room, or inside another subfolder of the same room. Benchmarks may
-/// measure anything, and any reader may be fuzzed.
+/// Complains of headers that are inside another room, or inside another subfolder of the same room.
+/// Benchmarks may measure anything, and any reader may be fuzzed.
 Complaints check_doors(const SourceTree& tree, const Rooms& rooms) {
   Complaints complaints;
   for (const auto& [path, text] : tree) {
-    if (!is_source(path) || is_under(path, "tests/benchmarks") || is_under(path, "tests/fuzz")) continue;
+    if (!is_source(path) || is_under(path, "tests/benchmarks") || is_under(path, "tests/fuzz"))
+      continue;
     for (const auto& [line, header] : includes_of(text)) {
       if (!is_ours(header) || is_under(header, "tests")) continue;
       if (const auto shut = shut_by(rooms, path, header))
-        complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header + ", which is inside " + *shut);
+        complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header +
+                             ", which is inside " + *shut);
     }
   }
   return complaints;
@@ -283,7 +299,8 @@ Complaints check_doors_lead_somewhere(const SourceTree& tree, const Rooms& rooms
   Complaints complaints;
   for (const auto& [folder, room] : rooms) {
     for (const std::string& header : room.door) {
-      if (!tree.contains(folder + "/" + header)) complaints.push_back(folder + ": there is no " + header);
+      if (!tree.contains(folder + "/" + header))
+        complaints.push_back(folder + ": there is no " + header);
     }
   }
   return complaints;
@@ -295,8 +312,11 @@ Complaints check_reserved_libraries(const SourceTree& tree) {
     if (!is_source(path) || is_under(path, "tests")) continue;
     for (const auto& [line, header] : includes_of(text)) {
       for (const Reserved& reserved : kReserved) {
-        if (!std::regex_match(header, reserved.header) || std::regex_match(path, reserved.may_include)) continue;
-        complaints.push_back(path + ":" + std::to_string(line) + ": " + reserved.name + " is not for this file");
+        if (!std::regex_match(header, reserved.header) ||
+            std::regex_match(path, reserved.may_include))
+          continue;
+        complaints.push_back(path + ":" + std::to_string(line) + ": " + reserved.name +
+                             " is not for this file");
       }
     }
   }
@@ -325,8 +345,8 @@ std::set<std::string> in_circles(Graph reaches) {
   return nodes;
 }
 
-/// Who includes whom among the nodes that `node_of` makes of paths. A room's own files may use its subfolders and be
-/// used by them.
+/// Who includes whom among the nodes that `node_of` makes of paths. A room's own files may use its
+/// subfolders and be used by them.
 template <typename NodeOf>
 Graph graph_of(const SourceTree& tree, NodeOf node_of) {
   Graph graph;
@@ -340,29 +360,34 @@ Graph graph_of(const SourceTree& tree, NodeOf node_of) {
   return graph;
 }
 
-/// Files that include each other, a header and its source taken as one; rooms; and the subfolders of a room.
+/// Files that include each other, a header and its source taken as one; rooms; and the subfolders
+/// of a room.
 Complaints check_circles(const SourceTree& tree) {
-  const auto without_ending = [](const std::string& path) { return path.substr(0, path.rfind('.')); };
+  const auto without_ending = [](const std::string& path) {
+    return path.substr(0, path.rfind('.'));
+  };
   const auto room = [](const std::string& path) { return room_of(folder_of(path)); };
   Graph folders = graph_of(tree, folder_of);
   std::erase_if(folders, [](const auto& node) { return node.first == room_of(node.first); });
   Complaints complaints;
   for (const Graph& graph : {graph_of(tree, without_ending), graph_of(tree, room), folders}) {
-    for (const std::string& node : in_circles(graph)) complaints.push_back(node + ": includes itself by way of others");
+    for (const std::string& node : in_circles(graph))
+      complaints.push_back(node + ": includes itself by way of others");
   }
   return complaints;
 }
 
 /// Complains of each line of code that `pattern` is found in, in the files that `applies` to.
 template <typename Applies>
-void find_in_code(const SourceTree& tree, const std::regex& pattern, const std::string& what, Applies applies,
-                  Complaints& complaints) {
+void find_in_code(const SourceTree& tree, const std::regex& pattern, const std::string& what,
+                  Applies applies, Complaints& complaints) {
   for (const auto& [path, text] : tree) {
     if (!is_source(path) || !applies(path)) continue;
     std::istringstream lines(code_of(text));
     std::string line;
     for (int number = 1; std::getline(lines, line); ++number) {
-      if (std::regex_search(line, pattern)) complaints.push_back(path + ":" + std::to_string(number) + ": " + what);
+      if (std::regex_search(line, pattern))
+        complaints.push_back(path + ":" + std::to_string(number) + ": " + what);
     }
   }
 }
@@ -373,24 +398,25 @@ std::vector<std::string> shipped_causes(const SourceTree& tree) {
   std::vector<std::string> causes;
   const auto list = tree.find("server/error_sources/shipped_causes.h");
   if (list == tree.end()) return causes;
-  for (std::sregex_iterator one(list->second.begin(), list->second.end(), kLine), end; one != end; ++one)
+  for (std::sregex_iterator one(list->second.begin(), list->second.end(), kLine), end; one != end;
+       ++one)
     if ((*one)[1] != "CAUSE") causes.push_back((*one)[1]);
   return causes;
 }
 
-/// Complains of whoever asks for a cause by its spelling instead of asking its record: by a comparison, by the
-/// beginning or end of a text, by looking its record up, by adding it to a list, or by a table with a spelling for a
-/// key.
+/// Complains of whoever asks for a cause by its spelling instead of asking its record: by a
+/// comparison, by the beginning or end of a text, by looking its record up, by adding it to a list,
+/// or by a table with a spelling for a key.
 Complaints check_causes(const SourceTree& tree) {
   std::string any;
   for (const std::string& cause : shipped_causes(tree)) any += (any.empty() ? "" : "|") + cause;
   Complaints complaints;
   if (any.empty()) return complaints;
   const std::string spelling = "\"(" + any + ")[:@_]?\"";
-  const std::regex asks(
-      "[=!]= *" + spelling + "|" + spelling +
-      " *[=!]=|(starts_with|ends_with|contains|find|count|compare|cause_spelled|find_cause|emplace_back|push_back)\\(" +
-      spelling + "|(^|[{,]) *\\{" + spelling + ", \"");
+  const std::regex asks("[=!]= *" + spelling + "|" + spelling +
+                        " *[=!]=|(starts_with|ends_with|contains|find|count|compare|cause_spelled|"
+                        "find_cause|emplace_back|push_back)\\(" +
+                        spelling + "|(^|[{,]) *\\{" + spelling + ", \"");
   for (const auto& [path, text] : tree) {
     const bool is_of_server = is_under(path, "server") && !is_under(path, "server/error_sources");
     if (!is_source(path) || !(is_of_server || is_under(path, "clients"))) continue;
@@ -398,20 +424,24 @@ Complaints check_causes(const SourceTree& tree) {
     std::string line;
     for (int number = 1; std::getline(lines, line); ++number) {
       if (std::regex_search(line, asks))
-        complaints.push_back(path + ":" + std::to_string(number) + ": asks for a cause by its spelling");
+        complaints.push_back(path + ":" + std::to_string(number) +
+                             ": asks for a cause by its spelling");
     }
   }
   return complaints;
 }
 
-/// Complains of whoever decides by the words of a message: by what an error's sentence holds, or by a text of several
-/// words anywhere. Readers of files of other programs may: what they read has no other form.
+/// Complains of whoever decides by the words of a message: by what an error's sentence holds, or by
+/// a text of several words anywhere. Readers of files of other programs may: what they read has no
+/// other form.
 Complaints check_words(const SourceTree& tree) {
   const std::string asks = R"(\.(find|rfind|starts_with|ends_with|contains|compare)\()";
-  static const std::regex kOfAMessage(R"((\bmessage|\bsentence(\([^()]*\))?|\bwhat\(\)\)*|\bwhy|\bverdict|\bnext))" +
-                                      asks + R"(|(\.message|\bsentence(\([^()]*\))?) *[=!]= *")");
+  static const std::regex kOfAMessage(
+      R"((\bmessage|\bsentence(\([^()]*\))?|\bwhat\(\)\)*|\bwhy|\bverdict|\bnext))" + asks +
+      R"(|(\.message|\bsentence(\([^()]*\))?) *[=!]= *")");
   static const std::regex kOfWords(asks + R"re("[^"]*[A-Za-z'] [A-Za-z][^"]*")re");
-  static const std::regex kReaders(R"(^(server/measurement/files|clients/cam/\w+)/.*|^server/robot/branch_hint\.cpp$)");
+  static const std::regex kReaders(
+      R"(^(server/measurement/files|clients/cam/\w+)/.*|^server/robot/branch_hint\.cpp$)");
   Complaints complaints;
   for (const auto& [path, text] : tree) {
     if (!is_source(path) || !(is_under(path, "server") || is_under(path, "clients"))) continue;
@@ -420,7 +450,8 @@ Complaints check_words(const SourceTree& tree) {
     std::string line;
     for (int number = 1; std::getline(lines, line); ++number) {
       if (std::regex_search(line, kOfAMessage) || std::regex_search(line, kOfWords))
-        complaints.push_back(path + ":" + std::to_string(number) + ": decides by the words of a message");
+        complaints.push_back(path + ":" + std::to_string(number) +
+                             ": decides by the words of a message");
     }
   }
   return complaints;
@@ -428,12 +459,15 @@ Complaints check_words(const SourceTree& tree) {
 
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
-  static const std::regex kMayStart(R"(^server/(main\.cpp|host/caught_signals\.(h|cpp))$|)"
-                                    R"(^(server/trainer|server/dds|server/http|clients/session|clients/cli/work)/.*)");
+  static const std::regex kMayStart(
+      R"(^server/(main\.cpp|host/caught_signals\.(h|cpp))$|)"
+      R"(^(server/trainer|server/dds|server/http|clients/session|clients/cli/work)/.*)");
   Complaints complaints;
   find_in_code(
       tree, kThread, "starts a thread",
-      [](const std::string& path) { return !is_under(path, "tests") && !std::regex_match(path, kMayStart); },
+      [](const std::string& path) {
+        return !is_under(path, "tests") && !std::regex_match(path, kMayStart);
+      },
       complaints);
   return complaints;
 }
@@ -442,12 +476,13 @@ Complaints check_sleeps(const SourceTree& tree) {
   static const std::regex kSleep(R"(\b(sleep_for|sleep_until)\b|\b(usleep|nanosleep|sleep)\s*\()");
   Complaints complaints;
   find_in_code(
-      tree, kSleep, "sleeps instead of waiting for a state", [](const std::string&) { return true; }, complaints);
+      tree, kSleep, "sleeps instead of waiting for a state",
+      [](const std::string&) { return true; }, complaints);
   return complaints;
 }
 
-/// Complains of locks that clang does not see, and of mutexes that say neither by an annotation nor by a comment on
-/// their line what they guard.
+/// Complains of locks that clang does not see, and of mutexes that say neither by an annotation nor
+/// by a comment on their line what they guard.
 Complaints check_locks(const SourceTree& tree) {
   static const std::regex kUnseen(
       R"(\bstd\s*::\s*((recursive_|shared_|timed_)*mutex|(lock|scoped|unique|shared)_(guard|lock)|condition_variable(_any)?)\b)");
@@ -455,7 +490,10 @@ Complaints check_locks(const SourceTree& tree) {
   Complaints complaints;
   find_in_code(
       tree, kUnseen, "a lock that is not of server/base/mutex.h",
-      [](const std::string& path) { return !is_under(path, "tests") && path != "server/base/mutex.h"; }, complaints);
+      [](const std::string& path) {
+        return !is_under(path, "tests") && path != "server/base/mutex.h";
+      },
+      complaints);
   for (const auto& [path, text] : tree) {
     if (!is_source(path) || is_under(path, "tests")) continue;
     std::istringstream lines(text);
@@ -464,7 +502,8 @@ Complaints check_locks(const SourceTree& tree) {
       std::smatch mutex;
       if (!std::regex_match(line, mutex, kMutex) || mutex[3].matched) continue;
       if (text.find("TRAMMEL_GUARDED_BY(" + mutex.str(2) + ")") == std::string::npos)
-        complaints.push_back(path + ":" + std::to_string(number) + ": " + mutex.str(2) + " guards nothing");
+        complaints.push_back(path + ":" + std::to_string(number) + ": " + mutex.str(2) +
+                             " guards nothing");
     }
   }
   return complaints;
@@ -531,7 +570,8 @@ Opens opened_by(const std::string& header) {
   static const std::regex kOperator(R"(\boperator\s*(\(\)|\[\]|[^\s\w(]+))"),
       kTemplate(R"(^\s*template\s*<[^()]*?>\s)");
   static const std::regex kMember(R"(\(\)[^:]*:[^:].*[\w>]\s*$)");
-  const std::string plain = std::regex_replace(std::regex_replace(header, kOperator, "called"), kTemplate, "");
+  const std::string plain =
+      std::regex_replace(std::regex_replace(header, kOperator, "called"), kTemplate, "");
   const std::string outside = outside_brackets(plain);
   if (outside.find('=') != std::string::npos) return Opens::kOther;
   if (std::regex_search(plain, kType)) return Opens::kScope;
@@ -565,7 +605,8 @@ std::vector<Function> functions_of(std::string_view text) {
     if (c == '{' && opens != Opens::kScope) {
       inside = 1;
       is_function = opens == Opens::kFunction;
-    } else if (c == '{' || c == '}' || (c == ';' && outside_brackets(header + ";").ends_with(';'))) {
+    } else if (c == '{' || c == '}' ||
+               (c == ';' && outside_brackets(header + ";").ends_with(';'))) {
       header.clear();
     } else if (!header.empty() || !std::isspace(static_cast<unsigned char>(c))) {
       if (header.empty()) first = line;
@@ -576,7 +617,8 @@ std::vector<Function> functions_of(std::string_view text) {
   return functions;
 }
 
-/// Of server/ and clients/, those of three lines and more: shorter ones are names for an expression.
+/// Of server/ and clients/, those of three lines and more: shorter ones are names for an
+/// expression.
 std::vector<Function> functions_of(const SourceTree& tree) {
   std::vector<Function> all;
   for (const auto& [path, text] : tree) {
@@ -599,7 +641,8 @@ Complaints check_lengths(const std::vector<Function>& functions) {
   return complaints;
 }
 
-/// `1234 functions, median 8 lines, 90 % at most 23, longest 60`; of one room where `folder` says it.
+/// `1234 functions, median 8 lines, 90 % at most 23, longest 60`; of one room where `folder` says
+/// it.
 std::string lengths_in(const std::vector<Function>& functions, const std::string& folder) {
   std::vector<int> lines;
   for (const Function& function : functions) {
@@ -608,10 +651,11 @@ std::string lengths_in(const std::vector<Function>& functions, const std::string
   std::sort(lines.begin(), lines.end());
   if (lines.empty()) return "no functions";
   const auto at = [&](double share) {
-    return std::to_string(lines[static_cast<std::size_t>(share * static_cast<double>(lines.size() - 1))]);
+    return std::to_string(
+        lines[static_cast<std::size_t>(share * static_cast<double>(lines.size() - 1))]);
   };
-  return std::to_string(lines.size()) + " functions, median " + at(0.5) + " lines, 90 % at most " + at(0.9) +
-         ", longest " + at(1);
+  return std::to_string(lines.size()) + " functions, median " + at(0.5) + " lines, 90 % at most " +
+         at(0.9) + ", longest " + at(1);
 }
 
 Rooms read_rooms() {
@@ -653,16 +697,22 @@ TEST(Tidy, TheSourceTreeIsThere) {
   EXPECT_TRUE(tree.contains("tests/tidy_test.cpp"));
 }
 
-TEST(Tidy, RoomsIncludeLowerFloorsOnly) { EXPECT_EQ(shown(check_floors(read_source_tree(), read_rooms())), ""); }
+TEST(Tidy, RoomsIncludeLowerFloorsOnly) {
+  EXPECT_EQ(shown(check_floors(read_source_tree(), read_rooms())), "");
+}
 
 TEST(Tidy, NobodyLooksBehindADoor) {
   EXPECT_EQ(shown(check_doors(read_source_tree(), read_rooms())), "");
   EXPECT_EQ(shown(check_doors_lead_somewhere(read_source_tree(), read_rooms())), "");
 }
 
-TEST(Tidy, LibrariesStayInTheFoldersThatOwnThem) { EXPECT_EQ(shown(check_reserved_libraries(read_source_tree())), ""); }
+TEST(Tidy, LibrariesStayInTheFoldersThatOwnThem) {
+  EXPECT_EQ(shown(check_reserved_libraries(read_source_tree())), "");
+}
 
-TEST(Tidy, NothingIncludesItselfByWayOfOthers) { EXPECT_EQ(shown(check_circles(read_source_tree())), ""); }
+TEST(Tidy, NothingIncludesItselfByWayOfOthers) {
+  EXPECT_EQ(shown(check_circles(read_source_tree())), "");
+}
 
 TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
   const SourceTree tree = read_source_tree();
@@ -670,9 +720,13 @@ TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
   EXPECT_EQ(shown(check_causes(tree)), "");
 }
 
-TEST(Tidy, NobodyDecidesByTheWordsOfAMessage) { EXPECT_EQ(shown(check_words(read_source_tree())), ""); }
+TEST(Tidy, NobodyDecidesByTheWordsOfAMessage) {
+  EXPECT_EQ(shown(check_words(read_source_tree())), "");
+}
 
-TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
+TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) {
+  EXPECT_EQ(shown(check_threads(read_source_tree())), "");
+}
 
 TEST(Tidy, NobodySleeps) { EXPECT_EQ(shown(check_sleeps(read_source_tree())), ""); }
 
@@ -686,10 +740,13 @@ TEST(Tidy, NoFunctionIsLongerThanAScreen) {
     if (is_under(room, "server") || is_under(room, "clients"))
       std::cout << room << ": " << lengths_in(all, room) << "\n";
   }
-  std::cout << "server: " << lengths_in(all, "server") << "\nclients: " << lengths_in(all, "clients") << "\n";
+  std::cout << "server: " << lengths_in(all, "server")
+            << "\nclients: " << lengths_in(all, "clients") << "\n";
 }
 
-TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) { EXPECT_EQ(shown(check_locks(read_source_tree())), ""); }
+TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) {
+  EXPECT_EQ(shown(check_locks(read_source_tree())), "");
+}
 
 TEST(Tidy, TestFoldersMirrorTheServer) { EXPECT_EQ(shown(check_mirror(read_source_tree())), ""); }
 
@@ -722,25 +779,27 @@ TEST(TidyChecks, ReadRoomsFloorsAndDoorsFromATable) {
 }
 
 TEST(TidyChecks, AllowLowerFloorsAndTheOwnRoom) {
-  EXPECT_EQ(floors({{"server/calibrate/a.cpp",
-                     include("server/calibrate/a.h") + include("server/base/m.h") + "#include <vector>\n"},
-                    {"server/main.cpp", include("server/config/c.h")},
-                    {"server/bias/kernels/k.cpp", include("server/bias/model.h")},
-                    {"server/dds/d.cpp", include("idl/topics.h")}}),
-            "");
+  EXPECT_EQ(
+      floors({{"server/calibrate/a.cpp", include("server/calibrate/a.h") +
+                                             include("server/base/m.h") + "#include <vector>\n"},
+              {"server/main.cpp", include("server/config/c.h")},
+              {"server/bias/kernels/k.cpp", include("server/bias/model.h")},
+              {"server/dds/d.cpp", include("idl/topics.h")}}),
+      "");
 }
 
 TEST(TidyChecks, ComplainOfHigherFloorsAndSiblings) {
-  EXPECT_EQ(
-      floors({{"server/base/a.h", "\n" + include("server/calibrate/b.h")},
-              {"server/bias/kernels/b.cpp", include("server/calibrate/b.h")},
-              {"server/trainer/t.cpp", include("clients/session/session.h") + include("idl/topics.h")}}),
-      "server/base/a.h:2: includes server/calibrate/b.h: server/calibrate is on floor 3, server/base on floor 0\n"
-      "server/bias/kernels/b.cpp:1: includes server/calibrate/b.h: server/calibrate is on floor 3, server/bias on "
-      "floor 3\n"
-      "server/trainer/t.cpp:1: includes clients/session/session.h: clients/session has no floor that the server "
-      "knows\n"
-      "server/trainer/t.cpp:2: includes idl/topics.h: idl is for server/dds\n");
+  EXPECT_EQ(floors({{"server/base/a.h", "\n" + include("server/calibrate/b.h")},
+                    {"server/bias/kernels/b.cpp", include("server/calibrate/b.h")},
+                    {"server/trainer/t.cpp",
+                     include("clients/session/session.h") + include("idl/topics.h")}}),
+            "server/base/a.h:2: includes server/calibrate/b.h: server/calibrate is on floor 3, "
+            "server/base on floor 0\n"
+            "server/bias/kernels/b.cpp:1: includes server/calibrate/b.h: server/calibrate is on "
+            "floor 3, server/bias on floor 3\n"
+            "server/trainer/t.cpp:1: includes clients/session/session.h: clients/session has no "
+            "floor that the server knows\n"
+            "server/trainer/t.cpp:2: includes idl/topics.h: idl is for server/dds\n");
 }
 
 TEST(TidyChecks, ComplainOfAFolderThatIsNotInTheTable) {
@@ -750,10 +809,12 @@ TEST(TidyChecks, ComplainOfAFolderThatIsNotInTheTable) {
 }
 
 TEST(TidyChecks, LetClientsSeeTheirPartOnly) {
-  EXPECT_EQ(floors({{"clients/session/a.cpp", include("idl/topics.h") + include("server/base/result.h")},
-                    {"clients/cam/a.cpp", include("clients/session/session.h")},
-                    {"clients/cli/a.cpp", include("clients/cam/a.h") + include("server/trainer/train.h")}}),
-            "");
+  EXPECT_EQ(
+      floors(
+          {{"clients/session/a.cpp", include("idl/topics.h") + include("server/base/result.h")},
+           {"clients/cam/a.cpp", include("clients/session/session.h")},
+           {"clients/cli/a.cpp", include("clients/cam/a.h") + include("server/trainer/train.h")}}),
+      "");
   EXPECT_NE(floors({{"clients/session/a.cpp", include("server/bias/model.h")}}), "");
   EXPECT_NE(floors({{"clients/cam/a.cpp", include("server/bias/model.h")}}), "");
   EXPECT_NE(floors({{"clients/session/a.cpp", include("clients/cli/a.h")}}), "");
@@ -762,35 +823,43 @@ TEST(TidyChecks, LetClientsSeeTheirPartOnly) {
 }
 
 TEST(TidyChecks, LetConfigSeeOptionsOfAnyFloor) {
-  EXPECT_EQ(floors({{"server/config/c.h", include("server/dds/dds_options.h") + include("server/dds/codec.h")}}), "");
+  EXPECT_EQ(floors({{"server/config/c.h",
+                     include("server/dds/dds_options.h") + include("server/dds/codec.h")}}),
+            "");
   EXPECT_NE(floors({{"server/trainer/c.h", include("server/dds/dds_options.h")}}), "");
 }
 
 TEST(TidyChecks, LetTheRoomItsTestsAndItsDoorSeeWhatIsInside) {
-  EXPECT_EQ(
-      doors({{"server/bias/model.cpp", include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
-             {"server/bias/kernels/tiles.cpp", include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
-             {"server/trainer/t.cpp", include("server/bias/model.h") + include("server/bias/kernels/spelling.h")},
-             {"tests/bias/a_test.cpp", include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
-             {"tests/benchmarks/a.cpp", include("server/bias/inner.h")}}),
-      "");
+  EXPECT_EQ(doors({{"server/bias/model.cpp",
+                    include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
+                   {"server/bias/kernels/tiles.cpp",
+                    include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
+                   {"server/trainer/t.cpp",
+                    include("server/bias/model.h") + include("server/bias/kernels/spelling.h")},
+                   {"tests/bias/a_test.cpp",
+                    include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
+                   {"tests/benchmarks/a.cpp", include("server/bias/inner.h")}}),
+            "");
 }
 
 TEST(TidyChecks, ComplainOfWhoeverLooksBehindADoor) {
   EXPECT_EQ(
       doors({{"server/bias/search/starts.cpp", include("server/bias/kernels/tiles.h")},
-             {"server/trainer/t.cpp", include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
+             {"server/trainer/t.cpp",
+              include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
              {"tests/trainer/t_test.cpp", include("server/bias/inner.h")}}),
-      "server/bias/search/starts.cpp:1: includes server/bias/kernels/tiles.h, which is inside server/bias/kernels\n"
+      "server/bias/search/starts.cpp:1: includes server/bias/kernels/tiles.h, which is inside "
+      "server/bias/kernels\n"
       "server/trainer/t.cpp:1: includes server/bias/inner.h, which is inside server/bias\n"
       "server/trainer/t.cpp:2: includes server/bias/kernels/kernel.h, which is inside server/bias\n"
       "tests/trainer/t_test.cpp:1: includes server/bias/inner.h, which is inside server/bias\n");
 }
 
 TEST(TidyChecks, ComplainOfADoorThatLeadsNowhere) {
-  EXPECT_EQ(shown(check_doors_lead_somewhere({{"server/bias/a.h", ""}},
-                                             rooms_of("| 3 | `server/bias` | the rest | `a.h` `b.h` |\n"))),
-            "server/bias: there is no b.h\n");
+  EXPECT_EQ(
+      shown(check_doors_lead_somewhere(
+          {{"server/bias/a.h", ""}}, rooms_of("| 3 | `server/bias` | the rest | `a.h` `b.h` |\n"))),
+      "server/bias: there is no b.h\n");
 }
 
 TEST(TidyChecks, ComplainOfLibrariesOutsideTheirFolders) {
@@ -818,16 +887,19 @@ TEST(TidyChecks, FindCirclesOfRoomsHoweverLong) {
   SourceTree circle = line;
   circle["server/c/d.h"] = include("server/a/e.h");
   circle["server/a/e.h"] = "";
-  EXPECT_EQ(shown(check_circles(circle)),
-            "server/a: includes itself by way of others\nserver/b: includes itself by way of others\n"
-            "server/c: includes itself by way of others\n");
+  EXPECT_EQ(
+      shown(check_circles(circle)),
+      "server/a: includes itself by way of others\nserver/b: includes itself by way of others\n"
+      "server/c: includes itself by way of others\n");
 }
 
 TEST(TidyChecks, FindCirclesOfFilesAHeaderAndItsSourceTakenAsOne) {
-  EXPECT_EQ(shown(check_circles({{"server/a/a.h", ""},
-                                 {"server/a/a.cpp", include("server/a/a.h") + include("server/a/b.h")},
-                                 {"server/a/b.h", include("server/a/a.h")}})),
-            "server/a/a: includes itself by way of others\nserver/a/b: includes itself by way of others\n");
+  EXPECT_EQ(
+      shown(check_circles({{"server/a/a.h", ""},
+                           {"server/a/a.cpp", include("server/a/a.h") + include("server/a/b.h")},
+                           {"server/a/b.h", include("server/a/a.h")}})),
+      "server/a/a: includes itself by way of others\nserver/a/b: includes itself by way of "
+      "others\n");
 }
 
 TEST(TidyChecks, FindCirclesOfSubfoldersButLetARoomAndItsSubfoldersMeet) {
@@ -839,7 +911,8 @@ TEST(TidyChecks, FindCirclesOfSubfoldersButLetARoomAndItsSubfoldersMeet) {
                                  {"server/a/y/b.h", ""},
                                  {"server/a/y/c.h", include("server/a/x/d.h")},
                                  {"server/a/x/d.h", ""}})),
-            "server/a/x: includes itself by way of others\nserver/a/y: includes itself by way of others\n");
+            "server/a/x: includes itself by way of others\nserver/a/y: includes itself by way of "
+            "others\n");
 }
 
 TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
@@ -853,7 +926,9 @@ TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
   EXPECT_EQ(complaints("server/plan/a.cpp", "contains(\"tool\")"), 1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "{\"joint_map\", \"a map of a joint\"},"), 1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(\"tool\");"), 1u);
-  EXPECT_EQ(complaints("server/plan/a.cpp", "if (&source.cause() == &cause_spelled(\"joint_map\")) return;"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp",
+                       "if (&source.cause() == &cause_spelled(\"joint_map\")) return;"),
+            1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(record.spelling);"), 0u);
   EXPECT_EQ(complaints("server/error_sources/tool.cpp", "if (cause == \"tool\") return;"), 0u);
 }
@@ -862,26 +937,33 @@ TEST(TidyChecks, FindWhoeverDecidesByTheWordsOfAMessage) {
   const auto complaints = [](const std::string& path, const std::string& line) {
     return check_words({{path, line}}).size();
   };
-  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (error.message.find(\"written\") != npos) return;"), 1u);
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (error.message.find(\"written\") != npos) return;"),
+            1u);
   EXPECT_EQ(complaints("server/dds/a.cpp", "if (sentence(error).starts_with(kBusy)) return;"), 1u);
-  EXPECT_EQ(complaints("server/store/a.cpp", "if (std::string(error.what()).find(kFull) == 0) return;"), 1u);
-  EXPECT_EQ(complaints("server/store/a.cpp", "if (std::string_view(e.what()).find(\"disk is full\")) return;"), 1u);
+  EXPECT_EQ(
+      complaints("server/store/a.cpp", "if (std::string(error.what()).find(kFull) == 0) return;"),
+      1u);
+  EXPECT_EQ(complaints("server/store/a.cpp",
+                       "if (std::string_view(e.what()).find(\"disk is full\")) return;"),
+            1u);
   EXPECT_EQ(complaints("server/bias/a.cpp", "other.verdict.starts_with(\"not\")"), 1u);
   EXPECT_EQ(complaints("server/bias/a.cpp", "text.contains(\"not clearly\")"), 1u);
   EXPECT_EQ(complaints("clients/cli/a.cpp", "if (answer.message == \"no model\") return;"), 1u);
-  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (row.status == \"out_of_domain\" || text.find(\": \") > 0) return;"),
+  EXPECT_EQ(complaints("clients/cli/a.cpp",
+                       "if (row.status == \"out_of_domain\" || text.find(\": \") > 0) return;"),
             0u);
   EXPECT_EQ(complaints("server/measurement/files/a.cpp", "line.starts_with(\"Point Name\")"), 0u);
 }
 
 TEST(TidyChecks, FindThreadsInCodeAndNotInComments) {
-  EXPECT_EQ(shown(check_threads(
-                {{"server/bias/a.cpp", "int a;\nstd::jthread worker;\n"},
-                 {"server/bias/b.cpp", "// std::thread\nconst char* s = \"std::thread\"; /* std::\nthread */"},
-                 {"server/bias/c.cpp", "std::this_thread::get_id();\n"},
-                 {"server/trainer/trainer.h", "std::jthread worker_;\n"},
-                 {"server/main.cpp", "std::jthread signals;\n"}})),
-            "server/bias/a.cpp:2: starts a thread\n");
+  EXPECT_EQ(
+      shown(check_threads({{"server/bias/a.cpp", "int a;\nstd::jthread worker;\n"},
+                           {"server/bias/b.cpp",
+                            "// std::thread\nconst char* s = \"std::thread\"; /* std::\nthread */"},
+                           {"server/bias/c.cpp", "std::this_thread::get_id();\n"},
+                           {"server/trainer/trainer.h", "std::jthread worker_;\n"},
+                           {"server/main.cpp", "std::jthread signals;\n"}})),
+      "server/bias/a.cpp:2: starts a thread\n");
 }
 
 TEST(TidyChecks, TellCodeFromCommentsAndLiterals) {
@@ -894,30 +976,37 @@ TEST(TidyChecks, TellCodeFromCommentsAndLiterals) {
 std::string functions(std::string_view text) {
   std::string all;
   for (const Function& function : functions_of(text))
-    all += function.name + " " + std::to_string(function.line) + " " + std::to_string(function.lines) + "\n";
+    all += function.name + " " + std::to_string(function.line) + " " +
+           std::to_string(function.lines) + "\n";
   return all;
 }
 
 TEST(TidyChecks, CountTheLinesOfFunctionsFromTheirFirstToTheirBrace) {
-  EXPECT_EQ(functions("#include <a>\nnamespace a {\n\nint one() { return 1; }\n\n"
-                      "// { not code\ntemplate <int N = 3>\nint\ntwo(int a = 3) {\n  return a;\n}\n}\n"),
-            "one 4 1\ntwo 7 5\n");
-  EXPECT_EQ(functions("class CAPABILITY(1) A final : public B {\n  A() : a_{1}, b_(2) {\n    a_ = b_;\n  }\n  bool "
-                      "operator==(A b) const {\n"
-                      "    return true;\n  }\n private:\n  int f() const override {\n    return 3;\n  }\n};\n"),
-            "A 2 3\noperator== 5 3\nf 9 3\n");
+  EXPECT_EQ(
+      functions("#include <a>\nnamespace a {\n\nint one() { return 1; }\n\n"
+                "// { not code\ntemplate <int N = 3>\nint\ntwo(int a = 3) {\n  return a;\n}\n}\n"),
+      "one 4 1\ntwo 7 5\n");
+  EXPECT_EQ(
+      functions(
+          "class CAPABILITY(1) A final : public B {\n  A() : a_{1}, b_(2) {\n    a_ = b_;\n  }\n  "
+          "bool operator==(A b) const {\n"
+          "    return true;\n  }\n private:\n  int f() const override {\n    return 3;\n  }\n};\n"),
+      "A 2 3\noperator== 5 3\nf 9 3\n");
 }
 
 TEST(TidyChecks, TakeWhatStandsInAFunctionForAPartOfIt) {
-  EXPECT_EQ(functions("void f() {\n  const auto g = [](int a) {\n    return a;\n  };\n  struct B {\n    int h() {\n"
-                      "      return 1;\n    }\n  };\n  if (g(1)) {\n    for (;;) {\n    }\n  }\n}\n"),
-            "f 1 14\n");
+  EXPECT_EQ(
+      functions("void f() {\n  const auto g = [](int a) {\n    return a;\n  };\n  struct B {\n    "
+                "int h() {\n"
+                "      return 1;\n    }\n  };\n  if (g(1)) {\n    for (;;) {\n    }\n  }\n}\n"),
+      "f 1 14\n");
 }
 
 TEST(TidyChecks, TakeTablesAndTypesForNoFunctions) {
-  EXPECT_EQ(functions("const A kTable[] = {\n  {f(1), {2}},\n  {g()}};\nenum class E {\n  kA,\n  kB };\n"
-                      "int x{3};\nstd::array<int, 2> y() {\n  return {1, 2};\n}\n"),
-            "y 8 3\n");
+  EXPECT_EQ(
+      functions("const A kTable[] = {\n  {f(1), {2}},\n  {g()}};\nenum class E {\n  kA,\n  kB };\n"
+                "int x{3};\nstd::array<int, 2> y() {\n  return {1, 2};\n}\n"),
+      "y 8 3\n");
 }
 
 TEST(TidyChecks, ComplainOfFunctionsThatAreTooLong) {
@@ -926,46 +1015,53 @@ TEST(TidyChecks, ComplainOfFunctionsThatAreTooLong) {
     for (int i = 2; i < count; ++i) text += "  g();\n";
     return text + "}\n";
   };
-  EXPECT_EQ(
-      shown(check_lengths(functions_of(SourceTree{{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}}))), "");
   EXPECT_EQ(shown(check_lengths(functions_of(
-                SourceTree{{"server/a/a.cpp", "\n" + lines(61)}, {"clients/b/b.h", lines(3) + lines(70)}}))),
+                SourceTree{{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}}))),
+            "");
+  EXPECT_EQ(shown(check_lengths(functions_of(SourceTree{{"server/a/a.cpp", "\n" + lines(61)},
+                                                        {"clients/b/b.h", lines(3) + lines(70)}}))),
             "clients/b/b.h:4: f: 70 lines, limit 60\nserver/a/a.cpp:2: f: 61 lines, limit 60\n");
 }
 
 TEST(TidyChecks, TellMedianAndLongestOfARoom) {
   EXPECT_EQ(
       lengths_in(functions_of(SourceTree{
-                     {"server/a/a.cpp", "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}}),
+                     {"server/a/a.cpp",
+                      "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}}),
                  "server/a"),
       "2 functions, median 3 lines, 90 % at most 3, longest 4");
 }
 
 TEST(TidyChecks, FindSleepsEverywhere) {
-  EXPECT_EQ(shown(check_sleeps({{"tests/bias/a_test.cpp", "/* one\ntwo */ std::this_thread::sleep_for(1s);\n"},
-                                {"clients/cli/a.cpp", "usleep(10);\n"},
-                                {"server/base/a.cpp", "const char* s = R\"(usleep(10))\"; // sleep(1)\n"}})),
+  EXPECT_EQ(shown(check_sleeps(
+                {{"tests/bias/a_test.cpp", "/* one\ntwo */ std::this_thread::sleep_for(1s);\n"},
+                 {"clients/cli/a.cpp", "usleep(10);\n"},
+                 {"server/base/a.cpp", "const char* s = R\"(usleep(10))\"; // sleep(1)\n"}})),
             "clients/cli/a.cpp:1: sleeps instead of waiting for a state\n"
             "tests/bias/a_test.cpp:2: sleeps instead of waiting for a state\n");
 }
 
 TEST(TidyChecks, FindLocksThatTheCompilerDoesNotCheck) {
-  EXPECT_EQ(shown(check_locks({{"server/base/mutex.h", "std::mutex mutex_;\n"},
-                               {"server/a/a.h", "  std::mutex mutex_;\n  std::condition_variable_any c_;\n"},
-                               {"server/b/b.cpp", "const std::lock_guard lock(mutex_);\nstd::once_flag once;\n"},
-                               {"tests/b/b_test.cpp", "std::mutex mutex_;\n"}})),
+  EXPECT_EQ(shown(check_locks(
+                {{"server/base/mutex.h", "std::mutex mutex_;\n"},
+                 {"server/a/a.h", "  std::mutex mutex_;\n  std::condition_variable_any c_;\n"},
+                 {"server/b/b.cpp", "const std::lock_guard lock(mutex_);\nstd::once_flag once;\n"},
+                 {"tests/b/b_test.cpp", "std::mutex mutex_;\n"}})),
             "server/a/a.h:1: a lock that is not of server/base/mutex.h\n"
             "server/a/a.h:2: a lock that is not of server/base/mutex.h\n"
             "server/b/b.cpp:1: a lock that is not of server/base/mutex.h\n");
-  EXPECT_EQ(shown(check_locks({{"server/a/a.h", "  Mutex mutex_;\n  int n_ TRAMMEL_GUARDED_BY(mutex_);\n"},
-                               {"server/b/b.h", "  Mutex mutex_;  // one at a time\n"},
-                               {"server/c/c.h", "  mutable Mutex mutex_;\n  int n_;\n"}})),
+  EXPECT_EQ(shown(check_locks(
+                {{"server/a/a.h", "  Mutex mutex_;\n  int n_ TRAMMEL_GUARDED_BY(mutex_);\n"},
+                 {"server/b/b.h", "  Mutex mutex_;  // one at a time\n"},
+                 {"server/c/c.h", "  mutable Mutex mutex_;\n  int n_;\n"}})),
             "server/c/c.h:1: mutex_ guards nothing\n");
 }
 
 TEST(TidyChecks, ComplainOfATestFolderWithoutItsServerFolder) {
-  EXPECT_EQ(shown(check_mirror({{"server/bias/a.h", ""}, {"tests/bias/a_test.cpp", ""}, {"tests/fuzz/b.cpp", ""}})),
-            "");
+  EXPECT_EQ(
+      shown(check_mirror(
+          {{"server/bias/a.h", ""}, {"tests/bias/a_test.cpp", ""}, {"tests/fuzz/b.cpp", ""}})),
+      "");
   EXPECT_EQ(shown(check_mirror({{"server/bias/a.h", ""}, {"tests/kernels/a_test.cpp", ""}})),
             "tests/kernels: there is no server/kernels\n");
 }

@@ -18,13 +18,14 @@ double angle(const Pose& a, const Pose& b) { return pose_difference(a, b).tail<3
 
 bool same_tool(const ProgramTool& tool, const Pose& X_FT) {
   return distance(*tool.X_FT, X_FT) <= kToolPositionTolerance &&
-         angle(*tool.X_FT, X_FT) <= kToolRotationTolerance + std::min(tool.rotation_rounding, from_deg(0.02));
+         angle(*tool.X_FT, X_FT) <=
+             kToolRotationTolerance + std::min(tool.rotation_rounding, from_deg(0.02));
 }
 
 std::string difference_text(const ProgramTool& tool, const std::string& name, const Pose& X_FT) {
-  return fmt::format("tool {} is {} in the {}, {} is {} in the cell: {}", shown(tool.name), pose_text(*tool.X_FT),
-                     tool.from_row ? "row of --frames" : "program", name, pose_text(X_FT),
-                     apart_text(*tool.X_FT, X_FT));
+  return fmt::format("tool {} is {} in the {}, {} is {} in the cell: {}", shown(tool.name),
+                     pose_text(*tool.X_FT), tool.from_row ? "row of --frames" : "program", name,
+                     pose_text(X_FT), apart_text(*tool.X_FT, X_FT));
 }
 
 bool same_load(const StatedLoad& load, const Payload& payload) {
@@ -37,16 +38,18 @@ std::string load_text(double mass, const Vector3& p_F) {
   return fmt::format("{:.3f} kg at [{:.1f}, {:.1f}, {:.1f}] mm", mass, p.x(), p.y(), p.z());
 }
 
-std::string load_difference(const ProgramTool& tool, const std::string& name, const Payload& payload) {
+std::string load_difference(const ProgramTool& tool, const std::string& name,
+                            const Payload& payload) {
   const StatedLoad& load = *tool.load;
   const std::string in_cell =
       fmt::format("payload {} is {} in the cell", name, load_text(payload.mass, payload.p_FoCog_F));
   const double mass = std::abs(load.mass - payload.mass);
   if (!load.has_centre)
-    return fmt::format("load of tool {} is {:.3f} kg in the program, {}: {:.3f} kg apart", called(tool), load.mass,
-                       in_cell, mass);
-  return fmt::format("load of tool {} is {} in the program, {}: {:.3f} kg and {:.1f} mm apart", called(tool),
-                     load_text(load.mass, load.p_F), in_cell, mass, to_mm((load.p_F - payload.p_FoCog_F).norm()));
+    return fmt::format("load of tool {} is {:.3f} kg in the program, {}: {:.3f} kg apart",
+                       called(tool), load.mass, in_cell, mass);
+  return fmt::format("load of tool {} is {} in the program, {}: {:.3f} kg and {:.1f} mm apart",
+                     called(tool), load_text(load.mass, load.p_F), in_cell, mass,
+                     to_mm((load.p_F - payload.p_FoCog_F).norm()));
 }
 
 /// The tool of the cell whose name a program's tool has, case left aside.
@@ -57,7 +60,8 @@ std::map<std::string, Pose>::const_iterator named(const CellTools& cell, const s
 
 class Choosing {
  public:
-  Choosing(const Program& program, const CellTools& cell, const std::string& tool, const std::string& payload)
+  Choosing(const Program& program, const CellTools& cell, const std::string& tool,
+           const std::string& payload)
       : program_(program), cell_(cell), asked_(tool), payload_(payload) {}
 
   Result<std::vector<ToolChoice>> choose(const std::vector<ToolUse>& uses) {
@@ -65,7 +69,8 @@ class Choosing {
     bool any = false;
     for (std::size_t k = 0; k < choices.size(); ++k) {
       if (uses[k] == ToolUse::kNone) continue;
-      choices[k] = uses[k] == ToolUse::kJoints ? choice_of_the_cell(program_.tools[k]) : choice(program_.tools[k]);
+      choices[k] = uses[k] == ToolUse::kJoints ? choice_of_the_cell(program_.tools[k])
+                                               : choice(program_.tools[k]);
       if (choices[k].why_not.empty()) choose_payload(program_.tools[k], choices[k]);
       if (choices[k].why_not.empty() && cell_.check_known) {
         const Status known = cell_.check_known(choices[k].tool, choices[k].payload);
@@ -104,7 +109,8 @@ class Choosing {
     choice.tool = only ? cell_.tools.begin()->first : asked->first;
     if (!tool.X_FT || !same_tool(tool, cell_.tools.at(choice.tool)))
       choice.note =
-          fmt::format("motions of the axes with tool {}: where {} of the cell goes is told", called(tool), choice.tool);
+          fmt::format("motions of the axes with tool {}: where {} of the cell goes is told",
+                      called(tool), choice.tool);
     return choice;
   }
 
@@ -119,8 +125,9 @@ class Choosing {
     if (by_name != cell_.tools.end()) {
       choice.tool = by_name->first;
       if (!tool.X_FT) {
-        choice.note = fmt::format("tool {} is not in the files: it is taken for {} of the cell without comparing them",
-                                  shown(tool.name), by_name->first);
+        choice.note = fmt::format(
+            "tool {} is not in the files: it is taken for {} of the cell without comparing them",
+            shown(tool.name), by_name->first);
       } else if (!same_tool(tool, by_name->second)) {
         // Another tool of the program may be meant by --tool; one of the same name cannot.
         choice.why_not = difference_text(tool, by_name->first, by_name->second);
@@ -129,7 +136,8 @@ class Choosing {
       return choice;
     }
     if (!tool.X_FT) {
-      choice.why_not = fmt::format("tool {} is neither in the files handed over nor in the cell", shown(tool.name));
+      choice.why_not = fmt::format("tool {} is neither in the files handed over nor in the cell",
+                                   shown(tool.name));
       return choice;
     }
     for (const auto& [name, X_FT] : cell_.tools) {
@@ -140,9 +148,10 @@ class Choosing {
   }
 
   std::string nearest(const ProgramTool& tool) const {
-    const auto closest = std::min_element(cell_.tools.begin(), cell_.tools.end(), [&](const auto& a, const auto& b) {
-      return distance(*tool.X_FT, a.second) < distance(*tool.X_FT, b.second);
-    });
+    const auto closest =
+        std::min_element(cell_.tools.begin(), cell_.tools.end(), [&](const auto& a, const auto& b) {
+          return distance(*tool.X_FT, a.second) < distance(*tool.X_FT, b.second);
+        });
     if (closest == cell_.tools.end()) return "the cell has no tools";
     return difference_text(tool, closest->first, closest->second);
   }
@@ -156,17 +165,19 @@ class Choosing {
       }
     };
     if (choice.payload.empty() && stated && !tool.carries.empty()) find_by_load();
-    if (choice.payload.empty() && cell_.payloads.size() == 1) choice.payload = cell_.payloads.begin()->first;
-    if (choice.payload.empty() && cell_.payloads.contains(choice.tool)) choice.payload = choice.tool;
+    if (choice.payload.empty() && cell_.payloads.size() == 1)
+      choice.payload = cell_.payloads.begin()->first;
+    if (choice.payload.empty() && cell_.payloads.contains(choice.tool))
+      choice.payload = choice.tool;
     if (choice.payload.empty() && stated) find_by_load();
     const auto known = cell_.payloads.find(choice.payload);
     choice.load_note = tool.load_note;
     if (stated && known == cell_.payloads.end())
-      choice.load_note =
-          fmt::format("load of tool {} is {} in the program, {}: it is not compared", called(tool),
-                      tool.load->has_centre ? load_text(tool.load->mass, tool.load->p_F)
-                                            : fmt::format("{:.3f} kg", tool.load->mass),
-                      cell_.payloads.empty() ? "the cell has no payloads" : "none of the cell's payloads");
+      choice.load_note = fmt::format(
+          "load of tool {} is {} in the program, {}: it is not compared", called(tool),
+          tool.load->has_centre ? load_text(tool.load->mass, tool.load->p_F)
+                                : fmt::format("{:.3f} kg", tool.load->mass),
+          cell_.payloads.empty() ? "the cell has no payloads" : "none of the cell's payloads");
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
     const std::string why = load_difference(tool, known->first, known->second);
     // What is carried for a part of the program concerns that part.
@@ -188,7 +199,8 @@ bool is_placeholder(const StatedLoad& load) {
   return load.mass <= 0 || (load.mass <= 1 && load.p_F.norm() <= 1e-3 + 1e-9);
 }
 
-Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<ToolUse>& uses,
+Result<std::vector<ToolChoice>> choose_tools(const Program& program,
+                                             const std::vector<ToolUse>& uses,
                                              const CellTools& cell, const std::string& tool,
                                              const std::string& payload) {
   if (!tool.empty() && !cell.tools.contains(tool)) {

@@ -12,15 +12,18 @@
 /// Which tool and load of the cell each tool of a program is.
 namespace trammel::cam {
 
-/// The cell as its model has it: tools that the cell file leaves open are those that the training found.
+/// The cell as its model has it: tools that the cell file leaves open are those that the training
+/// found.
 struct CellTools {
   std::map<std::string, Pose> tools;  ///< X_FT
   std::map<std::string, Payload> payloads;
-  std::optional<Pose> X_WB = {};  ///< the cell's base, seen from its measuring system; empty: found from the data
+  std::optional<Pose> X_WB =
+      {};  ///< the cell's base, seen from its measuring system; empty: found from the data
   /// Refuses a tool and payload that the model has not learned with; empty: it knows all.
   std::function<Status(const std::string& tool, const std::string& payload)> check_known = {};
-  std::optional<Vector3> gravity_B = {};  ///< unit vector, seen from the robot's base; empty: not known
-  std::set<std::string> idle_axes = {};   ///< that carry neither robot nor part, by axis_called()
+  std::optional<Vector3> gravity_B =
+      {};  ///< unit vector, seen from the robot's base; empty: not known
+  std::set<std::string> idle_axes = {};  ///< that carry neither robot nor part, by axis_called()
 };
 
 struct ToolChoice {
@@ -38,20 +41,24 @@ enum class ToolUse {
 };
 
 constexpr double kToolPositionTolerance = 1e-5;  // m
-constexpr double kToolRotationTolerance = 9e-5;  // rad, 0.005 deg; and what the program's digits leave open
-constexpr double kLoadMassTolerance = 0.02;      // of the mass
-constexpr double kLoadCentreTolerance = 5e-3;    // m
+constexpr double kToolRotationTolerance =
+    9e-5;  // rad, 0.005 deg; and what the program's digits leave open
+constexpr double kLoadMassTolerance = 0.02;    // of the mass
+constexpr double kLoadCentreTolerance = 5e-3;  // m
 
 /// A load that programs state where they do not know it: at most 1 kg at most 1 mm from the flange.
 [[nodiscard]] bool is_placeholder(const StatedLoad& load);
 
-/// One choice a tool of the program, by what its targets are. `tool` and `payload` are what the user
-/// said, or empty. Refuses with both values and their difference: a tool that is not the cell's of that name, tools of
-/// which none is the cell's, a load that is not the cell's; where motions set a load that is not the cell's, only what
-/// they do with it cannot be corrected, as long as anything else can. A tool that is not in the files must be named as
-/// one of the cell's, or by the user.
-[[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<ToolUse>& uses,
-                                                           const CellTools& cell, const std::string& tool,
+/// One choice a tool of the program, by what its targets are. `tool` and `payload` are what the
+/// user said, or empty. Refuses with both values and their difference: a tool that is not the
+/// cell's of that name, tools of which none is the cell's, a load that is not the cell's; where
+/// motions set a load that is not the cell's, only what they do with it cannot be corrected, as
+/// long as anything else can. A tool that is not in the files must be named as one of the cell's,
+/// or by the user.
+[[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program,
+                                                           const std::vector<ToolUse>& uses,
+                                                           const CellTools& cell,
+                                                           const std::string& tool,
                                                            const std::string& payload);
 
 }  // namespace trammel::cam

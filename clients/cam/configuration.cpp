@@ -20,42 +20,47 @@ constexpr int kBranches = 8;
 constexpr double kOpen = 0.01;        // rad: a wrist that is open more decides joints 4 and 6
 constexpr double kStretched = 1e-9;   // rad: a wrist that is open less is stretched
 constexpr double kSameJoints = 1e-6;  // rad
-constexpr double kAsNear = 1e-2;      // of the way: how a controller weighs its joints is not known to more
-// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that is off by less is of
-// the branch that was meant. Controllers do not ask for more.
+constexpr double kAsNear =
+    1e-2;  // of the way: how a controller weighs its joints is not known to more
+// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that is
+// off by less is of the branch that was meant. Controllers do not ask for more.
 constexpr double kNextQuarter = kPi / 4;
 
-/// How a controller weighs the joints is not published. Ways that differ by less than kAsNear are decided where their
-/// sums and their longest joints say the same.
+/// How a controller weighs the joints is not published. Ways that differ by less than kAsNear are
+/// decided where their sums and their longest joints say the same.
 bool is_nearer(const JointVector& way, const JointVector& other) {
   if (other.norm() - way.norm() > kSameJoints + kAsNear * way.norm()) return true;
   return other.lpNorm<1>() - way.lpNorm<1>() > kSameJoints &&
          way.lpNorm<Eigen::Infinity>() - other.lpNorm<Eigen::Infinity>() < kSameJoints;
 }
 
-/// Where the branch that is said has joints far outside the quarter turns that are said, which joints and how. A
-/// stretched wrist leaves joints 4 and 6 open.
+/// Where the branch that is said has joints far outside the quarter turns that are said, which
+/// joints and how. A stretched wrist leaves joints 4 and 6 open.
 std::string contradiction(const Configuration& said, const JointVector& q) {
   std::vector<std::string> joints;
   for (std::size_t j = 0; said.conf && j < said.near.size(); ++j) {
     const double value = q(static_cast<Eigen::Index>(j));
     const bool open = j < 3 || std::abs(q(4)) > kOpen;
-    if (!said.near[j] || !open || std::abs(value - *said.near[j]) <= kPi / 4 + kNextQuarter) continue;
-    joints.push_back(fmt::format("joint {} at {:.1f} deg and not at {:.0f} to {:.0f} deg", j + 1, to_deg(value),
-                                 to_deg(*said.near[j] - kPi / 4), to_deg(*said.near[j] + kPi / 4)));
+    if (!said.near[j] || !open || std::abs(value - *said.near[j]) <= kPi / 4 + kNextQuarter)
+      continue;
+    joints.push_back(fmt::format("joint {} at {:.1f} deg and not at {:.0f} to {:.0f} deg", j + 1,
+                                 to_deg(value), to_deg(*said.near[j] - kPi / 4),
+                                 to_deg(*said.near[j] + kPi / 4)));
   }
   for (std::size_t j = 0; j < said.signs.size(); ++j) {
     const double value = q(static_cast<Eigen::Index>(j));
     const bool open = j < 3 || std::abs(q(4)) > kOpen;
-    if (!said.signs[j] || !open || std::abs(value) <= kOpen || (value < 0) == (*said.signs[j] < 0)) continue;
+    if (!said.signs[j] || !open || std::abs(value) <= kOpen || (value < 0) == (*said.signs[j] < 0))
+      continue;
     joints.push_back(fmt::format("joint {} is at {:.1f} deg", j + 1, to_deg(value)));
   }
   if (joints.empty()) return "";
   if (!said.conf)
     return fmt::format("its status and turn contradict each other, or what reaches the pose: {}",
                        fmt::join(joints, ", "));
-  return fmt::format("its configuration contradicts itself: branch {} has {}; the branch is followed", *said.conf,
-                     fmt::join(joints, ", "));
+  return fmt::format(
+      "its configuration contradicts itself: branch {} has {}; the branch is followed", *said.conf,
+      fmt::join(joints, ", "));
 }
 
 /// Where the wrist is stretched joint 4 may be anywhere: it stays.
@@ -86,7 +91,8 @@ double elbow_height(const Chain& arm, const JointVector& q) {
   return X.translation().z();
 }
 
-/// Whether a positive joint 5 turns the tool downward where joint 4 is at zero and the arm at its zero.
+/// Whether a positive joint 5 turns the tool downward where joint 4 is at zero and the arm at its
+/// zero.
 bool positive_5_bends_down(const Chain& arm) {
   JointVector q = JointVector::Zero(arm.size());
   const Vector3 straight = arm.flange_pose(q).linear().col(2);
@@ -96,8 +102,8 @@ bool positive_5_bends_down(const Chain& arm) {
 }
 
 /// Turns of joints 1, 4 and 6 that the limits allow, as the program says, or near to `previous`.
-void choose_turns(const Chain& arm, const Configuration& said, const std::optional<JointVector>& previous,
-                  JointVector& q) {
+void choose_turns(const Chain& arm, const Configuration& said,
+                  const std::optional<JointVector>& previous, JointVector& q) {
   for (int j = 0; j < arm.size(); ++j) {
     const Joint& joint = arm.joint(j);
     const auto index = static_cast<std::size_t>(j);
@@ -111,7 +117,8 @@ void choose_turns(const Chain& arm, const Configuration& said, const std::option
       if (value < joint.lower - 1e-9 || value > joint.upper + 1e-9) continue;
       double cost = std::abs(value - (previous ? (*previous)(j) : 0.0)) * 1e-3;
       if (has_near && std::abs(value - *said.near[index]) > kPi / 4 + 0.02) cost += 1;
-      if (has_turn && static_cast<int>(std::lround(value / (2 * kPi))) != *said.turns[index]) cost += 1;
+      if (has_turn && static_cast<int>(std::lround(value / (2 * kPi))) != *said.turns[index])
+        cost += 1;
       if (has_sign && (value < 0) != (*said.signs[index] < 0) && std::abs(value) > 1e-6) cost += 1;
       if (cost < least) {
         least = cost;
@@ -143,7 +150,8 @@ std::optional<ArmOfProgram::Rail> ArmOfProgram::arm_on(double rail) const {
   return Rail{*arm, robot_.flange_pose(q) * arm->flange_pose(rest).inverse()};
 }
 
-std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pose& X_BF, const Configuration& said,
+std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pose& X_BF,
+                                                     const Configuration& said,
                                                      const std::optional<JointVector>& previous,
                                                      std::optional<int>& chosen) const {
   struct Candidate {
@@ -175,7 +183,9 @@ std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pos
     }
     if (said.bends_down && *said.bends_down != (bends_down_ == (candidate.q(4) > 0))) sum += 30;
     if (const Candidate* other = other_elbow(candidate)) {
-      if (said.elbow_up && *said.elbow_up != (elbow_height(arm, candidate.q) > elbow_height(arm, other->q))) sum += 20;
+      if (said.elbow_up &&
+          *said.elbow_up != (elbow_height(arm, candidate.q) > elbow_height(arm, other->q)))
+        sum += 20;
       if (said.larger_joint_3 && *said.larger_joint_3 != (candidate.q(2) > other->q(2))) sum += 5;
     }
     return sum;
@@ -198,12 +208,14 @@ NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, dou
   JointVector seed = previous.value_or(JointVector::Zero(robot_.size()));
   for (std::size_t k = 0; k < rails_.size(); ++k) {
     const auto value = external.find(static_cast<int>(k));
-    if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
+    if (value == external.end())
+      return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
     seed(rails_[k]) = from_mm(value->second);
   }
   if (!previous) {
-    return {std::nullopt, std::nullopt,
-            "the program does not say the arm's configuration, and no motion to joints comes before"};
+    return {
+        std::nullopt, std::nullopt,
+        "the program does not say the arm's configuration, and no motion to joints comes before"};
   }
   const InverseResult found = inverse_kinematics(robot_, X_BF, seed);
   if (found.status == InverseStatus::kUnreachable)
@@ -213,10 +225,12 @@ NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, dou
 
 template <typename Solve>
 NominalJoints ArmOfProgram::on_rail(const Pose& X_BF, const std::map<int, double>& external,
-                                    const std::optional<JointVector>& previous, const Solve& solve) const {
+                                    const std::optional<JointVector>& previous,
+                                    const Solve& solve) const {
   if (rails_.empty()) return solve(robot_, X_BF, previous);
   const auto value = external.find(0);
-  if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
+  if (value == external.end())
+    return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
   const auto on = arm_on(from_mm(value->second));
   if (!on) return {std::nullopt, std::nullopt, "the arm on its rail is not understood"};
   const std::optional<JointVector> before =
@@ -230,7 +244,8 @@ NominalJoints ArmOfProgram::on_rail(const Pose& X_BF, const std::map<int, double
   return made;
 }
 
-NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
+NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said,
+                                   const std::map<int, double>& external,
                                    const std::optional<JointVector>& previous) const {
   if (offset_wrist_ && previous) return nearest(X_BF, external, *previous, false);
   if (!wrist_) return by_descent(X_BF, external, previous);
@@ -242,8 +257,10 @@ NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, 
                      made.doubt = contradiction(said, *made.q);
                    } else {
                      made.conf = said.conf;
-                     made.why_not = said.conf ? fmt::format("no joints of conf {} bring the tool there", *said.conf)
-                                              : "no joints bring the tool there";
+                     made.why_not =
+                         said.conf
+                             ? fmt::format("no joints of conf {} bring the tool there", *said.conf)
+                             : "no joints bring the tool there";
                    }
                    return made;
                  });
@@ -266,8 +283,8 @@ std::vector<int> ArmOfProgram::branches_of(const Chain& arm, const JointVector& 
   return found;
 }
 
-NominalJoints ArmOfProgram::nearest_branch(const Chain& arm, const Pose& X_BF, const JointVector& from,
-                                           bool on_a_line) const {
+NominalJoints ArmOfProgram::nearest_branch(const Chain& arm, const Pose& X_BF,
+                                           const JointVector& from, bool on_a_line) const {
   const std::vector<int> own = on_a_line ? branches_of(arm, from) : std::vector<int>();
   std::vector<JointVector> found;
   for (int number = 0; number < kBranches; ++number) {
@@ -275,20 +292,23 @@ NominalJoints ArmOfProgram::nearest_branch(const Chain& arm, const Pose& X_BF, c
     const auto q = branch(arm, X_BF, number, from);
     if (q && !arm.joint_outside_limits(*q)) found.push_back(*q);
   }
-  if (found.empty()) return {std::nullopt, std::nullopt, "no joints within the limits bring the tool there"};
+  if (found.empty())
+    return {std::nullopt, std::nullopt, "no joints within the limits bring the tool there"};
   const JointVector best = *std::min_element(
-      found.begin(), found.end(), [&](const auto& a, const auto& b) { return (a - from).norm() < (b - from).norm(); });
+      found.begin(), found.end(),
+      [&](const auto& a, const auto& b) { return (a - from).norm() < (b - from).norm(); });
   const bool undecided = std::any_of(found.begin(), found.end(), [&](const JointVector& other) {
     return (other - best).norm() >= kSameJoints && !is_nearer(best - from, other - from);
   });
   if (undecided)
-    return {std::nullopt, std::nullopt,
-            "two postures are equally near to the joints before, and the program does not say which"};
+    return {
+        std::nullopt, std::nullopt,
+        "two postures are equally near to the joints before, and the program does not say which"};
   return {best, std::nullopt, ""};
 }
 
-NominalJoints ArmOfProgram::nearest(const Pose& X_BF, const std::map<int, double>& external, const JointVector& from,
-                                    bool on_a_line) const {
+NominalJoints ArmOfProgram::nearest(const Pose& X_BF, const std::map<int, double>& external,
+                                    const JointVector& from, bool on_a_line) const {
   if (!wrist_ && !offset_wrist_) return by_descent(X_BF, external, from);
   return on_rail(X_BF, external, from,
                  [&](const Chain& arm, const Pose& X_RF, const std::optional<JointVector>& before) {

@@ -14,7 +14,8 @@ struct NominalJoints {
   std::optional<JointVector> q;  ///< rad; empty: none found
   std::optional<int> conf;       ///< the branch, where the arm has numbered branches
   std::string why_not;
-  std::string doubt = {};  ///< what the program says of the configuration contradicts itself; empty: it does not
+  std::string doubt =
+      {};  ///< what the program says of the configuration contradicts itself; empty: it does not
 };
 
 /// Robot arm with its rail, if any, as a chain and as the six turning axes alone.
@@ -22,15 +23,17 @@ class ArmOfProgram {
  public:
   explicit ArmOfProgram(const Chain& robot);
 
-  /// Joints for X_BF. `previous`: of the motion before, which decides what the program leaves open; without one, the
-  /// joints nearest to zero.
-  [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
+  /// Joints for X_BF. `previous`: of the motion before, which decides what the program leaves open;
+  /// without one, the joints nearest to zero.
+  [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said,
+                                     const std::map<int, double>& external,
                                      const std::optional<JointVector>& previous) const;
-  /// Of all joints for X_BF those nearest to `from`. `on_a_line`: only of the posture of `from`, which a line does not
-  /// leave. Two postures that are equally near are not decided.
-  [[nodiscard]] NominalJoints nearest(const Pose& X_BF, const std::map<int, double>& external, const JointVector& from,
-                                      bool on_a_line) const;
-  /// The chain's joints from a dialect's axes (deg) and external axes (mm); empty where the rail's value is missing.
+  /// Of all joints for X_BF those nearest to `from`. `on_a_line`: only of the posture of `from`,
+  /// which a line does not leave. Two postures that are equally near are not decided.
+  [[nodiscard]] NominalJoints nearest(const Pose& X_BF, const std::map<int, double>& external,
+                                      const JointVector& from, bool on_a_line) const;
+  /// The chain's joints from a dialect's axes (deg) and external axes (mm); empty where the rail's
+  /// value is missing.
   [[nodiscard]] std::optional<JointVector> from_axes(const std::vector<double>& axes,
                                                      const std::map<int, double>& external) const;
   [[nodiscard]] std::vector<double> to_axes(const JointVector& q) const;
@@ -49,14 +52,16 @@ class ArmOfProgram {
   /// What `solve(arm, X_RF, previous)` finds for the turning axes, with the rail's value in front.
   template <typename Solve>
   [[nodiscard]] NominalJoints on_rail(const Pose& X_BF, const std::map<int, double>& external,
-                                      const std::optional<JointVector>& previous, const Solve& solve) const;
+                                      const std::optional<JointVector>& previous,
+                                      const Solve& solve) const;
   [[nodiscard]] std::optional<JointVector> branch(const Chain& arm, const Pose& X_BF, int number,
                                                   const JointVector& near) const;
   /// The branches that `q` is in: several where they meet.
   [[nodiscard]] std::vector<int> branches_of(const Chain& arm, const JointVector& q) const;
-  [[nodiscard]] NominalJoints nearest_branch(const Chain& arm, const Pose& X_BF, const JointVector& from,
-                                             bool on_a_line) const;
-  [[nodiscard]] std::optional<JointVector> by_branches(const Chain& arm, const Pose& X_BF, const Configuration& said,
+  [[nodiscard]] NominalJoints nearest_branch(const Chain& arm, const Pose& X_BF,
+                                             const JointVector& from, bool on_a_line) const;
+  [[nodiscard]] std::optional<JointVector> by_branches(const Chain& arm, const Pose& X_BF,
+                                                       const Configuration& said,
                                                        const std::optional<JointVector>& previous,
                                                        std::optional<int>& conf) const;
   [[nodiscard]] NominalJoints by_descent(const Pose& X_BF, const std::map<int, double>& external,

@@ -28,7 +28,8 @@ constexpr double kReach = 3;                 // m, the lever of a joint
 
 Pose from_wire(const client::PoseMm& pose) {
   const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
-  return make_pose(R.normalized().toRotationMatrix(), Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
+  return make_pose(R.normalized().toRotationMatrix(),
+                   Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
 }
 
 JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
@@ -54,7 +55,8 @@ Status check_marks(const Program& program) {
   for (const SourceFile& file : program.files) {
     const auto mark = find_mark(file.text);
     if (!mark) continue;
-    return refused("it is corrected already, by model {} on {}", shown_short(mark->model), shown_short(mark->date))
+    return refused("it is corrected already, by model {} on {}", shown_short(mark->model),
+                   shown_short(mark->date))
         .in(file.name)
         .next("correct the original, or --again takes the one that is kept beside it");
   }
@@ -97,20 +99,25 @@ class Correcting {
     row.folded = target.folded;
     row.status = "refused";
     row.message = nominal_.targets[t].why_not;
-    if (const auto X_BT = wanted_pose(program_, arm_.robot(), cell_, nominal_, t)) row.p_B = X_BT->translation();
+    if (const auto X_BT = wanted_pose(program_, arm_.robot(), cell_, nominal_, t))
+      row.p_B = X_BT->translation();
   }
 
   Status ask_all(const AskCorrections& ask) {
     for (const TargetGroup& group : groups_of(program_, nominal_)) {
       std::vector<client::TargetMm> targets;
-      for (const std::size_t t : group.targets) targets.push_back(std::move(nominal_.targets[t].asked));
-      const client::Answer<client::CorrectedTarget> answer = TRY(ask(group.tool, group.payload, targets));
+      for (const std::size_t t : group.targets)
+        targets.push_back(std::move(nominal_.targets[t].asked));
+      const client::Answer<client::CorrectedTarget> answer =
+          TRY(ask(group.tool, group.payload, targets));
       targets = {};
       if (!result_.model_id.empty() && result_.model.hash != answer.model.hash)
-        return failure(ErrorCode::kBusy, "the model changed while the program was corrected").next("try again");
+        return failure(ErrorCode::kBusy, "the model changed while the program was corrected")
+            .next("try again");
       result_.model = answer.model;
       result_.model_id = answer.model.id;
-      for (std::size_t k = 0; k < group.targets.size(); ++k) take(group.targets[k], answer.items[k]);
+      for (std::size_t k = 0; k < group.targets.size(); ++k)
+        take(group.targets[k], answer.items[k]);
     }
     return {};
   }
@@ -136,16 +143,20 @@ class Correcting {
     const Pose X_TF = cell_.tools.at(nominal_.tools[target.tool].tool).inverse();
     JointVector q = from_wire(item.q_rad, arm_.robot());
     // The rail stays where the program has it.
-    if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal) q = arm_.near(X_BT * X_TF, *nominal);
+    if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal)
+      q = arm_.near(X_BT * X_TF, *nominal);
     row.joints = joints_on_wire(q, arm_.robot());
     for (int j = 0; j < q.size(); ++j) {
-      if (arm_.robot().joint(j).type == JointType::kRevolute) row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
+      if (arm_.robot().joint(j).type == JointType::kRevolute)
+        row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
     }
     const std::vector<double> exact =
         is_joints(target.coordinates)
             ? axes_of(target, arm_.to_axes(q))
-            : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
-    if (!std::all_of(exact.begin(), exact.end(), [](double number) { return std::isfinite(number); })) {
+            : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT,
+                         target.numbers);
+    if (!std::all_of(exact.begin(), exact.end(),
+                     [](double number) { return std::isfinite(number); })) {
       row.status = "refused";
       row.message = "what is to be commanded is no number";
       row.joints.clear();
@@ -158,9 +169,11 @@ class Correcting {
   }
 
   /// In the unit of the number.
-  [[nodiscard]] double largest_rounding(const ProgramTarget& target, std::size_t value, double sigma_mm) const {
-    const double mm = std::isfinite(sigma_mm) && sigma_mm > 0 ? std::max(kShareOfSigma * sigma_mm, kLeastRoundingMm)
-                                                              : kDefaultRoundingMm;
+  [[nodiscard]] double largest_rounding(const ProgramTarget& target, std::size_t value,
+                                        double sigma_mm) const {
+    const double mm = std::isfinite(sigma_mm) && sigma_mm > 0
+                          ? std::max(kShareOfSigma * sigma_mm, kLeastRoundingMm)
+                          : kDefaultRoundingMm;
     switch (target.coordinates) {
       case Coordinates::kJoints:
         return to_deg(from_mm(mm) / kReach);
@@ -185,7 +198,8 @@ class Correcting {
         const NumberStyle style =
             options_.keep_digits || target.coordinates == Coordinates::kJointPulses
                 ? slot.style
-                : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
+                : with_rounding(value, slot.style,
+                                largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
         text += number;
@@ -198,18 +212,19 @@ class Correcting {
 
   /// mm, of the tool.
   [[nodiscard]] double rounding(const ProgramTarget& target, const std::vector<double>& exact,
-                                const std::vector<double>& written, const JointVector& q, const Pose& X_TF) const {
+                                const std::vector<double>& written, const JointVector& q,
+                                const Pose& X_TF) const {
     if (!is_joints(target.coordinates)) {
-      return to_mm(
-          (pose_of(target.coordinates, written).translation() - pose_of(target.coordinates, exact).translation())
-              .norm());
+      return to_mm((pose_of(target.coordinates, written).translation() -
+                    pose_of(target.coordinates, exact).translation())
+                       .norm());
     }
     const auto rounded = arm_.from_axes(in_degrees(target, written), target.external);
     if (!rounded) return 0;
     const Pose X_FT = X_TF.inverse();
-    return to_mm(
-        ((arm_.robot().flange_pose(*rounded) * X_FT).translation() - (arm_.robot().flange_pose(q) * X_FT).translation())
-            .norm());
+    return to_mm(((arm_.robot().flange_pose(*rounded) * X_FT).translation() -
+                  (arm_.robot().flange_pose(q) * X_FT).translation())
+                     .norm());
   }
 
   CorrectedProgram finish() {
@@ -218,14 +233,16 @@ class Correcting {
       for (const std::size_t t : program_.moves[m].targets) rows_[t].order = m;
     }
     for (const ProgramMove& move : program_.moves) {
-      const bool corrected = !move.targets.empty() && std::all_of(move.targets.begin(), move.targets.end(),
-                                                                  [&](std::size_t t) { return rows_[t].corrected(); });
+      const bool corrected =
+          !move.targets.empty() && std::all_of(move.targets.begin(), move.targets.end(),
+                                               [&](std::size_t t) { return rows_[t].corrected(); });
       if (corrected) ++result_.moves_corrected;
     }
     check_path(program_, arm_.robot(), nominal_, rows_, result_);
     result_.rows = std::move(rows_);
     for (const LeftAlone& left : program_.left) {
-      if (left.motion.empty()) continue;  // no motion goes to it: nominal_targets() has a note of it
+      if (left.motion.empty())
+        continue;  // no motion goes to it: nominal_targets() has a note of it
       ReceiptRow& row = result_.rows.emplace_back();
       row.name = left.name;
       row.file = program_.files[left.file].name;
@@ -259,25 +276,29 @@ class Correcting {
     std::multimap<std::string, std::size_t> by_name;
     for (std::size_t r = program_.targets.size(); r < result_.rows.size(); ++r) {
       by_name.emplace(result_.rows[r].name, r);
-      if (!result_.rows[r].motion.empty()) by_line.emplace(std::pair(result_.rows[r].file, result_.rows[r].line), r);
+      if (!result_.rows[r].motion.empty())
+        by_line.emplace(std::pair(result_.rows[r].file, result_.rows[r].line), r);
     }
     std::set<std::string> said;
     std::set<std::pair<std::size_t, std::string>> told;  // rows, and what they move with
     for (const Reading& reading : program_.readings) {
       const auto first = written.lower_bound({reading.file, reading.of.begin});
-      if (first == written.end() || first->first != reading.file || first->second >= reading.of.end) continue;
+      if (first == written.end() || first->first != reading.file || first->second >= reading.of.end)
+        continue;
       const std::string& by_file = program_.files[reading.by_file].name;
       bool found = reading.motion;
       const auto tell = [&](auto rows) {
         for (auto row = rows.first; row != rows.second; ++row) {
-          if (told.insert({row->second, reading.name}).second) tell_along(result_.rows[row->second], reading.name);
+          if (told.insert({row->second, reading.name}).second)
+            tell_along(result_.rows[row->second], reading.name);
           found = true;
         }
       };
       tell(by_line.equal_range({by_file, reading.by_line}));
       if (!reading.by.empty()) tell(by_name.equal_range(reading.by));
-      const std::string note = fmt::format("{} line {} reads {}, which is corrected: what it makes of it moves with it",
-                                           by_file, reading.by_line, shown(reading.name));
+      const std::string note =
+          fmt::format("{} line {} reads {}, which is corrected: what it makes of it moves with it",
+                      by_file, reading.by_line, shown(reading.name));
       if (!found && said.insert(note).second) result_.notes.push_back(note);
     }
   }
@@ -287,10 +308,12 @@ class Correcting {
     row.message += fmt::format("; it moves with {}, which is corrected", shown(with));
   }
 
-  /// A motion that is left goes to a stored target all the same, which another motion has corrected.
+  /// A motion that is left goes to a stored target all the same, which another motion has
+  /// corrected.
   void tell_stored() {
     const auto is_name = [](const std::string& text) {
-      return !text.empty() && text.find_first_of(" ,(:") == std::string::npos && text[0] != '[' && text[0] != '{';
+      return !text.empty() && text.find_first_of(" ,(:") == std::string::npos && text[0] != '[' &&
+             text[0] != '{';
     };
     std::set<std::pair<std::string, std::string>> corrected;
     const auto key = [&](const ReceiptRow& row) {
@@ -299,11 +322,13 @@ class Correcting {
     };
     if (program_.left.empty()) return;
     for (std::size_t t = 0; t < program_.targets.size(); ++t) {
-      if (result_.rows[t].corrected() && is_name(result_.rows[t].name)) corrected.insert(key(result_.rows[t]));
+      if (result_.rows[t].corrected() && is_name(result_.rows[t].name))
+        corrected.insert(key(result_.rows[t]));
     }
     for (std::size_t r = program_.targets.size(); r < result_.rows.size(); ++r) {
       ReceiptRow& row = result_.rows[r];
-      if (!row.motion.empty() && corrected.contains(key(row)) && !row.moves_along) tell_along(row, row.name);
+      if (!row.motion.empty() && corrected.contains(key(row)) && !row.moves_along)
+        tell_along(row, row.name);
     }
   }
 
@@ -318,9 +343,11 @@ class Correcting {
     const std::vector<std::string> words =
         words_of({result_.model_id, options_.version, options_.date, short_hash(file.text)});
     if (place.a_line_each) {
-      for (const std::string& word : words) edits_[f].insert_line(place.at, place.begin + word + place.end);
+      for (const std::string& word : words)
+        edits_[f].insert_line(place.at, place.begin + word + place.end);
     } else {
-      edits_[f].insert_line(place.at, fmt::format("{}{}{}", place.begin, fmt::join(words, " "), place.end));
+      edits_[f].insert_line(place.at,
+                            fmt::format("{}{}{}", place.begin, fmt::join(words, " "), place.end));
     }
     Edits::Applied applied = std::move(edits_[f]).apply(file.text);
     for (Edits::Applied::Line& line : applied.inserted)
@@ -341,12 +368,13 @@ class Correcting {
 }  // namespace
 
 std::size_t CorrectedProgram::left_alone() const {
-  return static_cast<std::size_t>(
-      std::count_if(rows.begin(), rows.end(), [](const ReceiptRow& row) { return !row.corrected(); }));
+  return static_cast<std::size_t>(std::count_if(
+      rows.begin(), rows.end(), [](const ReceiptRow& row) { return !row.corrected(); }));
 }
 
-Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot, const CellTools& cell,
-                                         const AskCorrections& ask, const CorrectProgramOptions& options) {
+Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot,
+                                         const CellTools& cell, const AskCorrections& ask,
+                                         const CorrectProgramOptions& options) {
   TRY(check_marks(program));
   const ArmOfProgram arm(robot);
   NominalTargets nominal = TRY(nominal_targets(program, arm, cell, options.tool, options.payload));

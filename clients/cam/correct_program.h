@@ -11,13 +11,14 @@
 #include "clients/session/session_types.h"
 #include "server/robot/cell.h"
 
-/// A program in, a corrected program and its receipt out. The same for every dialect, and for a model in a file or
-/// behind a service.
+/// A program in, a corrected program and its receipt out. The same for every dialect, and for a
+/// model in a file or behind a service.
 namespace trammel::cam {
 
 /// Corrects targets with one tool and payload. All answers of one program come from one model.
 using AskCorrections = std::function<Result<client::Answer<client::CorrectedTarget>>(
-    const std::string& tool, const std::string& payload, const std::vector<client::TargetMm>& targets)>;
+    const std::string& tool, const std::string& payload,
+    const std::vector<client::TargetMm>& targets)>;
 
 struct CorrectProgramOptions {
   std::string tool, payload;  ///< of the cell, as the user named them
@@ -28,7 +29,8 @@ struct CorrectProgramOptions {
 
 /// Refuses what choose_tools() refuses, a file that is marked as corrected, and what `ask` refuses.
 [[nodiscard]] Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot,
-                                                       const CellTools& cell, const AskCorrections& ask,
+                                                       const CellTools& cell,
+                                                       const AskCorrections& ask,
                                                        const CorrectProgramOptions& options);
 
 }  // namespace trammel::cam

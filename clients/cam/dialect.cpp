@@ -53,8 +53,18 @@ const std::vector<Entry>& entries() {
        read_inform,
        "MOVJ, MOVL or MOVC to C00000 under NPOS",
        {"TOOL[", "USER["}},
-      {Dialect::kUrScript, "urscript", {".script"}, read_urscript, "movej, movel, movep or movec", {"TCP"}},
-      {Dialect::kCamRob, "camrob", {}, read_camrob, "rows of number;x;y;z;a;b;c, in mm and deg", {"CAMROB"}},
+      {Dialect::kUrScript,
+       "urscript",
+       {".script"},
+       read_urscript,
+       "movej, movel, movep or movec",
+       {"TCP"}},
+      {Dialect::kCamRob,
+       "camrob",
+       {},
+       read_camrob,
+       "rows of number;x;y;z;a;b;c, in mm and deg",
+       {"CAMROB"}},
       {Dialect::kRoboDk,
        "robodk",
        {},
@@ -86,7 +96,8 @@ std::optional<Dialect> dialect_of_file(const std::string& path) {
   if (dot == std::string::npos) return std::nullopt;
   const std::string ending = lower(path.substr(dot));
   for (const Entry& entry : entries()) {
-    if (std::find(entry.endings.begin(), entry.endings.end(), ending) != entry.endings.end()) return entry.dialect;
+    if (std::find(entry.endings.begin(), entry.endings.end(), ending) != entry.endings.end())
+      return entry.dialect;
   }
   return std::nullopt;
 }
@@ -101,8 +112,9 @@ const char* motions_of(Dialect dialect) {
 bool may_have_row(Dialect dialect, const std::string& name) {
   for (const Entry& entry : entries()) {
     if (entry.dialect != dialect) continue;
-    return name == kRobotBase || std::any_of(entry.rows.begin(), entry.rows.end(),
-                                             [&](const char* beginning) { return name.starts_with(beginning); });
+    return name == kRobotBase ||
+           std::any_of(entry.rows.begin(), entry.rows.end(),
+                       [&](const char* beginning) { return name.starts_with(beginning); });
   }
   return false;
 }

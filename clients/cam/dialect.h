@@ -23,6 +23,7 @@ enum class Dialect { kRapid, kKrl, kFanuc, kInform, kUrScript, kCamRob, kRoboDk 
 /// All names that --format takes, for messages.
 [[nodiscard]] std::string dialect_names();
 
-[[nodiscard]] Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadOptions& options);
+[[nodiscard]] Program read_program(Dialect dialect, std::vector<SourceFile> files,
+                                   const ReadOptions& options);
 
 }  // namespace trammel::cam

@@ -15,10 +15,13 @@ Edits::Applied Edits::apply(const std::string& text) && {
   std::vector<Replacement> replacements = std::move(replacements_);
   std::vector<Line> lines = std::move(lines_);
   for (Line& line : lines) line.at = line_begin(text, line.at);  // a last line may have no end
-  const auto by_place = [](const Replacement& a, const Replacement& b) { return a.span.begin < b.span.begin; };
+  const auto by_place = [](const Replacement& a, const Replacement& b) {
+    return a.span.begin < b.span.begin;
+  };
   if (!std::is_sorted(replacements.begin(), replacements.end(), by_place))
     std::stable_sort(replacements.begin(), replacements.end(), by_place);
-  std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const auto& a, const auto& b) { return a.at < b.at; });
   const std::string end = line_end_of(text);
   Applied made;
   made.text.reserve(text.size() + text.size() / 8);

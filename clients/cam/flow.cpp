@@ -18,8 +18,8 @@ struct Block {
 
 bool is_routine(Kind kind) { return kind == Kind::kRoutine || kind == Kind::kInterrupt; }
 bool opens(Kind kind) {
-  return kind == Kind::kIf || kind == Kind::kSwitch || kind == Kind::kWhile || kind == Kind::kRepeat ||
-         is_routine(kind);
+  return kind == Kind::kIf || kind == Kind::kSwitch || kind == Kind::kWhile ||
+         kind == Kind::kRepeat || is_routine(kind);
 }
 bool is_loop(Kind kind) { return kind == Kind::kWhile || kind == Kind::kRepeat; }
 
@@ -46,13 +46,15 @@ class Order {
     for (std::size_t s = 0; s < steps_.size(); ++s) follow(s);
     Flow made;
     made.asides = asides();
-    if (std::any_of(made.asides.begin(), made.asides.end(),
-                    [](const Aside& aside) { return aside.at_failures && !aside.goes_back.empty(); }))
+    if (std::any_of(made.asides.begin(), made.asides.end(), [](const Aside& aside) {
+          return aside.at_failures && !aside.goes_back.empty();
+        }))
       end_where_they_fail(made.asides);
     made.next = std::move(next_);
     made.entries = {0};
     for (std::size_t s = 0; s < steps_.size(); ++s) {
-      if (steps_[s].kind == Kind::kRoutine && !called_.contains(steps_[s].label)) made.entries.push_back(s + 1);
+      if (steps_[s].kind == Kind::kRoutine && !called_.contains(steps_[s].label))
+        made.entries.push_back(s + 1);
       made.never_fails.push_back(steps_[s].never_fails);
     }
     return made;
@@ -112,7 +114,8 @@ class Order {
       case Kind::kCase:
       case Kind::kElse:
         // Nothing leads to the first but the head of its block.
-        if (in_[s] != kNone && kind_of(in_[s]) == Kind::kSwitch && blocks_[in_[s]].branches.front() == s)
+        if (in_[s] != kNone && kind_of(in_[s]) == Kind::kSwitch &&
+            blocks_[in_[s]].branches.front() == s)
           return add(s, s + 1);
         return add(s, in_[s] == kNone ? s + 1 : blocks_[in_[s]].end);
       case Kind::kEnd:
@@ -142,7 +145,8 @@ class Order {
     const Block& block = blocks_[opened_.at(s)];
     const Kind kind = steps_[s].kind;
     if (kind == Kind::kInterrupt) return add(s, block.end + 1);
-    if (kind != Kind::kSwitch && (kind != Kind::kRoutine || !called_.contains(steps_[s].label))) add(s, s + 1);
+    if (kind != Kind::kSwitch && (kind != Kind::kRoutine || !called_.contains(steps_[s].label)))
+      add(s, s + 1);
     for (const std::size_t branch : block.branches) {
       if (kind == Kind::kIf || kind == Kind::kSwitch) add(s, branch + 1);
     }
@@ -187,7 +191,13 @@ class Order {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       const Block& block = blocks_[b];
       if (kind_of(b) == Kind::kInterrupt)
-        all.push_back({steps_[block.head].label, block.head + 1, block.end, {block.end}, 0, steps_.size(), false});
+        all.push_back({steps_[block.head].label,
+                       block.head + 1,
+                       block.end,
+                       {block.end},
+                       0,
+                       steps_.size(),
+                       false});
       if (is_routine(kind_of(b))) add_handlers(block, all);
     }
     return all;
@@ -201,7 +211,8 @@ class Order {
     }
     for (std::size_t k = 0; k < begins.size(); ++k) {
       const std::size_t end = k + 1 < begins.size() ? begins[k + 1] : routine.end;
-      Aside aside{steps_[begins[k]].label, begins[k] + 1, end, {}, routine.head + 1, begins[0], true};
+      Aside aside{steps_[begins[k]].label, begins[k] + 1, end, {},
+                  routine.head + 1,        begins[0],     true};
       for (std::size_t s = aside.first; s < end; ++s) {
         if (steps_[s].kind == Kind::kGoBack) aside.goes_back.push_back(s);
       }
@@ -209,13 +220,15 @@ class Order {
     }
   }
 
-  /// A routine without a handler of its own ends where it fails, if a handler of those that call it goes on from there.
+  /// A routine without a handler of its own ends where it fails, if a handler of those that call it
+  /// goes on from there.
   void end_where_they_fail(const std::vector<Aside>& asides) {
     std::vector<bool> handles(blocks_.size(), false), ends(blocks_.size(), false);
     std::vector<std::size_t> open;
     const auto note_calls = [&](std::size_t from, std::size_t to) {
       for (std::size_t s = from; s < to; ++s) {
-        const auto called = steps_[s].kind == Kind::kCall ? routines_.find(steps_[s].label) : routines_.end();
+        const auto called =
+            steps_[s].kind == Kind::kCall ? routines_.find(steps_[s].label) : routines_.end();
         if (called == routines_.end() || handles[called->second] || ends[called->second]) continue;
         ends[called->second] = true;
         open.push_back(called->second);
@@ -250,7 +263,9 @@ class Order {
 
 }  // namespace
 
-Flow flow_of(const std::vector<Step>& steps, bool in_any_order) { return Order(steps, in_any_order).flow(); }
+Flow flow_of(const std::vector<Step>& steps, bool in_any_order) {
+  return Order(steps, in_any_order).flow();
+}
 
 std::vector<std::set<std::size_t>> motions_before(
     const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves) {
@@ -260,7 +275,9 @@ std::vector<std::set<std::size_t>> motions_before(
       [&](std::size_t step, Last& last) {
         if (const auto motion = moves(step)) last = {*motion};
       },
-      [](Last& last, const Last& other, const std::string&) { last.insert(other.begin(), other.end()); });
+      [](Last& last, const Last& other, const std::string&) {
+        last.insert(other.begin(), other.end());
+      });
 }
 
 }  // namespace trammel::cam

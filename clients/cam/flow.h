@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
-/// In which order the statements of a program may come, and what holds before each of them. Every dialect says what its
-/// statements do; loops, jumps, calls, interrupts and error handlers are followed here, for all of them alike.
+/// In which order the statements of a program may come, and what holds before each of them. Every
+/// dialect says what its statements do; loops, jumps, calls, interrupts and error handlers are
+/// followed here, for all of them alike.
 namespace trammel::cam {
 
 /// What a statement does to the order.
@@ -23,13 +24,15 @@ struct Step {
     kElse,       ///< the last branch of the block, without a condition
     kWhile,      ///< opens a block that repeats, or is passed over
     kRepeat,     ///< opens a block that repeats and is entered
-    kRoutine,    ///< opens a block that calls enter; one that nothing calls is entered by whoever runs the program
+    kRoutine,    ///< opens a block that calls enter; one that nothing calls is entered by whoever
+                 ///< runs the program
     kInterrupt,  ///< opens a block that comes in before any other statement, and goes back there
     kEnd,        ///< of the innermost block
     kExit,       ///< to behind the innermost loop
     kContinue,   ///< to the head of the innermost loop
     kReturn,     ///< from the routine
-    kHandler,    ///< ends what stands above it in the routine; comes in where a statement of that fails
+    kHandler,    ///< ends what stands above it in the routine; comes in where a statement of that
+                 ///< fails
     kGoBack,     ///< from a handler to where it came in
     kLabel,      ///< where jumps go
     kJump,       ///< to the labels of that name
@@ -37,23 +40,26 @@ struct Step {
     kCall        ///< of the routine of that name; of one that is not there: nothing
   };
   Kind kind = Kind::kPlain;
-  std::string label = {};    ///< of a label, jump, routine or call; of an interrupt or handler: as reasons call it
+  std::string label =
+      {};  ///< of a label, jump, routine or call; of an interrupt or handler: as reasons call it
   bool never_fails = false;  ///< no error handler comes in at it
 };
 
-/// Statements that come in before others and may go back there: an interrupt routine, an error handler.
+/// Statements that come in before others and may go back there: an interrupt routine, an error
+/// handler.
 struct Aside {
   std::string name;
-  std::size_t first = 0, end = 0;      ///< its statements; it is not left beyond `end` on the way back
+  std::size_t first = 0, end = 0;  ///< its statements; it is not left beyond `end` on the way back
   std::vector<std::size_t> goes_back;  ///< the steps that lead back
-  std::size_t from = 0, to = 0;        ///< it comes in before the steps [from, to) that are not its own
-  bool at_failures = false;            ///< not before steps that never fail
+  std::size_t from = 0, to = 0;  ///< it comes in before the steps [from, to) that are not its own
+  bool at_failures = false;      ///< not before steps that never fail
 };
 
 /// Where a program may go.
 struct Flow {
-  std::vector<std::vector<std::size_t>> next;  ///< statements that may come behind each; their number: none
-  std::vector<std::size_t> entries;            ///< the first statement, and the routines that nothing calls
+  std::vector<std::vector<std::size_t>>
+      next;                          ///< statements that may come behind each; their number: none
+  std::vector<std::size_t> entries;  ///< the first statement, and the routines that nothing calls
   std::vector<Aside> asides;
   std::vector<bool> never_fails;  ///< of each statement
 };
@@ -65,7 +71,8 @@ struct Flow {
 template <typename State, typename Apply, typename Join>
 class StatesBefore {
  public:
-  StatesBefore(const Flow& flow, const Apply& apply, const Join& join, const std::function<void(State&)>& also)
+  StatesBefore(const Flow& flow, const Apply& apply, const Join& join,
+               const std::function<void(State&)>& also)
       : flow_(flow),
         apply_(apply),
         join_(join),
@@ -120,7 +127,9 @@ class StatesBefore {
       for (std::size_t a = 0; a < flow_.asides.size(); ++a) {
         const Aside& aside = flow_.asides[a];
         const bool own = step >= aside.first && step <= aside.end;
-        if (own || step < aside.from || step >= aside.to || (aside.at_failures && flow_.never_fails[step])) continue;
+        if (own || step < aside.from || step >= aside.to ||
+            (aside.at_failures && flow_.never_fails[step]))
+          continue;
         reach(aside.first, state);
         const std::optional<State> back = made_by(a, state);
         if (!back || *back == state) continue;
@@ -175,26 +184,28 @@ class StatesBefore {
   const Apply& apply_;
   const Join& join_;
   const std::function<void(State&)>& also_;
-  States before_;                                                          ///< with what asides make of it
-  States reached_;                                                         ///< as the statements above lead to it
-  std::set<std::size_t> open_;                                             ///< in the order of the text
+  States before_;               ///< with what asides make of it
+  States reached_;              ///< as the statements above lead to it
+  std::set<std::size_t> open_;  ///< in the order of the text
   std::vector<std::vector<std::pair<State, std::optional<State>>>> made_;  ///< by each aside
 };
 
-/// What holds before each statement, and at last behind all, where `entry` holds at the entries of the flow.
-/// `apply(step, state)` makes what holds behind a statement. `join(state, other, by)` makes of a state one that holds
-/// for both, where ways come together; `by` names the aside that one of them leads through, empty: none. What it makes
-/// must come to rest. `also(state)` adds what comes in before every statement from elsewhere. A statement that nothing
-/// leads to follows the one above it.
+/// What holds before each statement, and at last behind all, where `entry` holds at the entries of
+/// the flow. `apply(step, state)` makes what holds behind a statement. `join(state, other, by)`
+/// makes of a state one that holds for both, where ways come together; `by` names the aside that
+/// one of them leads through, empty: none. What it makes must come to rest. `also(state)` adds what
+/// comes in before every statement from elsewhere. A statement that nothing leads to follows the
+/// one above it.
 template <typename State, typename Apply, typename Join>
-[[nodiscard]] std::vector<State> states_before(const Flow& flow, const State& entry, const Apply& apply,
-                                               const Join& join,
-                                               const std::type_identity_t<std::function<void(State&)>>& also = {}) {
+[[nodiscard]] std::vector<State> states_before(
+    const Flow& flow, const State& entry, const Apply& apply, const Join& join,
+    const std::type_identity_t<std::function<void(State&)>>& also = {}) {
   return StatesBefore<State, Apply, Join>(flow, apply, join, also).find(entry);
 }
 
-/// Of each statement, the motions that may be the last before it, as `moves(step)` numbers them; kNoMotion where none
-/// comes before, or what moved the arm is no motion. `moves` is empty for a statement that does not move the arm.
+/// Of each statement, the motions that may be the last before it, as `moves(step)` numbers them;
+/// kNoMotion where none comes before, or what moved the arm is no motion. `moves` is empty for a
+/// statement that does not move the arm.
 constexpr std::size_t kNoMotion = static_cast<std::size_t>(-1);
 [[nodiscard]] std::vector<std::set<std::size_t>> motions_before(
     const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves);

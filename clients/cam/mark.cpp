@@ -12,7 +12,8 @@ constexpr std::string_view kBegin = "TRAMMEL model=";
 constexpr std::size_t kFarthest = 400;  // bytes from the begin of a mark to its last word
 
 bool is_word(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' || c == '-' || c == '_';
+  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
+         c == '-' || c == '_';
 }
 
 std::string value_of(std::string_view text, std::string_view key) {
@@ -28,7 +29,8 @@ std::string value_of(std::string_view text, std::string_view key) {
 std::string short_hash(std::string_view bytes) { return sha256_hex(bytes).substr(0, 16); }
 
 std::vector<std::string> words_of(const Mark& mark) {
-  return {"TRAMMEL model=" + mark.model, "version=" + mark.version, "date=" + mark.date, "original=" + mark.original};
+  return {"TRAMMEL model=" + mark.model, "version=" + mark.version, "date=" + mark.date,
+          "original=" + mark.original};
 }
 
 std::optional<Mark> find_mark(std::string_view text) {

@@ -29,11 +29,13 @@ constexpr const char* kNotSaid =
     "the controller takes the joints nearest to those before, and the program does not say these";
 
 constexpr const char* kOtherStatus =
-    "its status and turn are of another posture than the motion before leaves, and a line keeps that one";
+    "its status and turn are of another posture than the motion before leaves, and a line keeps "
+    "that one";
 
 class Finding {
  public:
-  Finding(const Program& program, const ArmOfProgram& arm, const CellTools& cell, std::vector<ToolChoice> tools)
+  Finding(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
+          std::vector<ToolChoice> tools)
       : program_(program), arm_(arm), cell_(cell), found_{std::move(tools), {}, {}} {
     found_.targets.resize(program.targets.size());
   }
@@ -43,12 +45,13 @@ class Finding {
     note_unused();
     find_moving_axes();
     find_joints();
-    const auto doubts = std::count_if(found_.targets.begin(), found_.targets.end(),
-                                      [](const NominalTarget& target) { return !target.doubt.empty(); });
+    const auto doubts =
+        std::count_if(found_.targets.begin(), found_.targets.end(),
+                      [](const NominalTarget& target) { return !target.doubt.empty(); });
     if (doubts > 0)
       found_.notes.push_back(
-          fmt::format("{} targets: what the program says of the configuration contradicts itself, or the motion "
-                      "before; the receipt says what is followed",
+          fmt::format("{} targets: what the program says of the configuration contradicts itself, "
+                      "or the motion before; the receipt says what is followed",
                       doubts));
     return std::move(found_);
   }
@@ -57,9 +60,11 @@ class Finding {
   void note_tools() {
     found_.notes = program_.notes;
     for (const std::string& note : notes_on_base(program_, cell_)) found_.notes.push_back(note);
-    if (const std::string note = note_on_taught_targets(program_); !note.empty()) found_.notes.push_back(note);
+    if (const std::string note = note_on_taught_targets(program_); !note.empty())
+      found_.notes.push_back(note);
     const auto add = [&](const std::string& note) {
-      if (!note.empty() && std::find(found_.notes.begin(), found_.notes.end(), note) == found_.notes.end())
+      if (!note.empty() &&
+          std::find(found_.notes.begin(), found_.notes.end(), note) == found_.notes.end())
         found_.notes.push_back(note);
     };
     for (const ToolChoice& choice : found_.tools) {
@@ -74,13 +79,15 @@ class Finding {
     std::vector<std::string> points;
     for (const LeftAlone& left : program_.left) {
       if (left.motion.empty())
-        points.push_back(fmt::format("{} ({} line {})", shown(left.name), program_.files[left.file].name, left.line));
+        points.push_back(fmt::format("{} ({} line {})", shown(left.name),
+                                     program_.files[left.file].name, left.line));
     }
     if (points.empty()) return;
     const std::size_t more = points.size() - std::min(points.size(), kMost);
     points.resize(points.size() - more);
-    found_.notes.push_back(fmt::format("no motion in these files goes to {}{}: what is not used stays as it is",
-                                       fmt::join(points, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
+    found_.notes.push_back(
+        fmt::format("no motion in these files goes to {}{}: what is not used stays as it is",
+                    fmt::join(points, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
   }
 
   /// External axes that the cell has no rail for: the robot stands still only where they do.
@@ -98,7 +105,8 @@ class Finding {
     for (const int axis : program_.moved_axes) {
       if (axis >= rails) moving_axes_.insert(axis);
     }
-    std::erase_if(moving_axes_, [&](int axis) { return cell_.idle_axes.contains(axis_called(program_, axis)); });
+    std::erase_if(moving_axes_,
+                  [&](int axis) { return cell_.idle_axes.contains(axis_called(program_, axis)); });
   }
 
   /// Where a motion leaves the arm.
@@ -132,10 +140,13 @@ class Finding {
   void follow(std::size_t m) {
     const ProgramMove& move = program_.moves[m];
     std::vector<Stand> from = stands_before(move);
-    if (from.empty() && move.choice != JointChoice::kByConfiguration && move.near.empty() && move.axes.empty()) return;
+    if (from.empty() && move.choice != JointChoice::kByConfiguration && move.near.empty() &&
+        move.axes.empty())
+      return;
     const Stand line{from.size() == 1 ? from[0].q : std::nullopt, true};
     for (const std::size_t t : move.targets) {
-      const bool is_open = move.choice != JointChoice::kByConfiguration && !is_joints(program_.targets[t].coordinates);
+      const bool is_open = move.choice != JointChoice::kByConfiguration &&
+                           !is_joints(program_.targets[t].coordinates);
       if (is_open)
         find_open(t, move, from);
       else
@@ -155,12 +166,14 @@ class Finding {
     std::vector<Stand> from;
     for (const std::size_t m : move.before) {
       const std::optional<Stand> stand = m == kNoMotion ? Stand{} : stands_[m];
-      if (stand && std::find(from.begin(), from.end(), *stand) == from.end()) from.push_back(*stand);
+      if (stand && std::find(from.begin(), from.end(), *stand) == from.end())
+        from.push_back(*stand);
     }
     return from;
   }
 
-  /// What the target does not say follows from the motion before in this file, wherever the targets stand.
+  /// What the target does not say follows from the motion before in this file, wherever the targets
+  /// stand.
   void by_configuration(std::size_t t, std::size_t file) {
     std::optional<JointVector>& previous = last_[file];
     if (!done_[t] && !previous) note_beginning(t);
@@ -173,18 +186,21 @@ class Finding {
   void note_beginning(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     const bool may_say_it = program_.dialect == "krl" || program_.dialect == "inform";
-    if (noted_beginning_ || !may_say_it || target.configuration.said() || is_joints(target.coordinates)) return;
+    if (noted_beginning_ || !may_say_it || target.configuration.said() ||
+        is_joints(target.coordinates))
+      return;
     noted_beginning_ = true;
-    found_.notes.push_back(
-        fmt::format("{} ({} line {}): the program begins there and does not say the arm's posture. The one nearest to "
-                    "joints of zero "
-                    "is taken, the robot takes the one that it stands in",
-                    shown(target.name), program_.files[target.file].name, target.line));
+    found_.notes.push_back(fmt::format(
+        "{} ({} line {}): the program begins there and does not say the arm's posture. The one "
+        "nearest to joints of zero is taken, the robot takes the one that it stands in",
+        shown(target.name), program_.files[target.file].name, target.line));
   }
 
-  /// A target whose joints the controller chooses by those before it. All ways to it must lead to the same.
+  /// A target whose joints the controller chooses by those before it. All ways to it must lead to
+  /// the same.
   void find_open(std::size_t t, const ProgramMove& move, std::vector<Stand> from) {
-    if (!move.near.empty()) from = {{arm_.from_axes(in_degrees(Coordinates::kJointRadians, move.near), {})}};
+    if (!move.near.empty())
+      from = {{arm_.from_axes(in_degrees(Coordinates::kJointRadians, move.near), {})}};
     for (const Stand& stand : from) {
       NominalTarget& target = found_.targets[t];
       const NominalTarget was = target;
@@ -195,10 +211,12 @@ class Finding {
       const bool enough = stand.q && (!stand.posture_only || on_a_line);
       if (!enough && !program_.targets[t].configuration.said()) return leave_open(t, kNotSaid);
       if (!enough) note_as_said(t);
-      take(t, enough ? arm_.nearest(flange_of(t), program_.targets[t].external, *stand.q, on_a_line) : as_said(t, {}));
+      take(t, enough ? arm_.nearest(flange_of(t), program_.targets[t].external, *stand.q, on_a_line)
+                     : as_said(t, {}));
       if (enough) note_other_status(t, *stand.q);
       if (!was.q || !target.q) continue;
-      if (!same_posture(*was.q, *target.q)) return leave_open(t, "motions come to it in different postures");
+      if (!same_posture(*was.q, *target.q))
+        return leave_open(t, "motions come to it in different postures");
       target = was;
     }
   }
@@ -207,13 +225,14 @@ class Finding {
     if (noted_as_said_) return;
     noted_as_said_ = true;
     const ProgramTarget& target = program_.targets[t];
-    found_.notes.push_back(fmt::format(
-        "{} ({} line {}): the controller takes the joints nearest to those before, which the program does not say; the "
-        "configuration of the target is taken",
-        shown(target.name), program_.files[target.file].name, target.line));
+    found_.notes.push_back(
+        fmt::format("{} ({} line {}): the controller takes the joints nearest to those before, "
+                    "which the program does not say; the configuration of the target is taken",
+                    shown(target.name), program_.files[target.file].name, target.line));
   }
 
-  /// Branches by number are placeholders where lines pass over them; status and turns are what was stored.
+  /// Branches by number are placeholders where lines pass over them; status and turns are what was
+  /// stored.
   void note_other_status(std::size_t t, const JointVector& before) {
     const Configuration& stored = program_.targets[t].configuration;
     NominalTarget& target = found_.targets[t];
@@ -230,7 +249,8 @@ class Finding {
 
   /// Whole turns aside.
   static bool same_posture(const JointVector& a, const JointVector& b) {
-    return (a - b).unaryExpr([](double d) { return std::remainder(d, 2 * kPi); }).norm() < kSameJoints;
+    return (a - b).unaryExpr([](double d) { return std::remainder(d, 2 * kPi); }).norm() <
+           kSameJoints;
   }
 
   /// Whether there is a pose whose joints are to be found; joints are taken as they stand.
@@ -244,8 +264,10 @@ class Finding {
     for (const int axis : moving_axes_) {
       if (!target.external.contains(axis) && !program_.moved_axes.contains(axis)) continue;
       found.why_not = fmt::format(
-          "{0} {1}, and the cell has none; --idle-axis '{0}' says that it carries neither robot nor part",
-          axis_called(program_, axis), carries_robot(program_, axis) ? "is not at zero throughout" : "moves");
+          "{0} {1}, and the cell has none; --idle-axis '{0}' says that it carries neither robot "
+          "nor part",
+          axis_called(program_, axis),
+          carries_robot(program_, axis) ? "is not at zero throughout" : "moves");
       return false;
     }
     const auto beyond = [](double number) { return !(std::abs(number) < kLargest); };
@@ -268,14 +290,16 @@ class Finding {
   /// Of a pose that is prepared.
   [[nodiscard]] Pose flange_of(std::size_t t) const {
     const ProgramTarget& target = program_.targets[t];
-    const Pose X_BT = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers);
+    const Pose X_BT =
+        program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers);
     return X_BT * cell_.tools.at(found_.tools[target.tool].tool).inverse();
   }
 
   void take(std::size_t t, const NominalJoints& joints) {
     const ProgramTarget& target = program_.targets[t];
     NominalTarget& found = found_.targets[t];
-    found.asked.pose = to_wire(program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers));
+    found.asked.pose =
+        to_wire(program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers));
     found.doubt = joints.doubt;
     if (joints.q) {
       found.asked.seed_rad = joints_on_wire(*joints.q, arm_.robot());
@@ -292,12 +316,15 @@ class Finding {
     }
   }
 
-  [[nodiscard]] NominalJoints as_said(std::size_t t, const std::optional<JointVector>& previous) const {
+  [[nodiscard]] NominalJoints as_said(std::size_t t,
+                                      const std::optional<JointVector>& previous) const {
     const ProgramTarget& target = program_.targets[t];
     return arm_.joints(flange_of(t), target.configuration, target.external, previous);
   }
 
-  [[nodiscard]] bool outside(const JointVector& q) const { return arm_.robot().joint_outside_limits(q).has_value(); }
+  [[nodiscard]] bool outside(const JointVector& q) const {
+    return arm_.robot().joint_outside_limits(q).has_value();
+  }
 
   const Program& program_;
   const ArmOfProgram& arm_;
@@ -332,8 +359,9 @@ std::vector<double> in_degrees(const ProgramTarget& target, std::vector<double> 
   return in_degrees(target.coordinates, std::move(axes));
 }
 
-Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
-                                       const std::string& tool, const std::string& payload, BareTools bare) {
+Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm,
+                                       const CellTools& cell, const std::string& tool,
+                                       const std::string& payload, BareTools bare) {
   TRY(check_files(program));
   TRY(check_stated_robot(program, arm.robot()));
   TRY(check_gravity(program, cell));

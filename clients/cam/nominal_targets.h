@@ -28,26 +28,31 @@ struct NominalTargets {
 /// Where motions command axes, and no pose depends on the tool: which tool of the cell is it?
 enum class BareTools {
   kAsInTheProgram,
-  kOfTheCell  ///< the one that is asked for, or the cell's only one: measuring programs leave it to the controller
+  kOfTheCell  ///< the one that is asked for, or the cell's only one: measuring programs leave it to
+              ///< the controller
 };
 
-/// In the order of the motions, since one motion may leave its configuration to the one before. Refuses what
-/// choose_tools() refuses, and files that check_files() refuses.
-[[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm,
-                                                     const CellTools& cell, const std::string& tool,
+/// In the order of the motions, since one motion may leave its configuration to the one before.
+/// Refuses what choose_tools() refuses, and files that check_files() refuses.
+[[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program,
+                                                     const ArmOfProgram& arm, const CellTools& cell,
+                                                     const std::string& tool,
                                                      const std::string& payload,
                                                      BareTools bare = BareTools::kAsInTheProgram);
 
 /// X_BT of a target; empty for joints that were not found.
-[[nodiscard]] std::optional<Pose> wanted_pose(const Program& program, const Chain& robot, const CellTools& cell,
-                                              const NominalTargets& nominal, std::size_t target);
+[[nodiscard]] std::optional<Pose> wanted_pose(const Program& program, const Chain& robot,
+                                              const CellTools& cell, const NominalTargets& nominal,
+                                              std::size_t target);
 
-/// Targets of one tool and payload of the cell, to be asked for together; those that cannot be corrected left out.
+/// Targets of one tool and payload of the cell, to be asked for together; those that cannot be
+/// corrected left out.
 struct TargetGroup {
   std::string tool, payload;
   std::vector<std::size_t> targets;
 };
-[[nodiscard]] std::vector<TargetGroup> groups_of(const Program& program, const NominalTargets& nominal);
+[[nodiscard]] std::vector<TargetGroup> groups_of(const Program& program,
+                                                 const NominalTargets& nominal);
 
 /// rad, of a rail mm.
 [[nodiscard]] std::vector<double> joints_on_wire(const JointVector& q, const Chain& robot);

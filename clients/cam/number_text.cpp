@@ -21,9 +21,13 @@ std::size_t digits_at(std::string_view text, std::size_t from) {
 }
 
 /// Decimal exponent of the first digit.
-int magnitude_of(double value) { return value == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(value)))); }
+int magnitude_of(double value) {
+  return value == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(value))));
+}
 
-bool is_zero(std::string_view text) { return text.find_first_of("123456789") == std::string_view::npos; }
+bool is_zero(std::string_view text) {
+  return text.find_first_of("123456789") == std::string_view::npos;
+}
 
 /// `1.25`, always with a digit before the point.
 std::string fixed_text(double value, const NumberStyle& style) {
@@ -39,7 +43,8 @@ std::string exponent_text(double value, const NumberStyle& style) {
   text.erase(e);
   if (text.front() == '-' && is_zero(text)) text.erase(0, 1);
   const char* sign = exponent < 0 ? "-" : style.exponent_plus ? "+" : "";
-  return fmt::format("{}{}{}{:0{}d}", text, style.exponent, sign, std::abs(exponent), style.exponent_digits);
+  return fmt::format("{}{}{}{:0{}d}", text, style.exponent, sign, std::abs(exponent),
+                     style.exponent_digits);
 }
 
 }  // namespace
@@ -62,7 +67,8 @@ std::optional<WrittenNumber> read_number(std::string_view text) {
   style.decimals = static_cast<int>(behind);
   if (at < text.size() && (text[at] == 'e' || text[at] == 'E')) {
     style.exponent = text[at++];
-    if (at < text.size() && (text[at] == '+' || text[at] == '-')) style.exponent_plus = text[at++] == '+';
+    if (at < text.size() && (text[at] == '+' || text[at] == '-'))
+      style.exponent_plus = text[at++] == '+';
     style.exponent_digits = static_cast<int>(digits_at(text, at));
     if (style.exponent_digits == 0) return std::nullopt;
     at += static_cast<std::size_t>(style.exponent_digits);
@@ -70,7 +76,8 @@ std::optional<WrittenNumber> read_number(std::string_view text) {
   if (at != text.size()) return std::nullopt;
   const char* begin = text.data() + (text.front() == '+' ? 1 : 0);
   const auto [end, error] = std::from_chars(begin, text.data() + text.size(), number.value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(number.value)) return std::nullopt;
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(number.value))
+    return std::nullopt;
   return number;
 }
 
@@ -94,7 +101,8 @@ std::string number_text(double value, const NumberStyle& style) {
   if (style.ends_in_point && style.decimals == 0) {
     text.insert(digits + digits_at(text, digits), ".");
   }
-  if (style.bare_point && text[digits] == '0' && text.size() > digits + 1 && text[digits + 1] == '.') {
+  if (style.bare_point && text[digits] == '0' && text.size() > digits + 1 &&
+      text[digits + 1] == '.') {
     text.erase(digits, 1);
   }
   if (style.plus && digits == 0) text.insert(0, "+");

@@ -27,7 +27,8 @@ struct WrittenNumber {
 
 /// Half a unit of the last digit that `style` writes of `value`.
 [[nodiscard]] double rounding_of(double value, const NumberStyle& style);
-/// `style` with so many decimals more that rounding_of() is at most `largest`; ten decimals at most.
+/// `style` with so many decimals more that rounding_of() is at most `largest`; ten decimals at
+/// most.
 [[nodiscard]] NumberStyle with_rounding(double value, NumberStyle style, double largest);
 [[nodiscard]] std::string number_text(double value, const NumberStyle& style);
 

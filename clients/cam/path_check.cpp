@@ -29,7 +29,8 @@ struct SpeedLimit {
   int joint = -1;  ///< that reaches its limit first
 };
 
-SpeedLimit speed_limit(const Chain& robot, const JointVector& from, const JointVector& to, double way) {
+SpeedLimit speed_limit(const Chain& robot, const JointVector& from, const JointVector& to,
+                       double way) {
   SpeedLimit least;
   for (int j = 0; j < robot.size(); ++j) {
     const double turn = std::abs(to(j) - from(j));
@@ -42,8 +43,8 @@ SpeedLimit speed_limit(const Chain& robot, const JointVector& from, const JointV
 
 class Path {
  public:
-  Path(const Program& program, const Chain& robot, const NominalTargets& nominal, std::vector<ReceiptRow>& rows,
-       CorrectedProgram& result)
+  Path(const Program& program, const Chain& robot, const NominalTargets& nominal,
+       std::vector<ReceiptRow>& rows, CorrectedProgram& result)
       : program_(program), robot_(robot), nominal_(nominal), rows_(rows), result_(result) {}
 
   void check() {
@@ -64,11 +65,13 @@ class Path {
     }
     if (too_fast_ > 0) {
       result_.notes.push_back(
-          fmt::format("{} motions would turn an axis faster than it can, which they did not before", too_fast_));
+          fmt::format("{} motions would turn an axis faster than it can, which they did not before",
+                      too_fast_));
     }
     if (result_.largest_step_mm > kNoticeableMm && left_beside_) {
       result_.notes.push_back(fmt::format(
-          "a target that is left stands beside corrected ones on a straight path: a step of {:.3f} mm at {} line {}",
+          "a target that is left stands beside corrected ones on a straight path: a step of {:.3f} "
+          "mm at {} line {}",
           result_.largest_step_mm, result_.largest_step_file, result_.largest_step_line));
     }
   }
@@ -82,13 +85,17 @@ class Path {
     if (way < kLeastWay || !row.corrected()) return;
     const JointVector &was = *nominal_.targets[from].q, &is = *nominal_.targets[to].q;
     row.path_limit_before_mm_s = speed_limit(robot_, was, is, way).mm_s;
-    const SpeedLimit after = speed_limit(robot_, joints_of(rows_[from], robot_, was), joints_of(row, robot_, is), way);
+    const SpeedLimit after =
+        speed_limit(robot_, joints_of(rows_[from], robot_, was), joints_of(row, robot_, is), way);
     row.path_limit_after_mm_s = after.mm_s;
-    if (!move.speed_mm_s || !(*move.speed_mm_s > after.mm_s) || *move.speed_mm_s > row.path_limit_before_mm_s) return;
+    if (!move.speed_mm_s || !(*move.speed_mm_s > after.mm_s) ||
+        *move.speed_mm_s > row.path_limit_before_mm_s)
+      return;
     ++too_fast_;
     row.message += fmt::format("{}at {:.6g} mm/s joint {} would turn faster than it can",
                                row.message.empty() ? "" : "; ", *move.speed_mm_s, after.joint + 1);
-    row.suggestion += fmt::format("{}{:.4g} mm/s at most", row.suggestion.empty() ? "" : "; ", after.mm_s);
+    row.suggestion +=
+        fmt::format("{}{:.4g} mm/s at most", row.suggestion.empty() ? "" : "; ", after.mm_s);
   }
 
   void note_change(const ReceiptRow& from, const ReceiptRow& to) {

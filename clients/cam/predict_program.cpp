@@ -37,12 +37,14 @@ PredictedTarget left(const Program& program, const LeftAlone& left) {
   return row;
 }
 
-void take(const client::PredictedError& predicted, const Chain& robot, const JointVector& q, PredictedTarget& row) {
+void take(const client::PredictedError& predicted, const Chain& robot, const JointVector& q,
+          PredictedTarget& row) {
   row.predicted = predicted;
   row.status = predicted.in_domain ? "ok" : "out_of_domain";
   if (!predicted.in_domain)
-    row.message = fmt::format("too far from the training poses: {:.0f} % of the learned bias are taken",
-                              100 * predicted.bias_share);
+    row.message =
+        fmt::format("too far from the training poses: {:.0f} % of the learned bias are taken",
+                    100 * predicted.bias_share);
   if (const auto joint = robot.joint_outside_limits(q)) {
     row.status = "joint_limit";
     row.message = fmt::format("joint {} is outside its limits", *joint + 1);
@@ -51,17 +53,19 @@ void take(const client::PredictedError& predicted, const Chain& robot, const Joi
 
 }  // namespace
 
-Result<PredictedProgram> predict_program(const Program& program, const Chain& robot, const CellTools& cell,
-                                         const AskPredictions& ask, const std::string& tool,
-                                         const std::string& payload) {
+Result<PredictedProgram> predict_program(const Program& program, const Chain& robot,
+                                         const CellTools& cell, const AskPredictions& ask,
+                                         const std::string& tool, const std::string& payload) {
   const ArmOfProgram arm(robot);
-  const NominalTargets nominal = TRY(nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell));
+  const NominalTargets nominal =
+      TRY(nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell));
   PredictedProgram result;
   result.notes = nominal.notes;
   for (std::size_t t = 0; t < program.targets.size(); ++t) {
     result.targets.push_back(begun(program, t));
     result.targets[t].message = nominal.targets[t].why_not;
-    if (const auto X_BT = wanted_pose(program, robot, cell, nominal, t)) result.targets[t].p_B = X_BT->translation();
+    if (const auto X_BT = wanted_pose(program, robot, cell, nominal, t))
+      result.targets[t].p_B = X_BT->translation();
   }
   for (const TargetGroup& group : groups_of(program, nominal)) {
     std::vector<std::size_t> found;
@@ -79,7 +83,8 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
     if (poses.empty()) continue;
     const auto answer = TRY(ask(group.tool, group.payload, poses));
     if (!result.model_id.empty() && result.model.hash != answer.model.hash)
-      return failure(ErrorCode::kBusy, "the model changed while the program was predicted").next("try again");
+      return failure(ErrorCode::kBusy, "the model changed while the program was predicted")
+          .next("try again");
     result.model = answer.model;
     result.model_id = answer.model.id;
     for (std::size_t k = 0; k < found.size(); ++k)

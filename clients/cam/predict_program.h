@@ -12,16 +12,19 @@
 /// Where the tool really goes with a program as it is.
 namespace trammel::cam {
 
-/// Predicts the error at joints with one tool and payload. All answers of one program come from one model.
+/// Predicts the error at joints with one tool and payload. All answers of one program come from one
+/// model.
 using AskPredictions = std::function<Result<client::Answer<client::PredictedError>>(
-    const std::string& tool, const std::string& payload, const std::vector<client::CommandedJoints>& poses)>;
+    const std::string& tool, const std::string& payload,
+    const std::vector<client::CommandedJoints>& poses)>;
 
 struct PredictedTarget {
   std::string name, file, motion, tool, frame;
   int line = 0;
   std::vector<int> used_at;
-  std::string status;   ///< `ok`, `out_of_domain`, `joint_limit`, or `refused` where nothing can be said
-  std::string message;  ///< why not ok
+  std::string
+      status;  ///< `ok`, `out_of_domain`, `joint_limit`, or `refused` where nothing can be said
+  std::string message;                         ///< why not ok
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, as commanded
   client::PredictedError predicted = {};       ///< not set where refused
 };
@@ -33,9 +36,12 @@ struct PredictedProgram {
   std::vector<std::string> notes;
 };
 
-/// A corrected program is predicted as it is. Refuses what choose_tools() refuses and what `ask` refuses.
+/// A corrected program is predicted as it is. Refuses what choose_tools() refuses and what `ask`
+/// refuses.
 [[nodiscard]] Result<PredictedProgram> predict_program(const Program& program, const Chain& robot,
-                                                       const CellTools& cell, const AskPredictions& ask,
-                                                       const std::string& tool, const std::string& payload);
+                                                       const CellTools& cell,
+                                                       const AskPredictions& ask,
+                                                       const std::string& tool,
+                                                       const std::string& payload);
 
 }  // namespace trammel::cam

@@ -19,14 +19,18 @@ namespace {
 bool is_utf16(const std::string& text) {
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) return true;
   if (text.size() < 4) return false;
-  const auto zeros = [&](std::size_t first) { return text[first] == '\0' && text[first + 2] == '\0'; };
+  const auto zeros = [&](std::size_t first) {
+    return text[first] == '\0' && text[first + 2] == '\0';
+  };
   return zeros(0) != zeros(1);
 }
 
-double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }
+double near_turn(double angle, double like) {
+  return angle + 360 * std::round((like - angle) / 360);
+}
 
-/// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg only a sum of the
-/// others is given: the first stays.
+/// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg
+/// only a sum of the others is given: the first stays.
 Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
   Eigen::Vector3d one = to_deg(1.0) * zyx_angles(R);
   if (is_beta_upright(R)) {
@@ -73,12 +77,13 @@ bool is_joints(Coordinates coordinates) {
 std::string pose_text(const Pose& X) {
   const Vector3 p = X.translation() * to_mm(1);
   const Eigen::Quaterniond q(X.linear());
-  return fmt::format("[{:.3f}, {:.3f}, {:.3f}] mm [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z(), q.w(), q.x(),
-                     q.y(), q.z());
+  return fmt::format("[{:.3f}, {:.3f}, {:.3f}] mm [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(),
+                     p.z(), q.w(), q.x(), q.y(), q.z());
 }
 
 std::string apart_text(const Pose& a, const Pose& b) {
-  return fmt::format("{:.3f} mm and {:.4f} deg apart", to_mm((a.translation() - b.translation()).norm()),
+  return fmt::format("{:.3f} mm and {:.4f} deg apart",
+                     to_mm((a.translation() - b.translation()).norm()),
                      to_deg(pose_difference(a, b).tail<3>().norm()));
 }
 
@@ -89,10 +94,11 @@ bool same_place(const Pose& a, const Pose& b) {
          pose_difference(a, b).tail<3>().norm() <= kSameTurn;
 }
 
-std::string against_row(const std::string& row, const Pose& X, const Pose& by_files, const std::string& place) {
+std::string against_row(const std::string& row, const Pose& X, const Pose& by_files,
+                        const std::string& place) {
   if (same_place(X, by_files)) return "";
-  return fmt::format("{} is {} by --frames and {} by {}: {}", row, pose_text(X), pose_text(by_files), place,
-                     apart_text(X, by_files));
+  return fmt::format("{} is {} by --frames and {} by {}: {}", row, pose_text(X),
+                     pose_text(by_files), place, apart_text(X, by_files));
 }
 
 bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool) {
@@ -117,7 +123,8 @@ FramesRows rows_of(const Program& program) {
     if (!tool.row.empty()) (tool.X_FT ? rows.used : rows.open).insert(tool.row);
   }
   for (const ProgramFrame& frame : program.frames) {
-    if (!frame.row.empty()) (frame.why_not.empty() || frame.in_base ? rows.used : rows.open).insert(frame.row);
+    if (!frame.row.empty())
+      (frame.why_not.empty() || frame.in_base ? rows.used : rows.open).insert(frame.row);
   }
   rows.used.insert(kRobotBase);
   return rows;
@@ -146,7 +153,9 @@ std::size_t add_once(Program& program, ProgramFrame frame) {
 }
 
 std::string called(const ProgramTool& tool) {
-  return tool.carries.empty() ? shown(tool.name) : fmt::format("{} carrying {}", shown(tool.name), shown(tool.carries));
+  return tool.carries.empty()
+             ? shown(tool.name)
+             : fmt::format("{} carrying {}", shown(tool.name), shown(tool.carries));
 }
 
 namespace {
@@ -167,12 +176,14 @@ void remove_targets(Program& program, const std::vector<bool>& leave) {
 }
 
 /// Whether one of the motions [first, end) of an arc is left.
-bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::size_t first, std::size_t end) {
-  return std::any_of(program.moves.begin() + static_cast<std::ptrdiff_t>(first),
-                     program.moves.begin() + static_cast<std::ptrdiff_t>(end), [&](const ProgramMove& move) {
-                       return move.left_some || std::any_of(move.targets.begin(), move.targets.end(),
-                                                            [&](std::size_t t) { return leave[t]; });
-                     });
+bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::size_t first,
+                 std::size_t end) {
+  return std::any_of(
+      program.moves.begin() + static_cast<std::ptrdiff_t>(first),
+      program.moves.begin() + static_cast<std::ptrdiff_t>(end), [&](const ProgramMove& move) {
+        return move.left_some || std::any_of(move.targets.begin(), move.targets.end(),
+                                             [&](std::size_t t) { return leave[t]; });
+      });
 }
 
 }  // namespace
@@ -189,17 +200,18 @@ void leave_targets_in(Program& program, const std::set<std::string>& files) {
       unused.insert(file);
       continue;
     }
-    program.left.push_back({target.name, target.file, target.line, target.motion,
-                            "it stands in a system file of the controller, which a run over a folder leaves as it is; "
-                            "hand that file over by its name to have it corrected"});
+    program.left.push_back(
+        {target.name, target.file, target.line, target.motion,
+         "it stands in a system file of the controller, which a run over a folder leaves as it is; "
+         "hand that file over by its name to have it corrected"});
   }
   if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
   for (ProgramMove& move : program.moves)
-    move.left_some = move.left_some ||
-                     std::any_of(move.targets.begin(), move.targets.end(), [&](std::size_t t) { return leave[t]; });
+    move.left_some = move.left_some || std::any_of(move.targets.begin(), move.targets.end(),
+                                                   [&](std::size_t t) { return leave[t]; });
   for (const std::string& file : unused)
-    program.notes.push_back(
-        fmt::format("positions in {}, a system file of the controller, are left as they are", file));
+    program.notes.push_back(fmt::format(
+        "positions in {}, a system file of the controller, are left as they are", file));
   remove_targets(program, leave);
 }
 
@@ -213,9 +225,9 @@ void leave_halves_of_arcs(Program& program) {
       if (leave[t]) continue;
       leave[t] = more = any = true;
       const ProgramTarget& target = program.targets[t];
-      program.left.push_back(
-          {target.name, target.file, target.line, target.motion,
-           fmt::format("the other point of its arc ({} line {}) is left", program.files[arc.file].name, arc.line)});
+      program.left.push_back({target.name, target.file, target.line, target.motion,
+                              fmt::format("the other point of its arc ({} line {}) is left",
+                                          program.files[arc.file].name, arc.line)});
     }
     return more;
   };
@@ -245,7 +257,8 @@ bool carries_robot(const Program& program, int axis) {
 std::string axis_called(const Program& program, int axis) {
   const int of_six = axis % 6 + 1;
   if (program.dialect == "fanuc")
-    return axis < 6 ? fmt::format("axis E{}", of_six) : fmt::format("group {}, axis {}", axis / 6 + 1, of_six);
+    return axis < 6 ? fmt::format("axis E{}", of_six)
+                    : fmt::format("group {}, axis {}", axis / 6 + 1, of_six);
   if (program.dialect == "inform")
     return fmt::format("{} axis {}", axis < kFirstStationAxis ? "base" : "station", of_six);
   return fmt::format("external axis {}", static_cast<char>('a' + axis));
@@ -254,7 +267,8 @@ std::string axis_called(const Program& program, int axis) {
 Status take_idle_axes(Program& program, const std::vector<std::string>& names) {
   std::map<std::string, int> known;
   for (const ProgramTarget& target : program.targets) {
-    for (const auto& [axis, value] : target.external) known.emplace(axis_called(program, axis), axis);
+    for (const auto& [axis, value] : target.external)
+      known.emplace(axis_called(program, axis), axis);
   }
   for (const int axis : program.moved_axes) known.emplace(axis_called(program, axis), axis);
   for (const std::string& name : names) {
@@ -265,7 +279,8 @@ Status take_idle_axes(Program& program, const std::vector<std::string>& names) {
       return failure(ErrorCode::kUsage, "the program has no axis '{}'", shown(name))
           .of("--idle-axis")
           .with_text(name)
-          .next(all.empty() ? "its targets have no external axes" : fmt::format("it has {}", fmt::join(all, ", ")));
+          .next(all.empty() ? "its targets have no external axes"
+                            : fmt::format("it has {}", fmt::join(all, ", ")));
     }
     program.moved_axes.erase(axis->second);
     for (ProgramTarget& target : program.targets) target.external.erase(axis->second);
@@ -285,9 +300,13 @@ std::size_t line_begin(const std::string& text, std::size_t at) {
 
 Status check_files(const Program& program) {
   for (const SourceFile& file : program.files) {
-    if (is_utf16(file.text)) return refused("text in UTF-16, expected UTF-8").in(file.name).next("save it as UTF-8");
-    if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos) continue;
-    return refused("its lines end in CR alone").in(file.name).next("save it with line ends LF or CR LF");
+    if (is_utf16(file.text))
+      return refused("text in UTF-16, expected UTF-8").in(file.name).next("save it as UTF-8");
+    if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos)
+      continue;
+    return refused("its lines end in CR alone")
+        .in(file.name)
+        .next("save it with line ends LF or CR LF");
   }
   if (program.cuts.empty()) return {};
   const Cut& cut = program.cuts.front();
@@ -318,9 +337,11 @@ Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {
   return Pose::Identity();
 }
 
-std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const std::vector<double>& like) {
-  const Vector3 p =
-      coordinates == Coordinates::kRotationVector ? pose.translation().eval() : (pose.translation() * to_mm(1)).eval();
+std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose,
+                               const std::vector<double>& like) {
+  const Vector3 p = coordinates == Coordinates::kRotationVector
+                        ? pose.translation().eval()
+                        : (pose.translation() * to_mm(1)).eval();
   std::vector<double> numbers = {p.x(), p.y(), p.z()};
   switch (coordinates) {
     case Coordinates::kQuaternion: {

@@ -10,12 +10,14 @@
 #include "clients/cam/number_text.h"
 #include "server/robot/cell.h"
 
-/// A robot program, whatever controller it is for: files of bytes, and what was understood of them. A reader of a
-/// dialect makes it; everything behind the readers is the same for all dialects. Bytes that no reader understood stay.
+/// A robot program, whatever controller it is for: files of bytes, and what was understood of them.
+/// A reader of a dialect makes it; everything behind the readers is the same for all dialects.
+/// Bytes that no reader understood stay.
 namespace trammel::cam {
 
 struct SourceFile {
-  std::string name;  ///< as the receipt shows it: a path, relative to the folder that was handed over
+  std::string
+      name;  ///< as the receipt shows it: a path, relative to the folder that was handed over
   std::string text;  ///< the bytes, in whatever encoding
 };
 
@@ -48,21 +50,24 @@ struct Rewrite {
   std::vector<Slot> slots;
 };
 
-/// What a program says of the arm's configuration at a target. Candidates are the closed-form solutions of a spherical
-/// wrist; a dialect scores them.
+/// What a program says of the arm's configuration at a target. Candidates are the closed-form
+/// solutions of a spherical wrist; a dialect scores them.
 struct Configuration {
-  std::optional<int> conf;                  ///< 0..7 as inverse_kinematics.h numbers it
-  std::vector<std::optional<double>> near;  ///< rad, a value of each joint to be near to; empty: not said
-  std::vector<std::optional<int>> turns;    ///< of each joint: 0 within ±180 deg, 1 a turn above, -1 below
-  std::vector<std::optional<int>> signs;    ///< of each joint: -1 negative, +1 not; empty: not said
-  std::optional<bool> behind_axis_1;        ///< wrist centre behind axis 1
-  std::optional<bool> elbow_up;             ///< the higher of the two elbows
-  std::optional<bool> larger_joint_3;       ///< of the two elbows the one with the larger joint 3
-  std::optional<bool> bends_down;           ///< with joint 4 near zero the wrist would bend the tool downward
+  std::optional<int> conf;  ///< 0..7 as inverse_kinematics.h numbers it
+  std::vector<std::optional<double>>
+      near;  ///< rad, a value of each joint to be near to; empty: not said
+  std::vector<std::optional<int>>
+      turns;  ///< of each joint: 0 within ±180 deg, 1 a turn above, -1 below
+  std::vector<std::optional<int>> signs;  ///< of each joint: -1 negative, +1 not; empty: not said
+  std::optional<bool> behind_axis_1;      ///< wrist centre behind axis 1
+  std::optional<bool> elbow_up;           ///< the higher of the two elbows
+  std::optional<bool> larger_joint_3;     ///< of the two elbows the one with the larger joint 3
+  std::optional<bool>
+      bends_down;  ///< with joint 4 near zero the wrist would bend the tool downward
 
   [[nodiscard]] bool said() const {
-    return conf || !near.empty() || !turns.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 ||
-           bends_down;
+    return conf || !near.empty() || !turns.empty() || !signs.empty() || behind_axis_1 || elbow_up ||
+           larger_joint_3 || bends_down;
   }
 };
 
@@ -82,20 +87,22 @@ struct ProgramTool {
   std::optional<StatedLoad> load;
   double rotation_rounding = 0;  ///< rad, what its digits leave open
   std::string why_not;           ///< why its targets cannot be corrected; empty: they can
-  std::string carries = {};    ///< the load that motions set, as the program calls it; empty: `load` is the tool's own
+  std::string carries =
+      {};  ///< the load that motions set, as the program calls it; empty: `load` is the tool's own
   std::string load_note = {};  ///< why that load cannot be compared
   std::string row = {};        ///< of --frames, that may tell X_FT; empty: none may
   bool from_row = false;       ///< X_FT is what that row says
 };
 
-/// A frame that targets are given in. A reader tells it as seen from the controller's world; read_program() makes it
-/// seen from the robot's base.
+/// A frame that targets are given in. A reader tells it as seen from the controller's world;
+/// read_program() makes it seen from the robot's base.
 struct ProgramFrame {
   std::string name;
   Pose X_BO = Pose::Identity();
   std::string why_not;   ///< why its targets cannot be corrected; empty: they can
   std::string row = {};  ///< of --frames, that may tell X_BO; empty: none may
-  bool in_base = false;  ///< the reader has it seen from the robot's base already, as rows of --frames are
+  bool in_base =
+      false;  ///< the reader has it seen from the robot's base already, as rows of --frames are
 };
 
 /// Where the robot stands in the controller's world, and who says so.
@@ -106,8 +113,16 @@ struct StatedBase {
   int line = 0;  ///< 0: not a line of a file
 };
 
-/// A number of a robot that its controller's files state, so that another robot than the cell's is found out.
-enum class ArmNumber { kAxes, kHeightOfAxis2, kAxis1ToAxis2, kAxis2ToAxis3, kAxis3ToWrist, kWristToFlange };
+/// A number of a robot that its controller's files state, so that another robot than the cell's is
+/// found out.
+enum class ArmNumber {
+  kAxes,
+  kHeightOfAxis2,
+  kAxis1ToAxis2,
+  kAxis2ToAxis3,
+  kAxis3ToWrist,
+  kWristToFlange
+};
 struct StatedNumber {
   ArmNumber of = ArmNumber::kAxes;
   double value = 0;  ///< m; of kAxes their number
@@ -147,8 +162,8 @@ struct ProgramTarget {
   std::map<int, double> external;           ///< mm or deg as stated, by axis from 0
   std::vector<double> pulses_per_deg = {};  ///< of each axis, where its numbers are pulses
   std::vector<Rewrite> rewrites;
-  bool folded = false;         ///< was computed by the program from other targets
-  std::string comment;         ///< a line to insert above `comment_at`, without its end; empty: none
+  bool folded = false;  ///< was computed by the program from other targets
+  std::string comment;  ///< a line to insert above `comment_at`, without its end; empty: none
   std::size_t comment_at = 0;  ///< first byte of a line
   bool linear = false;         ///< the tool's path to it is a line or an arc
 };
@@ -173,18 +188,21 @@ enum class JointChoice {
 struct ProgramMove {
   std::size_t file = 0;
   int line = 0;
-  std::vector<std::size_t> targets;       ///< of Program::targets, that it may go to; empty: left alone
-  bool is_arc = false;                    ///< to an end by way of another target
-  bool arc_goes_on = false;               ///< it is part of the arc of the motion before
-  bool left_some = false;                 ///< a target of it is left
+  std::vector<std::size_t> targets;  ///< of Program::targets, that it may go to; empty: left alone
+  bool is_arc = false;               ///< to an end by way of another target
+  bool arc_goes_on = false;          ///< it is part of the arc of the motion before
+  bool left_some = false;            ///< a target of it is left
   std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
   JointChoice choice = JointChoice::kByConfiguration;
-  std::vector<double> near = {};      ///< rad, joints that the motion names; empty: none
-  std::vector<double> axes = {};      ///< deg, where it commands axes, also where these are left; empty: it does not
-  std::set<std::size_t> before = {};  ///< motions that may be the last before it, as motions_before() has them
+  std::vector<double> near = {};  ///< rad, joints that the motion names; empty: none
+  std::vector<double> axes =
+      {};  ///< deg, where it commands axes, also where these are left; empty: it does not
+  std::set<std::size_t> before =
+      {};  ///< motions that may be the last before it, as motions_before() has them
 };
 
-/// A statement reads the stored numbers of a target: what it makes of them moves where the target is corrected.
+/// A statement reads the stored numbers of a target: what it makes of them moves where the target
+/// is corrected.
 struct Reading {
   std::size_t file = 0;
   Span of;           ///< the bytes that hold the target
@@ -242,25 +260,32 @@ struct Program : StatedRobot {
   std::vector<Cut> cuts;
 
   /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
-  [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
+  [[nodiscard]] bool is_understood() const {
+    return !(moves.empty() && targets.empty() && left.empty());
+  }
 };
 
 struct ReadOptions {
-  bool split = false;                       ///< a target that is used with two tools or frames becomes two
-  bool keep_joints = false;                 ///< joint targets stay as they are
-  std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
-  std::set<std::string> spared = {};        ///< files that are read and not written
-  std::vector<std::string> idle_axes = {};  ///< external axes that carry neither robot nor part, by axis_called()
-  StatedRobot stated = {};                  ///< by files that are no programs
-  std::vector<SourceFile> beside = {};      ///< read for what they say of values: other tasks, system variables
-  std::vector<double> pulses_per_deg = {};  ///< of each axis, as the controller counts them; empty: not told
+  bool split = false;        ///< a target that is used with two tools or frames becomes two
+  bool keep_joints = false;  ///< joint targets stay as they are
+  std::map<std::string, Pose> frames =
+      {};  ///< values of tools and frames that the files leave open, by name
+  std::set<std::string> spared = {};  ///< files that are read and not written
+  std::vector<std::string> idle_axes =
+      {};                   ///< external axes that carry neither robot nor part, by axis_called()
+  StatedRobot stated = {};  ///< by files that are no programs
+  std::vector<SourceFile> beside =
+      {};  ///< read for what they say of values: other tasks, system variables
+  std::vector<double> pulses_per_deg =
+      {};  ///< of each axis, as the controller counts them; empty: not told
 };
 
-/// Refuses files in UTF-16, lines that end in CR alone (readers count by LF, and comments end with it), and a file that
-/// was cut off, whose missing part may decide what the rest means.
+/// Refuses files in UTF-16, lines that end in CR alone (readers count by LF, and comments end with
+/// it), and a file that was cut off, whose missing part may decide what the rest means.
 [[nodiscard]] Status check_files(const Program& program);
 
-/// The row of --frames that tells where the robot stands in the world that the program's frames are told in.
+/// The row of --frames that tells where the robot stands in the world that the program's frames are
+/// told in.
 constexpr const char* kRobotBase = "robot_base";
 
 /// `[0.000, 0.000, 600.000] mm [1.000000, 0.000000, 0.000000, 0.000000]`
@@ -270,11 +295,13 @@ constexpr const char* kRobotBase = "robot_base";
 
 /// The same place and turn as far as tools and frames are compared.
 [[nodiscard]] bool same_place(const Pose& a, const Pose& b);
-/// Why a row of --frames cannot hold beside what the files say at a place, both seen from the same; empty: it can.
+/// Why a row of --frames cannot hold beside what the files say at a place, both seen from the same;
+/// empty: it can.
 [[nodiscard]] std::string against_row(const std::string& row, const Pose& X, const Pose& by_files,
                                       const std::string& place);
 
-/// Gives a tool or frame the value of a row of --frames, which it may have. Whether there is such a row.
+/// Gives a tool or frame the value of a row of --frames, which it may have. Whether there is such a
+/// row.
 bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool);
 bool take_row(const std::string& row, const ReadOptions& options, ProgramFrame& frame);
 
@@ -284,25 +311,29 @@ struct FramesRows {
 };
 [[nodiscard]] FramesRows rows_of(const Program& program);
 
-/// The number of a tool in the program's list, where it is put if no tool of that name, place and load is there.
+/// The number of a tool in the program's list, where it is put if no tool of that name, place and
+/// load is there.
 std::size_t add_once(Program& program, ProgramTool tool);
 /// The same of a frame: of that name, whatever its case, and pose.
 std::size_t add_once(Program& program, ProgramFrame frame);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);
-/// Leaves the targets that stand in files of these names: those that a motion goes to are told, with the reason.
+/// Leaves the targets that stand in files of these names: those that a motion goes to are told,
+/// with the reason.
 void leave_targets_in(Program& program, const std::set<std::string>& files);
 /// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
 void leave_halves_of_arcs(Program& program);
 
-/// Of Yaskawa's external axes, in pulses: those that carry the robot, and behind them those that carry the part.
+/// Of Yaskawa's external axes, in pulses: those that carry the robot, and behind them those that
+/// carry the part.
 constexpr int kFirstBaseAxis = 6, kFirstStationAxis = 12;
 /// Whether the robot stands elsewhere as soon as the axis is not at zero.
 [[nodiscard]] bool carries_robot(const Program& program, int axis);
-/// An external axis as a person calls it: `external axis b`, `group 2, axis 1` (FANUC), `base axis 1` (Yaskawa).
+/// An external axis as a person calls it: `external axis b`, `group 2, axis 1` (FANUC), `base axis
+/// 1` (Yaskawa).
 [[nodiscard]] std::string axis_called(const Program& program, int axis);
-/// Takes axes out of the targets that carry neither robot nor part, called as axis_called() does. Refuses a name that
-/// no axis of the program has.
+/// Takes axes out of the targets that carry neither robot nor part, called as axis_called() does.
+/// Refuses a name that no axis of the program has.
 [[nodiscard]] Status take_idle_axes(Program& program, const std::vector<std::string>& names);
 
 /// The number of the line of a byte, from 1.

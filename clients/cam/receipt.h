@@ -21,16 +21,19 @@ struct ReceiptRow {
   std::string status;  ///< `ok`, `out_of_domain`, ...; `refused` where the program leaves it open
   std::string message, suggestion;
   Coordinates coordinates = Coordinates::kQuaternion;
-  std::vector<double> before, after;  ///< numbers of the file, in its units; `after` as written, empty: left alone
-  std::vector<double> joints;         ///< deg, mm: what the controller will take; empty: left alone
+  std::vector<double> before,
+      after;  ///< numbers of the file, in its units; `after` as written, empty: left alone
+  std::vector<double> joints;  ///< deg, mm: what the controller will take; empty: left alone
   double error_before_mm = kNotKnown, error_after_mm = kNotKnown;
   double sigma_mm = kNotKnown;           ///< of the true error, per axis
   double sigma_measured_mm = kNotKnown;  ///< of one measurement
   double rounding_mm = kNotKnown;        ///< distance of what is written from what was computed
   int iterations = 0;
   bool folded = false;
-  bool moves_along = false;  ///< it is left as it was, and moves all the same: with a target that is corrected
-  /// Speed of the tool at which the first axis reaches its limit on the way from the target before; see path_check.h.
+  bool moves_along =
+      false;  ///< it is left as it was, and moves all the same: with a target that is corrected
+  /// Speed of the tool at which the first axis reaches its limit on the way from the target before;
+  /// see path_check.h.
   double path_limit_before_mm_s = kNotKnown, path_limit_after_mm_s = kNotKnown;
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, the wanted position
   Vector3 correction_B = Vector3::Zero();      ///< m, commanded - wanted position
@@ -54,7 +57,8 @@ struct CorrectedProgram {
   std::vector<InsertedLine> inserted;
   std::vector<std::string> notes;
   std::size_t moves = 0, moves_corrected = 0;
-  /// Largest change of the correction from a target to the next on a straight path, mm, and the latter's place.
+  /// Largest change of the correction from a target to the next on a straight path, mm, and the
+  /// latter's place.
   double largest_step_mm = 0;
   std::string largest_step_file = {};
   int largest_step_line = 0;

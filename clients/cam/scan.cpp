@@ -13,15 +13,16 @@ bool is_letter(char c) {
 
 class Scanner {
  public:
-  Scanner(std::string_view text, std::size_t begin, std::size_t end, int line, const ScanOptions& options)
+  Scanner(std::string_view text, std::size_t begin, std::size_t end, int line,
+          const ScanOptions& options)
       : text_(text.substr(0, end)), at_(begin), line_(line), options_(options) {}
 
   std::vector<Piece> all() {
     std::vector<Piece> pieces;
     while (skip_blanks()) {
-      const bool after_value =
-          !pieces.empty() && pieces.back().end == at_ &&
-          (pieces.back().kind != Piece::Kind::kSign || pieces.back().is(")") || pieces.back().is("]"));
+      const bool after_value = !pieces.empty() && pieces.back().end == at_ &&
+                               (pieces.back().kind != Piece::Kind::kSign || pieces.back().is(")") ||
+                                pieces.back().is("]"));
       pieces.push_back(next(after_value));
     }
     return pieces;
@@ -58,10 +59,13 @@ class Scanner {
       piece.end = number_end(at_ + first);
     } else if (is_letter(c)) {
       piece.kind = Piece::Kind::kWord;
-      while (piece.end < text_.size() && (is_letter(text_[piece.end]) || is_digit(text_[piece.end]))) ++piece.end;
+      while (piece.end < text_.size() &&
+             (is_letter(text_[piece.end]) || is_digit(text_[piece.end])))
+        ++piece.end;
     } else if (options_.quotes.find(c) != std::string_view::npos) {
       piece.kind = Piece::Kind::kText;
-      while (piece.end < text_.size() && text_[piece.end] != c && text_[piece.end] != '\n') ++piece.end;
+      while (piece.end < text_.size() && text_[piece.end] != c && text_[piece.end] != '\n')
+        ++piece.end;
       if (piece.end < text_.size() && text_[piece.end] == c) ++piece.end;
     }
     piece.text = text_.substr(at_, piece.end - at_);
@@ -75,7 +79,8 @@ class Scanner {
     if (at < text_.size() && text_[at] == '.') ++at;
     while (digit(at)) ++at;
     if (at < text_.size() && (text_[at] == 'e' || text_[at] == 'E')) {
-      const std::size_t sign = at + 1 < text_.size() && (text_[at + 1] == '+' || text_[at + 1] == '-') ? 2 : 1;
+      const std::size_t sign =
+          at + 1 < text_.size() && (text_[at + 1] == '+' || text_[at + 1] == '-') ? 2 : 1;
       if (digit(at + sign)) {
         at += sign;
         while (digit(at)) ++at;

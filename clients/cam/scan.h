@@ -23,8 +23,9 @@ struct ScanOptions {
   std::string_view quotes;   ///< each of them encloses texts
 };
 
-/// The pieces of text[begin, end). A sign belongs to a number where no value stands before it. `line`: of `begin`.
-[[nodiscard]] std::vector<Piece> pieces_of(std::string_view text, std::size_t begin, std::size_t end, int line,
-                                           const ScanOptions& options);
+/// The pieces of text[begin, end). A sign belongs to a number where no value stands before it.
+/// `line`: of `begin`.
+[[nodiscard]] std::vector<Piece> pieces_of(std::string_view text, std::size_t begin,
+                                           std::size_t end, int line, const ScanOptions& options);
 
 }  // namespace trammel::cam

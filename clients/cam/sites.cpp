@@ -39,7 +39,8 @@ std::string used_differently(const Program& program, const std::vector<SiteUse>&
   std::vector<std::string> texts;
   for (const SiteUse& way : ways) {
     texts.push_back(fmt::format("tool {} in {} ({} line {})", called(program.tools[way.tool]),
-                                shown(program.frames[way.frame].name), program.files[way.file].name, way.line));
+                                shown(program.frames[way.frame].name), program.files[way.file].name,
+                                way.line));
   }
   return fmt::format("it is used in different ways: {}", fmt::join(texts, ", "));
 }
@@ -72,7 +73,8 @@ void Sites::finish(Program& program, const Describe& describe) const {
       for (const SiteUse& use : site.uses) program.moves[use.move].left_some = true;
       continue;
     }
-    for (const SiteUse& use : site.uses) program.moves[use.move].targets.push_back(program.targets.size());
+    for (const SiteUse& use : site.uses)
+      program.moves[use.move].targets.push_back(program.targets.size());
     program.targets.push_back(std::move(target));
   }
 }

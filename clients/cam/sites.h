@@ -27,13 +27,14 @@ struct Site {
   std::vector<SiteUse> uses;
 };
 
-/// The places that motions of a program go to. One that is used with several tools or frames is told apart.
+/// The places that motions of a program go to. One that is used with several tools or frames is
+/// told apart.
 class Sites {
  public:
   void add(std::size_t file, std::size_t begin, const std::string& name, SiteUse use);
 
-  /// Says what stands at a site: fills coordinates, numbers, configuration, rewrites. Returns why it cannot be
-  /// corrected; empty: it can.
+  /// Says what stands at a site: fills coordinates, numbers, configuration, rewrites. Returns why
+  /// it cannot be corrected; empty: it can.
   using Describe = std::function<std::string(const Site& site, ProgramTarget& target)>;
   /// Adds a target to the program for each site, or what is left and why.
   void finish(Program& program, const Describe& describe) const;
@@ -43,6 +44,7 @@ class Sites {
 };
 
 /// `it is used in different ways: tool a in b (f.src line 3), ...`
-[[nodiscard]] std::string used_differently(const Program& program, const std::vector<SiteUse>& ways);
+[[nodiscard]] std::string used_differently(const Program& program,
+                                           const std::vector<SiteUse>& ways);
 
 }  // namespace trammel::cam

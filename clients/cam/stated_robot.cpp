@@ -23,10 +23,13 @@ constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
 constexpr double kSameUp = 0.09;      // rad: 5 deg
 
-double angle_between(const Vector3& a, const Vector3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+double angle_between(const Vector3& a, const Vector3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
 
 std::string direction_text(const Vector3& direction) {
-  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x() + 0.0, direction.y() + 0.0, direction.z() + 0.0);
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x() + 0.0, direction.y() + 0.0,
+                     direction.z() + 0.0);
 }
 
 std::string place_of(const StatedBase& base) {
@@ -50,7 +53,8 @@ std::optional<double> number_of(ArmNumber number, const Chain& robot) {
   if (!arm) return std::nullopt;
   if (number == ArmNumber::kAxes) return arm->size();
   const bool on_rail = arm->size() != robot.size();
-  if (!has_spherical_wrist(*arm) || (on_rail && number == ArmNumber::kHeightOfAxis2)) return std::nullopt;
+  if (!has_spherical_wrist(*arm) || (on_rail && number == ArmNumber::kHeightOfAxis2))
+    return std::nullopt;
   const auto link = [&](int j) { return arm->joint(j).link; };
   switch (number) {
     case ArmNumber::kHeightOfAxis2:
@@ -92,8 +96,8 @@ std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robo
   if (!ours) return std::nullopt;
   if (stated.of == ArmNumber::kAxes) {
     if (stated.value == *ours) return std::nullopt;
-    return refused("{} says {:g} {}, the robot file of {} has {:g}", stated.name, stated.value, words_for(stated.of),
-                   shown(robot.name()), *ours)
+    return refused("{} says {:g} {}, the robot file of {} has {:g}", stated.name, stated.value,
+                   words_for(stated.of), shown(robot.name()), *ours)
         .in(stated.file)
         .at_row(stated.line)
         .of(stated.name)
@@ -102,8 +106,9 @@ std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robo
   }
   const double apart = std::abs(std::abs(stated.value) - std::abs(*ours));
   if (apart <= kSameLength) return std::nullopt;
-  return refused("{} says {:.3f} mm {}, the robot file of {} has {:.3f} mm: {:.3f} mm apart", stated.name,
-                 to_mm(stated.value), words_for(stated.of), shown(robot.name()), to_mm(*ours), to_mm(apart))
+  return refused("{} says {:.3f} mm {}, the robot file of {} has {:.3f} mm: {:.3f} mm apart",
+                 stated.name, to_mm(stated.value), words_for(stated.of), shown(robot.name()),
+                 to_mm(*ours), to_mm(apart))
       .in(stated.file)
       .at_row(stated.line)
       .of(stated.name)
@@ -114,8 +119,10 @@ std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robo
 
 /// The digits behind `letters`: 210 of `KR 210 R2700` behind `KR`, 2700 behind `R`.
 std::string digits_behind(const std::string& type, const std::string& letters, std::size_t fewest) {
-  for (std::size_t at = type.find(letters); at != std::string::npos; at = type.find(letters, at + 1)) {
-    const std::size_t first = std::min(type.find_first_not_of(" _-", at + letters.size()), type.size());
+  for (std::size_t at = type.find(letters); at != std::string::npos;
+       at = type.find(letters, at + 1)) {
+    const std::size_t first =
+        std::min(type.find_first_not_of(" _-", at + letters.size()), type.size());
     const std::size_t end = std::min(type.find_first_not_of("0123456789", first), type.size());
     const bool whole = at == 0 || std::isalpha(static_cast<unsigned char>(type[at - 1])) == 0;
     if (whole && end - first >= fewest) return type.substr(first, end - first);
@@ -125,11 +132,14 @@ std::string digits_behind(const std::string& type, const std::string& letters, s
 
 /// ABB's number of a model: 6640 of `ROB1_6640_2.75_205`.
 std::string abb_model(const std::string& type) {
-  const std::size_t first = type.starts_with("ROB") ? std::min(type.find('_'), type.size() - 1) + 1 : type.size();
-  return type.substr(first, std::min(type.find_first_not_of("0123456789", first), type.size()) - first);
+  const std::size_t first =
+      type.starts_with("ROB") ? std::min(type.find('_'), type.size() - 1) + 1 : type.size();
+  return type.substr(first,
+                     std::min(type.find_first_not_of("0123456789", first), type.size()) - first);
 }
 
-/// m, of `ROB1_6640_2.75_205` and of `IRB 6640-205/2.75`: the number with a point; 0: there is none.
+/// m, of `ROB1_6640_2.75_205` and of `IRB 6640-205/2.75`: the number with a point; 0: there is
+/// none.
 double abb_reach(const std::string& type) {
   const std::size_t point = type.find('.');
   if (point == std::string::npos || point == 0) return 0;
@@ -159,8 +169,10 @@ bool has_bars(const std::string& abb) {
 
 std::optional<Error> contradiction(const StatedCoupling& stated, const Chain& robot) {
   if (coupling_of(robot, stated.axis) != nullptr) return std::nullopt;
-  return refused("{} {} says that axis {} follows another one, the robot file of {} has no coupling of it", stated.name,
-                 shown(stated.text), stated.axis + 1, shown(robot.name()))
+  return refused(
+             "{} {} says that axis {} follows another one, the robot file of {} has no coupling of "
+             "it",
+             stated.name, shown(stated.text), stated.axis + 1, shown(robot.name()))
       .in(stated.file)
       .at_row(stated.line)
       .of(stated.name)
@@ -172,19 +184,21 @@ std::optional<Error> contradiction(const StatedCoupling& stated, const Chain& ro
 std::optional<Error> contradiction(const StatedType& stated, const Chain& robot) {
   const std::string theirs = upper(stated.type), ours = upper(robot.name());
   const auto differ = [&](const std::string& letters, std::size_t fewest) {
-    const std::string a = digits_behind(theirs, letters, fewest), b = digits_behind(ours, letters, fewest);
+    const std::string a = digits_behind(theirs, letters, fewest),
+                      b = digits_behind(ours, letters, fewest);
     return !a.empty() && !b.empty() && a != b;
   };
   const std::string abb = abb_model(theirs), irb = digits_behind(ours, "IRB", 2);
   const bool both_abb = !abb.empty() && !irb.empty();
   const double reach = abb_reach(theirs), our_reach = abb_reach(ours);
-  const bool other_reach = both_abb && reach > 0 && our_reach > 0 && std::abs(reach - our_reach) > kSameReach;
+  const bool other_reach =
+      both_abb && reach > 0 && our_reach > 0 && std::abs(reach - our_reach) > kSameReach;
   const bool other_abb = (both_abb && abb != irb) || other_reach;
   if (!other_abb && has_bars(abb)) {
     const Coupling* coupling = coupling_of(robot, 2);
     if (coupling == nullptr || coupling->kind != CouplingKind::kParallelogram)
-      return refused("{} says {}, an arm whose axis 3 is held by bars, the robot file of {} has {}", stated.name,
-                     shown(stated.type), shown(robot.name()),
+      return refused("{} says {}, an arm whose axis 3 is held by bars, the robot file of {} has {}",
+                     stated.name, shown(stated.type), shown(robot.name()),
                      coupling == nullptr ? "no coupling of it" : "a coupling of kind controller")
           .in(stated.file)
           .at_row(stated.line)
@@ -194,7 +208,8 @@ std::optional<Error> contradiction(const StatedType& stated, const Chain& robot)
           .value();
   }
   if (!other_abb && !differ("KR", 1) && !differ("R", kFewest)) return std::nullopt;
-  return refused("{} says {}, the robot file is of {}", stated.name, shown(stated.type), shown(robot.name()))
+  return refused("{} says {}, the robot file is of {}", stated.name, shown(stated.type),
+                 shown(robot.name()))
       .in(stated.file)
       .at_row(stated.line)
       .of(stated.name)
@@ -228,12 +243,12 @@ Status check_stated_robot(const Program& program, const Chain& robot) {
   for (const StatedBase& base : program.bases) {
     const StatedBase& first = program.bases.front();
     if (same_place(base.X_WB, first.X_WB)) continue;
-    Failure two =
-        refused("the robot stands at {} in the controller's world by {}, at {} by {}: {}", pose_text(first.X_WB),
-                place_of(first), pose_text(base.X_WB), place_of(base), apart_text(first.X_WB, base.X_WB))
-            .in(base.file)
-            .of(base.name)
-            .next("mend the one that is wrong");
+    Failure two = refused("the robot stands at {} in the controller's world by {}, at {} by {}: {}",
+                          pose_text(first.X_WB), place_of(first), pose_text(base.X_WB),
+                          place_of(base), apart_text(first.X_WB, base.X_WB))
+                      .in(base.file)
+                      .of(base.name)
+                      .next("mend the one that is wrong");
     if (base.line > 0) two.value().row = base.line;
     problems.push_back(two.value());
   }
@@ -252,9 +267,10 @@ Status check_gravity(const Program& program, const CellTools& cell) {
   for (const StatedUp& up : program.ups) {
     const double apart = cell.gravity_B ? angle_between(up.up_B, -*cell.gravity_B) : 0;
     if (apart <= kSameUp) continue;
-    problems.push_back(refused("by {} up is {} in the robot's base, by the cell's base and gravity it is {}: the robot "
-                               "is mounted {:.0f} deg otherwise",
-                               up.name, direction_text(up.up_B), direction_text(-*cell.gravity_B), to_deg(apart))
+    problems.push_back(refused("by {} up is {} in the robot's base, by the cell's base and gravity "
+                               "it is {}: the robot is mounted {:.0f} deg otherwise",
+                               up.name, direction_text(up.up_B), direction_text(-*cell.gravity_B),
+                               to_deg(apart))
                            .in(up.file)
                            .at_row(up.line)
                            .of(up.name)
@@ -268,26 +284,28 @@ Status check_gravity(const Program& program, const CellTools& cell) {
 std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell) {
   if (program.bases.empty() || same_place(program.bases.front().X_WB, Pose::Identity())) return {};
   const StatedBase& base = program.bases.front();
-  std::string stands =
-      fmt::format("the robot stands at {} in the controller's world, by {}: targets are taken from there",
-                  pose_text(base.X_WB), place_of(base));
+  std::string stands = fmt::format(
+      "the robot stands at {} in the controller's world, by {}: targets are taken from there",
+      pose_text(base.X_WB), place_of(base));
   if (cell.X_WB && !same_place(*cell.X_WB, base.X_WB))
-    stands += fmt::format("; the cell's base, {}, is seen from its measuring system", pose_text(*cell.X_WB));
+    stands += fmt::format("; the cell's base, {}, is seen from its measuring system",
+                          pose_text(*cell.X_WB));
   std::vector<std::string> notes = {stands};
   const Vector3 up_B = base.X_WB.linear().transpose() * Vector3::UnitZ();
   const double tilted = cell.gravity_B ? angle_between(up_B, -*cell.gravity_B) : 0;
   if (tilted > kSameUp)
-    notes.push_back(
-        fmt::format("by {} up is {} in the robot's base, by the cell's base and gravity it is {}, {:.0f} "
-                    "deg off: see that the model is of a robot that is mounted so",
-                    place_of(base), direction_text(up_B), direction_text(-*cell.gravity_B), to_deg(tilted)));
+    notes.push_back(fmt::format(
+        "by {} up is {} in the robot's base, by the cell's base and gravity it is {}, {:.0f} deg "
+        "off: see that the model is of a robot that is mounted so",
+        place_of(base), direction_text(up_B), direction_text(-*cell.gravity_B), to_deg(tilted)));
   std::vector<std::string> rows;
   for (const ProgramFrame& frame : program.frames) {
     if (frame.in_base && !frame.row.empty()) rows.push_back(shown(frame.row));
   }
   if (!rows.empty())
-    notes.push_back(fmt::format("{} of --frames: taken as seen from the robot's base, not from the controller's world",
-                                fmt::join(rows, ", ")));
+    notes.push_back(fmt::format(
+        "{} of --frames: taken as seen from the robot's base, not from the controller's world",
+        fmt::join(rows, ", ")));
   return notes;
 }
 

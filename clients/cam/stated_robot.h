@@ -12,18 +12,20 @@ namespace trammel::cam {
 /// Adds what further files say.
 void take_stated(const StatedRobot& stated, StatedRobot& all);
 
-/// Makes the frames of a program seen from the robot's base: by a row `robot_base` of --frames, else by what the files
-/// say; where nobody says anything the controller's world is the base.
+/// Makes the frames of a program seen from the robot's base: by a row `robot_base` of --frames,
+/// else by what the files say; where nobody says anything the controller's world is the base.
 void stand_in_world(Program& program, const ReadOptions& options);
 
-/// Refuses two places that stand the robot differently, and lengths, axes or a type that are not those of `robot`, each
-/// with both places and values.
+/// Refuses two places that stand the robot differently, and lengths, axes or a type that are not
+/// those of `robot`, each with both places and values.
 [[nodiscard]] Status check_stated_robot(const Program& program, const Chain& robot);
 
-/// Refuses a program that says of its robot that it is mounted otherwise than the cell's base and gravity do.
+/// Refuses a program that says of its robot that it is mounted otherwise than the cell's base and
+/// gravity do.
 [[nodiscard]] Status check_gravity(const Program& program, const CellTools& cell);
 
-/// Where the robot was taken to stand, where that is not the origin of the controller's world; a sentence each.
+/// Where the robot was taken to stand, where that is not the origin of the controller's world; a
+/// sentence each.
 [[nodiscard]] std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell);
 
 }  // namespace trammel::cam

@@ -16,13 +16,15 @@ constexpr std::size_t kMost = 500;      // nobody jogs to more
 constexpr double kStep = 0.5;           // mm: plain coordinates are multiples of it
 constexpr double kSame = 1e-4;          // mm: below any written digit
 constexpr double kSameRotation = 5e-5;  // rad: a jogged wrist comes back to 1e-4 at best
-constexpr double kNearest = 20;         // mm: paths of CAM systems have their points closer together
-constexpr std::size_t kTenth = 10;      // of the poses, or one, may look drawn by chance
+constexpr double kNearest = 20;     // mm: paths of CAM systems have their points closer together
+constexpr std::size_t kTenth = 10;  // of the poses, or one, may look drawn by chance
 
 bool is_plain(double mm) { return std::abs(mm - kStep * std::round(mm / kStep)) < kSame; }
 
 /// An axis of the tool lies along one of the frame: nobody jogs that exactly.
-bool is_aligned(const Pose& X) { return X.linear().cwiseAbs().maxCoeff() > std::cos(kSameRotation); }
+bool is_aligned(const Pose& X) {
+  return X.linear().cwiseAbs().maxCoeff() > std::cos(kSameRotation);
+}
 
 bool share_a_number(const Pose& a, const Pose& b) {
   const Vector3 apart = ((a.translation() - b.translation()) * to_mm(1)).cwiseAbs();
@@ -53,16 +55,17 @@ double usual_step(const std::vector<Pose>& poses) {
 std::string note_on_taught_targets(const Program& program) {
   std::vector<Pose> poses;
   for (const ProgramTarget& target : program.targets) {
-    if (!is_joints(target.coordinates) && !target.folded) poses.push_back(pose_of(target.coordinates, target.numbers));
+    if (!is_joints(target.coordinates) && !target.folded)
+      poses.push_back(pose_of(target.coordinates, target.numbers));
   }
   if (poses.size() < kFewest || poses.size() > kMost || usual_step(poses) < kNearest) return "";
   std::size_t drawn = 0;
   for (std::size_t k = 0; k < poses.size(); ++k) drawn += looks_drawn(poses, k) ? 1 : 0;
   if (drawn > std::max<std::size_t>(1, poses.size() / kTenth)) return "";
   return fmt::format(
-      "{} of {} poses look taught: no number of them is round or stands twice. Taught positions hold the robot's "
-      "errors "
-      "already and get worse when they are corrected; correct only what was programmed off line",
+      "{} of {} poses look taught: no number of them is round or stands twice. Taught positions "
+      "hold the robot's errors already and get worse when they are corrected; correct only what "
+      "was programmed off line",
       poses.size() - drawn, poses.size());
 }
 

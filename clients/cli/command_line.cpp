@@ -52,10 +52,13 @@ std::string json_path_in(const std::vector<std::string>& words) {
   return "";
 }
 
-/// One line for each error, on standard error; as JSON, too, where that was asked for on standard output.
-int tell_errors(const Error& error, const std::string& command, const std::vector<std::string>& words) {
+/// One line for each error, on standard error; as JSON, too, where that was asked for on standard
+/// output.
+int tell_errors(const Error& error, const std::string& command,
+                const std::vector<std::string>& words) {
   const std::string name = command.empty() ? "trammel" : "trammel " + command;
-  for (const Error& one : apart(error)) fmt::print(stderr, "{}: {}\n", emphasised(name), sentence(one));
+  for (const Error& one : apart(error))
+    fmt::print(stderr, "{}: {}\n", emphasised(name), sentence(one));
   tell_refusal(error, json_path_in(words));
   return exit_code(error.code);
 }
@@ -102,16 +105,20 @@ void make_command_line(CLI::App& app, Action& chosen) {
   app.require_subcommand(0, 1);
   app.footer(std::string(common_footer()));
   add_commands(app, chosen);
-  for (CLI::App* command : app.get_subcommands([](CLI::App* one) { return !one->get_name().empty(); })) {
+  for (CLI::App* command :
+       app.get_subcommands([](CLI::App* one) { return !one->get_name().empty(); })) {
     const std::string examples(examples_of(command->get_name()));
-    command->footer((examples.empty() ? "" : "Examples:\n" + examples + "\n\n") + std::string(common_footer()));
+    command->footer((examples.empty() ? "" : "Examples:\n" + examples + "\n\n") +
+                    std::string(common_footer()));
   }
   set_help_format(app);
   need_finite_numbers(app);
 }
 
 int run_command_line(int argc, const char* const* argv) {
-  CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
+  CLI::App app(
+      "Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.",
+      "trammel");
   Action chosen;
   make_command_line(app, chosen);
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
@@ -123,7 +130,8 @@ int run_command_line(int argc, const char* const* argv) {
   const Result<std::vector<std::string>> all = with_defaults(app, words, defaults_path());
   if (!all) return tell_errors(all.error(), name, words);
   try {
-    app.parse(std::vector<std::string>(all->rbegin(), all->rend()));  // the parser takes them from the end
+    app.parse(std::vector<std::string>(all->rbegin(),
+                                       all->rend()));  // the parser takes them from the end
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return tell_help(app, error);
     return tell_errors(usage_error(app, error, name), name, words);

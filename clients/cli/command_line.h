@@ -10,11 +10,12 @@ namespace trammel::cli {
 
 class Action;
 
-/// All commands with their help, for `app`; what they do is put into `chosen`. Both outlive the parsing.
+/// All commands with their help, for `app`; what they do is put into `chosen`. Both outlive the
+/// parsing.
 void make_command_line(CLI::App& app, Action& chosen);
 
-/// The program `trammel`: reads the command line, does what it says, writes errors to standard error. Returns the exit
-/// code: 0, 2 wrong usage, 3 refused data, 4 unreachable or busy service.
+/// The program `trammel`: reads the command line, does what it says, writes errors to standard
+/// error. Returns the exit code: 0, 2 wrong usage, 3 refused data, 4 unreachable or busy service.
 [[nodiscard]] int run_command_line(int argc, const char* const* argv);
 
 [[nodiscard]] int exit_code(ErrorCode code);

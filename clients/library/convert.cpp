@@ -13,9 +13,12 @@ constexpr double kHottest = 1000;      // degrees Celsius, either side of zero
 constexpr double kFarthestMm = 1e6;    // of a position, as in files
 constexpr double kLargestJoint = 1e6;  // deg, of a rail mm
 
-bool is_rail(const Chain& robot, int joint) { return robot.joint(joint).type == JointType::kPrismatic; }
+bool is_rail(const Chain& robot, int joint) {
+  return robot.joint(joint).type == JointType::kPrismatic;
+}
 
-/// The code of the same name. One that is new in ours needs its line here: the compiler refuses a switch that lacks it.
+/// The code of the same name. One that is new in ours needs its line here: the compiler refuses a
+/// switch that lacks it.
 constexpr api::ErrorCode same_code(trammel::ErrorCode code) {
   using trammel::ErrorCode;
   switch (code) {
@@ -42,7 +45,8 @@ constexpr api::ErrorCode same_code(trammel::ErrorCode code) {
 /// Whether a code of the library, cast to ours, is the one of the same name.
 constexpr bool casts_keep_names() {
   for (int k = 0; k <= static_cast<int>(trammel::ErrorCode::kInternal); ++k)
-    if (same_code(static_cast<trammel::ErrorCode>(k)) != static_cast<api::ErrorCode>(k)) return false;
+    if (same_code(static_cast<trammel::ErrorCode>(k)) != static_cast<api::ErrorCode>(k))
+      return false;
   return true;
 }
 static_assert(casts_keep_names());
@@ -86,7 +90,9 @@ Result<Pose> from_api(const api::Pose& X_AB) {
   const Vector3 p_mm(X_AB.xyz_mm[0], X_AB.xyz_mm[1], X_AB.xyz_mm[2]);
   for (const double mm : X_AB.xyz_mm) {
     if (!(std::abs(mm) <= kFarthestMm))
-      return refused("position is {} mm, limit {:.0f}", mm, kFarthestMm).of("xyz_mm").beyond(mm, kFarthestMm);
+      return refused("position is {} mm, limit {:.0f}", mm, kFarthestMm)
+          .of("xyz_mm")
+          .beyond(mm, kFarthestMm);
   }
   const Eigen::Quaterniond R(X_AB.q_wxyz[0], X_AB.q_wxyz[1], X_AB.q_wxyz[2], X_AB.q_wxyz[3]);
   if (!(std::abs(R.norm() - 1) <= kUnitLength)) {
@@ -99,13 +105,15 @@ Result<Pose> from_api(const api::Pose& X_AB) {
 
 std::vector<double> joints_to_api(const JointVector& q, const Chain& robot) {
   std::vector<double> joints;
-  for (int j = 0; j < q.size(); ++j) joints.push_back(is_rail(robot, j) ? to_mm(q(j)) : to_deg(q(j)));
+  for (int j = 0; j < q.size(); ++j)
+    joints.push_back(is_rail(robot, j) ? to_mm(q(j)) : to_deg(q(j)));
   return joints;
 }
 
 Result<JointVector> joints_from_api(std::span<const double> joints_deg, const Chain& robot) {
   if (joints_deg.size() != static_cast<std::size_t>(robot.size())) {
-    return failure(ErrorCode::kUsage, "{} joints, robot {} has {}", joints_deg.size(), robot.name(), robot.size())
+    return failure(ErrorCode::kUsage, "{} joints, robot {} has {}", joints_deg.size(), robot.name(),
+                   robot.size())
         .of("joints_deg")
         .beyond(joints_deg.size(), robot.size());
   }
@@ -122,11 +130,13 @@ Result<JointVector> joints_from_api(std::span<const double> joints_deg, const Ch
   return q;
 }
 
-Result<std::vector<JointVector>> all_joints_from_api(std::span<const double> joints_deg, const Chain& robot) {
+Result<std::vector<JointVector>> all_joints_from_api(std::span<const double> joints_deg,
+                                                     const Chain& robot) {
   const auto n = static_cast<std::size_t>(robot.size());
   if (joints_deg.size() % n != 0) {
-    return failure(ErrorCode::kUsage, "{} joint values, not a multiple of the {} joints of robot {}", joints_deg.size(),
-                   n, robot.name())
+    return failure(ErrorCode::kUsage,
+                   "{} joint values, not a multiple of the {} joints of robot {}",
+                   joints_deg.size(), n, robot.name())
         .of("joints_deg")
         .beyond(joints_deg.size(), n);
   }
@@ -143,13 +153,16 @@ Result<std::vector<JointVector>> all_joints_from_api(std::span<const double> joi
 Status check_context(const api::Context& context, const Chain& robot) {
   const auto count = static_cast<int>(context.directions.size());
   if (count != 0 && count != robot.size()) {
-    return failure(ErrorCode::kUsage, "{} directions, robot {} has {} joints", count, robot.name(), robot.size())
+    return failure(ErrorCode::kUsage, "{} directions, robot {} has {} joints", count, robot.name(),
+                   robot.size())
         .of("directions")
         .beyond(count, robot.size());
   }
   for (const int direction : context.directions) {
     if (direction < -1 || direction > 1)
-      return refused("direction is {}, not -1, 0 or 1", direction).of("directions").beyond(direction, 1);
+      return refused("direction is {}, not -1, 0 or 1", direction)
+          .of("directions")
+          .beyond(direction, 1);
   }
   if (context.temperature_c && !(std::abs(*context.temperature_c) <= kHottest)) {
     return refused("temperature is {} C, limit {:.0f}", *context.temperature_c, kHottest)
@@ -163,6 +176,8 @@ Status check_context(const api::Context& context, const Chain& robot) {
 
 namespace trammel::api {
 
-std::string to_text(ErrorCode code) { return trammel::to_text(static_cast<trammel::ErrorCode>(code)); }
+std::string to_text(ErrorCode code) {
+  return trammel::to_text(static_cast<trammel::ErrorCode>(code));
+}
 
 }  // namespace trammel::api

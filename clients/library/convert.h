@@ -27,11 +27,14 @@ template <typename T>
 /// deg, of a rail mm.
 [[nodiscard]] std::vector<double> joints_to_api(const JointVector& q, const Chain& robot);
 /// Refuses another number of joints than the robot has, and numbers that are not finite.
-[[nodiscard]] Result<JointVector> joints_from_api(std::span<const double> joints_deg, const Chain& robot);
-/// Joint vectors one after the other. Refuses likewise, and an incomplete last one; `row` of the error is its index.
-[[nodiscard]] Result<std::vector<JointVector>> all_joints_from_api(std::span<const double> joints_deg,
-                                                                   const Chain& robot);
-/// Refuses directions other than -1, 0 and 1, another number of them than joints, and a temperature that is none.
+[[nodiscard]] Result<JointVector> joints_from_api(std::span<const double> joints_deg,
+                                                  const Chain& robot);
+/// Joint vectors one after the other. Refuses likewise, and an incomplete last one; `row` of the
+/// error is its index.
+[[nodiscard]] Result<std::vector<JointVector>> all_joints_from_api(
+    std::span<const double> joints_deg, const Chain& robot);
+/// Refuses directions other than -1, 0 and 1, another number of them than joints, and a temperature
+/// that is none.
 [[nodiscard]] Status check_context(const api::Context& context, const Chain& robot);
 
 }  // namespace trammel::library

@@ -44,15 +44,18 @@ constexpr double kLargestShare = 0.9;        // of the rows that may be held out
 
 trammel::Status check_share(double share) {
   if (share >= 0 && share <= kLargestShare) return {};
-  return failure(trammel::ErrorCode::kUsage, "validation_share is {}, limits 0 and {}", share, kLargestShare)
+  return failure(trammel::ErrorCode::kUsage, "validation_share is {}, limits 0 and {}", share,
+                 kLargestShare)
       .of("validation_share")
       .beyond(share, kLargestShare);
 }
 
-/// Batches made ready for a cell, each a session of its own or as many as its column says. Two of one name get numbers.
+/// Batches made ready for a cell, each a session of its own or as many as its column says. Two of
+/// one name get numbers.
 trammel::Result<CheckedBatch> checked(std::span<const Batch> batches, const trammel::Cell& cell,
                                       const HoldOut& hold_out) {
-  if (batches.empty()) return failure(trammel::ErrorCode::kUsage, "no batch, at least 1 is needed").of("batches");
+  if (batches.empty())
+    return failure(trammel::ErrorCode::kUsage, "no batch, at least 1 is needed").of("batches");
   std::map<std::string, int> met;
   std::vector<CheckedBatch> all;
   for (const Batch& batch : batches) {
@@ -67,13 +70,16 @@ trammel::Result<CheckedBatch> checked(std::span<const Batch> batches, const tram
 
 /// The cell, unless its own model could not be trained.
 trammel::Status trainable(const Cell& cell, SpecUse use) {
-  std::vector<trammel::Error> problems = check_model_spec(*cell.inside().cell, cell.inside().where, use);
+  std::vector<trammel::Error> problems =
+      check_model_spec(*cell.inside().cell, cell.inside().where, use);
   if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
   return {};
 }
 
 std::array<double, 3> mm(const Vector3& v) { return {to_mm(v.x()), to_mm(v.y()), to_mm(v.z())}; }
-std::array<double, 3> deg(const Vector3& v) { return {to_deg(v.x()), to_deg(v.y()), to_deg(v.z())}; }
+std::array<double, 3> deg(const Vector3& v) {
+  return {to_deg(v.x()), to_deg(v.y()), to_deg(v.z())};
+}
 
 Prediction prediction_of(const ErrorPrediction& p) {
   Prediction out;
@@ -105,7 +111,8 @@ CorrectedTarget corrected(const Correction& c, const Chain& robot) {
 }
 
 Figures figures_from(const ErrorFigures& f) {
-  return {to_mm(f.rms), to_mm(f.mean), to_mm(f.p997), to_mm(f.max), mm(f.axis_mean), mm(f.axis_stddev)};
+  return {to_mm(f.rms), to_mm(f.mean),   to_mm(f.p997),
+          to_mm(f.max), mm(f.axis_mean), mm(f.axis_stddev)};
 }
 
 Evaluation evaluation_of(const trammel::Evaluation& e) {
@@ -122,14 +129,15 @@ Evaluation evaluation_of(const trammel::Evaluation& e) {
                  e.coverage_95_stated};
   if (e.nlpd) out.nlpd = nlpd_in_mm(*e.nlpd);
   if (const auto& o = e.orientation) {
-    out.orientation =
-        OrientationErrors{o->poses, to_deg(o->nominal), to_deg(o->calibrated), to_deg(o->compensated), o->coverage_95};
+    out.orientation = OrientationErrors{o->poses, to_deg(o->nominal), to_deg(o->calibrated),
+                                        to_deg(o->compensated), o->coverage_95};
   }
   return out;
 }
 
 /// A target as the model takes it. Refuses what a file of targets would.
-trammel::Result<trammel::Target> target_from(const Target& asked, const Context& context, const Chain& robot) {
+trammel::Result<trammel::Target> target_from(const Target& asked, const Context& context,
+                                             const Chain& robot) {
   trammel::Target target;
   target.direction = context.directions;
   target.temperature = context.temperature_c;
@@ -143,12 +151,14 @@ trammel::Result<trammel::Target> target_from(const Target& asked, const Context&
   const trammel::Result<trammel::Pose> X_BT = from_api(*asked.pose);
   if (!X_BT) return tl::make_unexpected(X_BT.error());
   target.X_BT = *X_BT;
-  if (!asked.conf && !target.seed) return refused("neither conf nor joints near the wanted branch").of("conf");
+  if (!asked.conf && !target.seed)
+    return refused("neither conf nor joints near the wanted branch").of("conf");
   if (!asked.conf) return target;
   if (*asked.conf < 0 || *asked.conf > 7)
     return refused("conf is {}, limits 0 and 7", *asked.conf).of("conf").beyond(*asked.conf, 7);
   if (!has_spherical_wrist(robot)) {
-    return refused("conf is {}, but robot {} has no spherical wrist to number branches by", *asked.conf, robot.name())
+    return refused("conf is {}, but robot {} has no spherical wrist to number branches by",
+                   *asked.conf, robot.name())
         .of("conf")
         .with_value(*asked.conf)
         .next("give joints_deg");
@@ -168,7 +178,8 @@ trammel::Result<Context> known_context(const CompensatedModel& model, Context co
   return context;
 }
 
-trammel::Result<std::vector<PoseContext>> contexts(std::span<const double> joints_deg, const Context& context,
+trammel::Result<std::vector<PoseContext>> contexts(std::span<const double> joints_deg,
+                                                   const Context& context,
                                                    const trammel::Cell& cell) {
   auto all = TRY(library::all_joints_from_api(joints_deg, cell.robot));
   std::vector<PoseContext> poses(all.size());
@@ -195,7 +206,8 @@ bool goes_on(const Progress& progress, const std::string& stage, double share) {
 Result<Cell> Cell::load(const std::string& path) {
   auto cell = read_cell(path);
   if (!cell) return passed_on(cell);
-  return Cell(std::make_shared<const Inside>(Inside{std::make_shared<const trammel::Cell>(std::move(*cell)), path}));
+  return Cell(std::make_shared<const Inside>(
+      Inside{std::make_shared<const trammel::Cell>(std::move(*cell)), path}));
 }
 std::string Cell::name() const { return inside_->cell->name; }
 std::string Cell::robot() const { return inside_->cell->robot.name(); }
@@ -256,12 +268,14 @@ std::string Model::text() const { return serialize(inside_->model); }
 
 ModelFacts Model::facts() const {
   const ModelProvenance& from = inside_->model.provenance();
-  return {from.id, from.hash, inside_->model.cell().name, from.level, from.batch_id, from.training_poses, 0,
-          false,   notes()};
+  return {from.id,    from.hash,     inside_->model.cell().name,
+          from.level, from.batch_id, from.training_poses,
+          0,          false,         notes()};
 }
 Cell Model::cell() const {
   const auto& cell = inside_->model.parts().physics.cell;
-  return Cell(std::make_shared<const Cell::Inside>(Cell::Inside{cell, "model " + inside_->model.provenance().id}));
+  return Cell(std::make_shared<const Cell::Inside>(
+      Cell::Inside{cell, "model " + inside_->model.provenance().id}));
 }
 std::string Model::bias() const {
   const auto& bias = inside_->model.parts().bias;
@@ -272,7 +286,8 @@ std::vector<Parameter> Model::parameters() const {
   std::vector<Parameter> all;
   for (const IdentifiedParameter& p : inside_->model.parts().parameters) {
     const double scale = p.parameter.scale;
-    all.push_back({p.parameter.name, p.parameter.unit, scale * p.value, kExpanded * scale * p.stddev, p.identified});
+    all.push_back({p.parameter.name, p.parameter.unit, scale * p.value,
+                   kExpanded * scale * p.stddev, p.identified});
   }
   return all;
 }
@@ -282,7 +297,9 @@ std::vector<double> Model::parameter_covariance() const {
   std::vector<double> all;
   for (Eigen::Index i = 0; i < parts.covariance.rows(); ++i) {
     for (Eigen::Index j = 0; j < parts.covariance.cols(); ++j) {
-      const auto scale = [&](Eigen::Index k) { return parts.parameters[static_cast<std::size_t>(k)].parameter.scale; };
+      const auto scale = [&](Eigen::Index k) {
+        return parts.parameters[static_cast<std::size_t>(k)].parameter.scale;
+      };
       all.push_back(scale(i) * scale(j) * parts.covariance(i, j));
     }
   }
@@ -306,7 +323,8 @@ Measured Model::measured() const {
     out.from_above.push_back(joint.falling);
     out.from_below.push_back(joint.rising);
   }
-  if (known->temperature) std::tie(out.temperature_min_c, out.temperature_max_c) = *known->temperature;
+  if (known->temperature)
+    std::tie(out.temperature_min_c, out.temperature_max_c) = *known->temperature;
   out.lower_mm = mm(known->lower);
   out.upper_mm = mm(known->upper);
   out.volume_m3 = known->volume;
@@ -321,7 +339,8 @@ std::string Model::budget_json() const {
 
 std::vector<Note> Model::notes() const { return library::to_api(notes_of(inside_->model)); }
 
-Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg, const Context& context) const {
+Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg,
+                                               const Context& context) const {
   const CompensatedModel& model = inside_->model;
   const auto known = known_context(model, context);
   if (!known) return passed_on(known);
@@ -332,12 +351,14 @@ Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_de
   for (std::size_t first = 0; first < poses->size(); first += kPosesTogether) {
     const auto from = poses->begin() + static_cast<std::ptrdiff_t>(first);
     const auto count = static_cast<std::ptrdiff_t>(std::min(kPosesTogether, poses->size() - first));
-    for (const ErrorPrediction& p : model.predict_all({from, from + count})) all.push_back(prediction_of(p));
+    for (const ErrorPrediction& p : model.predict_all({from, from + count}))
+      all.push_back(prediction_of(p));
   }
   return all;
 }
 
-Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targets, const Context& context) const {
+Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targets,
+                                                    const Context& context) const {
   const CompensatedModel& model = inside_->model;
   const Chain& robot = model.cell().robot;
   const auto known = known_context(model, context);
@@ -345,7 +366,9 @@ Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targ
   std::vector<trammel::Target> wanted;
   for (const Target& target : targets) {
     auto one = target_from(target, *known, robot);
-    if (!one) return tl::make_unexpected(to_api(Failure(one.error()).at_row(static_cast<long>(wanted.size())).value()));
+    if (!one)
+      return tl::make_unexpected(
+          to_api(Failure(one.error()).at_row(static_cast<long>(wanted.size())).value()));
     wanted.push_back(std::move(*one));
   }
   std::vector<CorrectedTarget> all;
@@ -372,8 +395,10 @@ Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
 Result<Model> train(const Cell& cell, std::span<const Batch> batches, const TrainOptions& options) {
   const auto fits = trainable(cell, {.error_sources = !options.level, .bias = !options.bias});
   if (!fits) return passed_on(fits);
-  if (const auto fits_too = check_share(options.validation_share); !fits_too) return passed_on(fits_too);
-  const auto batch = checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
+  if (const auto fits_too = check_share(options.validation_share); !fits_too)
+    return passed_on(fits_too);
+  const auto batch =
+      checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
   if (!batch) return passed_on(batch);
   if (!options.as_read) {
     const auto first = check_first_batch(cell.inside().cell, *batch, options.level);
@@ -385,26 +410,32 @@ Result<Model> train(const Cell& cell, std::span<const Batch> batches, const Trai
   how.bias = options.bias;
   how.seed = options.seed;
   how.trained_at = unix_now();
-  how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
+  how.progress = [&](const std::string& stage, double share) {
+    return goes_on(options.progress, stage, share);
+  };
   auto model = trammel::train(cell.inside().cell, *batch, how);
   if (!model) return passed_on(model);
   return Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(*model)}));
 }
 
-Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
+Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches,
+                             const DiagnoseOptions& options) {
   const auto fits = trainable(cell, {});
   if (!fits) return passed_on(fits);
   const auto batch = checked(batches, *cell.inside().cell, drawn(0, options.seed));
   if (!batch) return passed_on(batch);
   trammel::DiagnoseOptions how;
   how.seed = options.seed;
-  how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
+  how.progress = [&](const std::string& stage, double share) {
+    return goes_on(options.progress, stage, share);
+  };
   const auto found = trammel::diagnose(cell.inside().cell, *batch, how);
   if (!found) return tl::make_unexpected(to_api(with_rows_set_aside(found.error(), *batch)));
   return diagnosis_json(*found, notes_of(*cell.inside().cell)).dump(2);
 }
 
-Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
+Result<Extension> extend(const Cell& cell, std::span<const Batch> batches,
+                         const DiagnoseOptions& options) {
   const auto fits = trainable(cell, {});
   if (!fits) return passed_on(fits);
   const std::shared_ptr<const trammel::Cell>& of = cell.inside().cell;
@@ -428,7 +459,8 @@ Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const
   Extension told{diagnosis_json(*found, notes_of(*of)).dump(2), {}, {}, extended->why_not};
   if (!told.why_not.empty()) return told;
   told.error_sources = std::move(extended->extension->lasting);
-  told.model = Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(extended->extension->after)}));
+  told.model = Model(
+      std::make_shared<const Model::Inside>(Model::Inside{std::move(extended->extension->after)}));
   return told;
 }
 
@@ -458,7 +490,8 @@ trammel::Result<trammel::PlanOptions> plan_options(const PlanOptions& asked) {
     options.other = asked.criterion.substr(comma + 1);
   } else {
     return failure(trammel::ErrorCode::kUsage,
-                   "criterion '{}': expected lhs, observability, check or separate:CAUSE,CAUSE", asked.criterion)
+                   "criterion '{}': expected lhs, observability, check or separate:CAUSE,CAUSE",
+                   asked.criterion)
         .of("criterion")
         .with_text(asked.criterion);
   }
@@ -482,7 +515,8 @@ Result<Plan> plan(const Cell& cell, const PlanOptions& options) {
     if (of.tools.size() == 1) commanded.context.tool.clear();
     if (of.payloads.size() == 1) commanded.context.payload.clear();
     out.pose_ids.push_back(pose.id);
-    for (const double joint : joints_to_api(pose.context.q, of.robot)) out.joints_deg.push_back(joint);
+    for (const double joint : joints_to_api(pose.context.q, of.robot))
+      out.joints_deg.push_back(joint);
   }
   out.csv = to_csv(list);
   return out;
@@ -503,7 +537,8 @@ Result<Batch> simulate(const Cell& cell, const std::string& truth, const std::st
   auto batch = trammel::simulate(*robot, poses, how);
   if (!batch) return passed_on(batch);
   batch->joint_types = list->joint_types;
-  for (std::size_t i = 0; i < poses.size(); ++i) batch->measurements[i].pose_id = list->poses[i].pose_id;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    batch->measurements[i].pose_id = list->poses[i].pose_id;
   return Batch::parse(to_csv(*batch), "simulated");
 }
 

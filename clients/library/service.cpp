@@ -27,8 +27,9 @@ struct Session::Inside {
       const MutexLock lock(mutex);
       if (const auto known = robots.find(cell); known != robots.end()) return known->second;
     }
-    const auto model = TRY(session->export_model(cell, 0).and_then(
-        [&](const std::string& text) { return deserialize(text, "model of cell " + cell, ModelTexts::kAsTheyAre); }));
+    const auto model = TRY(session->export_model(cell, 0).and_then([&](const std::string& text) {
+      return deserialize(text, "model of cell " + cell, ModelTexts::kAsTheyAre);
+    }));
     const MutexLock lock(mutex);
     return robots.try_emplace(cell, model.cell().robot).first->second;
   }
@@ -42,7 +43,9 @@ client::CallContext context_of(const Asked& asked) {
   return {asked.cell, asked.context.tool, asked.context.payload, asked.controller_compensates, {}};
 }
 
-client::Approach approach_of(const Context& context) { return {context.directions, context.temperature_c, {}}; }
+client::Approach approach_of(const Context& context) {
+  return {context.directions, context.temperature_c, {}};
+}
 
 /// rad, of a rail mm.
 std::vector<double> to_wire(const JointVector& q, const Chain& robot) {
@@ -57,7 +60,8 @@ std::vector<double> to_wire(const JointVector& q, const Chain& robot) {
 std::vector<double> from_wire(const std::vector<double>& joints, const Chain& robot) {
   std::vector<double> joints_deg = joints;
   for (std::size_t j = 0; j < joints.size() && j < static_cast<std::size_t>(robot.size()); ++j) {
-    if (robot.joint(static_cast<int>(j)).type == JointType::kRevolute) joints_deg[j] = to_deg(joints[j]);
+    if (robot.joint(static_cast<int>(j)).type == JointType::kRevolute)
+      joints_deg[j] = to_deg(joints[j]);
   }
   return joints_deg;
 }
@@ -68,7 +72,9 @@ client::PoseMm to_wire(const trammel::Pose& X_BT) {
   return {p[0], p[1], p[2], q[0], q[1], q[2], q[3]};
 }
 
-Pose from_wire(const client::PoseMm& p) { return {{p.x_mm, p.y_mm, p.z_mm}, {p.qw, p.qx, p.qy, p.qz}}; }
+Pose from_wire(const client::PoseMm& p) {
+  return {{p.x_mm, p.y_mm, p.z_mm}, {p.qw, p.qx, p.qy, p.qz}};
+}
 
 Prediction from_wire(const client::PredictedError& p) {
   const auto square = [](double s) { return s * s; };
@@ -81,18 +87,28 @@ Prediction from_wire(const client::PredictedError& p) {
   out.covariance_mm2 = {square(p.sx_mm), p.cxy_mm2, p.cxz_mm2, p.cxy_mm2,      square(p.sy_mm),
                         p.cyz_mm2,       p.cxz_mm2, p.cyz_mm2, square(p.sz_mm)};
   out.rotation_deg = {to_deg(p.rx_rad), to_deg(p.ry_rad), to_deg(p.rz_rad)};
-  if (!std::isnan(p.srx_rad)) out.rotation_stddev_deg = {to_deg(p.srx_rad), to_deg(p.sry_rad), to_deg(p.srz_rad)};
+  if (!std::isnan(p.srx_rad))
+    out.rotation_stddev_deg = {to_deg(p.srx_rad), to_deg(p.sry_rad), to_deg(p.srz_rad)};
   out.in_domain = p.in_domain;
   out.bias_share = p.bias_share;
   return out;
 }
 
 CorrectedTarget from_wire(const client::CorrectedTarget& t, const Chain& robot) {
-  return {t.status,   from_wire(t.commanded),    from_wire(t.q_rad, robot), t.error_before_mm, t.error_after_mm,
-          t.sigma_mm, to_deg(t.turn_before_rad), to_deg(t.turn_after_rad),  t.iterations,      t.message};
+  return {t.status,
+          from_wire(t.commanded),
+          from_wire(t.q_rad, robot),
+          t.error_before_mm,
+          t.error_after_mm,
+          t.sigma_mm,
+          to_deg(t.turn_before_rad),
+          to_deg(t.turn_after_rad),
+          t.iterations,
+          t.message};
 }
 
-trammel::Result<client::TargetMm> to_wire(const Target& target, const Context& context, const Chain& robot) {
+trammel::Result<client::TargetMm> to_wire(const Target& target, const Context& context,
+                                          const Chain& robot) {
   client::TargetMm wire;
   wire.joint_target = !target.pose;
   wire.conf = target.conf;
@@ -143,7 +159,8 @@ Result<Session> Session::open(const SessionOptions& options) {
   how.timeout = std::min(options.timeout, kLongestTimeout);
   how.security = options.security;
   auto places = parse_hosts(options.hosts, options.ports);
-  if (!places) return tl::make_unexpected(library::to_api(Failure(places.error()).of("hosts").value()));
+  if (!places)
+    return tl::make_unexpected(library::to_api(Failure(places.error()).of("hosts").value()));
   how.servers = *std::move(places);
   auto session = client::Session::open(how);
   if (!session) return passed_on(session);
@@ -161,7 +178,8 @@ Result<std::vector<Server>> Session::servers() const {
 }
 
 Result<std::vector<ModelFacts>> Session::models(const std::string& cell) const {
-  const auto models = cell.empty() ? inside_->session->model_status() : inside_->session->models(cell);
+  const auto models =
+      cell.empty() ? inside_->session->model_status() : inside_->session->models(cell);
   if (!models) return passed_on(models);
   return each<ModelFacts>(*models, facts_of);
 }
@@ -172,25 +190,31 @@ Result<std::string> Session::export_model(const std::string& cell, int version) 
   return std::move(*text);
 }
 
-Result<Answer<Prediction>> Session::predict(const Asked& asked, std::span<const double> joints_deg) const {
+Result<Answer<Prediction>> Session::predict(const Asked& asked,
+                                            std::span<const double> joints_deg) const {
   const auto robot = inside_->robot_of(asked.cell);
   if (!robot) return passed_on(robot);
-  if (const auto fits = library::check_context(asked.context, *robot); !fits) return passed_on(fits);
+  if (const auto fits = library::check_context(asked.context, *robot); !fits)
+    return passed_on(fits);
   const auto all = library::all_joints_from_api(joints_deg, *robot);
   if (!all) return passed_on(all);
   std::vector<client::CommandedJoints> poses;
-  for (const JointVector& q : *all) poses.push_back({to_wire(q, *robot), approach_of(asked.context)});
+  for (const JointVector& q : *all)
+    poses.push_back({to_wire(q, *robot), approach_of(asked.context)});
   const auto answer = inside_->session->predict_error_at(context_of(asked), poses);
   if (!answer) return passed_on(answer);
-  return Answer<Prediction>{
-      facts_of(answer->model),
-      each<Prediction>(answer->items, [](const client::PredictedError& p) { return from_wire(p); })};
+  return Answer<Prediction>{facts_of(answer->model),
+                            each<Prediction>(answer->items, [](const client::PredictedError& p) {
+                              return from_wire(p);
+                            })};
 }
 
-Result<Answer<CorrectedTarget>> Session::correct(const Asked& asked, std::span<const Target> targets) const {
+Result<Answer<CorrectedTarget>> Session::correct(const Asked& asked,
+                                                 std::span<const Target> targets) const {
   const auto robot = inside_->robot_of(asked.cell);
   if (!robot) return passed_on(robot);
-  if (const auto fits = library::check_context(asked.context, *robot); !fits) return passed_on(fits);
+  if (const auto fits = library::check_context(asked.context, *robot); !fits)
+    return passed_on(fits);
   std::vector<client::TargetMm> wanted;
   for (const Target& target : targets) {
     auto wire = to_wire(target, asked.context, *robot);
@@ -203,7 +227,8 @@ Result<Answer<CorrectedTarget>> Session::correct(const Asked& asked, std::span<c
   if (!answer) return passed_on(answer);
   return Answer<CorrectedTarget>{
       facts_of(answer->model),
-      each<CorrectedTarget>(answer->items, [&](const client::CorrectedTarget& t) { return from_wire(t, *robot); })};
+      each<CorrectedTarget>(
+          answer->items, [&](const client::CorrectedTarget& t) { return from_wire(t, *robot); })};
 }
 
 Result<std::int64_t> Session::submit(const std::string& cell, const std::string& batch_id,
@@ -213,24 +238,27 @@ Result<std::int64_t> Session::submit(const std::string& cell, const std::string&
   return *job;
 }
 
-Result<std::int64_t> Session::retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
+Result<std::int64_t> Session::retrain(const std::string& cell,
+                                      const std::vector<std::string>& batch_ids,
                                       const std::string& level, const std::string& bias) const {
   const auto job = inside_->session->train(cell, batch_ids, level, bias);
   if (!job) return passed_on(job);
   return *job;
 }
 
-Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id, const std::string& csv,
-                                       bool apply) const {
+Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id,
+                                       const std::string& csv, bool apply) const {
   const auto job = inside_->session->diagnose(cell, batch_id, csv, apply);
   if (!job) return passed_on(job);
   return *job;
 }
 
-Result<std::int64_t> Session::check(const std::string& cell, const std::string& batch_id, const std::string& csv,
+Result<std::int64_t> Session::check(const std::string& cell, const std::string& batch_id,
+                                    const std::string& csv,
                                     std::optional<double> tolerance_mm) const {
   const double as_the_cell_says = std::numeric_limits<double>::quiet_NaN();
-  const auto job = inside_->session->check_health(cell, batch_id, csv, tolerance_mm.value_or(as_the_cell_says));
+  const auto job =
+      inside_->session->check_health(cell, batch_id, csv, tolerance_mm.value_or(as_the_cell_says));
   if (!job) return passed_on(job);
   return *job;
 }
@@ -243,9 +271,10 @@ Result<std::string> Session::findings(const std::string& cell, std::int64_t job)
 
 Result<Job> Session::wait_for(std::int64_t job, std::chrono::milliseconds limit,
                               const std::function<void(const Job&)>& listener) const {
-  const auto last = inside_->session->wait_for_job(job, limit, [&](const client::JobStatus& status) {
-    if (listener) listener(job_of(status));
-  });
+  const auto last =
+      inside_->session->wait_for_job(job, limit, [&](const client::JobStatus& status) {
+        if (listener) listener(job_of(status));
+      });
   if (!last) return passed_on(last);
   return job_of(*last);
 }
@@ -258,7 +287,8 @@ Result<std::vector<Job>> Session::jobs(const std::string& cell) const {
 
 namespace {
 
-client::ChangeOptions decided_against(std::optional<int> expected_version, const std::string& reason) {
+client::ChangeOptions decided_against(std::optional<int> expected_version,
+                                      const std::string& reason) {
   client::ChangeOptions change;
   change.expected_version = expected_version;
   change.reason = reason;
@@ -289,16 +319,18 @@ Result<int> Session::roll_back(const std::string& cell, const std::string& reaso
   return *now;
 }
 
-Status Session::release(const std::string& cell, const std::string& batch_id, const std::string& reason,
-                        std::optional<int> expected_version) const {
-  const auto done = inside_->session->release(cell, batch_id, decided_against(expected_version, reason));
+Status Session::release(const std::string& cell, const std::string& batch_id,
+                        const std::string& reason, std::optional<int> expected_version) const {
+  const auto done =
+      inside_->session->release(cell, batch_id, decided_against(expected_version, reason));
   if (!done) return passed_on(done);
   return {};
 }
 
-Status Session::discard(const std::string& cell, const std::string& batch_id, const std::string& reason,
-                        std::optional<int> expected_version) const {
-  const auto done = inside_->session->discard(cell, batch_id, decided_against(expected_version, reason));
+Status Session::discard(const std::string& cell, const std::string& batch_id,
+                        const std::string& reason, std::optional<int> expected_version) const {
+  const auto done =
+      inside_->session->discard(cell, batch_id, decided_against(expected_version, reason));
   if (!done) return passed_on(done);
   return {};
 }

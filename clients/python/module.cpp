@@ -1,4 +1,5 @@
-// The inside of the Python package: libtrammel with NumPy arrays. trammel/__init__.py is what people see of it.
+// The inside of the Python package: libtrammel with NumPy arrays. trammel/__init__.py is what
+// people see of it.
 #include <pybind11/functional.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -55,14 +56,16 @@ auto unlocked(const Work& work) {
 py::dict to_python(const api::Error& error) {
   py::list also;
   for (const api::Error& other : error.also) also.append(to_python(other));
-  return py::dict("code"_a = api::to_text(error.code), "message"_a = error.message, "file"_a = error.file,
-                  "row"_a = error.row, "column"_a = error.field, "value"_a = error.value, "limit"_a = error.limit,
-                  "text"_a = error.text, "next"_a = error.next, "also"_a = also, "sentence"_a = error.sentence);
+  return py::dict("code"_a = api::to_text(error.code), "message"_a = error.message,
+                  "file"_a = error.file, "row"_a = error.row, "column"_a = error.field,
+                  "value"_a = error.value, "limit"_a = error.limit, "text"_a = error.text,
+                  "next"_a = error.next, "also"_a = also, "sentence"_a = error.sentence);
 }
 
 /// Raises the exception of trammel.errors that fits.
 void raise(const api::Error& error) {
-  const py::object exception = py::module_::import("trammel.errors").attr("exception_of")(to_python(error));
+  const py::object exception =
+      py::module_::import("trammel.errors").attr("exception_of")(to_python(error));
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
 }
 
@@ -90,20 +93,23 @@ class Told {
   std::optional<py::error_already_set> raised_;
 };
 
-/// The result of `work(progress)`, which runs without the interpreter's lock; or what the listener raised.
+/// The result of `work(progress)`, which runs without the interpreter's lock; or what the listener
+/// raised.
 template <typename Work>
 auto told_of(const py::object& listener, const Work& work) {
   Told told(listener);
-  auto result =
-      unlocked([&] { return work([&](const std::string& stage, double share) { return told(stage, share); }); });
+  auto result = unlocked([&] {
+    return work([&](const std::string& stage, double share) { return told(stage, share); });
+  });
   told.raise_again();
   return value_or_raise(std::move(result));
 }
 
 /// A table of `columns` numbers a row, N x columns; one row may come without its brackets.
-std::vector<double> rows_of(const Numbers& array, const std::string& argument, py::ssize_t columns) {
-  const bool fits =
-      (array.ndim() == 2 && array.shape(1) == columns) || (array.ndim() == 1 && array.shape(0) == columns);
+std::vector<double> rows_of(const Numbers& array, const std::string& argument,
+                            py::ssize_t columns) {
+  const bool fits = (array.ndim() == 2 && array.shape(1) == columns) ||
+                    (array.ndim() == 1 && array.shape(0) == columns);
   if (!fits) refuse(argument, "an array of shape (N, " + std::to_string(columns) + ") is needed");
   return {array.data(), array.data() + array.size()};
 }
@@ -112,7 +118,8 @@ std::vector<double> rows_of(const Numbers& array, const std::string& argument, p
 template <typename Item, typename Of>
 py::array_t<double> table(const std::vector<Item>& items, py::ssize_t columns, const Of& of) {
   const auto rows = static_cast<py::ssize_t>(items.size());
-  py::array_t<double> array(columns == 1 ? std::vector<py::ssize_t>{rows} : std::vector<py::ssize_t>{rows, columns});
+  py::array_t<double> array(columns == 1 ? std::vector<py::ssize_t>{rows}
+                                         : std::vector<py::ssize_t>{rows, columns});
   double* to = array.mutable_data();
   for (const Item& item : items) to = std::copy_n(of(item), columns, to);
   return array;
@@ -143,7 +150,8 @@ py::list texts(const std::vector<Item>& items, const Of& of) {
 
 py::dict to_python(const std::vector<api::Prediction>& items) {
   using P = api::Prediction;
-  py::array_t<double> covariance = table(items, 9, [](const P& p) { return p.covariance_mm2.data(); });
+  py::array_t<double> covariance =
+      table(items, 9, [](const P& p) { return p.covariance_mm2.data(); });
   py::array_t<bool> in_domain(static_cast<py::ssize_t>(items.size()));
   for (std::size_t i = 0; i < items.size(); ++i) in_domain.mutable_data()[i] = items[i].in_domain;
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -153,10 +161,14 @@ py::dict to_python(const std::vector<api::Prediction>& items) {
       "error_mm"_a = table(items, 3, [](const P& p) { return p.error_mm.data(); }),
       "stddev_mm"_a = table(items, 3, [](const P& p) { return p.stddev_mm.data(); }),
       "true_stddev_mm"_a = table(items, 3, [](const P& p) { return p.true_stddev_mm.data(); }),
-      "covariance_mm2"_a = covariance.reshape({static_cast<py::ssize_t>(items.size()), py::ssize_t{3}, py::ssize_t{3}}),
+      "covariance_mm2"_a = covariance.reshape(
+          {static_cast<py::ssize_t>(items.size()), py::ssize_t{3}, py::ssize_t{3}}),
       "rotation_deg"_a = table(items, 3, [](const P& p) { return p.rotation_deg.data(); }),
-      "rotation_stddev_deg"_a = table(
-          items, 3, [](const P& p) { return (p.rotation_stddev_deg ? *p.rotation_stddev_deg : kNotLearned).data(); }),
+      "rotation_stddev_deg"_a =
+          table(items, 3,
+                [](const P& p) {
+                  return (p.rotation_stddev_deg ? *p.rotation_stddev_deg : kNotLearned).data();
+                }),
       "in_domain"_a = in_domain, "bias_share"_a = numbers(items, &P::bias_share));
 }
 
@@ -166,12 +178,16 @@ py::dict to_python(const std::vector<api::CorrectedTarget>& items, std::size_t j
   for (std::size_t i = 0; i < items.size(); ++i) iterations.mutable_data()[i] = items[i].iterations;
   const std::vector<double> none(joints, std::numeric_limits<double>::quiet_NaN());
   return py::dict(
-      "status"_a = texts(items, [](const T& t) { return t.status; }), "pose"_a = poses(items, &T::commanded),
-      "joints_deg"_a =
-          table(items, static_cast<py::ssize_t>(joints),
-                [&](const T& t) { return t.joints_deg.size() == joints ? t.joints_deg.data() : none.data(); }),
+      "status"_a = texts(items, [](const T& t) { return t.status; }),
+      "pose"_a = poses(items, &T::commanded),
+      "joints_deg"_a = table(items, static_cast<py::ssize_t>(joints),
+                             [&](const T& t) {
+                               return t.joints_deg.size() == joints ? t.joints_deg.data()
+                                                                    : none.data();
+                             }),
       "error_before_mm"_a = numbers(items, &T::error_before_mm),
-      "error_after_mm"_a = numbers(items, &T::error_after_mm), "sigma_mm"_a = numbers(items, &T::sigma_mm),
+      "error_after_mm"_a = numbers(items, &T::error_after_mm),
+      "sigma_mm"_a = numbers(items, &T::sigma_mm),
       "turn_before_deg"_a = numbers(items, &T::turn_before_deg),
       "turn_after_deg"_a = numbers(items, &T::turn_after_deg), "iterations"_a = iterations,
       "message"_a = texts(items, [](const T& t) { return t.message; }));
@@ -184,8 +200,9 @@ py::list to_python(const std::vector<api::Note>& notes) {
 }
 
 py::dict to_python(const api::ModelFacts& facts) {
-  return py::dict("id"_a = facts.id, "hash"_a = facts.hash, "cell"_a = facts.cell, "level"_a = facts.level,
-                  "batch"_a = facts.batch, "training_poses"_a = facts.training_poses, "version"_a = facts.version,
+  return py::dict("id"_a = facts.id, "hash"_a = facts.hash, "cell"_a = facts.cell,
+                  "level"_a = facts.level, "batch"_a = facts.batch,
+                  "training_poses"_a = facts.training_poses, "version"_a = facts.version,
                   "in_force"_a = facts.in_force, "notes"_a = to_python(facts.notes));
 }
 
@@ -194,14 +211,15 @@ py::dict to_python(const api::Figures& f) {
   const char* const names[] = {"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k)
     axis[names[k]] = py::dict("mean_mm"_a = f.axis_mean_mm[k], "std_mm"_a = f.axis_stddev_mm[k]);
-  return py::dict("rms_mm"_a = f.rms_mm, "mean_mm"_a = f.mean_mm, "p997_mm"_a = f.p997_mm, "max_mm"_a = f.max_mm,
-                  "axis"_a = axis);
+  return py::dict("rms_mm"_a = f.rms_mm, "mean_mm"_a = f.mean_mm, "p997_mm"_a = f.p997_mm,
+                  "max_mm"_a = f.max_mm, "axis"_a = axis);
 }
 
 py::dict to_python(const api::OrientationErrors& o) {
   const auto level = [](double rms) { return py::dict("rms_deg"_a = rms); };
   py::dict out("poses"_a = o.poses, "nominal"_a = level(o.nominal_rms_deg),
-               "calibrated"_a = level(o.calibrated_rms_deg), "compensated"_a = level(o.compensated_rms_deg));
+               "calibrated"_a = level(o.calibrated_rms_deg),
+               "compensated"_a = level(o.compensated_rms_deg));
   if (o.coverage_95) out["coverage_95"] = *o.coverage_95;
   return out;
 }
@@ -210,8 +228,9 @@ py::dict to_python(const api::OrientationErrors& o) {
 py::dict to_python(const api::Evaluation& e) {
   py::dict out("poses"_a = e.poses);
   out.attr("update")(to_python(e.compensated));
-  out["levels"] = py::dict("nominal"_a = to_python(e.nominal), "calibrated"_a = to_python(e.calibrated),
-                           "compensated"_a = to_python(e.compensated));
+  out["levels"] =
+      py::dict("nominal"_a = to_python(e.nominal), "calibrated"_a = to_python(e.calibrated),
+               "compensated"_a = to_python(e.compensated));
   out["coverage_95"] = e.coverage_95;
   if (e.coverage_95_stated) out["coverage_95_stated"] = *e.coverage_95_stated;
   out["in_domain"] = e.in_domain;
@@ -229,8 +248,9 @@ py::dict to_python(const api::Job& job) {
 }
 
 py::dict to_python(const api::Server& server) {
-  return py::dict("id"_a = server.id, "version"_a = server.version, "state"_a = server.state, "cells"_a = server.cells,
-                  "trouble"_a = server.trouble, "uptime_s"_a = server.uptime_s, "queued_jobs"_a = server.queued_jobs);
+  return py::dict("id"_a = server.id, "version"_a = server.version, "state"_a = server.state,
+                  "cells"_a = server.cells, "trouble"_a = server.trouble,
+                  "uptime_s"_a = server.uptime_s, "queued_jobs"_a = server.queued_jobs);
 }
 
 template <typename T>
@@ -246,21 +266,25 @@ std::vector<double> joints_of(const Numbers& array, const std::string& argument)
 }
 
 /// The argument as (N, n) of a robot with n joints.
-std::vector<double> joints_of(const Numbers& array, const std::string& argument, std::size_t joints) {
+std::vector<double> joints_of(const Numbers& array, const std::string& argument,
+                              std::size_t joints) {
   return rows_of(array, argument, static_cast<py::ssize_t>(joints));
 }
 
 /// Targets from columns: poses (N, 7), joints (N, n), branches (N,) or one for all.
-std::vector<api::Target> targets_of(const std::optional<Numbers>& pose, const std::optional<Numbers>& joints_deg,
+std::vector<api::Target> targets_of(const std::optional<Numbers>& pose,
+                                    const std::optional<Numbers>& joints_deg,
                                     const std::optional<Whole>& conf) {
   if (!pose && !joints_deg) refuse("pose", "poses or joints_deg are needed");
   const std::vector<double> wanted = pose ? rows_of(*pose, "pose", 7) : std::vector<double>();
-  const std::vector<double> joints = joints_deg ? joints_of(*joints_deg, "joints_deg") : std::vector<double>();
+  const std::vector<double> joints =
+      joints_deg ? joints_of(*joints_deg, "joints_deg") : std::vector<double>();
   const auto rows_in = [](const Numbers& array) {
     return array.ndim() == 2 ? static_cast<std::size_t>(array.shape(0)) : 1;
   };
   const std::size_t count = pose ? wanted.size() / 7 : rows_in(*joints_deg);
-  if (joints_deg && rows_in(*joints_deg) != count) refuse("joints_deg", "as many rows as poses are needed");
+  if (joints_deg && rows_in(*joints_deg) != count)
+    refuse("joints_deg", "as many rows as poses are needed");
   const bool one_conf = conf && conf->size() == 1;
   if (conf && !one_conf && static_cast<std::size_t>(conf->size()) != count)
     refuse("conf", "one for all or one a pose is needed");
@@ -294,7 +318,9 @@ void add_files(py::module_& m) {
   py::class_<api::Cell>(m, "Cell")
       .def_static(
           "load",
-          [](const std::string& path) { return value_or_raise(unlocked([&] { return api::Cell::load(path); })); },
+          [](const std::string& path) {
+            return value_or_raise(unlocked([&] { return api::Cell::load(path); }));
+          },
           "path"_a)
       .def("name", &api::Cell::name)
       .def("robot", &api::Cell::robot)
@@ -305,7 +331,9 @@ void add_files(py::module_& m) {
   py::class_<api::Batch>(m, "Batch")
       .def_static(
           "load",
-          [](const std::string& path) { return value_or_raise(unlocked([&] { return api::Batch::load(path); })); },
+          [](const std::string& path) {
+            return value_or_raise(unlocked([&] { return api::Batch::load(path); }));
+          },
           "path"_a)
       .def_static(
           "parse",
@@ -355,7 +383,9 @@ py::array_t<double> covariance_of(const api::Model& model) {
 void add_model_file(py::class_<api::Model>& type) {
   type.def_static(
           "load",
-          [](const std::string& path) { return value_or_raise(unlocked([&] { return api::Model::load(path); })); },
+          [](const std::string& path) {
+            return value_or_raise(unlocked([&] { return api::Model::load(path); }));
+          },
           "path"_a)
       .def_static(
           "parse",
@@ -384,26 +414,32 @@ void add_model_file(py::class_<api::Model>& type) {
 void add_model_work(py::class_<api::Model>& type) {
   type.def(
           "predict",
-          [](const api::Model& model, const Numbers& joints_deg, std::string tool, std::string payload,
-             std::vector<int> directions, std::optional<double> temperature_c) {
-            const std::vector<double> joints = joints_of(joints_deg, "joints_deg", model.cell().joints());
-            const api::Context context =
-                context_of(std::move(tool), std::move(payload), std::move(directions), temperature_c);
-            return to_python(value_or_raise(unlocked([&] { return model.predict(joints, context); })));
+          [](const api::Model& model, const Numbers& joints_deg, std::string tool,
+             std::string payload, std::vector<int> directions,
+             std::optional<double> temperature_c) {
+            const std::vector<double> joints =
+                joints_of(joints_deg, "joints_deg", model.cell().joints());
+            const api::Context context = context_of(std::move(tool), std::move(payload),
+                                                    std::move(directions), temperature_c);
+            return to_python(
+                value_or_raise(unlocked([&] { return model.predict(joints, context); })));
           },
           "joints_deg"_a, "tool"_a, "payload"_a, "directions"_a, "temperature_c"_a)
       .def(
           "correct",
-          [](const api::Model& model, const std::optional<Numbers>& pose, const std::optional<Numbers>& joints_deg,
-             const std::optional<Whole>& conf, std::string tool, std::string payload, std::vector<int> directions,
+          [](const api::Model& model, const std::optional<Numbers>& pose,
+             const std::optional<Numbers>& joints_deg, const std::optional<Whole>& conf,
+             std::string tool, std::string payload, std::vector<int> directions,
              std::optional<double> temperature_c) {
             const std::vector<api::Target> targets = targets_of(pose, joints_deg, conf);
-            const api::Context context =
-                context_of(std::move(tool), std::move(payload), std::move(directions), temperature_c);
-            return to_python(value_or_raise(unlocked([&] { return model.correct(targets, context); })),
-                             model.cell().joints());
+            const api::Context context = context_of(std::move(tool), std::move(payload),
+                                                    std::move(directions), temperature_c);
+            return to_python(
+                value_or_raise(unlocked([&] { return model.correct(targets, context); })),
+                model.cell().joints());
           },
-          "pose"_a, "joints_deg"_a, "conf"_a, "tool"_a, "payload"_a, "directions"_a, "temperature_c"_a)
+          "pose"_a, "joints_deg"_a, "conf"_a, "tool"_a, "payload"_a, "directions"_a,
+          "temperature_c"_a)
       .def(
           "evaluate",
           [](const api::Model& model, const std::vector<api::Batch>& batches) {
@@ -415,15 +451,17 @@ void add_model_work(py::class_<api::Model>& type) {
 void add_work(py::module_& m) {
   m.def(
       "train",
-      [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::optional<std::string> level,
-         std::optional<std::string> bias, std::uint64_t seed, double validation_share, const py::object& progress,
-         bool as_read) {
+      [](const api::Cell& cell, const std::vector<api::Batch>& batches,
+         std::optional<std::string> level, std::optional<std::string> bias, std::uint64_t seed,
+         double validation_share, const py::object& progress, bool as_read) {
         return told_of(progress, [&](api::Progress told) {
           return api::train(cell, batches,
-                            {std::move(level), std::move(bias), seed, validation_share, std::move(told), as_read});
+                            {std::move(level), std::move(bias), seed, validation_share,
+                             std::move(told), as_read});
         });
       },
-      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a, "as_read"_a);
+      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a,
+      "as_read"_a);
   m.def(
       "diagnose",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::uint64_t seed,
@@ -445,19 +483,20 @@ void add_work(py::module_& m) {
       "cell"_a, "batches"_a, "seed"_a, "progress"_a);
   m.def(
       "plan",
-      [](const api::Cell& cell, std::size_t count, std::uint64_t seed, std::string criterion, bool positions_only) {
+      [](const api::Cell& cell, std::size_t count, std::uint64_t seed, std::string criterion,
+         bool positions_only) {
         const api::PlanOptions options{count, seed, std::move(criterion), positions_only};
         const api::Plan plan = value_or_raise(unlocked([&] { return api::plan(cell, options); }));
-        const py::array_t<double> joints(
-            {static_cast<py::ssize_t>(plan.pose_ids.size()), static_cast<py::ssize_t>(cell.joints())},
-            plan.joints_deg.data());
+        const py::array_t<double> joints({static_cast<py::ssize_t>(plan.pose_ids.size()),
+                                          static_cast<py::ssize_t>(cell.joints())},
+                                         plan.joints_deg.data());
         return py::dict("pose_ids"_a = plan.pose_ids, "joints_deg"_a = joints, "csv"_a = plan.csv);
       },
       "cell"_a, "count"_a, "seed"_a, "criterion"_a, "positions_only"_a);
   m.def(
       "simulate",
-      [](const api::Cell& cell, const std::string& truth, const std::string& plan_csv, std::uint64_t seed,
-         bool positions_only, bool noise_free) {
+      [](const api::Cell& cell, const std::string& truth, const std::string& plan_csv,
+         std::uint64_t seed, bool positions_only, bool noise_free) {
         return value_or_raise(unlocked([&] {
           return api::simulate(cell, truth, plan_csv, {seed, positions_only, noise_free});
         }));
@@ -477,13 +516,15 @@ api::Job waited_for(const Session& session, std::int64_t job, std::chrono::milli
   const auto until = std::chrono::steady_clock::now() + limit;
   bool was_there = false;  // from then on a server that does not answer is waited for
   while (true) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        until - std::chrono::steady_clock::now());
     auto ended = unlocked([&] {
       return session.wait_for(job, std::clamp(left, std::chrono::milliseconds(0), kSlice),
                               [&](const api::Job&) { was_there = true; });
     });
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    const bool goes_on = !ended && ended.error().code == api::ErrorCode::kUnreachable && was_there && left > kSlice;
+    const bool goes_on =
+        !ended && ended.error().code == api::ErrorCode::kUnreachable && was_there && left > kSlice;
     if (!goes_on) return value_or_raise(std::move(ended));
   }
 }
@@ -492,14 +533,17 @@ void add_session_state(py::class_<Session>& session) {
   session
       .def_static(
           "open",
-          [](std::uint32_t domain, std::vector<std::uint16_t> ports, double timeout_s, std::vector<std::string> hosts,
-             std::string security) {
-            const api::SessionOptions options{domain, std::move(ports), milliseconds(timeout_s), std::move(hosts),
-                                              std::move(security)};
+          [](std::uint32_t domain, std::vector<std::uint16_t> ports, double timeout_s,
+             std::vector<std::string> hosts, std::string security) {
+            const api::SessionOptions options{domain, std::move(ports), milliseconds(timeout_s),
+                                              std::move(hosts), std::move(security)};
             return value_or_raise(unlocked([&] { return Session::open(options); }));
           },
           "domain"_a, "ports"_a, "timeout_s"_a, "hosts"_a, "security"_a)
-      .def("servers", [](const Session& s) { return list_of(value_or_raise(unlocked([&] { return s.servers(); }))); })
+      .def("servers",
+           [](const Session& s) {
+             return list_of(value_or_raise(unlocked([&] { return s.servers(); })));
+           })
       .def(
           "models",
           [](const Session& s, const std::string& cell) {
@@ -519,12 +563,16 @@ void add_session_work(py::class_<Session>& session) {
       .def(
           "predict",
           [](const Session& s, const std::string& cell, const Numbers& joints_deg, std::string tool,
-             std::string payload, std::vector<int> directions, std::optional<double> temperature_c) {
+             std::string payload, std::vector<int> directions,
+             std::optional<double> temperature_c) {
             const std::vector<double> joints = joints_of(joints_deg, "joints_deg");
-            const api::Asked asked{
-                cell, context_of(std::move(tool), std::move(payload), std::move(directions), temperature_c), false};
+            const api::Asked asked{cell,
+                                   context_of(std::move(tool), std::move(payload),
+                                              std::move(directions), temperature_c),
+                                   false};
             const auto answer = value_or_raise(unlocked([&] { return s.predict(asked, joints); }));
-            if (answer.items.size() != static_cast<std::size_t>(joints_deg.ndim() == 2 ? joints_deg.shape(0) : 1))
+            if (answer.items.size() !=
+                static_cast<std::size_t>(joints_deg.ndim() == 2 ? joints_deg.shape(0) : 1))
               refuse("joints_deg", "an array of shape (N, n) is needed, n the robot's joints");
             return py::make_tuple(to_python(answer.model), to_python(answer.items));
           },
@@ -532,15 +580,20 @@ void add_session_work(py::class_<Session>& session) {
       .def(
           "correct",
           [](const Session& s, const std::string& cell, const std::optional<Numbers>& pose,
-             const std::optional<Numbers>& joints_deg, const std::optional<Whole>& conf, std::string tool,
-             std::string payload, std::vector<int> directions, std::optional<double> temperature_c) {
+             const std::optional<Numbers>& joints_deg, const std::optional<Whole>& conf,
+             std::string tool, std::string payload, std::vector<int> directions,
+             std::optional<double> temperature_c) {
             const std::vector<api::Target> targets = targets_of(pose, joints_deg, conf);
-            const api::Asked asked{
-                cell, context_of(std::move(tool), std::move(payload), std::move(directions), temperature_c), false};
+            const api::Asked asked{cell,
+                                   context_of(std::move(tool), std::move(payload),
+                                              std::move(directions), temperature_c),
+                                   false};
             const auto answer = value_or_raise(unlocked([&] { return s.correct(asked, targets); }));
-            return py::make_tuple(to_python(answer.model), to_python(answer.items, joints_in(answer.items)));
+            return py::make_tuple(to_python(answer.model),
+                                  to_python(answer.items, joints_in(answer.items)));
           },
-          "cell"_a, "pose"_a, "joints_deg"_a, "conf"_a, "tool"_a, "payload"_a, "directions"_a, "temperature_c"_a);
+          "cell"_a, "pose"_a, "joints_deg"_a, "conf"_a, "tool"_a, "payload"_a, "directions"_a,
+          "temperature_c"_a);
 }
 
 void add_session_care(py::class_<Session>& session) {
@@ -549,19 +602,23 @@ void add_session_care(py::class_<Session>& session) {
           "retrain",
           [](const Session& s, const std::string& cell, const std::vector<std::string>& batch_ids,
              const std::string& level, const std::string& bias) {
-            return value_or_raise(unlocked([&] { return s.retrain(cell, batch_ids, level, bias); }));
+            return value_or_raise(
+                unlocked([&] { return s.retrain(cell, batch_ids, level, bias); }));
           },
           "cell"_a, "batch_ids"_a, "level"_a, "bias"_a)
       .def(
           "diagnose",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv,
-             bool apply) { return value_or_raise(unlocked([&] { return s.diagnose(cell, batch_id, csv, apply); })); },
+          [](const Session& s, const std::string& cell, const std::string& batch_id,
+             const std::string& csv, bool apply) {
+            return value_or_raise(unlocked([&] { return s.diagnose(cell, batch_id, csv, apply); }));
+          },
           "cell"_a, "batch_id"_a, "csv"_a, "apply"_a)
       .def(
           "check",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv,
-             std::optional<double> tolerance_mm) {
-            return value_or_raise(unlocked([&] { return s.check(cell, batch_id, csv, tolerance_mm); }));
+          [](const Session& s, const std::string& cell, const std::string& batch_id,
+             const std::string& csv, std::optional<double> tolerance_mm) {
+            return value_or_raise(
+                unlocked([&] { return s.check(cell, batch_id, csv, tolerance_mm); }));
           },
           "cell"_a, "batch_id"_a, "csv"_a, "tolerance_mm"_a)
       .def(
@@ -582,7 +639,8 @@ void add_session_changes(py::class_<Session>& session) {
   session
       .def(
           "submit",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv) {
+          [](const Session& s, const std::string& cell, const std::string& batch_id,
+             const std::string& csv) {
             return value_or_raise(unlocked([&] { return s.submit(cell, batch_id, csv); }));
           },
           "cell"_a, "batch_id"_a, "csv"_a)
@@ -602,28 +660,32 @@ void add_session_changes(py::class_<Session>& session) {
           "activate",
           [](const Session& s, const std::string& cell, int version, const std::string& reason,
              std::optional<int> expected_version, bool force) {
-            return value_or_raise(unlocked([&] { return s.activate(cell, version, reason, expected_version, force); }));
+            return value_or_raise(unlocked(
+                [&] { return s.activate(cell, version, reason, expected_version, force); }));
           },
           "cell"_a, "version"_a, "reason"_a, "expected_version"_a, "force"_a)
       .def(
           "roll_back",
           [](const Session& s, const std::string& cell, const std::string& reason,
              std::optional<int> expected_version) {
-            return value_or_raise(unlocked([&] { return s.roll_back(cell, reason, expected_version); }));
+            return value_or_raise(
+                unlocked([&] { return s.roll_back(cell, reason, expected_version); }));
           },
           "cell"_a, "reason"_a, "expected_version"_a)
       .def(
           "release",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& reason,
-             std::optional<int> expected_version) {
-            value_or_raise(unlocked([&] { return s.release(cell, batch_id, reason, expected_version); }));
+          [](const Session& s, const std::string& cell, const std::string& batch_id,
+             const std::string& reason, std::optional<int> expected_version) {
+            value_or_raise(
+                unlocked([&] { return s.release(cell, batch_id, reason, expected_version); }));
           },
           "cell"_a, "batch_id"_a, "reason"_a, "expected_version"_a)
       .def(
           "discard",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& reason,
-             std::optional<int> expected_version) {
-            value_or_raise(unlocked([&] { return s.discard(cell, batch_id, reason, expected_version); }));
+          [](const Session& s, const std::string& cell, const std::string& batch_id,
+             const std::string& reason, std::optional<int> expected_version) {
+            value_or_raise(
+                unlocked([&] { return s.discard(cell, batch_id, reason, expected_version); }));
           },
           "cell"_a, "batch_id"_a, "reason"_a, "expected_version"_a);
 }

@@ -102,8 +102,12 @@ const char* text(wire::JobKind kind) {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-std::optional<double> if_known(double value) { return std::isnan(value) ? std::nullopt : std::optional(value); }
-std::optional<std::int64_t> if_known(std::int64_t unix_s) { return unix_s < 0 ? std::nullopt : std::optional(unix_s); }
+std::optional<double> if_known(double value) {
+  return std::isnan(value) ? std::nullopt : std::optional(value);
+}
+std::optional<std::int64_t> if_known(std::int64_t unix_s) {
+  return unix_s < 0 ? std::nullopt : std::optional(unix_s);
+}
 
 wire::Approach to_wire(const Approach& approach) {
   wire::Approach result;
@@ -176,7 +180,8 @@ wire::Target to_wire(const TargetMm& target) {
 }
 
 Note from_wire(const wire::Note& note) {
-  constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning, Note::Severity::kStop};
+  constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning,
+                                            Note::Severity::kStop};
   return {note.code().to_string(), kSeverities[note.severity()], note.text()};
 }
 
@@ -271,8 +276,9 @@ DatedJob from_wire(const wire::Job& job, const std::string& server) {
 }
 
 BatchOfService from_wire(const wire::BatchInfo& batch) {
-  return {batch.cell(), batch.id(),     batch.quarantine(), batch.poses(), batch.accepted_at_unix_s(),
-          batch.hash(), batch.learned()};
+  return {
+      batch.cell(), batch.id(),     batch.quarantine(), batch.poses(), batch.accepted_at_unix_s(),
+      batch.hash(), batch.learned()};
 }
 
 ServerStatus from_wire(const wire::ServiceStatus& status) {

@@ -11,13 +11,14 @@ namespace {
 
 constexpr std::uint32_t kHighestDomain = 232;   // of ports that are numbers of UDP
 constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
-constexpr int kShareOfLooking = 2;              // of the timeout: its half at most, for discovery servers
+constexpr int kShareOfLooking = 2;  // of the timeout: its half at most, for discovery servers
 
 /// Adds the servers that the discovery servers tell of. It does without any where others are named.
 Status add_found_places(SessionOptions& options) {
-  const auto places =
-      wire::look_for_places(options.discovery_servers, options.domain, options.timeout / kShareOfLooking);
-  if (!places) return options.servers.empty() ? Status(tl::make_unexpected(places.error())) : Status();
+  const auto places = wire::look_for_places(options.discovery_servers, options.domain,
+                                            options.timeout / kShareOfLooking);
+  if (!places)
+    return options.servers.empty() ? Status(tl::make_unexpected(places.error())) : Status();
   for (const HostPort& place : *places) {
     if (std::find(options.servers.begin(), options.servers.end(), place) == options.servers.end())
       options.servers.push_back(place);
@@ -37,7 +38,9 @@ std::string make_name(const char* what) {
   return fmt::format("{}-{:08x}{:08x}{:08x}{:08x}", what, random(), random(), random(), random());
 }
 
-std::string change_id(const ChangeOptions& options) { return options.id.empty() ? make_name("change") : options.id; }
+std::string change_id(const ChangeOptions& options) {
+  return options.id.empty() ? make_name("change") : options.id;
+}
 
 wire::Change to_wire(const ChangeOptions& options) {
   wire::Change change;
@@ -51,7 +54,8 @@ Result<SessionOptions> completed(SessionOptions options) {
     TRY(add_found_places(options));
   }
   if (options.servers.empty()) {
-    for (const std::uint16_t port : options.server_ports) options.servers.push_back({options.address, port});
+    for (const std::uint16_t port : options.server_ports)
+      options.servers.push_back({options.address, port});
     return options;
   }
   return own_address_towards(options.servers.front().address).map([&](std::string address) {
@@ -80,14 +84,15 @@ Result<wire::ParticipantPtr> participant_of(const SessionOptions& options) {
 std::string Session::Participant::where_it_looked() const {
   std::string places;
   for (const HostPort& place : options.servers) places += " " + to_string(place);
-  return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), places, options.domain);
+  return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), places,
+                     options.domain);
 }
 
 Error Session::Participant::not_answered(Error error) const {
   if (options.security.empty()) return error;
   return Failure(std::move(error))
-      .next(fmt::format("see that one runs there, and that its certificates and those in {} are of the same plant and "
-                        "not over: the server's log names whom it refused",
+      .next(fmt::format("see that one runs there, and that its certificates and those in {} are of "
+                        "the same plant and not over: the server's log names whom it refused",
                         options.security))
       .value();
 }
@@ -100,11 +105,14 @@ Failure Session::Participant::not_allowed(const char* operation) const {
 
 Error Session::Participant::no_server() const {
   if (auto other = watch->other_contract()) return *other;
-  return not_answered(failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value());
+  return not_answered(
+      failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value());
 }
 
-Result<wire::ReadModelsReply> Session::Participant::read(const std::string& cell, const std::string& server,
-                                                         wire::ReadKind what, wire::ReadModelsRequest request,
+Result<wire::ReadModelsReply> Session::Participant::read(const std::string& cell,
+                                                         const std::string& server,
+                                                         wire::ReadKind what,
+                                                         wire::ReadModelsRequest request,
                                                          const std::string& record) {
   request.about().cell(cell);
   request.what(what);
@@ -115,8 +123,8 @@ std::string Session::Participant::record_of(const std::string& server) const {
   return server.empty() ? std::string() : watch->record_of(server);
 }
 
-Result<std::vector<wire::ReadModelsReply>> Session::Participant::read_all(const std::string& cell, wire::ReadKind what,
-                                                                          const wire::ReadModelsRequest& asked) {
+Result<std::vector<wire::ReadModelsReply>> Session::Participant::read_all(
+    const std::string& cell, wire::ReadKind what, const wire::ReadModelsRequest& asked) {
   const auto known = watch->wait_for_servers(options.servers.size(), deadline());
   if (known.empty()) return tl::make_unexpected(no_server());
   std::vector<wire::ReadModelsReply> replies;
@@ -127,7 +135,8 @@ Result<std::vector<wire::ReadModelsReply>> Session::Participant::read_all(const 
   return replies;
 }
 
-Result<wire::ManageModelsReply> Session::Participant::manage(const std::string& cell, wire::ManageAction action,
+Result<wire::ManageModelsReply> Session::Participant::manage(const std::string& cell,
+                                                             wire::ManageAction action,
                                                              const ChangeOptions& change,
                                                              wire::ManageModelsRequest request,
                                                              const std::string& server) {
@@ -138,8 +147,10 @@ Result<wire::ManageModelsReply> Session::Participant::manage(const std::string& 
   return call<wire::ManageModels>(request, {cell, server, true, false, record_of(server)});
 }
 
-Result<std::int64_t> Session::Participant::release(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                                   const ChangeOptions& change, wire::ReleaseBatchesRequest request) {
+Result<std::int64_t> Session::Participant::release(const std::string& cell,
+                                                   const std::vector<std::string>& batch_ids,
+                                                   const ChangeOptions& change,
+                                                   wire::ReleaseBatchesRequest request) {
   request.about().cell(cell);
   request.batch_ids(batch_ids);
   request.change(to_wire(change));
@@ -157,7 +168,8 @@ void Session::Participant::remember(std::int64_t job, const std::string& server)
 void Session::Participant::told(std::int64_t number, const std::string& server) {
   const MutexLock lock(homes_mutex);
   const auto found = homes.find(number);
-  if (found != homes.end() && found->second.erase(server) > 0 && found->second.empty()) homes.erase(found);
+  if (found != homes.end() && found->second.erase(server) > 0 && found->second.empty())
+    homes.erase(found);
 }
 
 std::set<std::string> Session::Participant::may_have(std::int64_t number) {
@@ -175,7 +187,8 @@ Result<wire::Job> Session::Participant::job(const std::string& server, std::int6
   wire::ReadModelsRequest request;
   request.job(number);
   auto reply = TRY(read({}, server, wire::READ_JOB, std::move(request), record_of(server)));
-  if (reply.jobs().size() != 1) return failure(ErrorCode::kInternal, "server {} answered no job", server);
+  if (reply.jobs().size() != 1)
+    return failure(ErrorCode::kInternal, "server {} answered no job", server);
   return reply.jobs().front();
 }
 
@@ -183,11 +196,12 @@ Result<wire::Job> Session::Participant::job_of_cell(const std::string& server, s
                                                     const std::string& cell) {
   auto asked = job(server, number);
   if (!asked || cell.empty() || asked->cell() == cell) return asked;
-  return failure(ErrorCode::kNotFound, "job {} of server {} is of cell {}, not of {}", number, server, asked->cell(),
-                 cell);
+  return failure(ErrorCode::kNotFound, "job {} of server {} is of cell {}, not of {}", number,
+                 server, asked->cell(), cell);
 }
 
-Result<std::pair<std::string, wire::Job>> Session::Participant::find_job(std::int64_t number, const std::string& cell) {
+Result<std::pair<std::string, wire::Job>> Session::Participant::find_job(std::int64_t number,
+                                                                         const std::string& cell) {
   std::optional<std::pair<std::string, wire::Job>> found;
   Error last = no_server();
   for (const std::string& server : may_have(number)) {

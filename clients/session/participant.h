@@ -30,20 +30,21 @@ namespace trammel::client {
 [[nodiscard]] Result<SessionOptions> completed(SessionOptions options);
 [[nodiscard]] Result<wire::ParticipantPtr> participant_of(const SessionOptions& options);
 
-/// Share of the timeout that one part of a long call should take. At half of the timeout a request is sent again; this
-/// is far below.
+/// Share of the timeout that one part of a long call should take. At half of the timeout a request
+/// is sent again; this is far below.
 inline constexpr double kShareOfTimeout = 0.1;
 inline constexpr std::uint32_t kLeastPatience = 10;  // ms, before a busy server is asked again
 
-/// An operation's endpoints, made when it is first called: every client hears of every endpoint that the server has for
-/// another one.
+/// An operation's endpoints, made when it is first called: every client hears of every endpoint
+/// that the server has for another one.
 template <typename Operation>
 struct Endpoints {
   Mutex mutex;
   std::unique_ptr<Caller<Operation>> caller TRAMMEL_GUARDED_BY(mutex);
 };
 
-/// What a session is made of, and how its requests are sent. Members are destroyed from the last to the first.
+/// What a session is made of, and how its requests are sent. Members are destroyed from the last to
+/// the first.
 struct Session::Participant {
   SessionOptions options;
   wire::ParticipantPtr participant;
@@ -51,23 +52,27 @@ struct Session::Participant {
   std::string partition;
   wire::dds::Publisher* request_publisher = nullptr;
   wire::dds::Subscriber* reply_subscriber = nullptr;
-  std::tuple<Endpoints<wire::PredictError>, Endpoints<wire::CorrectTarget>, Endpoints<wire::SubmitMeasurements>,
-             Endpoints<wire::Train>, Endpoints<wire::Diagnose>, Endpoints<wire::CheckHealth>,
-             Endpoints<wire::ReadModels>, Endpoints<wire::ManageModels>, Endpoints<wire::ReleaseBatches>>
+  std::tuple<Endpoints<wire::PredictError>, Endpoints<wire::CorrectTarget>,
+             Endpoints<wire::SubmitMeasurements>, Endpoints<wire::Train>, Endpoints<wire::Diagnose>,
+             Endpoints<wire::CheckHealth>, Endpoints<wire::ReadModels>,
+             Endpoints<wire::ManageModels>, Endpoints<wire::ReleaseBatches>>
       endpoints;
   Mutex homes_mutex;
-  std::map<std::int64_t, std::set<std::string>> homes TRAMMEL_GUARDED_BY(homes_mutex);  // this session's jobs' servers
+  std::map<std::int64_t, std::set<std::string>> homes
+      TRAMMEL_GUARDED_BY(homes_mutex);  // this session's jobs' servers
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
   /// For error messages: how long it looked, on which ports, in which domain.
   [[nodiscard]] std::string where_it_looked() const;
-  /// Where no server answered. One that refuses a certificate is as silent as one that is not there.
+  /// Where no server answered. One that refuses a certificate is as silent as one that is not
+  /// there.
   [[nodiscard]] Error not_answered(Error error) const;
   [[nodiscard]] Failure not_allowed(const char* operation) const;
   [[nodiscard]] Error no_server() const;
 
-  /// An error reply of the server is an error here, and one of no server says where it was looked for.
+  /// An error reply of the server is an error here, and one of no server says where it was looked
+  /// for.
   template <typename Reply>
   [[nodiscard]] Result<Reply> as_result(Result<Reply> reply) const {
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
@@ -75,7 +80,8 @@ struct Session::Participant {
       error.message += fmt::format(" ({})", where_it_looked());
       return Failure(not_answered(std::move(error))).of("server").with_text(where_it_looked());
     }
-    if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
+    if (reply && reply->header().result() != wire::RESULT_OK)
+      return tl::make_unexpected(error_of(reply->header()));
     return reply;
   }
 
@@ -88,45 +94,52 @@ struct Session::Participant {
     const bool may_be_forbidden = !options.security.empty();
     std::optional<wire::QuietLibrary> quiet;
     if (may_be_forbidden) quiet.emplace();
-    auto opened = Caller<Operation>::open(*participant, *request_publisher, *reply_subscriber, partition, *watch);
+    auto opened = Caller<Operation>::open(*participant, *request_publisher, *reply_subscriber,
+                                          partition, *watch);
     if (!opened && may_be_forbidden) return not_allowed(Operation::kName);
     if (!opened) return tl::make_unexpected(opened.error());
     made.caller = std::move(*opened);
     return made.caller.get();
   }
 
-  /// Sends one request. A server that is busy has not done it and is asked again when it says, until the deadline; a
-  /// change keeps its id.
+  /// Sends one request. A server that is busy has not done it and is asked again when it says,
+  /// until the deadline; a change keeps its id.
   template <typename Operation>
-  [[nodiscard]] Result<typename Operation::Reply::type> call(const typename Operation::Request::type& request,
-                                                             const Route& route) {
+  [[nodiscard]] Result<typename Operation::Reply::type> call(
+      const typename Operation::Request::type& request, const Route& route) {
     const auto caller = caller_of<Operation>();
     if (!caller) return tl::make_unexpected(caller.error());
     const auto until = deadline();
     while (true) {
       auto reply = (*caller)->call(request, route, until);
       const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
-      const auto again = Clock::now() + std::chrono::milliseconds(
-                                            is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
+      const auto again =
+          Clock::now() +
+          std::chrono::milliseconds(
+              is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
       if (!is_busy || again >= until) return as_result(std::move(reply));
       watch->wait_until(again);
     }
   }
 
   /// From `server`, or from another one of its `record`; empty: from any.
-  [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell, const std::string& server,
-                                                   wire::ReadKind what, wire::ReadModelsRequest request = {},
+  [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
+                                                   const std::string& server, wire::ReadKind what,
+                                                   wire::ReadModelsRequest request = {},
                                                    const std::string& record = {});
   [[nodiscard]] std::string record_of(const std::string& server) const;
   /// From every server.
-  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what,
-                                                                    const wire::ReadModelsRequest& asked = {});
-  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action,
+  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(
+      const std::string& cell, wire::ReadKind what, const wire::ReadModelsRequest& asked = {});
+  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell,
+                                                       wire::ManageAction action,
                                                        const ChangeOptions& change,
                                                        wire::ManageModelsRequest request = {},
                                                        const std::string& server = {});
-  [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                             const ChangeOptions& change, wire::ReleaseBatchesRequest request);
+  [[nodiscard]] Result<std::int64_t> release(const std::string& cell,
+                                             const std::vector<std::string>& batch_ids,
+                                             const ChangeOptions& change,
+                                             wire::ReleaseBatchesRequest request);
 
   /// The job that was accepted, and remembers by whom: every server counts its own jobs.
   template <typename Reply>
@@ -137,19 +150,24 @@ struct Session::Participant {
   void remember(std::int64_t job, const std::string& server);
   /// The job is over, as this session has been told.
   void told(std::int64_t number, const std::string& server);
-  /// The servers that accepted a job of this number in this session, and have not told its end; without one all that
-  /// are known.
+  /// The servers that accepted a job of this number in this session, and have not told its end;
+  /// without one all that are known.
   [[nodiscard]] std::set<std::string> may_have(std::int64_t number);
   /// What `server`, or another one of its record, knows of the job.
   [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number);
-  [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number, const std::string& cell);
-  /// The server that has the job (of `cell`; empty: of any), and its present state. Refused where several have one.
-  [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number, const std::string& cell = {});
+  [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number,
+                                              const std::string& cell);
+  /// The server that has the job (of `cell`; empty: of any), and its present state. Refused where
+  /// several have one.
+  [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number,
+                                                                   const std::string& cell = {});
 
   /// Sends `items` in parts, all to be answered by one model.
   template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
-  [[nodiscard]] Result<Answer<Item>> call_in_parts(const CallContext& context, const std::vector<Wire>& items,
-                                                   const ShareListener& progress, const Put& put, const Get& get) {
+  [[nodiscard]] Result<Answer<Item>> call_in_parts(const CallContext& context,
+                                                   const std::vector<Wire>& items,
+                                                   const ShareListener& progress, const Put& put,
+                                                   const Get& get) {
     const AskPart<Item> ask = [&](std::size_t first, std::size_t count) -> Result<Answer<Item>> {
       typename Operation::Request::type request;
       request.about(to_wire(context));
@@ -157,15 +175,16 @@ struct Session::Participant {
       const auto reply = call<Operation>(request, {context.cell, {}});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
-        return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),
-                       get(*reply).size(), count);
+        return failure(ErrorCode::kInternal, "server {} answered {} items for {}",
+                       reply->header().server().to_string(), get(*reply).size(), count);
       }
       Answer<Item> answer;
       answer.model = from_wire(reply->model());
       for (const auto& item : get(*reply)) answer.items.push_back(from_wire(item));
       return answer;
     };
-    const PartSize size(kShareOfTimeout * PartSize::Seconds(options.timeout), wire::kTargetsPerRequest);
+    const PartSize size(kShareOfTimeout * PartSize::Seconds(options.timeout),
+                        wire::kTargetsPerRequest);
     return ask_in_parts<Item>(items.size(), context.cell, size, ask, progress,
                               [] { return PartSize::Seconds(Clock::now().time_since_epoch()); });
   }

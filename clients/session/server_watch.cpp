@@ -11,7 +11,8 @@ constexpr std::size_t kJobsRemembered = 1000;
 }  // namespace
 
 Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticipant& participant,
-                                                       wire::dds::Subscriber& subscriber, std::size_t named) {
+                                                       wire::dds::Subscriber& subscriber,
+                                                       std::size_t named) {
   std::unique_ptr<ServerWatch> watch(new ServerWatch(named));
   ServerWatch* self = watch.get();
   auto status = TRY(wire::StateReader<wire::ServiceStatusTopic>::open(
@@ -34,7 +35,9 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
   watch->model_reader_ = std::move(model);
   auto progress = TRY(wire::StateReader<wire::TrainingProgressTopic>::open(
       participant, subscriber, wire::progress_reader_qos(),
-      [self](const wire::TrainingProgress* sample, const std::string&, double) { self->on_progress(sample); }));
+      [self](const wire::TrainingProgress* sample, const std::string&, double) {
+        self->on_progress(sample);
+      }));
   watch->progress_reader_ = std::move(progress);
   return watch;
 }
@@ -43,8 +46,8 @@ std::optional<Error> ServerWatch::other_contract() const {
   const MutexLock lock(mutex_);
   if (others_.empty() || !servers_.empty()) return std::nullopt;
   const OtherServer& other = others_.begin()->second;
-  return refused("server {} ({}) speaks contract {} of the wire, this program speaks contract {}", other.id,
-                 other.program_version, other.contract, wire::CONTRACT_VERSION)
+  return refused("server {} ({}) speaks contract {} of the wire, this program speaks contract {}",
+                 other.id, other.program_version, other.contract, wire::CONTRACT_VERSION)
       .of("contract_version")
       .beyond(other.contract, wire::CONTRACT_VERSION)
       .next(other.contract < wire::CONTRACT_VERSION ? "update the server" : "update this program")
@@ -52,13 +55,15 @@ std::optional<Error> ServerWatch::other_contract() const {
 }
 
 bool ServerWatch::in_vain() const {
-  return servers_.empty() && !others_.empty() && Clock::now() - *others_since_ > wire::kStatusPeriod;
+  return servers_.empty() && !others_.empty() &&
+         Clock::now() - *others_since_ > wire::kStatusPeriod;
 }
 
 template <typename Found>
 void ServerWatch::wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found) {
   // The others' status comes every period and wakes this up.
-  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return found() || in_vain(); });
+  changed_.wait_until(lock, deadline,
+                      [&]() TRAMMEL_REQUIRES(mutex_) { return found() || in_vain(); });
 }
 
 bool serves(const KnownServer& server, const std::string& cell) {
@@ -69,12 +74,13 @@ bool serves(const KnownServer& server, const std::string& cell) {
 bool ServerWatch::is_settled(const KnownServer& chosen, const std::string& cell) const {
   if (cell.empty() || serves(chosen, cell)) return true;
   return servers_.size() >= named_ &&
-         std::none_of(servers_.begin(), servers_.end(), [&](const auto& entry) { return serves(entry.second, cell); });
+         std::none_of(servers_.begin(), servers_.end(),
+                      [&](const auto& entry) { return serves(entry.second, cell); });
 }
 
-std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
-                                                        Clock::time_point deadline,
-                                                        const std::function<bool(const KnownServer&)>& reachable) {
+std::optional<KnownServer> ServerWatch::wait_for_server(
+    const std::string& cell, const std::string& avoid, Clock::time_point deadline,
+    const std::function<bool(const KnownServer&)>& reachable) {
   MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
   const auto look = [&]() TRAMMEL_REQUIRES(mutex_) {
@@ -88,8 +94,9 @@ std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell,
   return *chosen;
 }
 
-std::optional<KnownServer> ServerWatch::another_server(const std::string& cell, const std::string& avoid,
-                                                       const std::function<bool(const KnownServer&)>& reachable) {
+std::optional<KnownServer> ServerWatch::another_server(
+    const std::string& cell, const std::string& avoid,
+    const std::function<bool(const KnownServer&)>& reachable) {
   const MutexLock lock(mutex_);
   const KnownServer* chosen = choose(cell, avoid, [&](const KnownServer& server) {
     return server.id() != avoid && serves(server, cell) && reachable(server);
@@ -103,13 +110,14 @@ void ServerWatch::was_slow(const std::string& server) {
   slow_[server] = Clock::now();
 }
 
-const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid,
-                                       const std::function<bool(const KnownServer&)>& reachable) const {
+const KnownServer* ServerWatch::choose(
+    const std::string& cell, const std::string& avoid,
+    const std::function<bool(const KnownServer&)>& reachable) const {
   const auto merit = [&](const KnownServer& server) TRAMMEL_REQUIRES(mutex_) {
     const auto slow = slow_.find(server.id());
     const bool is_quick = slow == slow_.end() || slow->second < server.heard;
-    return std::tuple(serves(server, cell), Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid,
-                      is_quick);
+    return std::tuple(serves(server, cell), Clock::now() - server.heard < wire::kStatusLost,
+                      server.id() != avoid, is_quick);
   };
   const KnownServer* best = nullptr;
   for (const auto& [id, server] : servers_) {
@@ -135,7 +143,8 @@ void ServerWatch::wake() {
   changed_.notify_all();
 }
 
-std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock::time_point deadline) {
+std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count,
+                                                       Clock::time_point deadline) {
   MutexLock lock(mutex_);
   wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
   changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
@@ -183,7 +192,8 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
 }
 
 std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& server, std::int64_t job,
-                                                        std::uint64_t& seen, Clock::time_point deadline) {
+                                                        std::uint64_t& seen,
+                                                        Clock::time_point deadline) {
   MutexLock lock(mutex_);
   std::optional<wire::Job> news;
   changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
@@ -203,7 +213,8 @@ void ServerWatch::on_contract(const wire::SpokenContract* spoken, const std::str
     if (spoken == nullptr) {
       others_.erase(participant);
     } else if (spoken->contract_version() != wire::CONTRACT_VERSION) {
-      others_[participant] = {spoken->server().to_string(), spoken->program_version(), spoken->contract_version()};
+      others_[participant] = {spoken->server().to_string(), spoken->program_version(),
+                              spoken->contract_version()};
       if (!others_since_) others_since_ = Clock::now();
     }
     if (others_.empty()) others_since_.reset();
@@ -211,20 +222,23 @@ void ServerWatch::on_contract(const wire::SpokenContract* spoken, const std::str
   changed_.notify_all();
 }
 
-void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant, double written_s) {
+void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant,
+                            double written_s) {
   {
     const MutexLock lock(mutex_);
     if (status != nullptr) {
       servers_[status->server().to_string()] = {participant, *status, Clock::now(), written_s};
       records_[status->server().to_string()] = status->record().to_string();
     } else {
-      std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
+      std::erase_if(servers_,
+                    [&](const auto& entry) { return entry.second.participant == participant; });
     }
   }
   changed_.notify_all();
 }
 
-void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant, double written_s) {
+void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant,
+                           double written_s) {
   {
     const MutexLock lock(mutex_);
     if (status != nullptr) {
@@ -240,7 +254,8 @@ void ServerWatch::on_progress(const wire::TrainingProgress* progress) {
   if (progress == nullptr) return;
   {
     const MutexLock lock(mutex_);
-    jobs_[progress->number()][progress->server().to_string()] = {++progress_count_, progress->job()};
+    jobs_[progress->number()][progress->server().to_string()] = {++progress_count_,
+                                                                 progress->job()};
     if (jobs_.size() > kJobsRemembered) jobs_.erase(jobs_.begin());
   }
   changed_.notify_all();

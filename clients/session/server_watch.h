@@ -46,61 +46,74 @@ struct KnownModel {
 class ServerWatch {
  public:
   /// `named`: how many servers the client names.
-  [[nodiscard]] static Result<std::unique_ptr<ServerWatch>> open(wire::dds::DomainParticipant& participant,
-                                                                 wire::dds::Subscriber& subscriber, std::size_t named);
+  [[nodiscard]] static Result<std::unique_ptr<ServerWatch>> open(
+      wire::dds::DomainParticipant& participant, wire::dds::Subscriber& subscriber,
+      std::size_t named);
 
-  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
-  /// status lately, then one that is not `avoid`, then one that was not slower than another one lately (was_slow()).
-  /// Waits until `deadline` for the first server, less long where all that are there speak another contract. One that
-  /// does not serve the cell is taken only when no other can be expected: all named servers are known, or kStatusLost
-  /// is over.
-  [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
-                                                           Clock::time_point deadline,
-                                                           const std::function<bool(const KnownServer&)>& reachable);
+  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then
+  /// one that published its status lately, then one that is not `avoid`, then one that was not
+  /// slower than another one lately (was_slow()). Waits until `deadline` for the first server, less
+  /// long where all that are there speak another contract. One that does not serve the cell is
+  /// taken only when no other can be expected: all named servers are known, or kStatusLost is over.
+  [[nodiscard]] std::optional<KnownServer> wait_for_server(
+      const std::string& cell, const std::string& avoid, Clock::time_point deadline,
+      const std::function<bool(const KnownServer&)>& reachable);
   /// The same without waiting, and never `avoid` nor one that does not serve the cell.
-  [[nodiscard]] std::optional<KnownServer> another_server(const std::string& cell, const std::string& avoid,
-                                                          const std::function<bool(const KnownServer&)>& reachable);
-  /// Another server answered before this one did: others are asked first until it is heard of again.
+  [[nodiscard]] std::optional<KnownServer> another_server(
+      const std::string& cell, const std::string& avoid,
+      const std::function<bool(const KnownServer&)>& reachable);
+  /// Another server answered before this one did: others are asked first until it is heard of
+  /// again.
   void was_slow(const std::string& server);
-  /// Why no server is found, where the only ones that are there speak another contract than this program.
+  /// Why no server is found, where the only ones that are there speak another contract than this
+  /// program.
   [[nodiscard]] std::optional<Error> other_contract() const;
-  /// What the record of the server is told from any other by, also where it has left; empty: it has one of its own.
+  /// What the record of the server is told from any other by, also where it has left; empty: it has
+  /// one of its own.
   [[nodiscard]] std::string record_of(const std::string& server) const;
   /// Lets the time pass.
   void wait_until(Clock::time_point time);
   /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 
-  /// Waits until `count` servers are known, or until `deadline`. After the first server it waits at most one status
-  /// period.
-  [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count, Clock::time_point deadline);
-  /// Waits until the models in force are as many as the servers report, one status period at most. The age of their
-  /// data is brought up to the present.
+  /// Waits until `count` servers are known, or until `deadline`. After the first server it waits at
+  /// most one status period.
+  [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count,
+                                                          Clock::time_point deadline);
+  /// Waits until the models in force are as many as the servers report, one status period at most.
+  /// The age of their data is brought up to the present.
   [[nodiscard]] std::vector<wire::ModelInfo> models_in_force();
 
-  /// Waits for progress of the job that is newer than number `seen`, and updates `seen`. Empty at `deadline`. An empty
-  /// `server` means any.
-  [[nodiscard]] std::optional<wire::Job> wait_for_progress(const std::string& server, std::int64_t job,
-                                                           std::uint64_t& seen, Clock::time_point deadline);
+  /// Waits for progress of the job that is newer than number `seen`, and updates `seen`. Empty at
+  /// `deadline`. An empty `server` means any.
+  [[nodiscard]] std::optional<wire::Job> wait_for_progress(const std::string& server,
+                                                           std::int64_t job, std::uint64_t& seen,
+                                                           Clock::time_point deadline);
 
  private:
   explicit ServerWatch(std::size_t named) : named_(named) {}
   void on_contract(const wire::SpokenContract* spoken, const std::string& participant);
-  /// Whether waiting for a server is in vain: those that are there speak another contract, and have been for a while.
+  /// Whether waiting for a server is in vain: those that are there speak another contract, and have
+  /// been for a while.
   [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
   /// Waits until `found`, and gives up at `deadline` or when it is in vain.
   template <typename Found>
-  void wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found) TRAMMEL_REQUIRES(mutex_);
-  void on_status(const wire::ServiceStatus* status, const std::string& participant, double written_s);
+  void wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found)
+      TRAMMEL_REQUIRES(mutex_);
+  void on_status(const wire::ServiceStatus* status, const std::string& participant,
+                 double written_s);
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_s);
   void on_progress(const wire::TrainingProgress* progress);
-  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
-                                          const std::function<bool(const KnownServer&)>& reachable) const
-      TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] const KnownServer* choose(
+      const std::string& cell, const std::string& avoid,
+      const std::function<bool(const KnownServer&)>& reachable) const TRAMMEL_REQUIRES(mutex_);
   /// Whether `chosen` serves the cell, or no named server does.
-  [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
-  /// How long ago the model was described so, by its server's clock alone: others may differ from it, or be set.
-  [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const
+      TRAMMEL_REQUIRES(mutex_);
+  /// How long ago the model was described so, by its server's clock alone: others may differ from
+  /// it, or be set.
+  [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const
+      TRAMMEL_REQUIRES(mutex_);
   /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
@@ -109,8 +122,9 @@ class ServerWatch {
   Condition changed_;
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
   std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
-  std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);     // by id
-  std::map<std::string, std::string> records_ TRAMMEL_GUARDED_BY(mutex_);     // by id, also of those that have left
+  std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
+  std::map<std::string, std::string> records_
+      TRAMMEL_GUARDED_BY(mutex_);  // by id, also of those that have left
   std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell

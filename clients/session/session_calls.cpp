@@ -12,12 +12,15 @@ namespace {
 constexpr std::chrono::milliseconds kJobPoll{2000};
 constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
 
-bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled"; }
+bool is_over(const JobStatus& job) {
+  return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled";
+}
 
 }  // namespace
 
 Result<std::string> check_security(const std::string& folder) {
-  return wire::read_security(folder).map([](const wire::Security& security) { return security.subject; });
+  return wire::read_security(folder).map(
+      [](const wire::Security& security) { return security.subject; });
 }
 
 Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
@@ -30,12 +33,16 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
 
   inside->partition = make_name("client");
   inside->request_publisher = inside->participant->create_publisher(wire::publisher_qos({}));
-  inside->reply_subscriber = inside->participant->create_subscriber(wire::subscriber_qos(inside->partition));
+  inside->reply_subscriber =
+      inside->participant->create_subscriber(wire::subscriber_qos(inside->partition));
   wire::dds::Subscriber* states = inside->participant->create_subscriber(wire::subscriber_qos({}));
-  if (inside->request_publisher == nullptr || inside->reply_subscriber == nullptr || states == nullptr) {
-    return failure(ErrorCode::kInternal, "cannot create the publisher and the subscribers of a session");
+  if (inside->request_publisher == nullptr || inside->reply_subscriber == nullptr ||
+      states == nullptr) {
+    return failure(ErrorCode::kInternal,
+                   "cannot create the publisher and the subscribers of a session");
   }
-  auto watch = TRY(ServerWatch::open(*inside->participant, *states, inside->options.servers.size()));
+  auto watch =
+      TRY(ServerWatch::open(*inside->participant, *states, inside->options.servers.size()));
   inside->watch = std::move(watch);
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
@@ -44,9 +51,9 @@ Session::Session(std::unique_ptr<Participant> participant) : participant_(std::m
 
 Session::~Session() = default;
 
-Result<Answer<PredictedError>> Session::predict_error(const CallContext& context,
-                                                      const std::vector<std::vector<double>>& joints_rad,
-                                                      const ShareListener& progress) {
+Result<Answer<PredictedError>> Session::predict_error(
+    const CallContext& context, const std::vector<std::vector<double>>& joints_rad,
+    const ShareListener& progress) {
   std::vector<CommandedJoints> poses;
   poses.reserve(joints_rad.size());
   for (const auto& q_rad : joints_rad) poses.push_back({q_rad});
@@ -60,7 +67,8 @@ Result<Answer<PredictedError>> Session::predict_error_at(const CallContext& cont
   items.reserve(poses.size());
   for (const CommandedJoints& pose : poses) items.push_back(to_wire(pose));
   return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      context, items, progress, [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
+      context, items, progress,
+      [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
       [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
 }
 
@@ -71,13 +79,15 @@ Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& cont
   items.reserve(targets.size());
   for (const TargetMm& target : targets) items.push_back(to_wire(target));
   return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
-      context, items, progress, [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
+      context, items, progress,
+      [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
       [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
 }
 
 Result<std::vector<ServerStatus>> Session::servers() {
   const auto& options = participant_->options;
-  const auto known = participant_->watch->wait_for_servers(options.servers.size(), participant_->deadline());
+  const auto known =
+      participant_->watch->wait_for_servers(options.servers.size(), participant_->deadline());
   if (known.empty()) return tl::make_unexpected(participant_->no_server());
   std::vector<ServerStatus> servers;
   for (const KnownServer& server : known) servers.push_back(from_wire(server.status));
@@ -85,7 +95,8 @@ Result<std::vector<ServerStatus>> Session::servers() {
 }
 
 Result<std::vector<ServerStatus>> Session::servers_when(
-    const std::function<bool(const std::vector<ServerStatus>&)>& holds, std::chrono::milliseconds limit) {
+    const std::function<bool(const std::vector<ServerStatus>&)>& holds,
+    std::chrono::milliseconds limit) {
   const auto until = Clock::now() + limit;
   while (true) {
     auto known = servers();
@@ -97,7 +108,8 @@ Result<std::vector<ServerStatus>> Session::servers_when(
 Result<std::vector<ModelInfo>> Session::model_status() {
   TRY(servers());
   std::vector<ModelInfo> models;
-  for (const wire::ModelInfo& model : participant_->watch->models_in_force()) models.push_back(from_wire(model));
+  for (const wire::ModelInfo& model : participant_->watch->models_in_force())
+    models.push_back(from_wire(model));
   return models;
 }
 
@@ -117,13 +129,16 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
     std::optional<wire::Job> news;
     while (!news) {
       if (Clock::now() >= deadline) {
-        return failure(ErrorCode::kUnreachable, "job {} is not over after {} ms: {}", job, limit.count(), status.what);
+        return failure(ErrorCode::kUnreachable, "job {} is not over after {} ms: {}", job,
+                       limit.count(), status.what);
       }
-      news = participant_->watch->wait_for_progress(server, job, seen, std::min(deadline, Clock::now() + kJobPoll));
+      news = participant_->watch->wait_for_progress(server, job, seen,
+                                                    std::min(deadline, Clock::now() + kJobPoll));
       if (news) continue;
       const auto asked = participant_->job(server, job);
-      const bool may_come = !asked && (asked.error().code == ErrorCode::kUnreachable ||
-                                       asked.error().code == ErrorCode::kBusy);  // a record that is away
+      const bool may_come =
+          !asked && (asked.error().code == ErrorCode::kUnreachable ||
+                     asked.error().code == ErrorCode::kBusy);  // a record that is away
       if (!asked && !may_come) return tl::make_unexpected(asked.error());
       if (asked) news = *asked;
     }

@@ -15,8 +15,8 @@ bool is_same(const wire::Job& a, const wire::Job& b) {
 
 /// Adds what no other server has told already: several have one record.
 template <typename Item, typename IsSame>
-void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told, const std::string& server,
-             const IsSame& is_same) {
+void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told,
+             const std::string& server, const IsSame& is_same) {
   const auto before = static_cast<std::ptrdiff_t>(all.size());  // a server tells each once
   for (const Item& item : told) {
     const auto known = [&](const auto& other) { return is_same(other.first, item); };
@@ -45,7 +45,8 @@ Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t
   request.page(page);
   auto reply = TRY(participant_->read(cell, found.first, wire::READ_FINDINGS, std::move(request),
                                       participant_->record_of(found.first)));
-  return DiagnosisAnswer{std::move(reply.text()), std::move(reply.page_html()), from_wire(reply.in_force())};
+  return DiagnosisAnswer{std::move(reply.text()), std::move(reply.page_html()),
+                         from_wire(reply.in_force())};
 }
 
 Result<std::vector<BatchOfService>> Session::quarantine(const std::string& cell) {
@@ -82,7 +83,8 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
   return jobs;
 }
 
-Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s, std::size_t most) {
+Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s,
+                                              std::size_t most) {
   wire::ReadModelsRequest request;
   request.since_unix_s(since_unix_s);
   request.most(static_cast<std::uint32_t>(most));

@@ -16,7 +16,8 @@ struct CallContext {
   std::string tool;     ///< empty: the cell's only one
   std::string payload;  ///< empty: the cell's only one
   bool controller_compensates = false;
-  std::string model;  ///< empty: the model in force; else `@version` or a model id that must be the one in force
+  std::string model;  ///< empty: the model in force; else `@version` or a model id that must be the
+                      ///< one in force
 };
 
 struct PoseMm {
@@ -31,12 +32,14 @@ struct ModelInfo {
   int version = 0;
   std::int64_t trained_at_unix_s = 0;
   double training_age_s = 0;
-  std::optional<std::int64_t> measured_at_unix_s = {};  ///< of its newest measurement; empty: not recorded
-  std::optional<double> data_age_s = {};                ///< of that measurement
+  std::optional<std::int64_t> measured_at_unix_s =
+      {};                                 ///< of its newest measurement; empty: not recorded
+  std::optional<double> data_age_s = {};  ///< of that measurement
   int training_poses = 0;
   std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
   bool in_force = false;
-  /// What a user of the model should know, the gravest first. In a list of versions only the one in force has them.
+  /// What a user of the model should know, the gravest first. In a list of versions only the one in
+  /// force has them.
   std::vector<Note> notes = {};
 };
 
@@ -61,8 +64,9 @@ struct PredictedError {
   double rx_rad = 0, ry_rad = 0, rz_rad = 0;     ///< rotation vector from nominal to predicted
   double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error
   double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement
-  double srx_rad = 0, sry_rad = 0, srz_rad = 0;  ///< stddev of one measured orientation; NaN: none was learned
-  double bias_share = 0;                         ///< of the learned residual that is taken
+  double srx_rad = 0, sry_rad = 0,
+         srz_rad = 0;     ///< stddev of one measured orientation; NaN: none was learned
+  double bias_share = 0;  ///< of the learned residual that is taken
 };
 
 struct TargetMm {
@@ -96,11 +100,11 @@ struct JobStatus {
   double share = 0;
   int model_version = 0;
   bool in_force = false;
-  /// How it ended: `open in_force not_better undecided diagnosed nothing_applied quarantined refused over_limit broken
-  /// cancelled`.
+  /// How it ended: `open in_force not_better undecided diagnosed nothing_applied quarantined
+  /// refused over_limit broken cancelled`.
   std::string verdict = "open";
-  /// Held-out rms of what was in force, and of the new model; what that must not exceed; two standard uncertainties of
-  /// the difference. Empty: not judged.
+  /// Held-out rms of what was in force, and of the new model; what that must not exceed; two
+  /// standard uncertainties of the difference. Empty: not judged.
   std::optional<double> before_mm = {}, after_mm = {}, limit_mm = {}, u95_mm = {};
   std::string why = {};   ///< of a job that made no model
   std::string next = {};  ///< what to do, as one clause
@@ -108,10 +112,13 @@ struct JobStatus {
 
 /// What a change takes for granted.
 struct ChangeOptions {
-  std::optional<int> expected_version = {};  ///< in force, 0: none; with another one nothing changes (kConflict)
-  std::string id = {};      ///< unique for ever: the change happens once under it; empty: the session makes one
-  bool force = false;       ///< of an activation: also of a version that is worse than the one in force
-  std::string reason = {};  ///< for the audit trail, of changes of what is in force and of quarantine
+  std::optional<int> expected_version =
+      {};  ///< in force, 0: none; with another one nothing changes (kConflict)
+  std::string id =
+      {};  ///< unique for ever: the change happens once under it; empty: the session makes one
+  bool force = false;  ///< of an activation: also of a version that is worse than the one in force
+  std::string reason =
+      {};  ///< for the audit trail, of changes of what is in force and of quarantine
 };
 
 /// The audit trail of a server as it sends it: JSON.
@@ -150,11 +157,13 @@ struct BatchOfService {
 struct ServerStatus {
   std::string server_id, version, state;
   std::vector<std::string> cells;
-  std::uint64_t requests = 0, refused = 0;        ///< answered; of them with an error
-  std::uint64_t shed = 0, unheard = 0;            ///< of them: busy or too late; to nobody, the client had left
-  std::uint64_t misdirected = 0, unreadable = 0;  ///< dropped: to another client's partition; not even a header
-  std::uint64_t lost = 0;                         ///< by DDS
-  std::string trouble;                            ///< what it cannot do now, and why; empty: nothing
+  std::uint64_t requests = 0, refused = 0;  ///< answered; of them with an error
+  std::uint64_t shed = 0,
+                unheard = 0;  ///< of them: busy or too late; to nobody, the client had left
+  std::uint64_t misdirected = 0,
+                unreadable = 0;  ///< dropped: to another client's partition; not even a header
+  std::uint64_t lost = 0;        ///< by DDS
+  std::string trouble;           ///< what it cannot do now, and why; empty: nothing
   double uptime_s = 0;
   int queued_jobs = 0;
 };

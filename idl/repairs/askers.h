@@ -23,14 +23,15 @@ namespace trammel::wire {
     static_cast<void>(body.entity());  // the reader
     const auto writer = body.entity();
     static_cast<void>(body.sequence_number());
-    if (body.u32().value_or(0) > 0 && (writer == kPublications || writer == kSubscriptions)) return true;
+    if (body.u32().value_or(0) > 0 && (writer == kPublications || writer == kSubscriptions))
+      return true;
   }
   return false;
 }
 
-/// Who is being told of our endpoints: where it listens, for as long as the library waits before it repeats a
-/// HEARTBEAT. A newcomer asks for the next 256 numbers at each HEARTBEAT, so it hears those that HeartbeatPace spares
-/// the others. Thread-safe.
+/// Who is being told of our endpoints: where it listens, for as long as the library waits before it
+/// repeats a HEARTBEAT. A newcomer asks for the next 256 numbers at each HEARTBEAT, so it hears
+/// those that HeartbeatPace spares the others. Thread-safe.
 class Askers {
  public:
   using Prefix = LostLeases::Prefix;
@@ -42,7 +43,8 @@ class Askers {
     const MutexLock lock(mutex_);
     if (participants_.size() >= kMost)
       std::erase_if(participants_, [now](const auto& entry) { return entry.second.until <= now; });
-    if (participants_.size() < kMost || participants_.contains(prefix)) participants_[prefix].sockets = sockets;
+    if (participants_.size() < kMost || participants_.contains(prefix))
+      participants_[prefix].sockets = sockets;
   }
   void asks(const Prefix& prefix, Time now) {
     const MutexLock lock(mutex_);

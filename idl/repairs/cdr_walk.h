@@ -9,8 +9,9 @@
 
 #include "common.h"
 
-/// Looks through a serialized sample before anything is made of it, so that no length that it claims is believed: the
-/// generated code would reserve a hundred times the bytes of a hostile sample, and accept any enumerator.
+/// Looks through a serialized sample before anything is made of it, so that no length that it
+/// claims is believed: the generated code would reserve a hundred times the bytes of a hostile
+/// sample, and accept any enumerator.
 namespace trammel::wire {
 
 using namespace v2;
@@ -30,15 +31,17 @@ struct Fault {
 /// Of a request of another contract than CONTRACT_VERSION.
 [[nodiscard]] Fault fault_of_contract(std::uint32_t contract_version);
 
-/// What a text may hold. None holds a NUL: it would end there for one maker's DDS, and not for another's.
+/// What a text may hold. None holds a NUL: it would end there for one maker's DDS, and not for
+/// another's.
 enum class Text {
   kAny,    ///< of a file: its reader judges it
   kPlain,  ///< a name, or a sentence: UTF-8 without control characters
   kToken   ///< printable ASCII without spaces
 };
 
-/// Goes through plain CDR (XCDR version 1, either byte order), member by member in the order of the IDL. Stops at the
-/// first fault; what is asked for after that does nothing. Never reads beyond the sample and reserves no memory.
+/// Goes through plain CDR (XCDR version 1, either byte order), member by member in the order of the
+/// IDL. Stops at the first fault; what is asked for after that does nothing. Never reads beyond the
+/// sample and reserves no memory.
 class CdrWalk {
  public:
   /// `sample` begins with its encapsulation.
@@ -58,7 +61,8 @@ class CdrWalk {
   [[nodiscard]] std::size_t list(const char* field, std::size_t most, std::size_t least_bytes);
   /// A list of structures or texts; `item` names one of them for people and looks through it.
   template <typename Item>
-  void list(const char* field, std::size_t most, std::size_t least_bytes, const char* name, const Item& item) {
+  void list(const char* field, std::size_t most, std::size_t least_bytes, const char* name,
+            const Item& item) {
     const std::size_t count = list(field, most, least_bytes);
     for (std::size_t i = 0; i < count && good(); ++i) {
       item_name_ = name;

@@ -30,14 +30,16 @@ using eprosima::fastrtps::rtps::SenderResource;
 
 constexpr std::chrono::milliseconds kBetweenLosses{500};
 constexpr std::uint16_t kDomainId = 0x000f, kUserData = 0x002c;
-constexpr std::uint16_t kLeaseDuration = 0x0002, kDefaultUnicast = 0x0031, kMetatrafficUnicast = 0x0032;
+constexpr std::uint16_t kLeaseDuration = 0x0002, kDefaultUnicast = 0x0031,
+                        kMetatrafficUnicast = 0x0032;
 constexpr std::string_view kMark = "trammel.domain=";
 
 std::optional<std::uint32_t> marked_domain(Bytes user_data) {
   const std::string_view text(reinterpret_cast<const char*>(user_data.data()), user_data.size());
   if (!text.starts_with(kMark)) return std::nullopt;
   std::uint32_t domain = 0;
-  const auto [end, error] = std::from_chars(text.data() + kMark.size(), text.data() + text.size(), domain);
+  const auto [end, error] =
+      std::from_chars(text.data() + kMark.size(), text.data() + text.size(), domain);
   if (error != std::errc()) return std::nullopt;
   return domain;
 }
@@ -136,8 +138,9 @@ class Gate final : public rtps::ChainingTransport {
 
   rtps::TransportDescriptorInterface* get_configuration() override;
 
-  bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size, LocatorsIterator* first,
-            LocatorsIterator* last, const std::chrono::steady_clock::time_point& limit) override {
+  bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size,
+            LocatorsIterator* first, LocatorsIterator* last,
+            const std::chrono::steady_clock::time_point& limit) override {
     if (size >= kHeader && !knows_itself_) {
       const MutexLock lock(mutex_);
       if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
@@ -145,16 +148,19 @@ class Gate final : public rtps::ChainingTransport {
     }
     if (guard_) guard_->sent(Bytes(buffer, size));
     if (guard_) own_messages_.sent(Bytes(buffer, size));
-    // A newcomer asks for the next 256 numbers at each HEARTBEAT: it hears those that the others are spared.
+    // A newcomer asks for the next 256 numbers at each HEARTBEAT: it hears those that the others
+    // are spared.
     const bool to_all = pace_.lets_out(Bytes(buffer, size));
     if (!domain_) return !to_all || below->send(buffer, size, first, last, limit);
     const LostLeases::Time now = LostLeases::now();
-    const std::vector<std::uint64_t> asking = to_all ? std::vector<std::uint64_t>() : askers_.sockets(now);
+    const std::vector<std::uint64_t> asking =
+        to_all ? std::vector<std::uint64_t>() : askers_.sockets(now);
     if (!to_all && asking.empty()) return true;
     leases_.awake(now);
     const std::vector<std::uint64_t> silent = leases_.silent_sockets(now);
     const bool strangers = guard_ && guard_->knows_strangers();
-    if (to_all && silent.empty() && !strangers) return below->send(buffer, size, first, last, limit);
+    if (to_all && silent.empty() && !strangers)
+      return below->send(buffer, size, first, last, limit);
     rtps::LocatorList rest;
     for (; *first != *last; ++*first) {
       const std::uint64_t socket = socket_of(**first);
@@ -166,14 +172,15 @@ class Gate final : public rtps::ChainingTransport {
     return rest.empty() || below->send(buffer, size, &begin, &end, limit);
   }
 
-  void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
-               const Locator_t& here, const Locator_t& there) override {
+  void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer,
+               std::uint32_t size, const Locator_t& here, const Locator_t& there) override {
     if (hearing_) hearing_->wait();
     if (guard_ && is_own(Bytes(buffer, size)) && !own_messages_.has(Bytes(buffer, size))) {
       dropped_->add(Dropped::kSource);
       return;
     }
-    const auto passed = guard_ ? guard_->check(Bytes(buffer, size), socket_of(there)) : Bytes(buffer, size);
+    const auto passed =
+        guard_ ? guard_->check(Bytes(buffer, size), socket_of(there)) : Bytes(buffer, size);
     if (!passed) return;
     const Bytes message = *passed;
     if (domain_ && is_of_another_domain(message, *domain_)) return;
@@ -219,7 +226,8 @@ class Gate final : public rtps::ChainingTransport {
       }
       Place place = place_of(data.payload);
       askers_.announced(prefix, place.sockets, now);
-      if (place.lease.count() > 0) leases_.announced(prefix, std::move(place.sockets), place.lease, now);
+      if (place.lease.count() > 0)
+        leases_.announced(prefix, std::move(place.sockets), place.lease, now);
       return true;
     });
     return true;
@@ -259,15 +267,16 @@ class Gate final : public rtps::ChainingTransport {
 
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {
  public:
-  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, GateOptions of, bool all,
-                 std::vector<Relay> believed)
+  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, GateOptions of,
+                 bool all, std::vector<Relay> believed)
       : ChainingTransportDescriptor(std::move(below)),
         options(std::move(of)),
         all_domains(all),
         relays(std::move(believed)) {}
 
   rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
-  /// A datagram that is sent has no more. The transport below receives what it is configured for itself.
+  /// A datagram that is sent has no more. The transport below receives what it is configured for
+  /// itself.
   std::uint32_t max_message_size() const override {
     return std::min(options.largest_sent, ChainingTransportDescriptor::max_message_size());
   }
@@ -285,10 +294,11 @@ Gate::Gate(const GateDescriptor& descriptor)
       hearing_(descriptor.options.hearing),
       dropped_(descriptor.options.dropped),
       guard_(descriptor.options.dropped
-                 ? std::make_unique<Guard>(
-                       static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped, descriptor.relays,
-                       descriptor.options.proof,
-                       descriptor.options.serves ? EndpointWatch::kMostOfClient : EndpointWatch::kMostOfServer)
+                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample),
+                                           descriptor.options.dropped, descriptor.relays,
+                                           descriptor.options.proof,
+                                           descriptor.options.serves ? EndpointWatch::kMostOfClient
+                                                                     : EndpointWatch::kMostOfServer)
                  : nullptr) {
   for (const Locator_t& host : descriptor.options.hosts) hosts_.push_back(socket_of(host));
 }
@@ -306,7 +316,8 @@ bool is_of_another_domain(std::span<const unsigned char> message, std::uint32_t 
 }
 
 bool is_announcement(std::span<const unsigned char> message) {
-  return any_data(message, [](const Data& data) { return data.writer == kAnnouncer && !data.payload.empty(); });
+  return any_data(
+      message, [](const Data& data) { return data.writer == kAnnouncer && !data.payload.empty(); });
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(

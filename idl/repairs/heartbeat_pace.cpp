@@ -22,7 +22,8 @@ std::optional<Lone> lone_submessage(Bytes message) {
   Bytes to, rest = message.subspan(kHeader);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
-    if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix) continue;  // around what is signed
+    if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix)
+      continue;  // around what is signed
     if (submessage->id == kInfoSource) continue;
     if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {
       to = is_everybody(submessage->body) ? Bytes() : submessage->body.first(kPrefix);
@@ -61,7 +62,8 @@ bool HeartbeatPace::lets_out(Bytes message, Time now) {
     if (!lone->to.empty() && (lone->submessage.flags & kSaysAlive) != 0) return true;
     const auto writer = writer_of_heartbeat(lone->submessage);
     if (!writer) return true;
-    return lone->to.empty() ? lets_heartbeat_out(*writer, now) : lets_offer_out(lone->to, *writer, now);
+    return lone->to.empty() ? lets_heartbeat_out(*writer, now)
+                            : lets_offer_out(lone->to, *writer, now);
   }
   if (lone->submessage.id != kAckNack || lone->to.empty()) return true;
   const auto ends = ends_of_first_question(lone->submessage);

@@ -13,13 +13,14 @@ using std::chrono::nanoseconds;
 
 /// Unix time when the steady clock began.
 nanoseconds beginning() {
-  static const nanoseconds at =
-      std::chrono::system_clock::now().time_since_epoch() - std::chrono::steady_clock::now().time_since_epoch();
+  static const nanoseconds at = std::chrono::system_clock::now().time_since_epoch() -
+                                std::chrono::steady_clock::now().time_since_epoch();
   return at;
 }
 
 nanoseconds library_time() {
-  return std::max(nanoseconds(0), beginning() + std::chrono::steady_clock::now().time_since_epoch());
+  return std::max(nanoseconds(0),
+                  beginning() + std::chrono::steady_clock::now().time_since_epoch());
 }
 
 }  // namespace
@@ -28,7 +29,8 @@ void start_library_clock() { static_cast<void>(beginning()); }
 
 }  // namespace trammel::wire
 
-// The library calls its own function of this name through the table of symbols, where a program's stands before it.
+// The library calls its own function of this name through the table of symbols, where a program's
+// stands before it.
 __attribute__((visibility("default"))) void eprosima::fastrtps::rtps::Time_t::now(Time_t& time) {
   const auto now = trammel::wire::library_time();
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(now);

@@ -15,7 +15,8 @@ LostLeases::Time LostLeases::now() {
 }
 
 std::size_t LostLeases::PrefixHash::operator()(const Prefix& prefix) const {
-  return std::hash<std::string_view>()({reinterpret_cast<const char*>(prefix.data()), prefix.size()});
+  return std::hash<std::string_view>()(
+      {reinterpret_cast<const char*>(prefix.data()), prefix.size()});
 }
 
 LostLeases::Time LostLeases::closed_until(const Participant& who) const {
@@ -32,7 +33,8 @@ void LostLeases::awake(Time now) {
   constexpr std::chrono::milliseconds kPeriod{200};
   if (before == Time{} || now - before < lease_ - kMargin - kPeriod) return;
   const MutexLock lock(mutex_);
-  for (auto& [prefix, who] : participants_) who.closed_until = std::max(now + lease_, who.heard + who.lease) + kLonger;
+  for (auto& [prefix, who] : participants_)
+    who.closed_until = std::max(now + lease_, who.heard + who.lease) + kLonger;
   all_open_until_ = 0;
 }
 
@@ -45,8 +47,8 @@ bool LostLeases::lets_in(const Prefix& prefix, Time now) {
   return true;
 }
 
-void LostLeases::announced(const Prefix& prefix, std::vector<std::uint64_t> sockets, std::chrono::milliseconds lease,
-                           Time now) {
+void LostLeases::announced(const Prefix& prefix, std::vector<std::uint64_t> sockets,
+                           std::chrono::milliseconds lease, Time now) {
   const MutexLock lock(mutex_);
   if (!participants_.contains(prefix)) make_room(now);
   Participant& who = participants_[prefix];
@@ -57,10 +59,12 @@ void LostLeases::announced(const Prefix& prefix, std::vector<std::uint64_t> sock
 }
 
 void LostLeases::make_room(Time now) {
-  std::erase_if(participants_, [&](const auto& entry) { return closed_until(entry.second) <= now; });
+  std::erase_if(participants_,
+                [&](const auto& entry) { return closed_until(entry.second) <= now; });
   if (participants_.size() < kMost) return;
-  participants_.erase(std::min_element(participants_.begin(), participants_.end(),
-                                       [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; }));
+  participants_.erase(std::min_element(
+      participants_.begin(), participants_.end(),
+      [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; }));
 }
 
 void LostLeases::left(const Prefix& prefix) {

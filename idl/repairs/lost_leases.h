@@ -13,12 +13,13 @@
 
 namespace trammel::wire {
 
-/// A lease that one side loses, both sides lose. Fast DDS 2.9 drops a participant from which it heard nothing for its
-/// lease. If that one has not dropped us at the same time (because it was stopped, say, or because only its own packets
-/// were lost), it keeps what it knew. To it we then seem to confirm what we have confirmed before, so it tells us
-/// nothing of its endpoints: the two do not see each other until one of them restarts. So after a lost lease neither
-/// listens nor talks to the other until that has lost ours; and who finds that it slept itself does so with everybody.
-/// Then both find each other as if for the first time. Thread-safe.
+/// A lease that one side loses, both sides lose. Fast DDS 2.9 drops a participant from which it
+/// heard nothing for its lease. If that one has not dropped us at the same time (because it was
+/// stopped, say, or because only its own packets were lost), it keeps what it knew. To it we then
+/// seem to confirm what we have confirmed before, so it tells us nothing of its endpoints: the two
+/// do not see each other until one of them restarts. So after a lost lease neither listens nor
+/// talks to the other until that has lost ours; and who finds that it slept itself does so with
+/// everybody. Then both find each other as if for the first time. Thread-safe.
 class LostLeases {
  public:
   using Prefix = std::array<unsigned char, kPrefix>;  ///< of a participant's GUID
@@ -33,15 +34,19 @@ class LostLeases {
   void awake(Time now);
   /// Whether a message of the participant is to be heard.
   [[nodiscard]] bool lets_in(const Prefix& prefix, Time now);
-  /// A participant's announcement that was let in: where it listens (address and port), and its lease.
-  void announced(const Prefix& prefix, std::vector<std::uint64_t> sockets, std::chrono::milliseconds lease, Time now);
+  /// A participant's announcement that was let in: where it listens (address and port), and its
+  /// lease.
+  void announced(const Prefix& prefix, std::vector<std::uint64_t> sockets,
+                 std::chrono::milliseconds lease, Time now);
   /// It said that it leaves.
   void left(const Prefix& prefix);
-  /// The sockets that nothing is to be sent to: those of participants that are not heard, and of no other one.
+  /// The sockets that nothing is to be sent to: those of participants that are not heard, and of no
+  /// other one.
   [[nodiscard]] std::vector<std::uint64_t> silent_sockets(Time now);
 
  private:
-  static constexpr std::size_t kMost = 2048;  // participants; of more, the one not heard for longest is forgotten
+  static constexpr std::size_t kMost =
+      2048;  // participants; of more, the one not heard for longest is forgotten
   static constexpr std::chrono::milliseconds kMargin{100}, kLonger{500};
   struct PrefixHash {
     std::size_t operator()(const Prefix& prefix) const;
@@ -53,7 +58,9 @@ class LostLeases {
     Time closed_until{};  // since we slept
   };
 
-  [[nodiscard]] Time lost_at(const Participant& who) const { return who.heard + who.lease - kMargin; }
+  [[nodiscard]] Time lost_at(const Participant& who) const {
+    return who.heard + who.lease - kMargin;
+  }
   [[nodiscard]] Time closed_until(const Participant& who) const;
   [[nodiscard]] bool is_closed(const Participant& who, Time now) const;
   void make_room(Time now) TRAMMEL_REQUIRES(mutex_);

@@ -13,9 +13,9 @@
 
 namespace trammel::wire {
 
-/// The messages that we have sent lately and that may come back to ourselves. Everybody knows our name, so what comes
-/// in it is ours only if we have sent it: a number that is skipped in our name would make us deaf to ourselves, and the
-/// watchdog would end us. Thread-safe.
+/// The messages that we have sent lately and that may come back to ourselves. Everybody knows our
+/// name, so what comes in it is ours only if we have sent it: a number that is skipped in our name
+/// would make us deaf to ourselves, and the watchdog would end us. Thread-safe.
 class OwnMessages {
  public:
   /// Call it before the message leaves.
@@ -32,7 +32,8 @@ class OwnMessages {
   }
 
  private:
-  static constexpr std::size_t kKept = 4096;  ///< more than leave in the time that one needs to come back
+  static constexpr std::size_t kKept =
+      4096;  ///< more than leave in the time that one needs to come back
 
   /// Not where all of it is for other participants.
   static bool may_come_back(Bytes message) {
@@ -42,7 +43,8 @@ class OwnMessages {
     Bytes rest = message.subspan(kHeader);
     while (const auto submessage = next_submessage(rest)) {
       if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
-      if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix) continue;  // around the rest
+      if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix)
+        continue;  // around the rest
       if (submessage->id == kInfoSource) continue;
       if (submessage->id != kInfoDestination) {
         if (!for_others) return true;
@@ -50,7 +52,8 @@ class OwnMessages {
       }
       if (submessage->body.size() < kPrefix) return true;
       const Bytes to = submessage->body.first(kPrefix);
-      const bool for_all = std::all_of(to.begin(), to.end(), [](unsigned char octet) { return octet == 0; });
+      const bool for_all =
+          std::all_of(to.begin(), to.end(), [](unsigned char octet) { return octet == 0; });
       for_others = !for_all && !std::equal(to.begin(), to.end(), self.begin());
     }
     return false;

@@ -10,8 +10,8 @@ std::atomic<int> living = 0;
 
 }  // namespace
 
-// What was said before is shown, and what was said meanwhile is not: the library tells its errors in a thread of its
-// own.
+// What was said before is shown, and what was said meanwhile is not: the library tells its errors
+// in a thread of its own.
 QuietLibrary::QuietLibrary() {
   eprosima::fastdds::dds::Log::Flush();
   ++living;

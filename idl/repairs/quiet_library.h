@@ -2,7 +2,8 @@
 
 namespace trammel::wire {
 
-/// While one lives, what the library says of an error is not shown: for what it may refuse, and is asked all the same.
+/// While one lives, what the library says of an error is not shown: for what it may refuse, and is
+/// asked all the same.
 class QuietLibrary {
  public:
   QuietLibrary();

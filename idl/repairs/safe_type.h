@@ -27,9 +27,10 @@ namespace trammel::wire {
   return {payload.data, payload.length};
 }
 
-/// A generated PubSubType that survives hostile bytes. The generated code may throw while it reads: then the sample
-/// stays in the reader and every later take throws again. It also believes lengths and accepts unknown enumerators.
-/// Here such samples are dropped and the reader goes on. Also guards the key buffer that all writers of a type share.
+/// A generated PubSubType that survives hostile bytes. The generated code may throw while it reads:
+/// then the sample stays in the reader and every later take throws again. It also believes lengths
+/// and accepts unknown enumerators. Here such samples are dropped and the reader goes on. Also
+/// guards the key buffer that all writers of a type share.
 template <typename PubSubType>
 class SafeType : public PubSubType {
  public:
@@ -52,7 +53,8 @@ class SafeType : public PubSubType {
     return deserialize_unseen(payload, data);
   }
 
-  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5) override {
+  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
+              bool force_md5) override {
     const MutexLock lock(key_mutex_);
     try {
       return PubSubType::getKey(data, handle, force_md5);
@@ -83,13 +85,15 @@ class SafeType : public PubSubType {
   const std::size_t max_sample_;
 
  private:
-  /// Bytes that a history reserves for a sample of unknown size. The generated figure assumes full sequences.
+  /// Bytes that a history reserves for a sample of unknown size. The generated figure assumes full
+  /// sequences.
   static constexpr std::uint32_t kReservedBytes = 4096;
 
   Mutex key_mutex_;  // the key buffer in PubSubType
 };
 
-/// What a request asks for, without its header: the bytes behind it. Their padding depends on where they begin.
+/// What a request asks for, without its header: the bytes behind it. Their padding depends on where
+/// they begin.
 struct ContentId {
   std::size_t hash = 0;
   std::size_t alignment = 0;
@@ -109,8 +113,8 @@ struct Received : Request {
   ContentId content = {};
 };
 
-/// The type of requests on the side of the server, whose samples are Received: whoever sent a header that can be read
-/// is told what is wrong with the rest.
+/// The type of requests on the side of the server, whose samples are Received: whoever sent a
+/// header that can be read is told what is wrong with the rest.
 template <typename PubSubType>
 class ReceivedType final : public SafeType<PubSubType> {
  public:
@@ -130,7 +134,8 @@ class ReceivedType final : public SafeType<PubSubType> {
     }
     received.fault = fault_of(*payload, received.header());
     if (!is_token(received.header().trace_id().c_str())) received.header().trace_id("");
-    if (received.fault || this->deserialize_unseen(payload, static_cast<Request*>(&received))) return true;
+    if (received.fault || this->deserialize_unseen(payload, static_cast<Request*>(&received)))
+      return true;
     received.fault = Fault{RESULT_MALFORMED, "the sample cannot be read", {}, {}, {}, {}};
     return true;
   }
@@ -140,12 +145,13 @@ class ReceivedType final : public SafeType<PubSubType> {
 
  private:
   /// A header that names no partition cannot be answered.
-  static bool read_header(eprosima::fastrtps::rtps::SerializedPayload_t* payload, RequestHeader& header,
-                          ContentId& content) {
+  static bool read_header(eprosima::fastrtps::rtps::SerializedPayload_t* payload,
+                          RequestHeader& header, ContentId& content) {
     if (find_fault<RequestHeader>(bytes_of(*payload))) return false;
     try {
       eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
-      eprosima::fastcdr::Cdr reader(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
+      eprosima::fastcdr::Cdr reader(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
+                                    eprosima::fastcdr::Cdr::DDS_CDR);
       reader.read_encapsulation();
       header.deserialize(reader);
       const std::size_t at = reader.getSerializedDataLength();
@@ -158,9 +164,11 @@ class ReceivedType final : public SafeType<PubSubType> {
     return valid_partition(header.reply_partition().to_string());
   }
 
-  [[nodiscard]] std::optional<Fault> fault_of(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
-                                              const RequestHeader& header) const {
-    if (header.contract_version() != CONTRACT_VERSION) return fault_of_contract(header.contract_version());
+  [[nodiscard]] std::optional<Fault> fault_of(
+      const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
+      const RequestHeader& header) const {
+    if (header.contract_version() != CONTRACT_VERSION)
+      return fault_of_contract(header.contract_version());
     return this->is_too_large(bytes_of(payload)) ? this->too_large(bytes_of(payload))
                                                  : find_fault<Request>(bytes_of(payload));
   }

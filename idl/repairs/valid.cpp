@@ -4,7 +4,8 @@
 
 #include "idl/limits.h"
 
-// How each type of the IDL is laid out, member by member. tests/dds/safe_type_test.cpp holds it against the types.
+// How each type of the IDL is laid out, member by member. tests/dds/safe_type_test.cpp holds it
+// against the types.
 
 namespace trammel::wire {
 namespace {
@@ -308,10 +309,11 @@ void shape(CdrWalk& walk, Of<SpokenContract>) {
 }  // namespace
 
 bool valid_partition(std::string_view name) {
-  return !name.empty() && name.size() <= MAX_NAME && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
-           c == '-';
-  });
+  return !name.empty() && name.size() <= MAX_NAME &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '.' || c == '_' || c == '-';
+         });
 }
 
 template <typename Sample>

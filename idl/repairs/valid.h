@@ -15,15 +15,17 @@
 #include "state.h"
 #include "training.h"
 
-/// Checks what the generated code does not check when it reads a sample: lengths, bounds, enumerators and texts. A
-/// reply or a state that is not valid is dropped; a request is answered with its fault if its header can be read.
+/// Checks what the generated code does not check when it reads a sample: lengths, bounds,
+/// enumerators and texts. A reply or a state that is not valid is dropped; a request is answered
+/// with its fault if its header can be read.
 namespace trammel::wire {
 
-/// Whether the name can be a reply partition: not empty, and without the wildcards of partition names.
+/// Whether the name can be a reply partition: not empty, and without the wildcards of partition
+/// names.
 [[nodiscard]] bool valid_partition(std::string_view name);
 
-/// What is wrong with a serialized sample (its encapsulation first); empty: nothing. One for each request, reply and
-/// state of the IDL.
+/// What is wrong with a serialized sample (its encapsulation first); empty: nothing. One for each
+/// request, reply and state of the IDL.
 template <typename Sample>
 [[nodiscard]] std::optional<Fault> find_fault(std::span<const unsigned char> sample);
 /// Of the beginning of any request.

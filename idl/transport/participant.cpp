@@ -29,7 +29,8 @@ namespace rtps = eprosima::fastrtps::rtps;
 constexpr std::uint32_t kSocketBuffer = 4u << 20;
 constexpr std::uint32_t kPortTries = 2000;
 
-/// The library's errors to standard error, which nobody may read any more: the library does not wait for that.
+/// The library's errors to standard error, which nobody may read any more: the library does not
+/// wait for that.
 class LibraryErrors final : public dds::LogConsumer {
  public:
   void Consume(const dds::Log::Entry& entry) override {
@@ -72,7 +73,8 @@ Status check_address(const std::string& address) {
   }
   const std::vector<std::string> own = own_addresses();
   if (std::find(own.begin(), own.end(), address) == own.end()) {
-    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address)
+    return failure(ErrorCode::kUsage,
+                   "address {} is not one of this host's, or its interface is down", address)
         .next(fmt::format("it has {}", fmt::join(own, ", ")));
   }
   return {};
@@ -86,7 +88,8 @@ void ParticipantDeleter::operator()(dds::DomainParticipant* participant) const {
 }
 
 eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time) {
-  return {static_cast<std::int32_t>(time.count() / 1000), static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
+  return {static_cast<std::int32_t>(time.count() / 1000),
+          static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
 }
 
 rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
@@ -95,7 +98,8 @@ rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
   return result;
 }
 
-Result<std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor>> udp_on(const std::string& address) {
+Result<std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor>> udp_on(
+    const std::string& address) {
   set_up_process();
   TRY(check_address(address));
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
@@ -106,8 +110,8 @@ Result<std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor>> udp_o
 }
 
 dds::DomainParticipantQos participant_qos(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport, const std::string& address,
-    std::uint16_t listen_port) {
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
+    const std::string& address, std::uint16_t listen_port) {
   dds::DomainParticipantQos qos;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports = {std::move(transport)};
@@ -116,9 +120,11 @@ dds::DomainParticipantQos participant_qos(
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = to_duration(kLease);
   builtin.discovery_config.leaseDuration_announcementperiod = to_duration(kAnnouncement);
-  // Each participant of a host takes the next free ports. With the library's 100 tries the 125th has none, and is deaf.
+  // Each participant of a host takes the next free ports. With the library's 100 tries the 125th
+  // has none, and is deaf.
   builtin.mutation_tries = kPortTries;
-  // A list of its own, even without a port, keeps the participant from joining the default multicast group.
+  // A list of its own, even without a port, keeps the participant from joining the default
+  // multicast group.
   builtin.metatrafficUnicastLocatorList.push_back(locator(address, listen_port));
   return qos;
 }

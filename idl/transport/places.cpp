@@ -48,14 +48,17 @@ std::uint32_t number_of(const std::string& address) {
 
 /// Neither 0.x nor a group.
 bool is_host(const std::string& address) {
-  if (address.find_first_not_of("0123456789.") != std::string::npos) return false;  // nor a NUL, where C would end it
+  if (address.find_first_not_of("0123456789.") != std::string::npos)
+    return false;  // nor a NUL, where C would end it
   const std::uint32_t first = number_of(address) >> 24;
   return first > 0 && first < 224;
 }
 
 bool is_id(std::string_view id) {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
-  return !id.empty() && id.size() <= kMostId && id.find_first_not_of(kLetters) == std::string_view::npos;
+  constexpr std::string_view kLetters =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
+  return !id.empty() && id.size() <= kMostId &&
+         id.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
 class Looker final : public dds::DomainParticipantListener {
@@ -72,7 +75,8 @@ class Looker final : public dds::DomainParticipantListener {
   FoundPlaces& found_;
 };
 
-std::vector<Relay> relays_of(const rtps::RemoteServerList_t& servers, const std::vector<HostPort>& places) {
+std::vector<Relay> relays_of(const rtps::RemoteServerList_t& servers,
+                             const std::vector<HostPort>& places) {
   std::vector<Relay> relays;
   std::size_t i = 0;
   for (const auto& server : servers) {
@@ -96,8 +100,9 @@ rtps::RemoteServerList_t remote(const std::vector<HostPort>& places) {
 }
 
 /// It talks to the discovery servers and nobody else.
-Result<ParticipantPtr> client_of(const std::vector<HostPort>& discovery_servers, const std::string& address,
-                                 rtps::DiscoveryProtocol_t protocol, const std::string& user_data,
+Result<ParticipantPtr> client_of(const std::vector<HostPort>& discovery_servers,
+                                 const std::string& address, rtps::DiscoveryProtocol_t protocol,
+                                 const std::string& user_data,
                                  dds::DomainParticipantListener* listener) {
   const auto udp = TRY(udp_on(address));
   const auto servers = remote(discovery_servers);
@@ -109,16 +114,19 @@ Result<ParticipantPtr> client_of(const std::vector<HostPort>& discovery_servers,
   discovery.discoveryProtocol = protocol;
   discovery.m_DiscoveryServers = servers;
   dds::DomainParticipant* participant =
-      dds::DomainParticipantFactory::get_instance()->create_participant(0, qos, listener, dds::StatusMask::none());
+      dds::DomainParticipantFactory::get_instance()->create_participant(0, qos, listener,
+                                                                        dds::StatusMask::none());
   if (participant == nullptr)
-    return failure(ErrorCode::kInternal, "cannot create a DDS participant for discovery servers on {}", address);
+    return failure(ErrorCode::kInternal,
+                   "cannot create a DDS participant for discovery servers on {}", address);
   return ParticipantPtr(participant);
 }
 
 }  // namespace
 
 std::string place_text(const Place& place) {
-  return fmt::format("{}{}{}{}{}{}", kServer, to_string(place.at), kDomain, place.domain, kId, place.server_id);
+  return fmt::format("{}{}{}{}{}{}", kServer, to_string(place.at), kDomain, place.domain, kId,
+                     place.server_id);
 }
 
 std::optional<Place> read_place(std::string_view text) {
@@ -129,7 +137,8 @@ std::optional<Place> read_place(std::string_view text) {
   place.at.port = number_in<std::uint16_t>(take_until(rest, kDomain), 0);
   place.domain = number_in<std::uint32_t>(take_until(rest, kId), kHighestDomain + 1);
   place.server_id = rest;
-  if (!is_host(place.at.address) || place.at.port < kLowestPort || place.domain > kHighestDomain || !is_id(rest))
+  if (!is_host(place.at.address) || place.at.port < kLowestPort || place.domain > kHighestDomain ||
+      !is_id(rest))
     return std::nullopt;
   return place_text(place) == text ? std::optional(place) : std::nullopt;  // one spelling only
 }
@@ -138,7 +147,9 @@ void FoundPlaces::heard(std::string_view user_data) {
   const auto place = read_place(user_data);
   if (!place || place->domain != domain_ || (far_ && place->at.address.starts_with("127."))) return;
   const MutexLock lock(mutex_);
-  if (places_.size() >= kMostPlaces || std::find(places_.begin(), places_.end(), place->at) != places_.end()) return;
+  if (places_.size() >= kMostPlaces ||
+      std::find(places_.begin(), places_.end(), place->at) != places_.end())
+    return;
   places_.push_back(place->at);
   changed_.notify_all();
 }
@@ -149,37 +160,43 @@ std::vector<HostPort> FoundPlaces::wait(std::chrono::milliseconds limit) {
   const auto any = [this]() TRAMMEL_REQUIRES(mutex_) { return !places_.empty(); };
   const auto enough = [this]() TRAMMEL_REQUIRES(mutex_) { return places_.size() >= kMostPlaces; };
   if (changed_.wait_until(lock, deadline, any))
-    changed_.wait_until(lock, std::min(deadline, std::chrono::steady_clock::now() + kOtherPlaces), enough);
+    changed_.wait_until(lock, std::min(deadline, std::chrono::steady_clock::now() + kOtherPlaces),
+                        enough);
   return places_;
 }
 
-Result<ParticipantPtr> announce_place(const Place& place, const std::vector<HostPort>& discovery_servers) {
-  auto beacon =
-      client_of(discovery_servers, place.at.address, rtps::DiscoveryProtocol_t::CLIENT, place_text(place), nullptr);
+Result<ParticipantPtr> announce_place(const Place& place,
+                                      const std::vector<HostPort>& discovery_servers) {
+  auto beacon = client_of(discovery_servers, place.at.address, rtps::DiscoveryProtocol_t::CLIENT,
+                          place_text(place), nullptr);
   if (!beacon) return beacon;
   // A discovery server passes on nobody who has no endpoint. Nothing is ever written.
-  const auto topic =
-      TRY(make_topic(**beacon, kTopic, new SafeType<ServiceStatusTopic::Type>(ServiceStatusTopic::kMaxSample)));
+  const auto topic = TRY(make_topic(
+      **beacon, kTopic, new SafeType<ServiceStatusTopic::Type>(ServiceStatusTopic::kMaxSample)));
   dds::Publisher* const publisher = (*beacon)->create_publisher(publisher_qos({}));
   if (publisher == nullptr || publisher->create_datawriter(topic, state_writer_qos()) == nullptr)
     return failure(ErrorCode::kInternal, "cannot create the writer that discovery servers pass on");
   return beacon;
 }
 
-Result<std::vector<HostPort>> look_for_places(const std::vector<HostPort>& discovery_servers, std::uint32_t domain,
+Result<std::vector<HostPort>> look_for_places(const std::vector<HostPort>& discovery_servers,
+                                              std::uint32_t domain,
                                               std::chrono::milliseconds limit) {
   const auto address = TRY(own_address_towards(discovery_servers.front().address));
   FoundPlaces found(domain, !address.starts_with("127."));
   Looker looker(found);
-  const auto participant =
-      TRY(client_of(discovery_servers, address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker));
+  const auto participant = TRY(
+      client_of(discovery_servers, address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker));
   std::vector<HostPort> places = found.wait(limit);
   if (!places.empty()) return places;
   std::vector<std::string> asked;
   for (const HostPort& one : discovery_servers) asked.push_back(to_string(one));
-  return failure(ErrorCode::kUnreachable, "no discovery server told of a server of domain {} within {} ms: {}", domain,
+  return failure(ErrorCode::kUnreachable,
+                 "no discovery server told of a server of domain {} within {} ms: {}", domain,
                  limit.count(), fmt::join(asked, ", "))
-      .next("does fast-discovery-server run there, in this order from -i 0, and is it in the server file?");
+      .next(
+          "does fast-discovery-server run there, in this order from -i 0, and is it in the server "
+          "file?");
 }
 
 }  // namespace trammel::wire

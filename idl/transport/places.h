@@ -13,8 +13,9 @@
 #include "server/base/mutex.h"
 #include "server/base/result.h"
 
-/// Where servers are, as discovery servers (Fast DDS's own `fast-discovery-server`) tell it. They tell nothing else:
-/// who knows a place goes there with its usual participant. A place is a hint of whoever said it.
+/// Where servers are, as discovery servers (Fast DDS's own `fast-discovery-server`) tell it. They
+/// tell nothing else: who knows a place goes there with its usual participant. A place is a hint of
+/// whoever said it.
 namespace trammel::wire {
 
 inline constexpr std::size_t kMostPlaces = 64;  ///< that one look takes
@@ -52,12 +53,16 @@ class FoundPlaces {
   std::vector<HostPort> places_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
-/// Tells the discovery servers of a place, from its own address, as long as what it returns lives. The number of a
-/// discovery server is its position: `fast-discovery-server -i 0` is the first. Waits for none of them.
-[[nodiscard]] Result<ParticipantPtr> announce_place(const Place& place, const std::vector<HostPort>& discovery_servers);
+/// Tells the discovery servers of a place, from its own address, as long as what it returns lives.
+/// The number of a discovery server is its position: `fast-discovery-server -i 0` is the first.
+/// Waits for none of them.
+[[nodiscard]] Result<ParticipantPtr> announce_place(const Place& place,
+                                                    const std::vector<HostPort>& discovery_servers);
 
-/// Asks them, from the address of this host that leads to the first. kUnreachable: none told of a server of `domain`.
-[[nodiscard]] Result<std::vector<HostPort>> look_for_places(const std::vector<HostPort>& discovery_servers,
-                                                            std::uint32_t domain, std::chrono::milliseconds limit);
+/// Asks them, from the address of this host that leads to the first. kUnreachable: none told of a
+/// server of `domain`.
+[[nodiscard]] Result<std::vector<HostPort>> look_for_places(
+    const std::vector<HostPort>& discovery_servers, std::uint32_t domain,
+    std::chrono::milliseconds limit);
 
 }  // namespace trammel::wire

@@ -8,7 +8,9 @@ namespace {
 constexpr std::size_t kMaxNumbers = MAX_TARGETS * MAX_JOINTS;
 constexpr std::size_t kPoseNumbers = 7;
 
-void numbers(CdrWalk& walk, const char* field, std::size_t most) { walk.wides(walk.list(field, most, 8)); }
+void numbers(CdrWalk& walk, const char* field, std::size_t most) {
+  walk.wides(walk.list(field, most, 8));
+}
 void octets(CdrWalk& walk, const char* field) { walk.octets(walk.list(field, MAX_TARGETS, 1)); }
 void poses(CdrWalk& walk, const char* field) {
   walk.wides(kPoseNumbers * walk.list(field, MAX_TARGETS, 8 * kPoseNumbers));
@@ -78,8 +80,10 @@ std::optional<Fault> find_fault<ros2::CorrectedTargets_>(std::span<const unsigne
   poses(walk, "commanded");
   walk.longs(1);
   numbers(walk, "joints_rad", kMaxNumbers);
-  for (const char* field : {"error_before_m", "error_after_m", "sigma_m"}) numbers(walk, field, MAX_TARGETS);
-  walk.list("messages", MAX_TARGETS, 4, "target", [&] { walk.text("messages", MAX_SENTENCE, Text::kAny); });
+  for (const char* field : {"error_before_m", "error_after_m", "sigma_m"})
+    numbers(walk, field, MAX_TARGETS);
+  walk.list("messages", MAX_TARGETS, 4, "target",
+            [&] { walk.text("messages", MAX_SENTENCE, Text::kAny); });
   return at_its_end(walk);
 }
 
@@ -89,9 +93,10 @@ std::string message_id(std::span<const unsigned char> sample) {
   if (!walk.good()) return {};
   std::string id;
   try {
-    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(const_cast<unsigned char*>(sample.data())),
-                                         sample.size());
-    eprosima::fastcdr::Cdr reader(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
+    eprosima::fastcdr::FastBuffer buffer(
+        reinterpret_cast<char*>(const_cast<unsigned char*>(sample.data())), sample.size());
+    eprosima::fastcdr::Cdr reader(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
+                                  eprosima::fastcdr::Cdr::DDS_CDR);
     reader.read_encapsulation();
     reader >> id;
   } catch (...) {

@@ -16,22 +16,27 @@
 #include "idl/transport/transport.h"
 #include "trammel_msgsPubSubTypes.h"
 
-/// Predictions and corrections for ROS 2 nodes (ros2/trammel_msgs): topics and types are named as ROS 2 names them on
-/// DDS, what correlates travels in the messages, and there is no partition.
+/// Predictions and corrections for ROS 2 nodes (ros2/trammel_msgs): topics and types are named as
+/// ROS 2 names them on DDS, what correlates travels in the messages, and there is no partition.
 namespace trammel::wire {
 
 namespace ros2 = trammel_msgs::msg::dds_;
 
 template <>
-[[nodiscard]] std::optional<Fault> find_fault<ros2::PredictErrors_>(std::span<const unsigned char> sample);
+[[nodiscard]] std::optional<Fault> find_fault<ros2::PredictErrors_>(
+    std::span<const unsigned char> sample);
 template <>
-[[nodiscard]] std::optional<Fault> find_fault<ros2::PredictedErrors_>(std::span<const unsigned char> sample);
+[[nodiscard]] std::optional<Fault> find_fault<ros2::PredictedErrors_>(
+    std::span<const unsigned char> sample);
 template <>
-[[nodiscard]] std::optional<Fault> find_fault<ros2::CorrectTargets_>(std::span<const unsigned char> sample);
+[[nodiscard]] std::optional<Fault> find_fault<ros2::CorrectTargets_>(
+    std::span<const unsigned char> sample);
 template <>
-[[nodiscard]] std::optional<Fault> find_fault<ros2::CorrectedTargets_>(std::span<const unsigned char> sample);
+[[nodiscard]] std::optional<Fault> find_fault<ros2::CorrectedTargets_>(
+    std::span<const unsigned char> sample);
 
-/// An operation under the names of ROS 2: its topics are `rt/trammel/...` (in ROS 2: `/trammel/...`).
+/// An operation under the names of ROS 2: its topics are `rt/trammel/...` (in ROS 2:
+/// `/trammel/...`).
 struct Ros2PredictErrors {
   using Operation = PredictError;
   using Request = ros2::PredictErrors_PubSubType;
@@ -60,14 +65,16 @@ struct ReceivedMessage : Message {
 /// The id with which a message begins; empty: there is none that could be answered.
 [[nodiscard]] std::string message_id(std::span<const unsigned char> sample);
 
-/// The type of questions on the side of the server: whoever sent an id that can be read is told what is wrong.
+/// The type of questions on the side of the server: whoever sent an id that can be read is told
+/// what is wrong.
 template <typename PubSubType>
 class ReceivedMessageType final : public SafeType<PubSubType> {
  public:
   using Message = typename PubSubType::type;
 
   /// `unreadable` counts the samples that are dropped.
-  ReceivedMessageType(std::size_t max_sample, std::shared_ptr<std::atomic<std::uint64_t>> unreadable)
+  ReceivedMessageType(std::size_t max_sample,
+                      std::shared_ptr<std::atomic<std::uint64_t>> unreadable)
       : SafeType<PubSubType>(max_sample), unreadable_(std::move(unreadable)) {}
 
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
@@ -80,7 +87,8 @@ class ReceivedMessageType final : public SafeType<PubSubType> {
       return false;
     }
     received.bytes = bytes.size();
-    received.content.hash = std::hash<std::string_view>{}({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    received.content.hash =
+        std::hash<std::string_view>{}({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     received.fault = fault_of(bytes);
     if (!received.fault && !this->deserialize_unseen(payload, static_cast<Message*>(&received)))
       received.fault = Fault{RESULT_MALFORMED, "the sample cannot be read", {}, {}, {}, {}};

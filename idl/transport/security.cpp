@@ -40,7 +40,9 @@ using Signed = std::unique_ptr<PKCS7, Free<PKCS7_free>>;
 using Authorities = std::unique_ptr<X509_STORE, Free<X509_STORE_free>>;
 using Verification = std::unique_ptr<X509_STORE_CTX, Free<X509_STORE_CTX_free>>;
 
-Bio bio_of(const std::string& text) { return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size()))); }
+Bio bio_of(const std::string& text) {
+  return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
 
 std::string text_of(BIO* bio) {
   char* data = nullptr;
@@ -54,7 +56,9 @@ class Folder {
   explicit Folder(std::string path) : path_(std::move(path)) {}
 
   [[nodiscard]] std::string path(const char* name) const { return path_ + "/" + name; }
-  [[nodiscard]] Result<std::string> text(const char* name) const { return read_text_file(path(name)); }
+  [[nodiscard]] Result<std::string> text(const char* name) const {
+    return read_text_file(path(name));
+  }
   [[nodiscard]] Failure wrong(const char* name, const std::string& why) const {
     return refused("{}", why).in(path(name));
   }
@@ -75,7 +79,9 @@ std::string text_of(const X509_NAME& name) {
   return text_of(out.get());
 }
 
-std::string subject_of(const X509& certificate) { return text_of(*X509_get_subject_name(&certificate)); }
+std::string subject_of(const X509& certificate) {
+  return text_of(*X509_get_subject_name(&certificate));
+}
 
 /// The authority of identities with the revocation lists behind it.
 Result<Authorities> identity_authority(const Folder& folder) {
@@ -98,20 +104,24 @@ Status check_certificate(const Folder& folder, X509& certificate) {
   const Verification verification(X509_STORE_CTX_new());
   X509_STORE_CTX_init(verification.get(), authorities.get(), &certificate, nullptr);
   if (X509_verify_cert(verification.get()) == 1) return {};
-  return folder.wrong("cert.pem", X509_verify_cert_error_string(X509_STORE_CTX_get_error(verification.get())))
+  return folder
+      .wrong("cert.pem",
+             X509_verify_cert_error_string(X509_STORE_CTX_get_error(verification.get())))
       .next("ask whoever issues certificates for a new one; see deploy/security/README.md");
 }
 
 Status check_key(const Folder& folder, const X509& certificate) {
   struct stat file {};
-  if (::stat(folder.path("key.pem").c_str(), &file) == 0 && (file.st_mode & (S_IRWXG | S_IRWXO) & ~S_IRGRP) != 0) {
+  if (::stat(folder.path("key.pem").c_str(), &file) == 0 &&
+      (file.st_mode & (S_IRWXG | S_IRWXO) & ~S_IRGRP) != 0) {
     return folder.wrong("key.pem", "others than its owner and group may read or change it")
         .next("chmod 640 " + folder.path("key.pem"));
   }
   const auto pem = TRY(folder.text("key.pem"));
   const Key key(PEM_read_bio_PrivateKey(bio_of(pem).get(), nullptr, nullptr, nullptr));
   if (!key) return folder.wrong("key.pem", "no private key in PEM form, or one with a password");
-  if (X509_check_private_key(&certificate, key.get()) != 1) return folder.wrong("key.pem", "not the key of cert.pem");
+  if (X509_check_private_key(&certificate, key.get()) != 1)
+    return folder.wrong("key.pem", "not the key of cert.pem");
   return {};
 }
 
@@ -125,8 +135,10 @@ Result<std::string> signed_text(const Folder& folder, const char* name, X509& au
   Authorities authorities(X509_STORE_new());
   X509_STORE_add_cert(authorities.get(), &authority);
   const Bio out(BIO_new(BIO_s_mem()));
-  if (PKCS7_verify(parsed.get(), nullptr, authorities.get(), given.get(), out.get(), PKCS7_TEXT) != 1)
-    return folder.wrong(name, "changed since it was signed, or not signed by permissions_ca.cert.pem");
+  if (PKCS7_verify(parsed.get(), nullptr, authorities.get(), given.get(), out.get(), PKCS7_TEXT) !=
+      1)
+    return folder.wrong(name,
+                        "changed since it was signed, or not signed by permissions_ca.cert.pem");
   return text_of(out.get());
 }
 
@@ -150,9 +162,11 @@ Status check_permissions(const Folder& folder, const std::string& subject, const
   constexpr const char* kName = "permissions.p7s";
   if (const std::string theirs = element(xml, "subject_name"); theirs != subject)
     return folder.wrong(kName, fmt::format("for {}, and cert.pem is of {}", theirs, subject));
-  const auto from = unix_time(element(xml, "not_before")), to = unix_time(element(xml, "not_after"));
+  const auto from = unix_time(element(xml, "not_before")),
+             to = unix_time(element(xml, "not_after"));
   const std::time_t now = std::time(nullptr);
-  if (from && now < *from) return folder.wrong(kName, "not valid before " + element(xml, "not_before"));
+  if (from && now < *from)
+    return folder.wrong(kName, "not valid before " + element(xml, "not_before"));
   if (to && now > *to) return folder.wrong(kName, "expired on " + element(xml, "not_after"));
   return {};
 }
@@ -166,7 +180,8 @@ std::string role_in(const std::string& permissions) {
   const std::size_t colon = permissions.find(": ", begin);
   if (end == std::string::npos || colon >= end) return {};
   const std::string role = permissions.substr(colon + 2, end - colon - 2);
-  constexpr std::array<std::string_view, 5> kKnown{"server", "observer", "cam", "metrologist", "engineer"};
+  constexpr std::array<std::string_view, 5> kKnown{"server", "observer", "cam", "metrologist",
+                                                   "engineer"};
   return std::find(kKnown.begin(), kKnown.end(), role) == kKnown.end() ? std::string() : role;
 }
 
@@ -178,7 +193,8 @@ struct NamePart {
 std::vector<NamePart> name_parts(const std::string& line) {
   std::vector<NamePart> parts;
   for (std::size_t at = 0; at < line.size();) {
-    const std::size_t end = std::min(line.find('/', at + 1), line.size()), equals = line.find('=', at);
+    const std::size_t end = std::min(line.find('/', at + 1), line.size()),
+                      equals = line.find('=', at);
     const std::string key = equals < end ? line.substr(at + 1, equals - at - 1) : std::string();
     if (line[at] == '/' && OBJ_txt2nid(key.c_str()) != NID_undef) {
       parts.push_back({key, line.substr(equals + 1, end - equals - 1)});
@@ -211,7 +227,8 @@ Name name_of(const std::vector<NamePart>& parts, int type) {
     const std::string value = unescaped(part.value);
     const auto* octets = reinterpret_cast<const unsigned char*>(value.data());
     const int size = static_cast<int>(value.size());
-    if (X509_NAME_add_entry_by_txt(name.get(), part.key.c_str(), type, octets, size, -1, 0) != 1) return nullptr;
+    if (X509_NAME_add_entry_by_txt(name.get(), part.key.c_str(), type, octets, size, -1, 0) != 1)
+      return nullptr;
   }
   return name;
 }
@@ -220,7 +237,8 @@ Name name_of(const std::vector<NamePart>& parts, int type) {
 bool begins_with_hash(const std::string& participant, const X509_NAME& name) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
   unsigned length = 0;
-  if (participant.size() < 6 || X509_NAME_digest(&name, EVP_sha256(), hash.data(), &length) != 1) return false;
+  if (participant.size() < 6 || X509_NAME_digest(&name, EVP_sha256(), hash.data(), &length) != 1)
+    return false;
   unsigned carried = 1;
   for (std::size_t i = 0; i < 6; ++i) {
     const unsigned expected = (carried << 7 | unsigned{hash[i]} >> 1) & 0xFF;
@@ -262,7 +280,8 @@ Status check_serves(const Security& security) {
   if (security.role.empty() || security.role == "server") return {};
   return Folder(security.folder)
       .wrong("permissions.p7s",
-             fmt::format("{} has the role {}, and a service needs the role server", security.subject, security.role))
+             fmt::format("{} has the role {}, and a service needs the role server",
+                         security.subject, security.role))
       .next("keys issue PLANT server NAME makes such a folder; see deploy/security/README.md");
 }
 

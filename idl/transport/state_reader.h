@@ -11,23 +11,26 @@
 
 namespace trammel::wire {
 
-/// Reads a state topic. The listener is called in threads of DDS and must neither block nor call DDS.
+/// Reads a state topic. The listener is called in threads of DDS and must neither block nor call
+/// DDS.
 template <typename State>
 class StateReader final : private dds::DataReaderListener {
  public:
   using Sample = typename State::Type::type;
-  /// The sample, the participant that wrote it and when (s, by the writer's clock for what it sends: library_clock.h);
-  /// no sample: the participant has left.
-  using Listener = std::function<void(const Sample*, const std::string& participant, double written_s)>;
+  /// The sample, the participant that wrote it and when (s, by the writer's clock for what it
+  /// sends: library_clock.h); no sample: the participant has left.
+  using Listener =
+      std::function<void(const Sample*, const std::string& participant, double written_s)>;
 
-  [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(dds::DomainParticipant& participant,
-                                                                 dds::Subscriber& subscriber,
-                                                                 const dds::DataReaderQos& qos, Listener listener) {
+  [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(
+      dds::DomainParticipant& participant, dds::Subscriber& subscriber,
+      const dds::DataReaderQos& qos, Listener listener) {
     return open(make_state_topic<State>(participant), subscriber, qos, std::move(listener));
   }
   [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(const Result<dds::Topic*>& topic,
                                                                  dds::Subscriber& subscriber,
-                                                                 const dds::DataReaderQos& qos, Listener listener) {
+                                                                 const dds::DataReaderQos& qos,
+                                                                 Listener listener) {
     if (!topic) return tl::make_unexpected(topic.error());
     std::unique_ptr<StateReader> result(new StateReader(subscriber, std::move(listener)));
     const auto mask = dds::StatusMask::data_available() << dds::StatusMask::subscription_matched();
@@ -48,16 +51,20 @@ class StateReader final : private dds::DataReaderListener {
   void on_data_available(dds::DataReader* reader) override {
     Sample sample;
     dds::SampleInfo info;
-    while (reader->take_next_sample(&sample, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    while (reader->take_next_sample(&sample, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       if (!info.valid_data) continue;
       const double written = 1e-9 * static_cast<double>(info.source_timestamp.to_ns());
       listener_(&sample, participant_of(info.sample_identity.writer_guid()), written);
     }
   }
 
-  void on_subscription_matched(dds::DataReader*, const dds::SubscriptionMatchedStatus& status) override {
+  void on_subscription_matched(dds::DataReader*,
+                               const dds::SubscriptionMatchedStatus& status) override {
     if (status.current_count_change >= 0) return;
-    listener_(nullptr, participant_of(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle)), 0);
+    listener_(
+        nullptr,
+        participant_of(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle)), 0);
   }
 
   dds::Subscriber& subscriber_;

@@ -13,13 +13,15 @@ namespace {
 
 namespace rtps = eprosima::fastrtps::rtps;
 
-// Bytes. On a line a datagram is one frame of an Ethernet: of a larger one a lost frame takes all others with it, so
-// that a line that loses every twentieth lets hardly any of 64 kB through. The handshake of DDS-Security is not sent in
-// parts: it holds certificate and permissions. Others may send larger ones.
+// Bytes. On a line a datagram is one frame of an Ethernet: of a larger one a lost frame takes all
+// others with it, so that a line that loses every twentieth lets hardly any of 64 kB through. The
+// handshake of DDS-Security is not sent in parts: it holds certificate and permissions. Others may
+// send larger ones.
 constexpr std::uint32_t kDatagramOfALine = 1400;
 constexpr std::uint32_t kSecuredDatagramOfALine = 16384;
 constexpr int kServersDepth = 16;
-// Until a reader has confirmed everything: a lost reply is to be missed at once. A state has readers in every client.
+// Until a reader has confirmed everything: a lost reply is to be missed at once. A state has
+// readers in every client.
 constexpr std::chrono::milliseconds kHeartbeat{10}, kStateHeartbeat{200};
 
 /// The builtin plugins of DDS-Security. The governance says what is signed and encrypted.
@@ -50,7 +52,8 @@ void set_call_history(Qos& qos, int depth) {
   qos.resource_limits().max_samples_per_instance = depth;
   qos.resource_limits().allocated_samples = 1;
   qos.data_sharing().off();
-  // A sample's memory goes with it: histories that keep it would hold as many of the largest ones as they are deep.
+  // A sample's memory goes with it: histories that keep it would hold as many of the largest ones
+  // as they are deep.
   qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
 }
 
@@ -62,52 +65,62 @@ void set_state_history(Qos& qos, int depth) {
   qos.resource_limits().max_instances = 0;
 }
 
-/// As long as one reader has not confirmed everything, each heartbeat goes to all readers, and all of them answer.
+/// As long as one reader has not confirmed everything, each heartbeat goes to all readers, and all
+/// of them answer.
 void set_writer_times(dds::DataWriterQos& qos, std::chrono::milliseconds heartbeat) {
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
   qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(heartbeat);
   qos.reliable_writer_qos().times.nackResponseDelay = to_duration(std::chrono::milliseconds(0));
-  // None between the fragments of a sample: a reader of Cyclone DDS takes what stands in the first HEARTBEAT that it
-  // hears for history, and drops the sample that is being sent.
+  // None between the fragments of a sample: a reader of Cyclone DDS takes what stands in the first
+  // HEARTBEAT that it hears for history, and drops the sample that is being sent.
   qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
 }
 
 void set_reader_times(dds::DataReaderQos& qos) {
-  qos.reliable_reader_qos().times.heartbeatResponseDelay = to_duration(std::chrono::milliseconds(0));
-  // Repeated until the writer offers something; a writer may be left by whoever died, or never mean to.
+  qos.reliable_reader_qos().times.heartbeatResponseDelay =
+      to_duration(std::chrono::milliseconds(0));
+  // Repeated until the writer offers something; a writer may be left by whoever died, or never mean
+  // to.
   qos.reliable_reader_qos().times.initialAcknackDelay = to_duration(std::chrono::milliseconds(20));
 }
 
 }  // namespace
 
-Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
+Result<ParticipantPtr> make_participant(const ParticipantOptions& options,
+                                        dds::DomainParticipantListener* discovery) {
   const auto udp = TRY(udp_on(options.address));
   GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
-  if (options.security) gate.proof = options.security->signs ? Proof::kOfMessages : Proof::kOfIdentity;
+  if (options.security)
+    gate.proof = options.security->signs ? Proof::kOfMessages : Proof::kOfIdentity;
   gate.serves = options.heard_of_itself != nullptr;
   gate.hearing = std::make_shared<Hearing>();
-  for (const std::uint16_t port : options.peer_ports) gate.hosts.push_back(locator(options.address, port));
+  for (const std::uint16_t port : options.peer_ports)
+    gate.hosts.push_back(locator(options.address, port));
   for (const HostPort& peer : options.peers) gate.hosts.push_back(locator(peer.address, peer.port));
   if (options.heard_of_itself) gate.hosts.push_back(locator(options.address, options.listen_port));
   if (!options.address.starts_with("127."))
     gate.largest_sent = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
 
-  dds::DomainParticipantQos qos = participant_qos(with_domain_gate(udp, gate), options.address, options.listen_port);
+  dds::DomainParticipantQos qos =
+      participant_qos(with_domain_gate(udp, gate), options.address, options.listen_port);
   qos.name(options.name);
   set_user_data(qos, domain_mark(options.domain));
   for (const auto& host : gate.hosts) qos.wire_protocol().builtin.initialPeersList.push_back(host);
   if (options.security) set_security(qos.properties(), *options.security);
 
-  dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
-      options.domain, qos, discovery, dds::StatusMask::none());
+  dds::DomainParticipant* participant =
+      dds::DomainParticipantFactory::get_instance()->create_participant(
+          options.domain, qos, discovery, dds::StatusMask::none());
   gate.hearing->begins();
   if (participant == nullptr) {
     if (options.security) {
-      return refused("DDS-Security refuses what is in it for domain {}: see the errors of the library", options.domain)
+      return refused(
+                 "DDS-Security refuses what is in it for domain {}: see the errors of the library",
+                 options.domain)
           .in(options.security->folder);
     }
-    return failure(ErrorCode::kInternal, "cannot create a DDS participant on {} in domain {}", options.address,
-                   options.domain);
+    return failure(ErrorCode::kInternal, "cannot create a DDS participant on {} in domain {}",
+                   options.address, options.domain);
   }
   return ParticipantPtr(participant);
 }
@@ -172,8 +185,8 @@ dds::DataWriterQos service_status_writer_qos() {
   return qos;
 }
 
-Result<dds::Topic*> make_topic(dds::DomainParticipant& participant, const std::string& name, dds::TopicDataType* type,
-                               const std::string& type_name) {
+Result<dds::Topic*> make_topic(dds::DomainParticipant& participant, const std::string& name,
+                               dds::TopicDataType* type, const std::string& type_name) {
   if (!type_name.empty()) type->setName(type_name.c_str());
   dds::TypeSupport support(type);
   dds::Topic* topic = nullptr;

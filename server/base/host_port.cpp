@@ -24,7 +24,9 @@ constexpr std::uint16_t kAnyPort = 9;  // a route does not depend on it
 
 std::string text_of(const in_addr& address) {
   std::array<char, INET_ADDRSTRLEN> text{};
-  return inet_ntop(AF_INET, &address, text.data(), text.size()) == nullptr ? std::string() : std::string(text.data());
+  return inet_ntop(AF_INET, &address, text.data(), text.size()) == nullptr
+             ? std::string()
+             : std::string(text.data());
 }
 
 std::optional<std::string> resolved(const std::string& host) {
@@ -44,7 +46,8 @@ std::optional<std::string> resolved(const std::string& host) {
 std::optional<std::uint16_t> port_of(const std::string& text) {
   int port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  if (error != std::errc{} || end != text.data() + text.size() || port < 1024 || port > 65535) return std::nullopt;
+  if (error != std::errc{} || end != text.data() + text.size() || port < 1024 || port > 65535)
+    return std::nullopt;
   return static_cast<std::uint16_t>(port);
 }
 
@@ -52,15 +55,18 @@ std::optional<std::uint16_t> port_of(const std::string& text) {
 
 Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port) {
   const std::size_t colon = text.find(':');
-  const std::optional<std::uint16_t> said = colon == std::string::npos ? port : port_of(text.substr(colon + 1));
+  const std::optional<std::uint16_t> said =
+      colon == std::string::npos ? port : port_of(text.substr(colon + 1));
   if (!said) {
-    return failure(ErrorCode::kUsage, "'{}', expected host:port with a port from 1024 to 65535", shown_short(text))
+    return failure(ErrorCode::kUsage, "'{}', expected host:port with a port from 1024 to 65535",
+                   shown_short(text))
         .with_text(shown_short(text));
   }
   const std::string host = text.substr(0, colon);
   const auto address = host.empty() ? std::nullopt : resolved(host);
   if (!address) {
-    return failure(ErrorCode::kUsage, "'{}' is no IPv4 address, and no name that this host can look up",
+    return failure(ErrorCode::kUsage,
+                   "'{}' is no IPv4 address, and no name that this host can look up",
                    shown_short(host))
         .with_text(shown_short(host));
   }
@@ -82,7 +88,9 @@ Result<std::vector<HostPort>> parse_hosts(const std::vector<std::string>& hosts,
   return places;
 }
 
-std::string to_string(const HostPort& place) { return fmt::format("{}:{}", place.address, place.port); }
+std::string to_string(const HostPort& place) {
+  return fmt::format("{}:{}", place.address, place.port);
+}
 
 std::vector<std::string> own_addresses() {
   std::vector<std::string> own;
@@ -110,12 +118,14 @@ Result<std::string> own_address_towards(const std::string& address) {
   sockaddr_in here{};
   socklen_t size = sizeof here;
   // A datagram socket that is connected has its own address, and has sent nothing.
-  const bool routed = is_address && probe >= 0 &&
-                      connect(probe, reinterpret_cast<const sockaddr*>(&there), sizeof there) == 0 &&
-                      getsockname(probe, reinterpret_cast<sockaddr*>(&here), &size) == 0;
+  const bool routed =
+      is_address && probe >= 0 &&
+      connect(probe, reinterpret_cast<const sockaddr*>(&there), sizeof there) == 0 &&
+      getsockname(probe, reinterpret_cast<sockaddr*>(&here), &size) == 0;
   if (probe >= 0) close(probe);
   if (!routed)
-    return failure(ErrorCode::kUnreachable, "no interface of this host leads to {}", shown_short(address))
+    return failure(ErrorCode::kUnreachable, "no interface of this host leads to {}",
+                   shown_short(address))
         .with_text(shown_short(address))
         .next("is the interface up? ip route");
   return text_of(here.sin_addr);

@@ -16,11 +16,12 @@ struct HostPort {
   bool operator==(const HostPort&) const = default;
 };
 
-inline constexpr std::uint16_t kDiscoveryPort = 11811;  ///< of a discovery server, where none is said
+inline constexpr std::uint16_t kDiscoveryPort =
+    11811;  ///< of a discovery server, where none is said
 inline constexpr std::size_t kMostDiscoveryServers = 8;
 
-/// From `host` or `host:port`, the host a name or an IPv4 address: a name becomes its first address. `port`: where none
-/// is said. kUsage: it is neither, or nobody knows the name.
+/// From `host` or `host:port`, the host a name or an IPv4 address: a name becomes its first
+/// address. `port`: where none is said. kUsage: it is neither, or nobody knows the name.
 [[nodiscard]] Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port);
 
 /// The same of several; one without a port is at each of `ports`.
@@ -31,8 +32,8 @@ inline constexpr std::size_t kMostDiscoveryServers = 8;
 
 /// The IPv4 addresses of this host's interfaces that are up and have a link now.
 [[nodiscard]] std::vector<std::string> own_addresses();
-/// The IPv4 address of this host by which it reaches `address`, as the routes are now. Sends nothing. kUnreachable:
-/// there is no route.
+/// The IPv4 address of this host by which it reaches `address`, as the routes are now. Sends
+/// nothing. kUnreachable: there is no route.
 [[nodiscard]] Result<std::string> own_address_towards(const std::string& address);
 
 }  // namespace trammel

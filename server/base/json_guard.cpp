@@ -28,7 +28,9 @@ class Scanner {
     at_ = begin;
     if (begin == json_.size()) return Token{Piece::kEnd, begin, begin};
     const Piece piece = piece_of(json_[begin]);
-    at_ = piece == Piece::kText ? end_of_text(begin) : piece == Piece::kScalar ? end_of_scalar(begin) : begin + 1;
+    at_ = piece == Piece::kText     ? end_of_text(begin)
+          : piece == Piece::kScalar ? end_of_scalar(begin)
+                                    : begin + 1;
     const Token token{piece, begin, at_};
     if (const Status counted = count(token); !counted) return tl::make_unexpected(counted.error());
     return token;
@@ -73,17 +75,22 @@ class Scanner {
     const std::size_t bytes = token.end - token.begin;
     switch (token.piece) {
       case Piece::kOpen:
-        return within("arrays and objects inside one another", ++depth_, limits_.depth).and_then([this] {
-          return within("arrays and objects", ++containers_, limits_.containers);
-        });
+        return within("arrays and objects inside one another", ++depth_, limits_.depth)
+            .and_then(
+                [this] { return within("arrays and objects", ++containers_, limits_.containers); });
       case Piece::kClose:
-        if (depth_ == 0) return refused("not JSON: byte {} closes what was not opened", token.begin).in(where_);
+        if (depth_ == 0)
+          return refused("not JSON: byte {} closes what was not opened", token.begin).in(where_);
         --depth_;
         return {};
       case Piece::kText:
-        return within("bytes in one text", bytes, limits_.text_bytes).and_then([this] { return one_more_value(); });
+        return within("bytes in one text", bytes, limits_.text_bytes).and_then([this] {
+          return one_more_value();
+        });
       case Piece::kScalar:
-        return within("bytes in one number", bytes, limits_.scalar_bytes).and_then([this] { return one_more_value(); });
+        return within("bytes in one number", bytes, limits_.scalar_bytes).and_then([this] {
+          return one_more_value();
+        });
       case Piece::kColon:
         return within("keys", ++members_, limits_.members);
       default:
@@ -95,7 +102,9 @@ class Scanner {
 
   Status within(const char* what, std::size_t count, std::size_t limit) const {
     if (count <= limit) return {};
-    return failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit).in(where_).beyond(count, limit);
+    return failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit)
+        .in(where_)
+        .beyond(count, limit);
   }
 
   std::string_view json_;
@@ -125,7 +134,8 @@ class Members {
     }
     if (closed_) return no_object();
     const bool top = depth == 1 && token.piece != Piece::kClose;
-    if (top && (token.piece == Piece::kComma || token.piece == Piece::kColon)) return separate(token);
+    if (top && (token.piece == Piece::kComma || token.piece == Piece::kColon))
+      return separate(token);
     if (depth == 0) {
       closed_ = true;
       if (json_[token.begin] != '}') return no_object();
@@ -147,7 +157,8 @@ class Members {
     if (token.piece == Piece::kComma) return end_member();
     if (key_ || !begin_) return no_object();
     const std::string_view text = json_.substr(*begin_, end_ - *begin_);
-    if (text.size() < 2 || text.front() != '"' || text.find('\\') != std::string_view::npos) return no_object();
+    if (text.size() < 2 || text.front() != '"' || text.find('\\') != std::string_view::npos)
+      return no_object();
     key_ = std::string(text.substr(1, text.size() - 2));
     begin_.reset();
     return {};
@@ -163,7 +174,9 @@ class Members {
     return {};
   }
 
-  [[nodiscard]] Status no_object() const { return refused("not a JSON object with keys and values").in(where_); }
+  [[nodiscard]] Status no_object() const {
+    return refused("not a JSON object with keys and values").in(where_);
+  }
 
   std::string_view json_;
   const std::string& where_;
@@ -176,7 +189,8 @@ class Members {
 
 }  // namespace
 
-Status check_json_limits(std::string_view json, const std::string& where, const JsonLimits& limits) {
+Status check_json_limits(std::string_view json, const std::string& where,
+                         const JsonLimits& limits) {
   TRY(check_size(json, where, limits));
   Scanner scanner(json, where, limits);
   while (true) {
@@ -186,17 +200,20 @@ Status check_json_limits(std::string_view json, const std::string& where, const 
   }
 }
 
-Result<std::map<std::string, std::string_view>> json_members(std::string_view json, const std::string& where,
+Result<std::map<std::string, std::string_view>> json_members(std::string_view json,
+                                                             const std::string& where,
                                                              const JsonLimits& limits) {
   // The limits are checked before anything is stored.
-  if (const Status fine = check_json_limits(json, where, limits); !fine) return tl::make_unexpected(fine.error());
+  if (const Status fine = check_json_limits(json, where, limits); !fine)
+    return tl::make_unexpected(fine.error());
   Scanner scanner(json, where, limits);
   Members members(json, where);
   while (true) {
     const Result<Token> token = scanner.next();
     if (!token) return tl::make_unexpected(token.error());
     if (token->piece == Piece::kEnd) return std::move(members).result();
-    if (const Status taken = members.take(*token, scanner.depth()); !taken) return tl::make_unexpected(taken.error());
+    if (const Status taken = members.take(*token, scanner.depth()); !taken)
+      return tl::make_unexpected(taken.error());
   }
 }
 

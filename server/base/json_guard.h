@@ -9,8 +9,9 @@
 
 namespace trammel {
 
-/// What a JSON text from outside may hold. A parser may need twenty times the memory of the text, and it copies and
-/// frees its tree by recursion. So the text is scanned first, without allocating and without recursion.
+/// What a JSON text from outside may hold. A parser may need twenty times the memory of the text,
+/// and it copies and frees its tree by recursion. So the text is scanned first, without allocating
+/// and without recursion.
 struct JsonLimits {
   std::size_t bytes = std::size_t{256} << 20;
   std::size_t depth = 16;                         ///< of arrays and objects inside one another
@@ -21,14 +22,14 @@ struct JsonLimits {
   std::size_t scalar_bytes = 64;                  ///< of one number
 };
 
-/// Refuses a text beyond the limits (kTooLarge) and names the limit. Does not check whether the text is valid JSON: the
-/// parser does.
-[[nodiscard]] Status check_json_limits(std::string_view json, const std::string& where, const JsonLimits& limits = {});
+/// Refuses a text beyond the limits (kTooLarge) and names the limit. Does not check whether the
+/// text is valid JSON: the parser does.
+[[nodiscard]] Status check_json_limits(std::string_view json, const std::string& where,
+                                       const JsonLimits& limits = {});
 
-/// The members of the JSON object `json`. Each value is the part of the text that holds it. Refuses a text beyond the
-/// limits, one that is no object, and a key that comes twice or holds an escape.
-[[nodiscard]] Result<std::map<std::string, std::string_view>> json_members(std::string_view json,
-                                                                           const std::string& where,
-                                                                           const JsonLimits& limits = {});
+/// The members of the JSON object `json`. Each value is the part of the text that holds it. Refuses
+/// a text beyond the limits, one that is no object, and a key that comes twice or holds an escape.
+[[nodiscard]] Result<std::map<std::string, std::string_view>> json_members(
+    std::string_view json, const std::string& where, const JsonLimits& limits = {});
 
 }  // namespace trammel

@@ -30,8 +30,8 @@ LineOutput::~LineOutput() {
 void LineOutput::write(std::string_view line) {
   const MutexLock lock(mutex_);
   if (dropped_ > 0 || within_line_) {
-    const std::string said =
-        fmt::format("{}{} lines could not be written here and are lost\n", within_line_ ? "\n" : "", dropped_);
+    const std::string said = fmt::format("{}{} lines could not be written here and are lost\n",
+                                         within_line_ ? "\n" : "", dropped_);
     if (!put(said)) {
       ++dropped_;
       return;
@@ -49,7 +49,8 @@ std::uint64_t LineOutput::dropped() const {
 
 bool LineOutput::put(std::string_view text) {
   while (!text.empty()) {
-    const long went = put_part(text.substr(0, PIPE_BUF));  // so much goes into a pipe whole, or not at all
+    const long went =
+        put_part(text.substr(0, PIPE_BUF));  // so much goes into a pipe whole, or not at all
     if (went < 0 && errno == EINTR) continue;
     if (went <= 0) return false;
     within_line_ = text[static_cast<std::size_t>(went) - 1] != '\n';

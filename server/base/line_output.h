@@ -8,9 +8,9 @@
 
 namespace trammel {
 
-/// Lines to a descriptor that others may have stopped reading: a pipe, a terminal, a socket. Never waits, and never
-/// raises a signal of its own (a process that ignores SIGPIPE gets none at all). What does not go is dropped, and the
-/// next line that goes says how many were. Thread-safe.
+/// Lines to a descriptor that others may have stopped reading: a pipe, a terminal, a socket. Never
+/// waits, and never raises a signal of its own (a process that ignores SIGPIPE gets none at all).
+/// What does not go is dropped, and the next line that goes says how many were. Thread-safe.
 class LineOutput {
  public:
   /// `descriptor` stays open and its flags, which other processes may share, stay as they are.
@@ -31,7 +31,8 @@ class LineOutput {
   [[nodiscard]] long put_part(std::string_view part) const;
 
   const int descriptor_;
-  int own_ = -1;  // the same pipe or terminal, opened again so as not to wait; below 0: it cannot be
+  int own_ =
+      -1;  // the same pipe or terminal, opened again so as not to wait; below 0: it cannot be
   bool is_socket_ = false;
   bool is_file_ = false;
   mutable Mutex mutex_;

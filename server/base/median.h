@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// The median of `values`, which must not be empty; of an even number the upper one of the two in the middle.
+/// The median of `values`, which must not be empty; of an even number the upper one of the two in
+/// the middle.
 [[nodiscard]] inline double median(std::vector<double> values) {
   TRAMMEL_CHECK(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -6,8 +6,8 @@
 #include <stop_token>
 #include <utility>
 
-/// Locks that the compiler checks. In `deploy/check threads` clang refuses code that uses a member without the lock
-/// that guards it. Other compilers ignore the annotations.
+/// Locks that the compiler checks. In `deploy/check threads` clang refuses code that uses a member
+/// without the lock that guards it. Other compilers ignore the annotations.
 #if defined(__clang__)
 #define TRAMMEL_THREAD_SAFETY(annotation) __attribute__((annotation))
 #else
@@ -36,7 +36,8 @@ class TRAMMEL_THREAD_SAFETY(capability("mutex")) Mutex {
 /// Holds a mutex until it is destroyed or unlock() is called.
 class TRAMMEL_THREAD_SAFETY(scoped_lockable) MutexLock {
  public:
-  explicit MutexLock(Mutex& mutex) TRAMMEL_THREAD_SAFETY(acquire_capability(mutex)) : lock_(mutex) {}
+  explicit MutexLock(Mutex& mutex) TRAMMEL_THREAD_SAFETY(acquire_capability(mutex))
+      : lock_(mutex) {}
   ~MutexLock() TRAMMEL_THREAD_SAFETY(release_capability()) = default;
   MutexLock(const MutexLock&) = delete;
   MutexLock& operator=(const MutexLock&) = delete;
@@ -48,9 +49,9 @@ class TRAMMEL_THREAD_SAFETY(scoped_lockable) MutexLock {
   std::unique_lock<Mutex> lock_;
 };
 
-/// A condition variable for Mutex. The lock is held before and after every wait, and released during it. `ready` is
-/// called with the lock held: `[this]() TRAMMEL_REQUIRES(mutex_) { return ...; }`. A wait with a limit or a stop token
-/// returns the last result of `ready`.
+/// A condition variable for Mutex. The lock is held before and after every wait, and released
+/// during it. `ready` is called with the lock held: `[this]() TRAMMEL_REQUIRES(mutex_) { return
+/// ...; }`. A wait with a limit or a stop token returns the last result of `ready`.
 class Condition {
  public:
   void notify_one() noexcept { condition_.notify_one(); }
@@ -65,7 +66,8 @@ class Condition {
     return condition_.wait(lock, stop, std::move(ready));
   }
   template <typename Clock, typename Duration, typename Ready>
-  bool wait_until(MutexLock& lock, const std::chrono::time_point<Clock, Duration>& deadline, Ready ready) {
+  bool wait_until(MutexLock& lock, const std::chrono::time_point<Clock, Duration>& deadline,
+                  Ready ready) {
     return condition_.wait_until(lock, deadline, std::move(ready));
   }
   template <typename Clock, typename Duration, typename Ready>
@@ -74,8 +76,8 @@ class Condition {
     return condition_.wait_until(lock, stop, deadline, std::move(ready));
   }
   template <typename Rep, typename Period, typename Ready>
-  bool wait_for(MutexLock& lock, const std::stop_token& stop, const std::chrono::duration<Rep, Period>& limit,
-                Ready ready) {
+  bool wait_for(MutexLock& lock, const std::stop_token& stop,
+                const std::chrono::duration<Rep, Period>& limit, Ready ready) {
     return condition_.wait_for(lock, stop, limit, std::move(ready));
   }
 

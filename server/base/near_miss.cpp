@@ -10,7 +10,8 @@ namespace {
 constexpr std::size_t kMostChanges = 2;
 constexpr std::size_t kLongest = 100;  // bytes; longer texts are no misspelled words
 
-/// The least number of edits from `a` to `b`: a letter inserted, left out, changed, or swapped with its neighbour.
+/// The least number of edits from `a` to `b`: a letter inserted, left out, changed, or swapped with
+/// its neighbour.
 std::size_t changes_between(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> least(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {

@@ -32,7 +32,8 @@ struct Note {
 
 /// The gravest first; those of one severity in the order in which they stand.
 [[nodiscard]] inline std::vector<Note> gravest_first(std::vector<Note> notes) {
-  std::stable_sort(notes.begin(), notes.end(), [](const Note& a, const Note& b) { return a.severity > b.severity; });
+  std::stable_sort(notes.begin(), notes.end(),
+                   [](const Note& a, const Note& b) { return a.severity > b.severity; });
   return notes;
 }
 

@@ -22,8 +22,9 @@ constexpr std::chrono::minutes kUntouched{1};
 pid_t owner_of(const fs::path& part) {
   if (part.extension() != ".part") return 0;
   const std::string number = part.stem().extension().string();
-  const bool digits = number.size() > 1 && std::all_of(number.begin() + 1, number.end(),
-                                                       [](unsigned char c) { return c >= '0' && c <= '9'; });
+  const bool digits =
+      number.size() > 1 && std::all_of(number.begin() + 1, number.end(),
+                                       [](unsigned char c) { return c >= '0' && c <= '9'; });
   return digits && number.size() < 9 ? static_cast<pid_t>(std::stol(number.substr(1))) : 0;
 }
 
@@ -40,7 +41,9 @@ bool is_untouched(const fs::path& part) {
 
 }  // namespace
 
-fs::path part_beside(const fs::path& file) { return fmt::format("{}.{}.part", file.string(), ::getpid()); }
+fs::path part_beside(const fs::path& file) {
+  return fmt::format("{}.{}.part", file.string(), ::getpid());
+}
 
 std::vector<fs::path> leftover_parts(const fs::path& folder) {
   std::vector<fs::path> left;

@@ -37,21 +37,25 @@ Character first_character(std::string_view text) {
 
 bool controls(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code < 0xA0) || (code >= 0x2028 && code <= 0x202E) ||
-         (code >= 0x2066 && code <= 0x2069) || code == 0x200E || code == 0x200F || code == 0x061C || code == 0xFEFF;
+         (code >= 0x2066 && code <= 0x2069) || code == 0x200E || code == 0x200F || code == 0x061C ||
+         code == 0xFEFF;
 }
 
-/// Those of the Unicode property Default_Ignorable_Code_Point, which fonts show as nothing, and noncharacters.
+/// Those of the Unicode property Default_Ignorable_Code_Point, which fonts show as nothing, and
+/// noncharacters.
 bool is_unseen(std::uint32_t code) {
   struct Range {
     std::uint32_t first, last;
   };
   constexpr Range kUnseen[] = {
-      {0x00AD, 0x00AD}, {0x034F, 0x034F}, {0x061C, 0x061C}, {0x115F, 0x1160},   {0x17B4, 0x17B5},   {0x180B, 0x180F},
-      {0x200B, 0x200F}, {0x202A, 0x202E}, {0x2060, 0x206F}, {0x3164, 0x3164},   {0xFDD0, 0xFDEF},   {0xFE00, 0xFE0F},
-      {0xFEFF, 0xFEFF}, {0xFFA0, 0xFFA0}, {0xFFF0, 0xFFFB}, {0x1BCA0, 0x1BCA3}, {0x1D173, 0x1D17A}, {0xE0000, 0xE0FFF}};
+      {0x00AD, 0x00AD},   {0x034F, 0x034F},   {0x061C, 0x061C},  {0x115F, 0x1160}, {0x17B4, 0x17B5},
+      {0x180B, 0x180F},   {0x200B, 0x200F},   {0x202A, 0x202E},  {0x2060, 0x206F}, {0x3164, 0x3164},
+      {0xFDD0, 0xFDEF},   {0xFE00, 0xFE0F},   {0xFEFF, 0xFEFF},  {0xFFA0, 0xFFA0}, {0xFFF0, 0xFFFB},
+      {0x1BCA0, 0x1BCA3}, {0x1D173, 0x1D17A}, {0xE0000, 0xE0FFF}};
   if ((code & 0xFFFE) == 0xFFFE) return true;
-  return std::any_of(std::begin(kUnseen), std::end(kUnseen),
-                     [code](const Range& range) { return code >= range.first && code <= range.last; });
+  return std::any_of(std::begin(kUnseen), std::end(kUnseen), [code](const Range& range) {
+    return code >= range.first && code <= range.last;
+  });
 }
 
 bool ends_line_or_field(std::uint32_t code) { return code == '\t' || code == '\n' || code == '\r'; }
@@ -93,11 +97,13 @@ bool is_utf8(std::string_view text) {
 }
 
 bool is_plain(std::string_view text) {
-  return all_of_characters(text, [](std::uint32_t code) { return !controls(code) && !is_unseen(code); });
+  return all_of_characters(text,
+                           [](std::uint32_t code) { return !controls(code) && !is_unseen(code); });
 }
 
 bool is_plain_lines(std::string_view text) {
-  return all_of_characters(text, [](std::uint32_t code) { return !controls(code) || ends_line_or_field(code); });
+  return all_of_characters(
+      text, [](std::uint32_t code) { return !controls(code) || ends_line_or_field(code); });
 }
 
 std::string shown(std::string_view text) {
@@ -105,14 +111,16 @@ std::string shown(std::string_view text) {
 }
 
 std::string shown_lines(std::string_view text) {
-  return spelled_out(
-      text, [](std::uint32_t code) { return (!controls(code) && !is_unseen(code)) || code == '\t' || code == '\n'; });
+  return spelled_out(text, [](std::uint32_t code) {
+    return (!controls(code) && !is_unseen(code)) || code == '\t' || code == '\n';
+  });
 }
 
 std::string shown_short(std::string_view text, std::size_t most_bytes) {
   if (text.size() <= most_bytes) return shown(text);
   // A character that the cut would split goes whole.
-  while (most_bytes > 0 && (static_cast<unsigned char>(text[most_bytes]) & 0xC0) == 0x80) --most_bytes;
+  while (most_bytes > 0 && (static_cast<unsigned char>(text[most_bytes]) & 0xC0) == 0x80)
+    --most_bytes;
   return shown(text.substr(0, most_bytes)) + "...";
 }
 

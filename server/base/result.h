@@ -14,12 +14,12 @@ namespace trammel {
 
 /// The kind of an error. It decides exit codes and reply codes, never the wording.
 enum class ErrorCode {
-  kUsage,        ///< the caller asked for something that does not exist (exit 2)
-  kRefused,      ///< data that must not be used: bad row, unknown tool, ill-conditioned fit (exit 3)
-  kNotFound,     ///< an unknown cell, model or job (exit 3)
-  kConflict,     ///< the same id with other content, a second writer (exit 3)
-  kTooLarge,     ///< over a stated limit (exit 3)
-  kBusy,         ///< a bounded queue is full; try again (exit 4)
+  kUsage,     ///< the caller asked for something that does not exist (exit 2)
+  kRefused,   ///< data that must not be used: bad row, unknown tool, ill-conditioned fit (exit 3)
+  kNotFound,  ///< an unknown cell, model or job (exit 3)
+  kConflict,  ///< the same id with other content, a second writer (exit 3)
+  kTooLarge,  ///< over a stated limit (exit 3)
+  kBusy,      ///< a bounded queue is full; try again (exit 4)
   kUnreachable,  ///< no service answered in time (exit 4)
   kInternal      ///< the disk, the database, a corrupt file of our own (exit 3)
 };
@@ -27,12 +27,13 @@ enum class ErrorCode {
 /// The spelling for programs: `refused`, `not_found`.
 [[nodiscard]] const char* to_text(ErrorCode code);
 
-/// An expected failure, as data. Programs and tests read the members, people read `sentence()`. Members that are not
-/// known are empty.
+/// An expected failure, as data. Programs and tests read the members, people read `sentence()`.
+/// Members that are not known are empty.
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
-  std::string message;          ///< one clause that says what, with value and limit: `joint 3 is 241.2 deg, limit 70.0`
-  std::string file;             ///< path or id of what was read: a file, a batch, a model
+  std::string message;  ///< one clause that says what, with value and limit: `joint 3 is 241.2 deg,
+                        ///< limit 70.0`
+  std::string file;     ///< path or id of what was read: a file, a batch, a model
   std::optional<long> row;      ///< line of the file, counted from 1 with its header
   std::string field;            ///< column, key (`tools: spindle: xyz_mm`) or option
   std::optional<double> value;  ///< as read, in the unit of the field
@@ -42,8 +43,8 @@ struct Error {
   std::vector<Error> also;      ///< what else is wrong, found in the same reading
 };
 
-/// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0; teach it again`. One
-/// more line for each error in `also`.
+/// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0;
+/// teach it again`. One more line for each error in `also`.
 [[nodiscard]] std::string sentence(const Error& error);
 
 /// One error that holds all: the first, with the others in `also`. `problems` is not empty.
@@ -55,13 +56,14 @@ template <typename T>
 using Result = tl::expected<T, Error>;
 using Status = Result<void>;
 
-/// A failure on its way to the caller. Each layer adds what it knows, inner layers first. Members that are already set
-/// stay as they are.
+/// A failure on its way to the caller. Each layer adds what it knows, inner layers first. Members
+/// that are already set stay as they are.
 class Failure : public tl::unexpected<Error> {
  public:
   explicit Failure(Error error) : tl::unexpected<Error>(std::move(error)) {}
 
-  /// Changes the kind of the error. Example: an unknown word in a file is no wrong usage of a command.
+  /// Changes the kind of the error. Example: an unknown word in a file is no wrong usage of a
+  /// command.
   Failure&& as(ErrorCode code) && {
     value().code = code;
     return std::move(*this);
@@ -78,7 +80,8 @@ class Failure : public tl::unexpected<Error> {
     if (value().field.empty()) value().field = std::move(field);
     return std::move(*this);
   }
-  /// Adds the key, column or option that the error is about. It stands before the message and before an inner field.
+  /// Adds the key, column or option that the error is about. It stands before the message and
+  /// before an inner field.
   Failure&& under(const std::string& key) && {
     value().message = key + ": " + value().message;
     value().field = value().field.empty() ? key : key + ": " + value().field;
@@ -118,7 +121,8 @@ template <typename... Args>
 /// What `TRY` hands out: a copy of the value of a named result, the moved value of a temporary one.
 template <typename R>
 auto value_of(R&& result) {
-  if constexpr (!std::is_void_v<typename std::remove_cvref_t<R>::value_type>) return *std::forward<R>(result);
+  if constexpr (!std::is_void_v<typename std::remove_cvref_t<R>::value_type>)
+    return *std::forward<R>(result);
 }
 
 /// Data that must not be used.
@@ -129,8 +133,9 @@ template <typename... Args>
 
 }  // namespace trammel
 
-/// The value of a `Result`, or the way out: where `expression` failed, the function that stands around it returns its
-/// error as it is. A `Status` has no value. Example: `const Cell cell = TRY(read_cell(path));`
+/// The value of a `Result`, or the way out: where `expression` failed, the function that stands
+/// around it returns its error as it is. A `Status` has no value. Example: `const Cell cell =
+/// TRY(read_cell(path));`
 #define TRY(expression)                                                                      \
   (__extension__({                                                                           \
     auto&& tried_ = (expression);                                                            \

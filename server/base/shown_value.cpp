@@ -23,7 +23,8 @@ struct Angular {
   std::string_view unit, read;
   double scale;  // degrees of the angle, and the rest
 };
-constexpr std::array<Angular, 3> kAngular = {{{"rad", "deg", 1}, {"rad/h", "deg/h", 1}, {"rad/Nmm", "deg/kNm", 1e6}}};
+constexpr std::array<Angular, 3> kAngular = {
+    {{"rad", "deg", 1}, {"rad/h", "deg/h", 1}, {"rad/Nmm", "deg/kNm", 1e6}}};
 
 /// Power of ten of the first digit.
 int order(double x) { return x == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(x)))); }
@@ -55,7 +56,8 @@ Reading reading_of(const std::string& unit) {
 ShownValue show_read(double value, double expanded, const Reading& reading) {
   const double read = reading.scale * value, u95 = reading.scale * expanded;
   const bool measure = reading.unit.starts_with("mm") || reading.unit.starts_with("deg");
-  const bool small = u95 > kSmallestPlain && u95 < 1;  // beyond, both are written without powers of ten anyway
+  const bool small =
+      u95 > kSmallestPlain && u95 < 1;  // beyond, both are written without powers of ten anyway
   if (!measure || !small) return show_with_uncertainty(read, u95);
   const int decimals = 1 - order(u95);
   return {fmt::format("{:.{}f}", read, decimals), fmt::format("{:.{}f}", u95, decimals)};

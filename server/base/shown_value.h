@@ -17,7 +17,8 @@ struct Reading {
 };
 [[nodiscard]] Reading reading_of(const std::string& unit);
 
-/// Both in `reading`'s unit, to two digits of the uncertainty; lengths and angles without powers of ten.
+/// Both in `reading`'s unit, to two digits of the uncertainty; lengths and angles without powers of
+/// ten.
 [[nodiscard]] ShownValue show_read(double value, double expanded, const Reading& reading);
 
 }  // namespace trammel

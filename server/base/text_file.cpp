@@ -40,13 +40,17 @@ Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes)
 
 Result<std::string> read_text_file(const std::string& path, std::size_t limit_bytes) {
   std::error_code error;
-  if (fs::is_directory(path, error)) return refused("a folder, expected a file").in(path).next("name a file in it");
-  if (!fs::is_regular_file(path, error) && !fs::is_fifo(path, error) && !fs::is_character_file(path, error)) {
+  if (fs::is_directory(path, error))
+    return refused("a folder, expected a file").in(path).next("name a file in it");
+  if (!fs::is_regular_file(path, error) && !fs::is_fifo(path, error) &&
+      !fs::is_character_file(path, error)) {
     return refused("no such file").in(path);
   }
   if (fs::is_regular_file(path, error) && fs::file_size(path, error) > limit_bytes) {
     const std::uintmax_t bytes = fs::file_size(path, error);
-    return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", bytes, limit_bytes).in(path).beyond(bytes, limit_bytes);
+    return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", bytes, limit_bytes)
+        .in(path)
+        .beyond(bytes, limit_bytes);
   }
   return read_up_to(path, limit_bytes);
 }
@@ -104,7 +108,8 @@ std::string other_place(const std::string& path) {
 }
 
 /// `done`: files that were renamed before, each after a blank.
-Failure cannot_be_written(const std::string& path, const std::string& why, const std::string& done = "") {
+Failure cannot_be_written(const std::string& path, const std::string& why,
+                          const std::string& done = "") {
   return refused("cannot be written: {}", why)
       .in(path)
       .next(done.empty() ? other_place(path) : "already written:" + done);
@@ -155,11 +160,13 @@ Status check_writable(const std::string& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return cannot_be_written(path, "it is a folder");
   const bool exists = fs::exists(path, error);
-  if (exists && ::access(path.c_str(), W_OK) != 0) return cannot_be_written(path, std::strerror(errno));
+  if (exists && ::access(path.c_str(), W_OK) != 0)
+    return cannot_be_written(path, std::strerror(errno));
   if (is_written_in_place(path)) return {};
   const fs::path parent = target_of(path).parent_path();
   const std::string folder = parent.empty() ? "." : parent.string();
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) return cannot_be_written(path, std::strerror(errno));
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    return cannot_be_written(path, std::strerror(errno));
   if (!fs::is_directory(folder, error)) return cannot_be_written(path, folder + " is no folder");
   return {};
 }

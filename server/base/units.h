@@ -2,8 +2,8 @@
 
 #include <numbers>
 
-/// Inside, quantities are in m, rad, kg, N and s, and names carry no unit. These functions convert at the boundary, and
-/// only there.
+/// Inside, quantities are in m, rad, kg, N and s, and names carry no unit. These functions convert
+/// at the boundary, and only there.
 namespace trammel {
 
 constexpr double kPi = std::numbers::pi;

@@ -27,13 +27,20 @@ class Counter final : public YAML::EventHandler {
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark&, YAML::anchor_t) override { entry(); }
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override { within("aliases", ++aliases_, kMostAliases); }
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override { entry(); }
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {
+    within("aliases", ++aliases_, kMostAliases);
+  }
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {
+    entry();
+  }
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
     deeper();
   }
   void OnSequenceEnd() override { --depth_; }
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
     deeper();
   }
   void OnMapEnd() override { --depth_; }
@@ -46,15 +53,19 @@ class Counter final : public YAML::EventHandler {
   }
   void within(const char* what, int count, int limit) const {
     if (count <= limit) return;
-    throw YamlRefusal{
-        failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit).in(where_).beyond(count, limit).value()};
+    throw YamlRefusal{failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit)
+                          .in(where_)
+                          .beyond(count, limit)
+                          .value()};
   }
 
   const std::string& where_;
   int depth_ = 0, entries_ = 0, aliases_ = 0;
 };
 
-std::string below(const std::string& path, const std::string& key) { return path.empty() ? key : path + ": " + key; }
+std::string below(const std::string& path, const std::string& key) {
+  return path.empty() ? key : path + ": " + key;
+}
 
 /// The error `expected a number`, with what was found instead.
 Failure expected(const char* what, const YAML::Node& found) {
@@ -84,9 +95,14 @@ Status check_yaml_limits(const std::string& text, const std::string& where) {
 YamlMap::YamlMap(YAML::Node node, std::string file)
     : YamlMap(std::move(node), std::move(file), "", std::make_shared<std::vector<Error>>()) {}
 
-YamlMap::YamlMap(YAML::Node node, std::string file, std::string path, std::shared_ptr<std::vector<Error>> problems)
-    : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)), problems_(std::move(problems)) {
-  if (!node_.IsMap()) refuse_at(trammel::line_of(node_.Mark()), refused("expected keys and values"));
+YamlMap::YamlMap(YAML::Node node, std::string file, std::string path,
+                 std::shared_ptr<std::vector<Error>> problems)
+    : node_(std::move(node)),
+      file_(std::move(file)),
+      path_(std::move(path)),
+      problems_(std::move(problems)) {
+  if (!node_.IsMap())
+    refuse_at(trammel::line_of(node_.Mark()), refused("expected keys and values"));
 }
 
 std::optional<long> line_of(const YAML::Mark& mark) {
@@ -107,19 +123,25 @@ std::string column_text(const YAML::Mark& mark) {
 
 std::optional<long> YamlMap::line_of(const std::string& key) const {
   for (const auto& entry : node_) {
-    if (entry.first.IsScalar() && entry.first.Scalar() == key) return trammel::line_of(entry.first.Mark());
+    if (entry.first.IsScalar() && entry.first.Scalar() == key)
+      return trammel::line_of(entry.first.Mark());
   }
   return trammel::line_of(node_.Mark());
 }
 
 void YamlMap::refuse_at(std::optional<long> line, Failure why) const {
   if (!why.value().row) why.value().row = line;
-  throw YamlRefusal{(path_.empty() ? std::move(why) : std::move(why).under(path_)).in(file_).value()};
+  throw YamlRefusal{
+      (path_.empty() ? std::move(why) : std::move(why).under(path_)).in(file_).value()};
 }
 
-void YamlMap::refuse(const std::string& key, const std::string& why) const { refuse(key, refused("{}", why)); }
+void YamlMap::refuse(const std::string& key, const std::string& why) const {
+  refuse(key, refused("{}", why));
+}
 
-void YamlMap::refuse(const std::string& key, Failure why) const { refuse_at(line_of(key), std::move(why).under(key)); }
+void YamlMap::refuse(const std::string& key, Failure why) const {
+  refuse_at(line_of(key), std::move(why).under(key));
+}
 
 void YamlMap::only(std::initializer_list<const char*> known) const {
   const std::vector<std::string> names(known.begin(), known.end());
@@ -139,7 +161,8 @@ std::vector<std::string> YamlMap::keys() const {
   std::set<std::string> seen;
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) refuse("?", "a key that is not a word");
-    if (!is_plain(entry.first.Scalar())) refuse(entry.first.Scalar(), "a key with control characters");
+    if (!is_plain(entry.first.Scalar()))
+      refuse(entry.first.Scalar(), "a key with control characters");
     if (!seen.insert(entry.first.Scalar()).second) refuse(entry.first.Scalar(), "given twice");
     names.push_back(entry.first.Scalar());
   }
@@ -157,15 +180,19 @@ YAML::Node YamlMap::at(const std::string& key) const {
 
 double YamlMap::number_of(const YAML::Node& node, const std::string& key) const {
   double value = 0;
-  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) refuse(key, expected("a number", node));
-  if (!std::isfinite(value)) refuse(key, refused("{} is not finite", node.Scalar()).with_text(node.Scalar()));
+  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value))
+    refuse(key, expected("a number", node));
+  if (!std::isfinite(value))
+    refuse(key, refused("{} is not finite", node.Scalar()).with_text(node.Scalar()));
   if (std::abs(value) > kLargestNumber)
     refuse(key, refused("{:g}, limit {:g}", value, kLargestNumber).beyond(value, kLargestNumber));
   return value;
 }
 
 double YamlMap::number(const std::string& key) const { return number_of(at(key), key); }
-double YamlMap::number(const std::string& key, double otherwise) const { return has(key) ? number(key) : otherwise; }
+double YamlMap::number(const std::string& key, double otherwise) const {
+  return has(key) ? number(key) : otherwise;
+}
 
 int YamlMap::integer(const std::string& key, int otherwise) const {
   if (!has(key)) return otherwise;
@@ -184,7 +211,8 @@ bool YamlMap::boolean(const std::string& key, bool otherwise) const {
 }
 
 std::string YamlMap::plain(const std::string& text, const std::string& key) const {
-  if (!is_plain(text)) refuse(key, refused("'{}' has control characters", shown_short(text)).with_text(shown(text)));
+  if (!is_plain(text))
+    refuse(key, refused("'{}' has control characters", shown_short(text)).with_text(shown(text)));
   return text;
 }
 
@@ -199,7 +227,8 @@ std::string YamlMap::text(const std::string& key, const std::string& otherwise) 
 std::vector<double> YamlMap::numbers(const std::string& key, std::size_t count) const {
   const YAML::Node node = at(key);
   if (!node.IsSequence() || node.size() != count) {
-    refuse(key, refused("expected a list of {} numbers", count).beyond(node.IsSequence() ? node.size() : 0, count));
+    refuse(key, refused("expected a list of {} numbers", count)
+                    .beyond(node.IsSequence() ? node.size() : 0, count));
   }
   std::vector<double> values;
   for (const YAML::Node& item : node) values.push_back(number_of(item, key));
@@ -217,14 +246,17 @@ std::vector<std::string> YamlMap::texts(const std::string& key) const {
   return values;
 }
 
-YamlMap YamlMap::map(const std::string& key) const { return {at(key), file_, below(path_, key), problems_}; }
+YamlMap YamlMap::map(const std::string& key) const {
+  return {at(key), file_, below(path_, key), problems_};
+}
 
 std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
   const YAML::Node node = at(key);
   if (!node.IsSequence()) refuse(key, "expected a list");
   std::vector<YamlMap> list;
   for (std::size_t i = 0; i < node.size(); ++i)
-    list.push_back(YamlMap(node[i], file_, below(path_, fmt::format("{} {}", key, i + 1)), problems_));
+    list.push_back(
+        YamlMap(node[i], file_, below(path_, fmt::format("{} {}", key, i + 1)), problems_));
   return list;
 }
 

@@ -10,8 +10,8 @@
 
 #include "server/base/result.h"
 
-/// Reads YAML that people write. Unknown keys are refused, texts with control characters too. Every error says file,
-/// key and what was expected. Included only by readers (`*_file.cpp`) and config/.
+/// Reads YAML that people write. Unknown keys are refused, texts with control characters too. Every
+/// error says file, key and what was expected. Included only by readers (`*_file.cpp`) and config/.
 namespace trammel {
 
 /// Thrown by YamlMap, caught by read_yaml(); never leaves a reader.
@@ -26,7 +26,8 @@ class YamlMap {
 
   /// Notes every key that is not in `known` as an error, and goes on.
   void only(std::initializer_list<const char*> known) const;
-  /// Calls `read`. An error in it is noted, and reading goes on: read_yaml() reports all errors at its end.
+  /// Calls `read`. An error in it is noted, and reading goes on: read_yaml() reports all errors at
+  /// its end.
   template <typename Read>
   void attempt(const Read& read) const {
     try {
@@ -58,7 +59,8 @@ class YamlMap {
   [[noreturn]] void refuse(const std::string& key, Failure why) const;
 
  private:
-  YamlMap(YAML::Node node, std::string file, std::string path, std::shared_ptr<std::vector<Error>> problems);
+  YamlMap(YAML::Node node, std::string file, std::string path,
+          std::shared_ptr<std::vector<Error>> problems);
   [[noreturn]] void refuse_at(std::optional<long> line, Failure why) const;
   [[nodiscard]] std::optional<long> line_of(const std::string& key) const;
   [[nodiscard]] YAML::Node at(const std::string& key) const;
@@ -71,8 +73,9 @@ class YamlMap {
   std::shared_ptr<std::vector<Error>> problems_;
 };
 
-/// Refuses a text that is not UTF-8, and one that is too large to be written by hand (kTooLarge): over a megabyte, 20
-/// levels of nesting, 20,000 entries or 100 aliases. Reads it once and keeps nothing. Throws what the parser throws.
+/// Refuses a text that is not UTF-8, and one that is too large to be written by hand (kTooLarge):
+/// over a megabyte, 20 levels of nesting, 20,000 entries or 100 aliases. Reads it once and keeps
+/// nothing. Throws what the parser throws.
 [[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
 
 /// Line of the text, counted from 1; empty if the parser does not know it.
@@ -82,12 +85,14 @@ class YamlMap {
 /// Whether the line of the mark begins with a tab among its blanks.
 [[nodiscard]] bool is_indented_by_tab(const std::string& text, const YAML::Mark& mark);
 
-/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one Error that holds all.
+/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one
+/// Error that holds all.
 template <typename Read>
 auto read_yaml(const std::string& text, const std::string& where, Read&& read)
     -> Result<decltype(read(std::declval<const YamlMap&>()))> {
   try {
-    if (const Status fine = check_yaml_limits(text, where); !fine) return tl::make_unexpected(fine.error());
+    if (const Status fine = check_yaml_limits(text, where); !fine)
+      return tl::make_unexpected(fine.error());
     const YamlMap map(YAML::Load(text), where);
     std::optional<decltype(read(map))> value;
     map.attempt([&] { value.emplace(read(map)); });
@@ -98,7 +103,8 @@ auto read_yaml(const std::string& text, const std::string& where, Read&& read)
   } catch (const YAML::Exception& error) {
     Failure damaged = refused("{}not YAML: {}", column_text(error.mark), error.msg).in(where);
     damaged.value().row = line_of(error.mark);
-    if (is_indented_by_tab(text, error.mark)) damaged.value().next = "indent with blanks: YAML takes no tabs";
+    if (is_indented_by_tab(text, error.mark))
+      damaged.value().next = "indent with blanks: YAML takes no tabs";
     return damaged;
   }
 }

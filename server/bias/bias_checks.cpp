@@ -12,7 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kFewestObservations = 10;  // an arm of six joints has eight hyperparameters: fewer decide nothing
+constexpr Index kFewestObservations =
+    10;  // an arm of six joints has eight hyperparameters: fewer decide nothing
 constexpr std::string_view kAxis[] = {"x", "y", "z"};
 
 Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
@@ -66,33 +67,38 @@ Status check_numbers(const MatrixXd& q, const MatrixXd& residual_B, const Vector
 }  // namespace
 
 Status check_observations(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
-  return check_shape(q, residual_B, sigma).and_then([&] { return check_numbers(q, residual_B, sigma); });
+  return check_shape(q, residual_B, sigma).and_then([&] {
+    return check_numbers(q, residual_B, sigma);
+  });
 }
 
-Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features, Index n) {
+Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features,
+                      Index n) {
   if (n > kMostCoupled)
-    return refused("bias kernel `{}`: {} observations, at most {} with joint_map or parameters", kernel, n,
-                   kMostCoupled)
+    return refused("bias kernel `{}`: {} observations, at most {} with joint_map or parameters",
+                   kernel, n, kMostCoupled)
         .of("bias")
         .with_text(kernel)
         .beyond(n, kMostCoupled);
   if (static_cast<Index>(features.size()) != n)
-    return refused("features of {} poses for {} observations, kernel `{}` needs them", features.size(), n, kernel)
+    return refused("features of {} poses for {} observations, kernel `{}` needs them",
+                   features.size(), n, kernel)
         .in("bias data")
         .of("features")
         .beyond(features.size(), n);
   const BiasFeatures& first = features.front();
   for (std::size_t i = 0; i < features.size(); ++i) {
     const BiasFeatures& at = features[i];
-    if (at.by_joint.rows() != 6 || at.by_joint.cols() != first.by_joint.cols() || at.by_parameter.rows() != 6 ||
-        at.by_parameter.cols() != first.by_parameter.cols())
-      return refused("features are {} x {} and {} x {}, should be 6 x {} and 6 x {}", at.by_joint.rows(),
-                     at.by_joint.cols(), at.by_parameter.rows(), at.by_parameter.cols(), first.by_joint.cols(),
-                     first.by_parameter.cols())
+    if (at.by_joint.rows() != 6 || at.by_joint.cols() != first.by_joint.cols() ||
+        at.by_parameter.rows() != 6 || at.by_parameter.cols() != first.by_parameter.cols())
+      return refused("features are {} x {} and {} x {}, should be 6 x {} and 6 x {}",
+                     at.by_joint.rows(), at.by_joint.cols(), at.by_parameter.rows(),
+                     at.by_parameter.cols(), first.by_joint.cols(), first.by_parameter.cols())
           .in("bias data")
           .of("features")
           .at_row(i + 1);
-    if (!at.by_joint.allFinite() || !at.by_parameter.allFinite() || !at.lever_F.allFinite() || !at.R_BF.allFinite())
+    if (!at.by_joint.allFinite() || !at.by_parameter.allFinite() || !at.lever_F.allFinite() ||
+        !at.R_BF.allFinite())
       return refused("a feature is not finite").of("features").in("bias data").at_row(i + 1);
   }
   return {};
@@ -101,7 +107,8 @@ Status check_features(const std::string& kernel, const std::vector<BiasFeatures>
 Status check_flange(const MatrixXd& q, const std::vector<BiasFeatures>& features) {
   const Index numbers = views_of(q, VectorXd::Ones(q.rows()), features).size;
   if (numbers > kMostFlangeNumbers)
-    return refused("bias at the flange: its joint vectors tell {} numbers, at most {}", numbers, kMostFlangeNumbers)
+    return refused("bias at the flange: its joint vectors tell {} numbers, at most {}", numbers,
+                   kMostFlangeNumbers)
         .of("bias")
         .beyond(numbers, kMostFlangeNumbers)
         .next("take a kernel without flange, or fewer poses");
@@ -120,13 +127,15 @@ Status check_hyperparameters(const BiasState& state, const SpelledBias& bias) {
         .of("offset")
         .beyond(state.offset.size(), kCoordinates);
   Index of_blocks = bias.flange ? rows - 1 : 0;  // of the rotation: kernel parameters and its size
-  for (const LinearBlockPtr& block : bias.blocks) of_blocks += block->parameter_count(state.features.front());
+  for (const LinearBlockPtr& block : bias.blocks)
+    of_blocks += block->parameter_count(state.features.front());
   if (state.block_hyperparameters.size() != of_blocks)
     return refused("bias state: {} hyperparameters of blocks, should be {} for kernel `{}`",
                    state.block_hyperparameters.size(), of_blocks, state.kernel)
         .of("block_hyperparameters")
         .beyond(state.block_hyperparameters.size(), of_blocks);
-  if (!state.hyperparameters.allFinite() || !state.offset.allFinite() || !state.block_hyperparameters.allFinite())
+  if (!state.hyperparameters.allFinite() || !state.offset.allFinite() ||
+      !state.block_hyperparameters.allFinite())
     return refused("bias state: a hyperparameter or offset is not finite").of("hyperparameters");
   return {};
 }

@@ -13,18 +13,20 @@ namespace trammel {
 /// Most observations of a kernel with blocks: learning from so many takes half a gigabyte.
 inline constexpr Eigen::Index kMostCoupled = 4000;
 
-/// Most numbers of a bias at the flange, 3 for each joint vector with one lever, 5 with two, 6 with more: it keeps a
-/// matrix of their square, 128 MB.
+/// Most numbers of a bias at the flange, 3 for each joint vector with one lever, 5 with two, 6 with
+/// more: it keeps a matrix of their square, 128 MB.
 inline constexpr Eigen::Index kMostFlangeNumbers = 4000;
 
 [[nodiscard]] Status check_observations(const Eigen::MatrixXd& q, const Eigen::MatrixXd& residual_B,
                                         const Eigen::VectorXd& sigma);
 /// The features of `n` observations for a kernel with blocks.
-[[nodiscard]] Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features,
-                                    Eigen::Index n);
+[[nodiscard]] Status check_features(const std::string& kernel,
+                                    const std::vector<BiasFeatures>& features, Eigen::Index n);
 /// The same for a bias at the flange: whether the joint vectors are few enough.
-[[nodiscard]] Status check_flange(const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& features);
-/// Whether the hyperparameters of `state` have the shape that `bias` asks for, and its features where it has blocks.
+[[nodiscard]] Status check_flange(const Eigen::MatrixXd& q,
+                                  const std::vector<BiasFeatures>& features);
+/// Whether the hyperparameters of `state` have the shape that `bias` asks for, and its features
+/// where it has blocks.
 [[nodiscard]] Status check_hyperparameters(const BiasState& state, const SpelledBias& bias);
 
 }  // namespace trammel

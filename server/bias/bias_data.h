@@ -23,8 +23,9 @@ struct BiasProblem {
 };
 
 struct BiasOptions {
-  std::string kernel = "se";  ///< `se`, `matern52 + joint_map`, `none`, ... as spelled in the cell file
-  int starts = 20;            ///< of the hyperparameter search
+  std::string kernel =
+      "se";         ///< `se`, `matern52 + joint_map`, `none`, ... as spelled in the cell file
+  int starts = 20;  ///< of the hyperparameter search
   std::uint64_t seed = 1;
   /// Called between steps with the share done, in [0, 1]. Returns false to give up.
   std::function<bool(double)> progress;
@@ -33,37 +34,44 @@ struct BiasOptions {
 /// At one joint vector, for the three coordinates in B.
 struct BiasPrediction {
   Vector3 mean_B = Vector3::Zero();  ///< m
-  /// m: the part of mean_B that the kernel learned from training poses nearby; all of it for a kernel without blocks.
-  /// The rest is H w of the blocks (linear_block.h) and the mean residual.
+  /// m: the part of mean_B that the kernel learned from training poses nearby; all of it for a
+  /// kernel without blocks. The rest is H w of the blocks (linear_block.h) and the mean residual.
   Vector3 nearby_B = Vector3::Zero();
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one measurement with average noise
-  Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
-  /// Posterior over prior variance of the function, the largest of the coordinates: 0 fully known, 1 unknown.
+  Matrix3 covariance_B =
+      Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
+  /// Posterior over prior variance of the function, the largest of the coordinates: 0 fully known,
+  /// 1 unknown.
   double prior_share = 1.0;
 };
 
-/// All that is needed to restore a fitted model bit for bit; factors and tables are computed again. `features` follow
-/// from the physics: they need not be stored, but must be given again as they were.
+/// All that is needed to restore a fitted model bit for bit; factors and tables are computed again.
+/// `features` follow from the physics: they need not be stored, but must be given again as they
+/// were.
 struct BiasState {
   std::string kernel;
-  Eigen::MatrixXd q;                ///< N x n, rad
-  Eigen::MatrixXd residual_B;       ///< N x 3, m
-  Eigen::VectorXd sigma;            ///< N, m
-  Eigen::VectorXd offset;           ///< of each coordinate, m: the mean residual, predicted far from all data
-  Eigen::MatrixXd hyperparameters;  ///< a column for each coordinate, natural logarithms: kernel, log σ_f, log σ_n
-  /// Of all blocks in their order, natural logarithms; of `flange` kernel and log σ (rad) of the rotation.
+  Eigen::MatrixXd q;           ///< N x n, rad
+  Eigen::MatrixXd residual_B;  ///< N x 3, m
+  Eigen::VectorXd sigma;       ///< N, m
+  Eigen::VectorXd
+      offset;  ///< of each coordinate, m: the mean residual, predicted far from all data
+  Eigen::MatrixXd hyperparameters;  ///< a column for each coordinate, natural logarithms: kernel,
+                                    ///< log σ_f, log σ_n
+  /// Of all blocks in their order, natural logarithms; of `flange` kernel and log σ (rad) of the
+  /// rotation.
   Eigen::VectorXd block_hyperparameters = {};
   std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };
 
 /// How the fit went.
 struct BiasFitReport {
-  Eigen::VectorXd log_likelihood;  ///< nat: of each coordinate, or one number where blocks couple them
-  Eigen::VectorXd noise_stddev;    ///< m, of each coordinate
-  double leave_one_out_rms = 0;    ///< m, Euclidean
-  int starts_at_best = 0;          ///< starts that ended within 0.1 nat of the best optimum on the subset
-  int evaluations = 0;             ///< of the full likelihood and gradient
+  Eigen::VectorXd
+      log_likelihood;  ///< nat: of each coordinate, or one number where blocks couple them
+  Eigen::VectorXd noise_stddev;  ///< m, of each coordinate
+  double leave_one_out_rms = 0;  ///< m, Euclidean
+  int starts_at_best = 0;  ///< starts that ended within 0.1 nat of the best optimum on the subset
+  int evaluations = 0;     ///< of the full likelihood and gradient
 };
 
 }  // namespace trammel

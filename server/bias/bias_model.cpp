@@ -15,8 +15,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSmallestSigma = 1e-7;  // m: no tracker knows a point better, whatever its file says
-constexpr double kMostNoiseRatio = 4.0;  // of variances: no point may dominate by claiming a sigma of 2 µm
+constexpr double kSmallestSigma =
+    1e-7;  // m: no tracker knows a point better, whatever its file says
+constexpr double kMostNoiseRatio =
+    4.0;  // of variances: no point may dominate by claiming a sigma of 2 µm
 constexpr std::string_view kNone = "none";
 
 double median(VectorXd values) {
@@ -37,7 +39,8 @@ VectorXd noise_shape(const VectorXd& sigma) {
 MatrixXd as_columns(const std::vector<GpHyperparameters>& outputs) {
   MatrixXd columns(outputs.front().kernel.size() + 2, static_cast<Index>(outputs.size()));
   for (std::size_t d = 0; d < outputs.size(); ++d)
-    columns.col(static_cast<Index>(d)) << outputs[d].kernel, outputs[d].log_signal_stddev, outputs[d].log_noise_stddev;
+    columns.col(static_cast<Index>(d)) << outputs[d].kernel, outputs[d].log_signal_stddev,
+        outputs[d].log_noise_stddev;
   return columns;
 }
 
@@ -51,7 +54,8 @@ CoupledHyperparameters hyperparameters_of(const BiasState& state) {
 }
 
 OutputData data_of(const BiasState& state) {
-  return {state.q, state.residual_B.rowwise() - state.offset.transpose(), noise_shape(state.sigma), state.features};
+  return {state.q, state.residual_B.rowwise() - state.offset.transpose(), noise_shape(state.sigma),
+          state.features};
 }
 
 Status check_described(const SpelledBias& bias, const BiasState& state) {
@@ -65,7 +69,8 @@ Status check_described(const SpelledBias& bias, const BiasState& state) {
 /// The bias whose maps are as the state has them.
 SpelledBias as_stored(SpelledBias bias, const BiasState& state) {
   if (bias.blocks.empty()) return bias;
-  const auto harmonics = harmonics_in(state.block_hyperparameters, state.features.front().by_joint.cols());
+  const auto harmonics =
+      harmonics_in(state.block_hyperparameters, state.features.front().by_joint.cols());
   return harmonics ? with_harmonics(std::move(bias), *harmonics, *harmonics) : bias;
 }
 
@@ -74,22 +79,26 @@ SpelledBias for_observations(SpelledBias bias, Index count) {
   return with_harmonics(std::move(bias), harmonics_for(count), harmonics_for(count));
 }
 
-BiasOutputsPtr conditioned(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at,
-                           VarianceForm form) {
+BiasOutputsPtr conditioned(const SpelledBias& bias, const OutputData& data,
+                           const CoupledHyperparameters& at, VarianceForm form) {
   if (bias.flange) return condition_flange(bias.kernel, data, at);
   if (!bias.blocks.empty()) return condition_coupled(bias, data, at, form);
   return condition_independent(bias.kernel, data, at.outputs, form);
 }
 
 std::optional<CoupledSearchResult> searched(const SpelledBias& bias, const OutputData& data,
-                                            const VectorXd& metrology_stddev, const SearchOptions& options,
+                                            const VectorXd& metrology_stddev,
+                                            const SearchOptions& options,
                                             const CoupledHyperparameters* last) {
   if (bias.flange) return search_flange_outputs(bias.kernel, data, metrology_stddev, options, last);
-  if (!bias.blocks.empty()) return search_coupled_outputs(bias, data, metrology_stddev, options, last);
+  if (!bias.blocks.empty())
+    return search_coupled_outputs(bias, data, metrology_stddev, options, last);
   return search_independent(bias.kernel, data, metrology_stddev, options, last);
 }
 
-double row_rms(const MatrixXd& rows) { return std::sqrt(rows.squaredNorm() / static_cast<double>(rows.rows())); }
+double row_rms(const MatrixXd& rows) {
+  return std::sqrt(rows.squaredNorm() / static_cast<double>(rows.rows()));
+}
 
 }  // namespace
 
@@ -99,26 +108,34 @@ struct BiasModel::Fitted {
   bool coupled = false;    // has blocks
   bool described = false;  // needs features
   BiasOutputsPtr outputs;
-  double mean_noise_shape = 1;  // noise variance of an average measurement, relative to the learned one
+  double mean_noise_shape =
+      1;  // noise variance of an average measurement, relative to the learned one
 
   Fitted(BiasState of, bool with_blocks, bool with_features, BiasOutputsPtr conditioned)
-      : state(std::move(of)), coupled(with_blocks), described(with_features), outputs(std::move(conditioned)) {
+      : state(std::move(of)),
+        coupled(with_blocks),
+        described(with_features),
+        outputs(std::move(conditioned)) {
     mean_noise_shape = noise_shape(state.sigma).mean();
     report.log_likelihood = outputs->log_likelihood();
     report.noise_stddev = outputs->noise_variance().cwiseSqrt();
     report.leave_one_out_rms = row_rms(state.residual_B - leave_one_out_mean_B());
   }
-  MatrixXd leave_one_out_mean_B() const { return outputs->leave_one_out_mean().rowwise() + state.offset.transpose(); }
+  MatrixXd leave_one_out_mean_B() const {
+    return outputs->leave_one_out_mean().rowwise() + state.offset.transpose();
+  }
 
   static Result<std::shared_ptr<Fitted>> from(const BiasState& state, VarianceForm form);
 };
 
-Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state, VarianceForm form) {
+Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state,
+                                                                   VarianceForm form) {
   TRY(check_observations(state.q, state.residual_B, state.sigma));
   if (state.kernel == kNone) {
     BiasState silent = state;
     silent.offset = VectorXd::Zero(kCoordinates);
-    return std::make_shared<Fitted>(std::move(silent), false, false, make_silent_outputs(state.residual_B));
+    return std::make_shared<Fitted>(std::move(silent), false, false,
+                                    make_silent_outputs(state.residual_B));
   }
   auto bias = spelled_bias(state.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
@@ -128,8 +145,11 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   const CoupledHyperparameters at = hyperparameters_of(state);
   const OutputData data = data_of(state);
   BiasOutputsPtr outputs = conditioned(*bias, data, at, form);
-  if (!outputs) return refused("bias: the covariance of {} observations is not positive definite", state.q.rows());
-  return std::make_shared<Fitted>(state, !bias->blocks.empty(), bias->needs_features(), std::move(outputs));
+  if (!outputs)
+    return refused("bias: the covariance of {} observations is not positive definite",
+                   state.q.rows());
+  return std::make_shared<Fitted>(state, !bias->blocks.empty(), bias->needs_features(),
+                                  std::move(outputs));
 }
 
 Result<BiasModel> BiasModel::restore(const BiasState& state) {
@@ -149,29 +169,40 @@ Result<BiasModel> BiasModel::refit(const BiasOptions& options) const {
   return fit_from({state.q, state.residual_B, state.sigma, state.features}, same_kernel, &state);
 }
 
-Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOptions& options, const BiasState* last) {
+Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOptions& options,
+                                      const BiasState* last) {
   TRY(check_observations(problem.q, problem.residual_B, problem.sigma));
-  BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kCoordinates), {}};
+  BiasState state{options.kernel,
+                  problem.q,
+                  problem.residual_B,
+                  problem.sigma,
+                  VectorXd::Zero(kCoordinates),
+                  {}};
   if (options.kernel == kNone) return restore(state);
   auto bias = spelled_bias(options.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
   if (options.starts < 1)
-    return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
+    return refused("bias fit: {} starts, at least 1", options.starts)
+        .of("starts")
+        .beyond(options.starts, 1);
   if (bias->needs_features()) state.features = problem.features;
   TRY(check_described(*bias, state));
-  bias = last != nullptr ? as_stored(*std::move(bias), *last) : for_observations(*std::move(bias), problem.q.rows());
+  bias = last != nullptr ? as_stored(*std::move(bias), *last)
+                         : for_observations(*std::move(bias), problem.q.rows());
 
   state.offset = problem.residual_B.colwise().mean().transpose();
   const OutputData data = data_of(state);
-  const VectorXd metrology_stddev = VectorXd::Constant(kCoordinates, median(clipped(problem.sigma)));
+  const VectorXd metrology_stddev =
+      VectorXd::Constant(kCoordinates, median(clipped(problem.sigma)));
   const SearchOptions search{options.starts, options.seed, options.progress, {}};
   std::optional<CoupledHyperparameters> from;
   if (last != nullptr) from = hyperparameters_of(*last);
   const CoupledHyperparameters* start = from ? &*from : nullptr;
   const auto found = searched(*bias, data, metrology_stddev, search, start);
   if (!found)
-    return refused("bias fit: no start of {} gave a positive definite covariance of {} observations", options.starts,
-                   problem.q.rows());
+    return refused(
+        "bias fit: no start of {} gave a positive definite covariance of {} observations",
+        options.starts, problem.q.rows());
   if (found->given_up) return failure(ErrorCode::kBusy, "bias fit: given up on request");
   state.hyperparameters = as_columns(found->found.outputs);
   state.block_hyperparameters = found->found.blocks;
@@ -208,8 +239,9 @@ Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
   if (median(clipped(state.sigma)) != median(clipped(old.sigma))) return restore(state);
 
   const VectorXd shape = noise_shape(state.sigma).tail(more.q.rows());
-  return regrown(std::move(state), fitted_->outputs->with({more.q, more.residual_B.rowwise() - old.offset.transpose(),
-                                                           shape, more.features}));
+  return regrown(std::move(state),
+                 fitted_->outputs->with({more.q, more.residual_B.rowwise() - old.offset.transpose(),
+                                         shape, more.features}));
 }
 
 Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) const {
@@ -243,7 +275,8 @@ Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) con
 
 Result<BiasModel> BiasModel::regrown(BiasState state, BiasOutputsPtr outputs) const {
   if (!outputs) return restore(state);
-  auto fitted = std::make_shared<Fitted>(std::move(state), fitted_->coupled, fitted_->described, std::move(outputs));
+  auto fitted = std::make_shared<Fitted>(std::move(state), fitted_->coupled, fitted_->described,
+                                         std::move(outputs));
   fitted->report.starts_at_best = fitted_->report.starts_at_best;
   fitted->report.evaluations = fitted_->report.evaluations;
   return BiasModel(std::move(fitted));
@@ -274,7 +307,8 @@ BiasPrediction BiasModel::predict(const JointVector& q, const BiasFeatures& feat
   return predict_all(q.transpose(), {features}).front();
 }
 
-std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q, const std::vector<BiasFeatures>& features) const {
+std::vector<BiasPrediction> BiasModel::predict_all(
+    const MatrixXd& q, const std::vector<BiasFeatures>& features) const {
   std::vector<BiasPrediction> predictions;
   const Vector3 noise = fitted_->mean_noise_shape * fitted_->outputs->noise_variance();
   for (const OutputPrediction& at : fitted_->outputs->predict(q, features)) {
@@ -290,15 +324,20 @@ std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q, const std:
   return predictions;
 }
 
-VectorXd BiasModel::leave_one_out_prior_share() const { return fitted_->outputs->leave_one_out_share(); }
+VectorXd BiasModel::leave_one_out_prior_share() const {
+  return fitted_->outputs->leave_one_out_share();
+}
 
 MatrixXd BiasModel::leave_one_out_mean_B() const { return fitted_->leave_one_out_mean_B(); }
 
-MatrixXd BiasModel::leave_one_out_stddev_B() const { return fitted_->outputs->leave_one_out_variance().cwiseSqrt(); }
+MatrixXd BiasModel::leave_one_out_stddev_B() const {
+  return fitted_->outputs->leave_one_out_variance().cwiseSqrt();
+}
 
 std::optional<MatrixXd> BiasModel::left_out_error_B(const MatrixXd& residual_B,
                                                     const std::vector<Index>& observations) const {
-  return fitted_->outputs->left_out_error(residual_B.rowwise() - fitted_->state.offset.transpose(), observations);
+  return fitted_->outputs->left_out_error(residual_B.rowwise() - fitted_->state.offset.transpose(),
+                                          observations);
 }
 
 const BiasState& BiasModel::state() const { return fitted_->state; }

@@ -24,15 +24,20 @@ constexpr std::array kCheap = {"se", "matern52", "se + parameters"};
 /// Where the tool's point is seen at several levers.
 constexpr std::array kAtFlange = {"se + flange", "matern52 + flange"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
-constexpr Index kBlocks = 8;                  // eight give a standard error, and seven eighths still show the physics
-constexpr std::size_t kFewestBlocks = 4;      // half of them: of fewer the standard error means little
-constexpr Index kFewestToJudge = 30;          // joint vectors: blocks of fewer than four tell nothing
-constexpr double kStandardErrors = 2;         // chance alone exceeds them in 1 of 40 cases
+constexpr Index kBlocks =
+    8;  // eight give a standard error, and seven eighths still show the physics
+constexpr std::size_t kFewestBlocks = 4;  // half of them: of fewer the standard error means little
+constexpr Index kFewestToJudge = 30;      // joint vectors: blocks of fewer than four tell nothing
+constexpr double kStandardErrors = 2;     // chance alone exceeds them in 1 of 40 cases
 constexpr double kHyperparametersOfNone = 3;  // the standard deviation of each coordinate
-constexpr double kFitShare = 0.5;             // of the time for one candidate: the rest goes into leaving out blocks
-constexpr double kGainOfPhysics = 0.9;        // rms with parameters over rms without: a tenth less is worth a diagnosis
-constexpr double kAboveNoise = 1.3;           // rms over the instrument's noise, which a cell's file knows to a tenth
-constexpr Index kMostRows = 900;   // to choose by: each candidate is fitted, and conditioned for each block left out
+constexpr double kFitShare =
+    0.5;  // of the time for one candidate: the rest goes into leaving out blocks
+constexpr double kGainOfPhysics =
+    0.9;  // rms with parameters over rms without: a tenth less is worth a diagnosis
+constexpr double kAboveNoise =
+    1.3;  // rms over the instrument's noise, which a cell's file knows to a tenth
+constexpr Index kMostRows =
+    900;  // to choose by: each candidate is fitted, and conditioned for each block left out
 constexpr Index kManyRows = 1200;  // of fewer all choose
 constexpr double kChoosing = 0.7;  // of the time, where some rows choose
 
@@ -42,7 +47,9 @@ std::vector<Index> in_order(Index count) {
   return all;
 }
 
-double rms(const MatrixXd& error) { return std::sqrt(error.squaredNorm() / static_cast<double>(error.rows())); }
+double rms(const MatrixXd& error) {
+  return std::sqrt(error.squaredNorm() / static_cast<double>(error.rows()));
+}
 
 /// -log density of each observation, summed over its coordinates, nat.
 VectorXd negative_log_density(const MatrixXd& error, const MatrixXd& stddev) {
@@ -54,7 +61,8 @@ VectorXd negative_log_density(const MatrixXd& error, const MatrixXd& stddev) {
 /// The sum of `of_row` over the rows of each pose.
 VectorXd by_pose(const std::vector<PoseGroup>& poses, const VectorXd& of_row) {
   VectorXd sum(std::ssize(poses));
-  for (std::size_t p = 0; p < poses.size(); ++p) sum[static_cast<Index>(p)] = of_row(poses[p]).sum();
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    sum[static_cast<Index>(p)] = of_row(poses[p]).sum();
   return sum;
 }
 
@@ -64,14 +72,16 @@ struct Fold {
   MatrixXd residual_B;  // N x 3
 };
 
-/// The blocks of whole poses, whose first rows are neighbours in `table` (N x n). Blocks that the physics cannot be
-/// identified without are left out.
-std::vector<Fold> folds(const BiasProblem& problem, const std::vector<PoseGroup>& poses, const MatrixXd& table,
-                        const ResidualWithout& residual_without) {
+/// The blocks of whole poses, whose first rows are neighbours in `table` (N x n). Blocks that the
+/// physics cannot be identified without are left out.
+std::vector<Fold> folds(const BiasProblem& problem, const std::vector<PoseGroup>& poses,
+                        const MatrixXd& table, const ResidualWithout& residual_without) {
   const std::vector<Index> observations = in_order(problem.q.rows());
   std::vector<Fold> all;
-  for (const std::vector<Index>& block : halved(table, poses, (std::ssize(poses) + kBlocks - 1) / kBlocks)) {
-    std::optional<MatrixXd> residual_B = residual_without ? residual_without(block) : problem.residual_B;
+  for (const std::vector<Index>& block :
+       halved(table, poses, (std::ssize(poses) + kBlocks - 1) / kBlocks)) {
+    std::optional<MatrixXd> residual_B =
+        residual_without ? residual_without(block) : problem.residual_B;
     if (!residual_B) continue;
     Fold fold{block, {}, *std::move(residual_B)};
     std::set_difference(observations.begin(), observations.end(), block.begin(), block.end(),
@@ -109,7 +119,8 @@ std::vector<T> at(const std::vector<T>& all, const std::vector<Index>& rows) {
   return some;
 }
 
-/// Errors of the block of `fold`, predicted by a bias conditioned on the rest; the hyperparameters stay.
+/// Errors of the block of `fold`, predicted by a bias conditioned on the rest; the hyperparameters
+/// stay.
 Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
   if (auto error = model.left_out_error_B(fold.residual_B, fold.block)) return *std::move(error);
   const BiasState& state = model.state();
@@ -158,12 +169,15 @@ Mean gain_of(const Missed& without, const Missed& with) {
 
 /// Without a bias each coordinate is expected to spread as the residual does.
 VectorXd negative_log_density_of_none(const MatrixXd& error) {
-  const Vector3 stddev = (error.colwise().squaredNorm() / static_cast<double>(error.rows())).cwiseSqrt().cwiseMax(1e-9);
+  const Vector3 stddev = (error.colwise().squaredNorm() / static_cast<double>(error.rows()))
+                             .cwiseSqrt()
+                             .cwiseMax(1e-9);
   return negative_log_density(error, stddev.transpose().replicate(error.rows(), 1));
 }
 
 VectorXd negative_log_density_left_out(const BiasProblem& problem, const BiasModel& model) {
-  return negative_log_density(problem.residual_B - model.leave_one_out_mean_B(), model.leave_one_out_stddev_B());
+  return negative_log_density(problem.residual_B - model.leave_one_out_mean_B(),
+                              model.leave_one_out_stddev_B());
 }
 
 double hyperparameters_of(const BiasModel& model) {
@@ -171,11 +185,13 @@ double hyperparameters_of(const BiasModel& model) {
   return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
 }
 
-/// Whether `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters were found with the
-/// pose that is left out, so each of them raises the sum by one nat (Akaike 1974).
+/// Whether `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters
+/// were found with the pose that is left out, so each of them raises the sum by one nat (Akaike
+/// 1974).
 bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
   const Mean likelier = mean_of(other - nlpd);
-  return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) > kStandardErrors * likelier.stddev;
+  return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) >
+         kStandardErrors * likelier.stddev;
 }
 
 /// The best candidate so far.
@@ -199,14 +215,15 @@ class Choosing {
         several_levers_(!problem.features.empty() && has_several_levers(problem.features)) {
     if (std::ssize(poses_) < kFewestToJudge) return;
     const Index count = problem.q.rows();
-    in_time_ = folds(problem, poses_, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
+    in_time_ = folds(problem, poses_, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)),
+                     residual_without);
     in_joint_space_ = folds(problem, poses_, problem.q, residual_without);
   }
 
   Result<ChosenBias> run() {
     if (std::ssize(poses_) < kFewestToJudge) {
-      choice_.sentence =
-          fmt::format("no bias: {} poses are too few to judge one, at least {}", poses_.size(), kFewestToJudge);
+      choice_.sentence = fmt::format("no bias: {} poses are too few to judge one, at least {}",
+                                     poses_.size(), kFewestToJudge);
       choice_.kernel = "none";
       return ChosenBias{choice_, std::nullopt};
     }
@@ -226,7 +243,8 @@ class Choosing {
         TRY(ask(kernel));
       }
     }
-    const double noise = std::sqrt(3 * problem_.sigma.squaredNorm() / static_cast<double>(problem_.sigma.size()));
+    const double noise =
+        std::sqrt(3 * problem_.sigma.squaredNorm() / static_cast<double>(problem_.sigma.size()));
     for (const char* kernel : kDear) {
       if (choice_.candidates[best_.candidate].leave_one_out_rms < kAboveNoise * noise) break;
       TRY(ask(kernel));
@@ -241,8 +259,8 @@ class Choosing {
     best_.nlpd = by_pose(poses_, nlpd);
     without_in_time_ = missed_by_none(in_time_);
     without_in_joint_space_ = missed_by_none(in_joint_space_);
-    choice_.candidates.push_back(
-        {"none", rms(error), nlpd.mean() / 3, rms(without_in_time_), rms(without_in_joint_space_), 0, 0, ""});
+    choice_.candidates.push_back({"none", rms(error), nlpd.mean() / 3, rms(without_in_time_),
+                                  rms(without_in_joint_space_), 0, 0, ""});
   }
 
   Status ask(const std::string& kernel) {
@@ -254,7 +272,8 @@ class Choosing {
     }
     BiasOptions options = options_;
     options.kernel = kernel;
-    const auto most = static_cast<double>(kCheap.size() + kDear.size() + (several_levers_ ? kAtFlange.size() : 0));
+    const auto most = static_cast<double>(kCheap.size() + kDear.size() +
+                                          (several_levers_ ? kAtFlange.size() : 0));
     const auto report = [this, most, done = asked_++](double share) {
       return !options_.progress || options_.progress((done + share) / most);
     };
@@ -263,19 +282,21 @@ class Choosing {
     const MatrixXd error = problem_.residual_B - model.leave_one_out_mean_B();
     const VectorXd nlpd = negative_log_density_left_out(problem_, model);
     constexpr double kBoth = (1 - kFitShare) / 2;
-    const auto in_time = TRY(missed(model, in_time_, [&](double share) { return report(kFitShare + kBoth * share); }));
-    const auto in_joint_space =
-        TRY(missed(model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); }));
+    const auto in_time = TRY(
+        missed(model, in_time_, [&](double share) { return report(kFitShare + kBoth * share); }));
+    const auto in_joint_space = TRY(missed(
+        model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); }));
     const Mean gain = gain_of(without_in_time_, in_time);
     const Mean far = gain_of(without_in_joint_space_, in_joint_space);
-    choice_.candidates.push_back(
-        {kernel, rms(error), nlpd.mean() / 3, rms(in_time), rms(in_joint_space), gain.value, gain.stddev, ""});
+    choice_.candidates.push_back({kernel, rms(error), nlpd.mean() / 3, rms(in_time),
+                                  rms(in_joint_space), gain.value, gain.stddev, ""});
     BiasCandidate& candidate = choice_.candidates.back();
 
     const double hyperparameters = hyperparameters_of(model);
     const VectorXd of_poses = by_pose(poses_, nlpd);
     if (!clearly_likelier(of_poses, best_.nlpd, hyperparameters - best_.hyperparameters)) {
-      candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
+      candidate.verdict =
+          fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
       not_likelier_.insert(choice_.candidates.size() - 1);
     } else if (gain.value <= kStandardErrors * gain.stddev) {
       candidate.verdict = "does not help beyond chance where neighbours in time are left out";
@@ -289,7 +310,8 @@ class Choosing {
 
   /// Why the kernel cannot be asked; empty: it can.
   [[nodiscard]] std::string too_many_for(const SpelledBias& bias) const {
-    if (!bias.blocks.empty() && all_.q.rows() > most_coupled_) return fmt::format("more than {} poses", most_coupled_);
+    if (!bias.blocks.empty() && all_.q.rows() > most_coupled_)
+      return fmt::format("more than {} poses", most_coupled_);
     if (bias.flange && !check_flange(all_.q, all_.features))
       return fmt::format("more than {} numbers at the flange", kMostFlangeNumbers);
     return {};
@@ -305,29 +327,34 @@ class Choosing {
     const BiasCandidate& none = choice_.candidates.front();
     if (best_.candidate > 0) {
       choice_.sentence = fmt::format(
-          "bias {}: leave-one-out {:.4f} mm, the residual is {:.4f} mm; blocks left out in time {:.4f} mm, in joint "
-          "space {:.4f} mm",
-          taken.kernel, to_mm(taken.leave_one_out_rms), to_mm(none.leave_one_out_rms), to_mm(taken.time_block_rms),
-          to_mm(taken.joint_block_rms));
+          "bias {}: leave-one-out {:.4f} mm, the residual is {:.4f} mm; blocks left out in time "
+          "{:.4f} mm, in joint space {:.4f} mm",
+          taken.kernel, to_mm(taken.leave_one_out_rms), to_mm(none.leave_one_out_rms),
+          to_mm(taken.time_block_rms), to_mm(taken.joint_block_rms));
       if (learns_physics()) {
         choice_.sentence +=
-            "; it gains by what physics would that the error sources may lack: diagnose the batch, a model that has "
-            "it holds farther out";
+            "; it gains by what physics would that the error sources may lack: diagnose the batch, "
+            "a model that has it holds farther out";
       }
     } else {
-      const auto other =
-          std::min_element(choice_.candidates.begin() + 1, choice_.candidates.end(), [](const auto& a, const auto& b) {
+      const auto other = std::min_element(
+          choice_.candidates.begin() + 1, choice_.candidates.end(),
+          [](const auto& a, const auto& b) {
             return a.skipped != b.skipped ? b.skipped : a.leave_one_out_nlpd < b.leave_one_out_nlpd;
           });
-      const bool likelier = !not_likelier_.contains(static_cast<std::size_t>(other - choice_.candidates.begin()));
-      choice_.sentence =
-          fmt::format("no bias helps: the residual is {:.4f} mm, leave-one-out {:.4f} mm with {}, which {}; left out",
-                      to_mm(none.leave_one_out_rms), to_mm(other->leave_one_out_rms), other->kernel,
-                      likelier ? other->verdict : "is not clearly likelier");
+      const bool likelier =
+          !not_likelier_.contains(static_cast<std::size_t>(other - choice_.candidates.begin()));
+      choice_.sentence = fmt::format(
+          "no bias helps: the residual is {:.4f} mm, leave-one-out {:.4f} mm with {}, which {}; "
+          "left out",
+          to_mm(none.leave_one_out_rms), to_mm(other->leave_one_out_rms), other->kernel,
+          likelier ? other->verdict : "is not clearly likelier");
     }
-    if (const std::size_t unjudged = 2 * kBlocks - in_time_.size() - in_joint_space_.size(); unjudged > 0) {
-      choice_.sentence += fmt::format("; {} of {} blocks do not judge: without them the physics cannot be identified",
-                                      unjudged, 2 * kBlocks);
+    if (const std::size_t unjudged = 2 * kBlocks - in_time_.size() - in_joint_space_.size();
+        unjudged > 0) {
+      choice_.sentence += fmt::format(
+          "; {} of {} blocks do not judge: without them the physics cannot be identified", unjudged,
+          2 * kBlocks);
     }
     return {std::move(choice_), std::move(best_.model)};
   }
@@ -359,8 +386,9 @@ class Choosing {
 std::vector<Index> rows_to_choose_by(const BiasProblem& problem) {
   if (problem.q.rows() <= kManyRows) return in_order(problem.q.rows());
   const std::vector<PoseGroup> poses = pose_groups(problem.q);
-  const std::size_t wanted = std::max<std::size_t>(
-      1, poses.size() * static_cast<std::size_t>(kMostRows) / static_cast<std::size_t>(problem.q.rows()));
+  const std::size_t wanted =
+      std::max<std::size_t>(1, poses.size() * static_cast<std::size_t>(kMostRows) /
+                                   static_cast<std::size_t>(problem.q.rows()));
   std::vector<Index> rows;
   for (std::size_t k = 0; k < wanted; ++k) {
     const PoseGroup& pose = poses[k * poses.size() / wanted];
@@ -376,8 +404,8 @@ BiasProblem rows_of(const BiasProblem& problem, const std::vector<Index>& rows) 
 }
 
 /// What `residual_without` says of the rows `some` without those at `rows` of them.
-std::optional<MatrixXd> left_of(const ResidualWithout& residual_without, const std::vector<Index>& some,
-                                const std::vector<Index>& rows) {
+std::optional<MatrixXd> left_of(const ResidualWithout& residual_without,
+                                const std::vector<Index>& some, const std::vector<Index>& rows) {
   const std::optional<MatrixXd> all = residual_without(at(some, rows));
   return all ? std::optional<MatrixXd>((*all)(some, Eigen::all)) : std::nullopt;
 }
@@ -385,18 +413,23 @@ std::optional<MatrixXd> left_of(const ResidualWithout& residual_without, const s
 /// `options` whose progress is the part [from, to] of the whole.
 BiasOptions as_share(BiasOptions options, double from, double to) {
   if (const auto whole = options.progress)
-    options.progress = [whole, from, to](double share) { return whole(from + (to - from) * share); };
+    options.progress = [whole, from, to](double share) {
+      return whole(from + (to - from) * share);
+    };
   return options;
 }
 
-/// The model that was found on some rows of `problem`, on all of them: its search goes on from where it ended.
-Result<BiasModel> grown(const BiasModel& model, const BiasProblem& problem, const BiasOptions& options) {
+/// The model that was found on some rows of `problem`, on all of them: its search goes on from
+/// where it ended.
+Result<BiasModel> grown(const BiasModel& model, const BiasProblem& problem,
+                        const BiasOptions& options) {
   BiasState state = model.state();
   state.q = problem.q;
   state.residual_B = problem.residual_B;
   state.sigma = problem.sigma;
   state.features = model.needs_features() ? problem.features : std::vector<BiasFeatures>();
-  return BiasModel::restore(state).and_then([&](const BiasModel& whole) { return whole.refit(options); });
+  return BiasModel::restore(state).and_then(
+      [&](const BiasModel& whole) { return whole.refit(options); });
 }
 
 }  // namespace
@@ -418,10 +451,12 @@ Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& op
     return Choosing(problem, problem, options, residual_without, most_coupled).run();
   const BiasProblem part = rows_of(problem, some);
   ResidualWithout of_part;
-  if (residual_without) of_part = [&](const std::vector<Index>& rows) { return left_of(residual_without, some, rows); };
+  if (residual_without)
+    of_part = [&](const std::vector<Index>& rows) { return left_of(residual_without, some, rows); };
   const BiasOptions first = as_share(options, 0, kChoosing), rest = as_share(options, kChoosing, 1);
   ChosenBias chosen = TRY(Choosing(part, problem, first, of_part, most_coupled).run());
-  chosen.choice.sentence += fmt::format("; chosen by {} of {} rows", part.q.rows(), problem.q.rows());
+  chosen.choice.sentence +=
+      fmt::format("; chosen by {} of {} rows", part.q.rows(), problem.q.rows());
   if (chosen.model) chosen.model = TRY(grown(*chosen.model, problem, rest));
   return chosen;
 }

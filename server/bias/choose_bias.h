@@ -11,21 +11,25 @@ namespace trammel {
 
 /// What a bias is worth: the errors of observations that were left out.
 struct BiasCandidate {
-  std::string kernel;             ///< as spelled; `none` first
-  double leave_one_out_rms = 0;   ///< m, Euclidean, with the physics identified from all poses; of `none` the residual
-  double leave_one_out_nlpd = 0;  ///< nat, mean of -log density over the coordinates; positions in m
-  double time_block_rms = 0;      ///< m, Euclidean; eighths of the observations, in their order, left out
-  double joint_block_rms = 0;     ///< m, Euclidean; eighths of joint space left out
-  double gain = 0;                ///< m²: by how much the mean square falls against `none`, blocks in time left out
-  double gain_stddev = 0;         ///< m²: standard error of the gain, from its scatter over the blocks
-  std::string verdict;            ///< why it was not taken, or `taken`
-  bool skipped = false;           ///< not fitted: no figures, the verdict says why
+  std::string kernel;  ///< as spelled; `none` first
+  double leave_one_out_rms =
+      0;  ///< m, Euclidean, with the physics identified from all poses; of `none` the residual
+  double leave_one_out_nlpd =
+      0;  ///< nat, mean of -log density over the coordinates; positions in m
+  double time_block_rms =
+      0;  ///< m, Euclidean; eighths of the observations, in their order, left out
+  double joint_block_rms = 0;  ///< m, Euclidean; eighths of joint space left out
+  double gain =
+      0;  ///< m²: by how much the mean square falls against `none`, blocks in time left out
+  double gain_stddev = 0;  ///< m²: standard error of the gain, from its scatter over the blocks
+  std::string verdict;     ///< why it was not taken, or `taken`
+  bool skipped = false;    ///< not fitted: no figures, the verdict says why
 };
 
 struct BiasChoice {
   std::string kernel;                     ///< the one taken
   std::vector<BiasCandidate> candidates;  ///< those tried, the simplest first
-  std::string sentence;                   ///< for people: which was taken, and what it is worth in mm
+  std::string sentence;  ///< for people: which was taken, and what it is worth in mm
 };
 
 struct ChosenBias {
@@ -36,37 +40,42 @@ struct ChosenBias {
 /// Written in place of a kernel: choose_bias() decides.
 inline constexpr std::string_view kAutoBias = "auto";
 
-/// N x 3, m: the residuals of all observations with the physics identified without these; empty where it cannot be
-/// identified from the rest. Observations that helped to identify the physics fit it too well. A bias could then seem
-/// to predict what is only their imprint.
-using ResidualWithout = std::function<std::optional<Eigen::MatrixXd>(const std::vector<Eigen::Index>&)>;
+/// N x 3, m: the residuals of all observations with the physics identified without these; empty
+/// where it cannot be identified from the rest. Observations that helped to identify the physics
+/// fit it too well. A bias could then seem to predict what is only their imprint.
+using ResidualWithout =
+    std::function<std::optional<Eigen::MatrixXd>(const std::vector<Eigen::Index>&)>;
 
-/// Whether `model`, fitted to `problem`, is clearly likelier than `none`: its leave-one-out log density exceeds that of
-/// `none` by more than one nat for each additional hyperparameter and twice the standard error.
+/// Whether `model`, fitted to `problem`, is clearly likelier than `none`: its leave-one-out log
+/// density exceeds that of `none` by more than one nat for each additional hyperparameter and twice
+/// the standard error.
 [[nodiscard]] bool is_worth_it(const BiasProblem& problem, const BiasModel& model);
 
-/// Takes the simplest bias that no other beats. The cheap ones are tried first: `none`, `se`, `matern52`,
-/// `se + parameters`, and where the observations have several levers `se + flange` and `matern52 + flange`. Where the
-/// best of them leaves clearly more than the instrument's noise, so are `matern52 + joint_map + parameters` and `se +
-/// joint_map`.
+/// Takes the simplest bias that no other beats. The cheap ones are tried first: `none`, `se`,
+/// `matern52`, `se + parameters`, and where the observations have several levers `se + flange` and
+/// `matern52 + flange`. Where the best of them leaves clearly more than the instrument's noise, so
+/// are `matern52 + joint_map + parameters` and `se + joint_map`.
 ///
 /// One bias beats another where
-/// - its leave-one-out log density, summed over the observations, is higher by more than one nat for each additional
+/// - its leave-one-out log density, summed over the observations, is higher by more than one nat
+/// for each additional
 ///   hyperparameter and twice the standard error;
-/// - with blocks in time left out, its mean square error is below that of `none` by more than twice the standard error
+/// - with blocks in time left out, its mean square error is below that of `none` by more than twice
+/// the standard error
 ///   over the blocks;
-/// - with blocks in joint space left out, its mean square error is not above that of `none` by as much.
-/// A block is an eighth of the observations that are neighbours; `problem` is in the order of measuring. The
-/// hyperparameters stay as found, the physics is as `residual_without` says (empty: as in `problem`). A block that the
-/// physics cannot be identified without does not judge, and the sentence says so. Where fewer than half of the blocks
-/// judge, nothing is taken.
+/// - with blocks in joint space left out, its mean square error is not above that of `none` by as
+/// much. A block is an eighth of the observations that are neighbours; `problem` is in the order of
+/// measuring. The hyperparameters stay as found, the physics is as `residual_without` says (empty:
+/// as in `problem`). A block that the physics cannot be identified without does not judge, and the
+/// sentence says so. Where fewer than half of the blocks judge, nothing is taken.
 ///
-/// Of more than 1200 observations some 900, whole poses evenly in the order of measuring, choose; the sentence says so.
-/// The bias that they choose is fitted to all, from where its search ended.
+/// Of more than 1200 observations some 900, whole poses evenly in the order of measuring, choose;
+/// the sentence says so. The bias that they choose is fitted to all, from where its search ended.
 ///
-/// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled` observations. At most
-/// seven fits. The same problem and seed give the same choice. Of `options` the kernel is not used. With fewer than 30
-/// observations nothing is taken. Refuses what BiasModel::fit() refuses.
+/// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled`
+/// observations. At most seven fits. The same problem and seed give the same choice. Of `options`
+/// the kernel is not used. With fewer than 30 observations nothing is taken. Refuses what
+/// BiasModel::fit() refuses.
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                              const ResidualWithout& residual_without = {},
                                              Eigen::Index most_coupled = kMostCoupled);

@@ -19,15 +19,19 @@ namespace {
 
 using Rows = std::vector<std::size_t>;  // rising
 
-constexpr double kAsked = 3;        // times the stated sigma: the least that a fit leaves where bad rows are looked for
-constexpr double kKept = 0.55;      // share of the rows that are fitted: with two bad ones in five, some are spared
-constexpr double kAgreeing = 0.6;   // share that must agree at the end
-constexpr double kMuchLess = 0.25;  // of what was left
-constexpr double kEquations = 1.5;  // for each parameter, of the rows that are fitted
+constexpr double kAsked =
+    3;  // times the stated sigma: the least that a fit leaves where bad rows are looked for
+constexpr double kKept =
+    0.55;  // share of the rows that are fitted: with two bad ones in five, some are spared
+constexpr double kAgreeing = 0.6;       // share that must agree at the end
+constexpr double kMuchLess = 0.25;      // of what was left
+constexpr double kEquations = 1.5;      // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
-constexpr std::size_t kPlacing = 4, kPlacingTool = 3;  // rows that place the base, and so many more for each tool
-constexpr int kDraws = 300;  // of seven rows of which two in five are bad all are good in 1 of 36 draws
+constexpr std::size_t kPlacing = 4,
+                      kPlacingTool = 3;  // rows that place the base, and so many more for each tool
+constexpr int kDraws =
+    300;  // of seven rows of which two in five are bad all are good in 1 of 36 draws
 constexpr double kNear = 3e-3, kNearTurn = 5e-3;  // m, rad: by so much an arm is off its drawing
 
 MeasurementBatch only(const MeasurementBatch& batch, const Rows& rows) {
@@ -87,7 +91,9 @@ class RowSearch {
   }
 
  private:
-  [[nodiscard]] double left(const CalibrationResult& found) const { return std::hypot(sigma_, found.discrepancy); }
+  [[nodiscard]] double left(const CalibrationResult& found) const {
+    return std::hypot(sigma_, found.discrepancy);
+  }
 
   [[nodiscard]] std::optional<CalibrationResult> fitted(const std::vector<std::string>& sources,
                                                         const MeasurementBatch& rows) const {
@@ -105,7 +111,8 @@ class RowSearch {
 
   [[nodiscard]] std::size_t rows_that_place() const {
     const auto& tools = cell_->tools;
-    const auto unknown = std::count_if(tools.begin(), tools.end(), [](const auto& tool) { return !tool.second; });
+    const auto unknown =
+        std::count_if(tools.begin(), tools.end(), [](const auto& tool) { return !tool.second; });
     return kPlacing + kPlacingTool * static_cast<std::size_t>(unknown);
   }
 
@@ -115,10 +122,11 @@ class RowSearch {
     std::ptrdiff_t most = 0;
     std::mt19937_64 random(1);
     for (int draw = 0; draw < kDraws; ++draw) {
-      std::optional<CalibrationResult> one = fitted(frames(), only(rows, some_of(rows.measurements.size(), random)));
+      std::optional<CalibrationResult> one =
+          fitted(frames(), only(rows, some_of(rows.measurements.size(), random)));
       if (!one) continue;
-      const Eigen::VectorXd off =
-          farness_of(rows, residuals_of(one->model, rows, one->model.values), {kNear, kNearTurn, true});
+      const Eigen::VectorXd off = farness_of(
+          rows, residuals_of(one->model, rows, one->model.values), {kNear, kNearTurn, true});
       const auto near = std::count_if(off.begin(), off.end(), [](double far) { return far <= 1; });
       if (near <= most) continue;
       most = near;
@@ -139,7 +147,8 @@ class RowSearch {
   }
 
   /// How far each row of `rows` is off, beside how far a good one may be.
-  [[nodiscard]] Eigen::VectorXd farness(const CalibrationResult& found, const MeasurementBatch& rows) const {
+  [[nodiscard]] Eigen::VectorXd farness(const CalibrationResult& found,
+                                        const MeasurementBatch& rows) const {
     return farness_of(rows, residuals_of(found.model, rows, found.model.values),
                       {found.discrepancy, found.discrepancy_rotation, true});
   }
@@ -154,16 +163,17 @@ class RowSearch {
     return rows;
   }
 
-  [[nodiscard]] static bool has_enough(const MeasurementBatch& rows, const CalibrationResult& found) {
+  [[nodiscard]] static bool has_enough(const MeasurementBatch& rows,
+                                       const CalibrationResult& found) {
     double equations = 0;
     for (const Measurement& m : rows.measurements) equations += m.gauge ? 1 : 3;
     return equations >= kEquations * static_cast<double>(found.parameters.size());
   }
 
   /// What is found of `sources` on the rows that fit it best.
-  [[nodiscard]] std::optional<CalibrationResult> concentrated(const MeasurementBatch& few,
-                                                              std::optional<CalibrationResult> start,
-                                                              const std::vector<std::string>& sources) const {
+  [[nodiscard]] std::optional<CalibrationResult> concentrated(
+      const MeasurementBatch& few, std::optional<CalibrationResult> start,
+      const std::vector<std::string>& sources) const {
     Rows kept;
     for (int step = 0; start && step < kMostSteps; ++step) {
       Rows next = nearest(farness(*start, few));
@@ -190,8 +200,8 @@ class RowSearch {
     Rows rows;
   };
   /// All rows that fit as well as those that were kept, and what is found of `sources` on them.
-  [[nodiscard]] std::optional<Readmitted> readmitted(CalibrationResult found,
-                                                     const std::vector<std::string>& sources) const {
+  [[nodiscard]] std::optional<Readmitted> readmitted(
+      CalibrationResult found, const std::vector<std::string>& sources) const {
     Rows kept;
     for (int step = 0; step < kMostSteps; ++step) {
       Rows next = near(found);
@@ -204,8 +214,9 @@ class RowSearch {
     return Readmitted{std::move(found), std::move(kept)};
   }
 
-  /// Of rows that are too few to find all sources on some of them, those that base and tool alone lead to: what is off
-  /// by as much as a suspect beside all that the drawing leaves does not agree.
+  /// Of rows that are too few to find all sources on some of them, those that base and tool alone
+  /// lead to: what is off by as much as a suspect beside all that the drawing leaves does not
+  /// agree.
   [[nodiscard]] Rows led_to_by_frames(const MeasurementBatch& few) const {
     const std::vector<std::string> sources = frames();
     std::optional<CalibrationResult> found = concentrated(few, fitted(sources, few), sources);
@@ -217,7 +228,8 @@ class RowSearch {
   /// `rows`; all, where they are too few to be right.
   [[nodiscard]] Rows enough(Rows rows) const {
     Rows all = all_rows(batch_.measurements.size());
-    return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all : rows;
+    return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all
+                                                                                          : rows;
   }
 
   const std::shared_ptr<const Cell>& cell_;
@@ -234,8 +246,8 @@ std::shared_ptr<const Cell> anywhere(const Cell& cell) {
 }
 
 /// Each session by itself: where its instrument stood, and what it measured of the arm as it was.
-Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                          const MeasurementBatch& batch) {
+Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell,
+                          const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   const std::shared_ptr<const Cell> placed = anywhere(*cell);
   const std::vector<MeasurementBatch> sessions = by_session(batch);
   std::vector<Rows> rows_of(sessions.size());
@@ -263,14 +275,17 @@ Rows agreeing_rows(const std::shared_ptr<const Cell>& cell, const std::vector<st
                    const MeasurementBatch& batch, const Result<CalibrationResult>& plain) {
   if (!has_sessions(batch)) return RowSearch(cell, sources, batch).agreeing(plain);
   const double sigma = stated_sigma(batch, *cell);
-  if (plain && std::hypot(sigma, most_left(*plain)) < kAsked * sigma) return all_rows(batch.measurements.size());
+  if (plain && std::hypot(sigma, most_left(*plain)) < kAsked * sigma)
+    return all_rows(batch.measurements.size());
   return agreeing_in_sessions(cell, sources, batch);
 }
 
 }  // namespace
 
-std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                                      const MeasurementBatch& batch, const Result<CalibrationResult>& plain) {
+std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell,
+                                      const std::vector<std::string>& sources,
+                                      const MeasurementBatch& batch,
+                                      const Result<CalibrationResult>& plain) {
   if (batch.measurements.empty()) return std::nullopt;
   const Rows rows = agreeing_rows(cell, sources, batch, plain);
   if (rows.size() == batch.measurements.size()) return std::nullopt;
@@ -283,9 +298,11 @@ std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell, c
 void add_suspects(const MeasurementBatch& others, CalibrationResult& found) {
   const MeasurementBatch here = aligned(others, found.sessions, found.model.cell->tracker);
   const Residuals r = residuals_of(found.model, here, found.model.values);
-  std::vector<SuspectPose> named = off_by(here, r, {found.discrepancy, found.discrepancy_rotation, true});
+  std::vector<SuspectPose> named =
+      off_by(here, r, {found.discrepancy, found.discrepancy_rotation, true});
   named.insert(named.end(), found.suspects.begin(), found.suspects.end());
-  std::stable_sort(named.begin(), named.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  std::stable_sort(named.begin(), named.end(),
+                   [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   found.suspects = std::move(named);
 }
 

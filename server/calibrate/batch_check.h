@@ -7,12 +7,14 @@
 
 namespace trammel {
 
-/// What speaks against learning from `batch` (checked against `cell`), of positions and orientations: a mistake of
-/// reading (look_at_readings(), orientation_doubt()) or another tool, with the figure of what would fit; and against
-/// its distances and touches (gauge_doubt()). Whoever looks at a batch before anything is learned asks this.
+/// What speaks against learning from `batch` (checked against `cell`), of positions and
+/// orientations: a mistake of reading (look_at_readings(), orientation_doubt()) or another tool,
+/// with the figure of what would fit; and against its distances and touches (gauge_doubt()).
+/// Whoever looks at a batch before anything is learned asks this.
 [[nodiscard]] std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell);
 
-/// The same without doubts about the tool: for a batch of which a model in force can judge that better.
+/// The same without doubts about the tool: for a batch of which a model in force can judge that
+/// better.
 [[nodiscard]] std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 /// Refuses a batch with a batch_doubt().

@@ -24,14 +24,19 @@ namespace trammel {
 
 namespace {
 
-constexpr double kWeighed = 20;               // nat: so much more likely must the data be with a cause that they add
-constexpr double kInsteadOfScales = 3;        // the same where it makes scales of the sessions superfluous
-constexpr double kOfMetal = 0.2;              // of the prior scale: 4 um per m and K
-constexpr std::size_t kSessionsOfWarmth = 3;  // of two, another scale of the instrument does the same
-constexpr double kStretched = 10;             // nat: so much more likely must the data be with scales of the sessions,
-constexpr double kStretchedOfSession = 3;     // and so much more for each of them
-constexpr double kPerhapsStretched = 0.25;    // of that price, by what scales alone would explain: worth a trial
-constexpr double kZeroed = 10;                // the same with zero errors of the instruments
+constexpr double kWeighed =
+    20;  // nat: so much more likely must the data be with a cause that they add
+constexpr double kInsteadOfScales =
+    3;                            // the same where it makes scales of the sessions superfluous
+constexpr double kOfMetal = 0.2;  // of the prior scale: 4 um per m and K
+constexpr std::size_t kSessionsOfWarmth =
+    3;  // of two, another scale of the instrument does the same
+constexpr double kStretched =
+    10;  // nat: so much more likely must the data be with scales of the sessions,
+constexpr double kStretchedOfSession = 3;  // and so much more for each of them
+constexpr double kPerhapsStretched =
+    0.25;                       // of that price, by what scales alone would explain: worth a trial
+constexpr double kZeroed = 10;  // the same with zero errors of the instruments
 constexpr double kZeroedOfInstrument = 3;
 
 /// The first value of the model's `base`; -1: it has none.
@@ -46,9 +51,11 @@ Eigen::Index place_of_base(const PhysicalModel& model) {
 
 bool has_unknown_frame(const Cell& cell) { return !cell.X_WB || has_unknown_tool(cell); }
 
-/// Unknown frames where the closed forms put them, refined together and taken over as the model's. Beside an unknown
-/// tool a base that is known and to be identified is free, too: the instrument may stand elsewhere.
-Status refine_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
+/// Unknown frames where the closed forms put them, refined together and taken over as the model's.
+/// Beside an unknown tool a base that is known and to be identified is free, too: the instrument
+/// may stand elsewhere.
+Status refine_frames(PhysicalModel& model, const MeasurementBatch& batch,
+                     const CalibrateOptions& options) {
   const bool base_known = model.cell->X_WB.has_value();
   const bool tool_unknown = has_unknown_tool(*model.cell);
   std::vector<std::string> free;
@@ -77,11 +84,12 @@ double price_of_scales(std::size_t sessions) {
   return kStretched + kStretchedOfSession * static_cast<double>(sessions - 1);
 }
 
-/// Whether the residuals of a session grow with the distance from its middle. The parameters have taken a part of that,
-/// so it is only a reason to look.
+/// Whether the residuals of a session grow with the distance from its middle. The parameters have
+/// taken a part of that, so it is only a reason to look.
 bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& located) {
   const Tracker& tracker = found.model.cell->tracker;
-  const MeasurementBatch here = moved(located, found.sessions, tracker.sigma, tracker.sigma_rotation);
+  const MeasurementBatch here =
+      moved(located, found.sessions, tracker.sigma, tracker.sigma_rotation);
   const Residuals r = residuals_of(found.model, here, found.model.values);
   const std::size_t S = found.sessions.size();
   std::vector<Vector3> middle(S, Vector3::Zero());
@@ -99,14 +107,17 @@ bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& l
     square[s] += from_middle.squaredNorm() / variance;
   }
   double gain = 0;
-  for (std::size_t s = 0; s < S; ++s) gain += square[s] > 0 ? 0.5 * along[s] * along[s] / square[s] : 0;
+  for (std::size_t s = 0; s < S; ++s)
+    gain += square[s] > 0 ? 0.5 * along[s] * along[s] / square[s] : 0;
   return gain > kPerhapsStretched * price_of_scales(S);
 }
 
 /// identify(), and once more with a scale for each session where the data ask for it.
-Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& problem, const CalibrateOptions& options) {
+Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& problem,
+                                                 const CalibrateOptions& options) {
   Result<CalibrationResult> rigid = identify(problem, options);
-  if (!rigid || rigid->sessions.size() < 2 || !perhaps_stretched(*rigid, problem.batch)) return rigid;
+  if (!rigid || rigid->sessions.size() < 2 || !perhaps_stretched(*rigid, problem.batch))
+    return rigid;
   CalibrationProblem with = problem;
   with.stretched = true;
   Result<CalibrationResult> stretched = identify(with, options);
@@ -114,9 +125,10 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
 }
 
-/// Anchors by the nominal arm; where known ones tell where the base is, base and anchors by all gauges together. Their
-/// priors are centred there.
-Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
+/// Anchors by the nominal arm; where known ones tell where the base is, base and anchors by all
+/// gauges together. Their priors are centred there.
+Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch,
+                         const CalibrateOptions& options) {
   if (!has_gauges(batch)) return {};
   TRY(locate_anchors(model, batch));
   const Eigen::Index base = place_of_base(model);
@@ -135,7 +147,8 @@ Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, co
 }
 
 /// Everything but the frames, which are where the model has them.
-Result<CalibrationResult> calibrate_placed(CalibrationProblem problem, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate_placed(CalibrationProblem problem,
+                                           const CalibrateOptions& options) {
   TRY(check_needs(problem));
   localise_base(problem.model, problem.batch);
   TRY(place_instruments(problem.model, problem.batch, options));
@@ -144,7 +157,8 @@ Result<CalibrationResult> calibrate_placed(CalibrationProblem problem, const Cal
 }
 
 /// From a base that stands where the model has it.
-Result<CalibrationResult> calibrate_from(CalibrationProblem placed, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate_from(CalibrationProblem placed,
+                                         const CalibrateOptions& options) {
   if (has_unknown_frame(*placed.model.cell)) {
     if (Status refined = refine_frames(placed.model, placed.batch, options); !refined)
       return Failure(refined.error()).in("batch " + placed.batch.id);
@@ -152,12 +166,14 @@ Result<CalibrationResult> calibrate_from(CalibrationProblem placed, const Calibr
   return calibrate_placed(std::move(placed), options);
 }
 
-/// Beside a tool that is known, positions at one place would fit a base that is turned anyhow: its turn shows only in
-/// what the real tool is off the drawn one. So both are found from all sides, and the base is taken.
-Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
-  PhysicalModel frames =
-      TRY(make_physical_model(model.cell, {std::string(cause_correcting(causes::Part::kBase).spelling),
-                                           std::string(cause_correcting(causes::Part::kTool).spelling)}));
+/// Beside a tool that is known, positions at one place would fit a base that is turned anyhow: its
+/// turn shows only in what the real tool is off the drawn one. So both are found from all sides,
+/// and the base is taken.
+Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch,
+                         const CalibrateOptions& options) {
+  PhysicalModel frames = TRY(make_physical_model(
+      model.cell, {std::string(cause_correcting(causes::Part::kBase).spelling),
+                   std::string(cause_correcting(causes::Part::kTool).spelling)}));
   const std::vector<Pose> bases = likely_bases(model, batch);
   double best = -std::numeric_limits<double>::infinity();
   for (const Pose& X_WB : bases) {
@@ -171,7 +187,8 @@ Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch, co
 }
 
 /// The most likely of those that begin at each of the places where the base may stand.
-Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem,
+                                            const CalibrateOptions& options) {
   std::vector<Pose> bases = likely_bases(problem.model, problem.batch);
   if (bases.size() > 1 && !has_unknown_tool(*problem.model.cell)) {
     PhysicalModel turned = problem.model;
@@ -183,18 +200,22 @@ Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem, c
     CalibrationProblem placed = problem;
     placed.model.X_WB = X_WB;
     Result<CalibrationResult> found = calibrate_from(std::move(placed), options);
-    if (!best || (found && (!*best || found->log_evidence > (*best)->log_evidence))) best = std::move(found);
+    if (!best || (found && (!*best || found->log_evidence > (*best)->log_evidence)))
+      best = std::move(found);
   }
-  if (const std::string untold = untold_turn(*problem.model.cell, problem.batch); *best && !untold.empty())
+  if (const std::string untold = untold_turn(*problem.model.cell, problem.batch);
+      *best && !untold.empty())
     (*best)->unidentifiable.insert((*best)->unidentifiable.begin(),
                                    UnidentifiableCombination{0, turn_of_base(), untold});
   return std::move(*best);
 }
 
 /// The batch as if each session had been measured as `sessions` say; without sessions as it is.
-MeasurementBatch moved_there(const CalibrationProblem& problem, const std::vector<SessionSetting>& sessions) {
+MeasurementBatch moved_there(const CalibrationProblem& problem,
+                             const std::vector<SessionSetting>& sessions) {
   const Tracker& tracker = problem.model.cell->tracker;
-  return sessions.empty() ? problem.batch : moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
+  return sessions.empty() ? problem.batch
+                          : moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
 }
 
 /// `found` was identified on what `sessions` had moved.
@@ -205,7 +226,8 @@ CalibrationResult told_of(CalibrationResult found, const std::vector<SessionSett
 }
 
 /// In the world of the last session.
-Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem,
+                                          const CalibrateOptions& options) {
   CalibrationProblem complete = problem;
   std::vector<SessionSetting> sessions;
   if (has_sessions(problem.batch)) {
@@ -222,12 +244,14 @@ Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, con
   });
 }
 
-/// The session with the most poses, whatever their order; of equal ones that whose name sorts first.
+/// The session with the most poses, whatever their order; of equal ones that whose name sorts
+/// first.
 std::size_t largest_session(const MeasurementBatch& batch) {
   const std::vector<SessionSetting> settings = settings_of(batch);
-  const auto largest = std::min_element(settings.begin(), settings.end(), [](const auto& a, const auto& b) {
-    return a.poses != b.poses ? a.poses > b.poses : a.id < b.id;
-  });
+  const auto largest =
+      std::min_element(settings.begin(), settings.end(), [](const auto& a, const auto& b) {
+        return a.poses != b.poses ? a.poses > b.poses : a.id < b.id;
+      });
   return static_cast<std::size_t>(largest - settings.begin());
 }
 
@@ -242,8 +266,10 @@ MeasurementBatch exchanged(MeasurementBatch batch, std::size_t session) {
   return batch;
 }
 
-/// `found` was told in the lengths of another session: once more in those of the newest, everything as it stands.
-Result<CalibrationResult> calibrate_in_newest_lengths(const CalibrationResult& found, const CalibrationProblem& problem,
+/// `found` was told in the lengths of another session: once more in those of the newest, everything
+/// as it stands.
+Result<CalibrationResult> calibrate_in_newest_lengths(const CalibrationResult& found,
+                                                      const CalibrationProblem& problem,
                                                       const CalibrateOptions& options) {
   const double longer = 1 + found.sessions.back().scale;
   std::vector<SessionSetting> sessions = settings_of(problem.batch);
@@ -268,32 +294,40 @@ Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationPro
                                        const CalibrateOptions& options) {
   CalibrationProblem there = problem;
   there.batch = exchanged(problem.batch, session);
-  Result<CalibrationResult> found = calibrate_there(there, options).map([&](CalibrationResult by_session) {
-    std::swap(by_session.sessions[session], by_session.sessions.back());
-    const Pose back = by_session.sessions.back().X_WS.inverse();
-    for (SessionSetting& setting : by_session.sessions) setting.X_WS = back * setting.X_WS;
-    by_session.sessions.back().X_WS = Pose::Identity();
-    by_session.model.X_WB = back * by_session.model.X_WB;
-    return by_session;
-  });
-  return found && found->sessions.back().scale != 0 ? calibrate_in_newest_lengths(*found, problem, options)
-                                                    : std::move(found);
+  Result<CalibrationResult> found =
+      calibrate_there(there, options).map([&](CalibrationResult by_session) {
+        std::swap(by_session.sessions[session], by_session.sessions.back());
+        const Pose back = by_session.sessions.back().X_WS.inverse();
+        for (SessionSetting& setting : by_session.sessions) setting.X_WS = back * setting.X_WS;
+        by_session.sessions.back().X_WS = Pose::Identity();
+        by_session.model.X_WB = back * by_session.model.X_WB;
+        return by_session;
+      });
+  return found && found->sessions.back().scale != 0
+             ? calibrate_in_newest_lengths(*found, problem, options)
+             : std::move(found);
 }
 
-/// Whether nothing that is to be found depends on which world it is told in: not where the instrument drifts to.
+/// Whether nothing that is to be found depends on which world it is told in: not where the
+/// instrument drifts to.
 bool is_of_the_robot(const PhysicalModel& model) {
   return std::all_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
-    return source->cause().scope != causes::Scope::kSession && source->cause().scope != causes::Scope::kPose;
+    return source->cause().scope != causes::Scope::kSession &&
+           source->cause().scope != causes::Scope::kPose;
   });
 }
 
 }  // namespace
 
-Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate(const CalibrationProblem& problem,
+                                    const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
-    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
+    return refused("no measurements to calibrate with")
+        .in("batch " + problem.batch.id)
+        .beyond(0, 1);
   TRY(check_gauges(problem.model, problem.batch));
-  // Nobody says where the base stands: it is found by the session that tells most, not by the few poses of the newest.
+  // Nobody says where the base stands: it is found by the session that tells most, not by the few
+  // poses of the newest.
   if (has_sessions(problem.batch) && !problem.model.cell->X_WB && is_of_the_robot(problem.model))
     return calibrate_by(largest_session(problem.batch), problem, options);
   return calibrate_there(problem, options).map([&](CalibrationResult found) {
@@ -305,7 +339,8 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
 namespace {
 
 /// Every combination of the forms that the causes in `specs` have.
-std::vector<std::vector<std::string>> combinations(const std::vector<std::string>& specs, const Cell& cell) {
+std::vector<std::vector<std::string>> combinations(const std::vector<std::string>& specs,
+                                                   const Cell& cell) {
   std::vector<std::vector<std::string>> all = {{}};
   for (const std::string& spec : specs) {
     std::vector<std::vector<std::string>> longer;
@@ -322,10 +357,12 @@ std::vector<std::vector<std::string>> combinations(const std::vector<std::string
 
 /// The most likely of the calibrations with the sources of each candidate.
 Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
-                                      std::vector<std::vector<std::string>> candidates, const MeasurementBatch& batch,
+                                      std::vector<std::vector<std::string>> candidates,
+                                      const MeasurementBatch& batch,
                                       const CalibrateOptions& options) {
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
-  std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
+  std::map<std::string, std::string>
+      found;  // sources that were searched for, with what the first form found
   for (std::vector<std::string>& candidate : candidates) {
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;
@@ -339,8 +376,10 @@ Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
   return best;
 }
 
-/// With `added` beside the cause that shows it, in each of its forms; the other sources as they were found.
-std::vector<std::vector<std::string>> with_added(const CalibrationResult& without, const CauseRecord& added) {
+/// With `added` beside the cause that shows it, in each of its forms; the other sources as they
+/// were found.
+std::vector<std::vector<std::string>> with_added(const CalibrationResult& without,
+                                                 const CauseRecord& added) {
   const CauseRecord& beside = cause_spelled(added.added_by_data->beside);
   std::vector<std::vector<std::string>> candidates;
   for (const causes::Form& form : beside.forms) {
@@ -352,10 +391,14 @@ std::vector<std::vector<std::string>> with_added(const CalibrationResult& withou
   return candidates;
 }
 
-/// The causes that the data may add: what shows them is asked for in any form, and the cell does not say them.
-std::vector<const CauseRecord*> may_be_added(const Cell& cell, const std::vector<std::string>& specs,
+/// The causes that the data may add: what shows them is asked for in any form, and the cell does
+/// not say them.
+std::vector<const CauseRecord*> may_be_added(const Cell& cell,
+                                             const std::vector<std::string>& specs,
                                              const MeasurementBatch& batch) {
-  const auto has = [&](std::string_view cause) { return std::find(specs.begin(), specs.end(), cause) != specs.end(); };
+  const auto has = [&](std::string_view cause) {
+    return std::find(specs.begin(), specs.end(), cause) != specs.end();
+  };
   const bool shows_days = batch.sessions.size() >= kSessionsOfWarmth && shows_warmth(batch);
   std::vector<const CauseRecord*> records;
   for (const CauseRecord* record : all_causes()) {
@@ -370,8 +413,8 @@ std::vector<const CauseRecord*> may_be_added(const Cell& cell, const std::vector
 
 namespace {
 
-/// Whether what goes with the temperature is as large as arms of metal have it, and of their sign: less is wear that
-/// went with the seasons, or an instrument.
+/// Whether what goes with the temperature is as large as arms of metal have it, and of their sign:
+/// less is wear that went with the seasons, or an instrument.
 bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   if (!added.needs.temperature) return true;
   Eigen::Index first = 0;
@@ -383,8 +426,8 @@ bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   return false;
 }
 
-/// Whether the data ask for what was added. Where it stands for what scales of the sessions explain otherwise it needs
-/// no more than to be likelier, the scales at their price.
+/// Whether the data ask for what was added. Where it stands for what scales of the sessions explain
+/// otherwise it needs no more than to be likelier, the scales at their price.
 bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& with) {
   if (!are_stretched(without.sessions) || are_stretched(with.sessions))
     return with.log_evidence > without.log_evidence + kWeighed;
@@ -394,7 +437,8 @@ bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& 
 
 /// With the links' weights, and their growth, where the data ask for them.
 Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& cell,
-                                            const std::vector<std::string>& specs, const MeasurementBatch& batch,
+                                            const std::vector<std::string>& specs,
+                                            const MeasurementBatch& batch,
                                             const CalibrateOptions& options) {
   Result<CalibrationResult> best = most_likely(cell, combinations(specs, *cell), batch, options);
   if (!best || !options.weigh_links) return best;
@@ -406,7 +450,8 @@ Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& c
 }
 
 /// With zero errors of the instruments, the other sources as they were found.
-Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without, const MeasurementBatch& batch,
+Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without,
+                                           const MeasurementBatch& batch,
                                            const CalibrateOptions& options) {
   std::vector<std::string> names;
   for (const ErrorSourcePtr& source : without.model.sources) names.push_back(source->name());
@@ -416,17 +461,20 @@ Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without, con
 
 }  // namespace
 
-Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
-                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
+                                    const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch,
+                                    const CalibrateOptions& options) {
   const std::vector<std::string> sources = TRY(with_instruments(specs, *cell, batch));
   Result<CalibrationResult> exact = calibrate_weighed(cell, sources, batch, options);
-  const bool zeros_asked = std::find(sources.begin(), sources.end(), kInstrumentZero) != sources.end();
+  const bool zeros_asked =
+      std::find(sources.begin(), sources.end(), kInstrumentZero) != sources.end();
   if (!has_gauges(batch) || zeros_asked) return exact;
   std::vector<std::string> with_zeros = sources;
   with_zeros.emplace_back(kInstrumentZero);
   // Values that are far too long fit nothing without a zero.
-  Result<CalibrationResult> zeroed =
-      exact ? calibrate_zeroed(*exact, batch, options) : calibrate_weighed(cell, with_zeros, batch, options);
+  Result<CalibrationResult> zeroed = exact ? calibrate_zeroed(*exact, batch, options)
+                                           : calibrate_weighed(cell, with_zeros, batch, options);
   if (!zeroed || !exact) return zeroed ? zeroed : exact;
   const auto zeros = static_cast<double>(zeroed->parameters.size() - exact->parameters.size());
   const double price = kZeroed + kZeroedOfInstrument * zeros;

@@ -7,7 +7,8 @@
 namespace trammel {
 
 Result<CalibrationResult> calibrate_with_maps(const std::shared_ptr<const Cell>& cell,
-                                              const std::vector<std::string>& specs, const MeasurementBatch& batch,
+                                              const std::vector<std::string>& specs,
+                                              const MeasurementBatch& batch,
                                               const CalibrateOptions& options) {
   // Specs that are wrong, or given twice, are refused as they are written.
   TRY(make_physical_model(cell, specs));
@@ -26,7 +27,8 @@ Result<CalibrationResult> calibrate_with_maps(const std::shared_ptr<const Cell>&
   if (!without) return without;
   const std::map<int, MapSpectrum> learned = learned_maps(*without, batch, joints);
   for (std::string& spec : all) {
-    if (const std::optional<int> joint = joint_of_open_map(spec)) spec = spelled_map(*joint, learned.at(*joint));
+    if (const std::optional<int> joint = joint_of_open_map(spec))
+      spec = spelled_map(*joint, learned.at(*joint));
   }
   return calibrate(cell, all, batch, options);
 }

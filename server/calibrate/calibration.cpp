@@ -11,7 +11,8 @@ Eigen::MatrixXd CalibrationResult::correlation() const {
 }
 
 double CalibrationResult::discrepancy_of_one(int together) const {
-  return together > 1 ? std::max(discrepancy, std::sqrt(together) * discrepancy_of_pose) : discrepancy;
+  return together > 1 ? std::max(discrepancy, std::sqrt(together) * discrepancy_of_pose)
+                      : discrepancy;
 }
 
 }  // namespace trammel

@@ -12,12 +12,13 @@
 /// What a calibration is asked, and what it found.
 namespace trammel {
 
-/// If the joints belong to the positions, identification leaves less than the larger of these: m rms, and a share of
-/// how far the positions spread. A nominal robot is off by a few mm.
+/// If the joints belong to the positions, identification leaves less than the larger of these: m
+/// rms, and a share of how far the positions spread. A nominal robot is off by a few mm.
 inline constexpr double kNoModelError = 0.025;
 inline constexpr double kNoModelShare = 0.05;
 
-/// A model to start from, and the measurements to explain. An unknown base and unknown tools are found first.
+/// A model to start from, and the measurements to explain. An unknown base and unknown tools are
+/// found first.
 struct CalibrationProblem {
   PhysicalModel model;
   MeasurementBatch batch;  ///< checked against the cell
@@ -27,8 +28,10 @@ struct CalibrationProblem {
 struct CalibrateOptions {
   int max_iterations = 100;
   std::vector<bool> held;    ///< a flag for each parameter that stays as it is; empty: none
-  bool weigh_links = false;  ///< `compliance` may add `self_weight` where no link mass is told and the data ask for it
-  bool robust = true;        ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
+  bool weigh_links = false;  ///< `compliance` may add `self_weight` where no link mass is told and
+                             ///< the data ask for it
+  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has
+                       ///< little influence
 };
 
 /// A pose whose residual is far above its sigma.
@@ -56,21 +59,25 @@ struct CalibrationResult {
   std::vector<UnidentifiableCombination> unidentifiable;
   double condition_number = 0;  ///< of the identified directions, prior units
   double log_likelihood = 0;    ///< nat, of the residuals under sigma and discrepancy
-  double log_evidence = 0;      ///< nat: the same with the parameters integrated over their priors (Laplace)
-  double rms = 0;               ///< m, Euclidean residual of the training positions; of gauges alone: of their values
-  double discrepancy = 0;       ///< m per axis: what the model leaves beyond the measurement's sigma
+  double log_evidence =
+      0;  ///< nat: the same with the parameters integrated over their priors (Laplace)
+  double rms =
+      0;  ///< m, Euclidean residual of the training positions; of gauges alone: of their values
+  double discrepancy = 0;  ///< m per axis: what the model leaves beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
-  double discrepancy_of_pose = 0;   ///< m per axis: what all positions at one joint vector share of it
-  /// m per axis: what each of so many positions at one joint vector is weighed with beside its own sigma: together as
-  /// one pose, as far as they share the arm's error.
+  double discrepancy_of_pose =
+      0;  ///< m per axis: what all positions at one joint vector share of it
+  /// m per axis: what each of so many positions at one joint vector is weighed with beside its own
+  /// sigma: together as one pose, as far as they share the arm's error.
   [[nodiscard]] double discrepancy_of_one(int together) const;
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  /// Of a batch of several sessions: what belongs to each, the newest last. aligned() moves its measurements into the
-  /// world of the model. Empty: one session.
+  /// Of a batch of several sessions: what belongs to each, the newest last. aligned() moves its
+  /// measurements into the world of the model. Empty: one session.
   std::vector<SessionSetting> sessions;
-  std::vector<double> cost_record;  ///< half the weighted sum of squares, of all iterations in their order
+  std::vector<double>
+      cost_record;  ///< half the weighted sum of squares, of all iterations in their order
   bool converged = false;
   int iterations = 0;
   std::string message;  ///< of the solver

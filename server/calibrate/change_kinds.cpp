@@ -15,14 +15,16 @@ ChangeKinds::ChangeKinds(const PhysicalModel& model, ChangesOf of) : probe_(mode
     // What belongs to a session alone, such as where its tracker stood, is no change of the arm.
     if (cause->scope == causes::Scope::kSession && of == ChangesOf::kArm) continue;
     if (cause->scope != causes::Scope::kJoint) add_of_arm(*cause);
-    for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j) add(*cause, j);
+    for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j)
+      add(*cause, j);
   }
 }
 
 void ChangeKinds::add_of_arm(const CauseRecord& cause) {
   const std::size_t tools = probe_.cell->tools.size();
   const bool each = cause.takes_numbers && tools > 1;
-  for (std::size_t k = 1; k <= (each ? tools : 1); ++k) add(cause, -1, each ? fmt::format("+{}", k) : "");
+  for (std::size_t k = 1; k <= (each ? tools : 1); ++k)
+    add(cause, -1, each ? fmt::format("+{}", k) : "");
 }
 
 void ChangeKinds::add(const CauseRecord& cause, int joint, const std::string& behind) {

@@ -16,7 +16,9 @@ struct ChangeKind {
   Eigen::Index first = 0, count = 0;
 
   /// The source that begins at the pose with that index.
-  [[nodiscard]] std::string from(int index) const { return fmt::format("{}@{}{}", spelling, index + 1, behind); }
+  [[nodiscard]] std::string from(int index) const {
+    return fmt::format("{}@{}{}", spelling, index + 1, behind);
+  }
 };
 
 enum class ChangesOf {
@@ -24,14 +26,16 @@ enum class ChangesOf {
   kArmAndInstrument,  ///< and a tracker that is moved
 };
 
-/// A model that has every kind of change from the first pose on, at nothing, behind the parameters of another one.
+/// A model that has every kind of change from the first pose on, at nothing, behind the parameters
+/// of another one.
 class ChangeKinds {
  public:
   ChangeKinds(const PhysicalModel& model, ChangesOf of);
 
   [[nodiscard]] const std::vector<ChangeKind>& kinds() const { return kinds_; }
   [[nodiscard]] const PhysicalModel& probe() const { return probe_; }
-  /// Of the probe's parameters: those of the model, and those of the kinds, in the order of kinds().
+  /// Of the probe's parameters: those of the model, and those of the kinds, in the order of
+  /// kinds().
   [[nodiscard]] std::vector<Eigen::Index> own() const;
   [[nodiscard]] std::vector<Eigen::Index> changes() const { return places_; }
 

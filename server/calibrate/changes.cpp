@@ -21,13 +21,15 @@ namespace {
 
 constexpr double kChance = 1e-4;  // of a false change in all sessions together
 constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
-constexpr double kLeastSeen = 1;  // information of a candidate, prior units: below it these poses do not show it
+constexpr double kLeastSeen =
+    1;  // information of a candidate, prior units: below it these poses do not show it
 constexpr double kLeastInflation = 1;
 constexpr std::size_t kFewestToWander = 4;  // sessions
 constexpr double kSlowest = 1e-4;           // prior standard deviations a session
 constexpr int kRates = 60;
 
-/// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P), of its motion.
+/// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P),
+/// of its motion.
 struct Sums {
   MatrixXd own, shared, motion;  // K x K, K x P, K x 7
   VectorXd gradient;             // K
@@ -70,7 +72,8 @@ struct Seen {
 /// The equations of a whole batch beside one calibration.
 class ChangeSearch {
  public:
-  ChangeSearch(const CalibrationResult& found, std::vector<SessionSetting> sessions, const MeasurementBatch& batch)
+  ChangeSearch(const CalibrationResult& found, std::vector<SessionSetting> sessions,
+               const MeasurementBatch& batch)
       : kinds_(found.model, ChangesOf::kArm),
         sessions_(std::move(sessions)),
         s_(scaled_parameters(kinds_.probe(), {})),
@@ -90,8 +93,10 @@ class ChangeSearch {
     const MeasurementBatch here = moved(batch, sessions_, tracker.sigma, tracker.sigma_rotation);
     find_middles(here);
     const Weights weights = weights_of(found, here);
-    for (std::size_t row = 0; row < here.measurements.size(); ++row) add(here.measurements[row], weights, row);
-    VectorXd at_rest = VectorXd::Zero(P);  // the shared parameters are where their gradient vanishes
+    for (std::size_t row = 0; row < here.measurements.size(); ++row)
+      add(here.measurements[row], weights, row);
+    VectorXd at_rest =
+        VectorXd::Zero(P);  // the shared parameters are where their gradient vanishes
     eliminate(blocks_, information_, at_rest);
     factor_.compute(information_);
   }
@@ -108,16 +113,19 @@ class ChangeSearch {
       }
       add_alone(s, inflation, all);
     }
-    const auto best = std::max_element(all.begin(), all.end(),
-                                       [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+    const auto best =
+        std::max_element(all.begin(), all.end(),
+                         [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
     const Wandering wandering = all_calm() ? most_wandering(inflation) : Wandering{};
-    if (wandering.kind != nullptr && (best == all.end() || wandering.gain > best->gain)) return told(wandering);
+    if (wandering.kind != nullptr && (best == all.end() || wandering.gain > best->gain))
+      return told(wandering);
     if (best == all.end()) return std::nullopt;
     const double chance = chance_of(static_cast<int>(best->kind->count), best->gain, all.size());
     if (chance > kChance) return std::nullopt;
     Change change{spelled(*best), best->session, best->gain, chance, {}};
     for (const Scored& other : all) {
-      if (&other != &*best && other.gain > best->gain - kAsGood) change.could_also_be.push_back(spelled(other));
+      if (&other != &*best && other.gain > best->gain - kAsGood)
+        change.could_also_be.push_back(spelled(other));
     }
     return change;
   }
@@ -142,11 +150,12 @@ class ChangeSearch {
   [[nodiscard]] std::string spelled(const Scored& one) const {
     if (!one.alone) return one.kind->from(first_of(one.session));
     const std::string tool = one.kind->behind.empty() ? "+1" : one.kind->behind;
-    return fmt::format("{}@{}{}+{}", one.kind->spelling, first_of(one.session) + 1, tool, first_of(one.session + 1));
+    return fmt::format("{}@{}{}+{}", one.kind->spelling, first_of(one.session) + 1, tool,
+                       first_of(one.session + 1));
   }
 
-  /// What held in one session only: a reflector that sat elsewhere that day. Of the first session that is a change at
-  /// the second one, of the newest it is how the tool sits today.
+  /// What held in one session only: a reflector that sat elsewhere that day. Of the first session
+  /// that is a change at the second one, of the newest it is how the tool sits today.
   void add_alone(std::size_t session, double inflation, std::vector<Scored>& all) const {
     if (session + 1 >= sessions_.size()) return;
     Seen seen;
@@ -159,7 +168,8 @@ class ChangeSearch {
     }
   }
 
-  /// The one number that a random walk from session to session explains best, where that is beyond chance.
+  /// The one number that a random walk from session to session explains best, where that is beyond
+  /// chance.
   [[nodiscard]] Wandering most_wandering(double inflation) const {
     Wandering best;
     if (sessions_.size() < kFewestToWander) return best;
@@ -171,7 +181,8 @@ class ChangeSearch {
     if (best.kind != nullptr && chance_of(1, best.gain, kinds_.kinds().size()) > kChance) return {};
     return best;
   }
-  /// Steps z of unit variance times the rate, summed up: the evidence of the rate is that of a Gaussian prior.
+  /// Steps z of unit variance times the rate, summed up: the evidence of the rate is that of a
+  /// Gaussian prior.
   [[nodiscard]] Wandering wandering_of(const ChangeKind& kind, double inflation) const {
     const auto S = static_cast<Index>(sessions_.size());
     const auto P = static_cast<Index>(own_.size());
@@ -189,7 +200,8 @@ class ChangeSearch {
     const MatrixXd sums = MatrixXd::Ones(S - 1, S - 1).triangularView<Eigen::Lower>();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(sums.transpose() * left * sums);
     const VectorXd strength =
-        (eigen.eigenvectors().transpose() * (sums.transpose() * along)).array().square() / inflation;
+        (eigen.eigenvectors().transpose() * (sums.transpose() * along)).array().square() /
+        inflation;
     Wandering best{&kind, 0, 0};
     for (int k = 0; k < kRates; ++k) {
       const double variance = std::pow(kSlowest, 2 - 2.0 * k / kRates);
@@ -212,12 +224,15 @@ class ChangeSearch {
                   wandering.rate * scale,
                   {}};
     for (std::size_t s = 1; s < sessions_.size(); ++s)
-      change.steps.push_back(fmt::format("{}+{:.6f}", wandering.kind->from(first_of(s)), 1e3 * change.rate));
+      change.steps.push_back(
+          fmt::format("{}+{:.6f}", wandering.kind->from(first_of(s)), 1e3 * change.rate));
     change.source = change.steps.front();
     return change;
   }
 
-  [[nodiscard]] bool all_calm() const { return std::find(calm_.begin(), calm_.end(), false) == calm_.end(); }
+  [[nodiscard]] bool all_calm() const {
+    return std::find(calm_.begin(), calm_.end(), false) == calm_.end();
+  }
   [[nodiscard]] int first_of(std::size_t session) const { return sessions_[session].first; }
   /// Null for the newest session, where the base itself moves.
   [[nodiscard]] const SessionBlock* block(std::size_t session) const {
@@ -281,15 +296,16 @@ class ChangeSearch {
     return along.dot(left.ldlt().solve(along));
   }
 
-  [[nodiscard]] Scored score(const ChangeKind& kind, std::size_t session, const Seen& seen, double inflation) const {
+  [[nodiscard]] Scored score(const ChangeKind& kind, std::size_t session, const Seen& seen,
+                             double inflation) const {
     const double gained = gain(kind.first, kind.count, seen) / inflation;
     double rows = 0;
     for (const SessionSetting& one : sessions_) rows += 3.0 * one.poses;
     return {&kind, session, gained, gained - static_cast<double>(kind.count) * std::log(rows)};
   }
 
-  /// How much larger gains are than white noise would make them: the mean over single numbers between halves of the
-  /// poses. A session whose noise is in question tells nothing of that.
+  /// How much larger gains are than white noise would make them: the mean over single numbers
+  /// between halves of the poses. A session whose noise is in question tells nothing of that.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;
     for (std::size_t j = 0; j < joints_; ++j) {
@@ -312,8 +328,9 @@ class ChangeSearch {
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;
   const std::size_t joints_;
-  std::vector<bool> calm_;  // sessions that tell how much larger gains are than white noise makes them
-  MatrixXd information_;    // P x P, of the shared parameters with their priors, in prior units
+  std::vector<bool>
+      calm_;  // sessions that tell how much larger gains are than white noise makes them
+  MatrixXd information_;  // P x P, of the shared parameters with their priors, in prior units
   std::vector<SessionBlock> blocks_;
   std::vector<Sums> whole_;   // by session
   std::vector<Sums> halves_;  // by joint and session: its poses above the middle
@@ -323,12 +340,14 @@ class ChangeSearch {
 
 }  // namespace
 
-std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch) {
+std::optional<Change> strongest_change(const CalibrationResult& found,
+                                       const MeasurementBatch& batch) {
   if (found.sessions.size() < 2) return std::nullopt;
   return ChangeSearch(found, found.sessions, batch).strongest();
 }
 
-std::optional<Change> change_instead_of_noise(const CalibrationResult& found, const MeasurementBatch& batch) {
+std::optional<Change> change_instead_of_noise(const CalibrationResult& found,
+                                              const MeasurementBatch& batch) {
   std::vector<SessionSetting> sessions = found.sessions;
   for (SessionSetting& session : sessions) session.own_noise = session.own_noise_rotation = 0;
   if (sessions.size() < 2 || sessions == found.sessions) return std::nullopt;

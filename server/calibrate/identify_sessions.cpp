@@ -11,7 +11,8 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostChanges = 12;
-// Nat, beside Schwarz's price of what it adds: so much more likely must a change make the data than a noisy session.
+// Nat, beside Schwarz's price of what it adds: so much more likely must a change make the data than
+// a noisy session.
 constexpr double kInsteadOfNoise = 10;
 
 /// The sources of the model as they are: each in the form and with the orders that were found.
@@ -26,20 +27,26 @@ struct Proposal {
   bool instead_of_noise = false;
 };
 
-std::optional<Proposal> proposed_change(const CalibrationResult& found, const MeasurementBatch& batch) {
-  if (std::optional<Change> seen = strongest_change(found, batch)) return Proposal{std::move(*seen)};
+std::optional<Proposal> proposed_change(const CalibrationResult& found,
+                                        const MeasurementBatch& batch) {
+  if (std::optional<Change> seen = strongest_change(found, batch))
+    return Proposal{std::move(*seen)};
   std::optional<Change> instead = change_instead_of_noise(found, batch);
   if (!instead) return std::nullopt;
   return Proposal{std::move(*instead), true};
 }
 
-bool is_better(const CalibrationResult& with, const CalibrationResult& without, const Proposal& proposal) {
+bool is_better(const CalibrationResult& with, const CalibrationResult& without,
+               const Proposal& proposal) {
   double price = 0;
   if (proposal.instead_of_noise) {
     double rows = 0;  // that show it
-    const std::size_t end = is_of_one_session(proposal.change) ? proposal.change.session + 1 : with.sessions.size();
-    for (std::size_t s = proposal.change.session; s < end; ++s) rows += 3.0 * with.sessions[s].poses;
-    const auto added = static_cast<double>(with.parameters.size()) - static_cast<double>(without.parameters.size());
+    const std::size_t end =
+        is_of_one_session(proposal.change) ? proposal.change.session + 1 : with.sessions.size();
+    for (std::size_t s = proposal.change.session; s < end; ++s)
+      rows += 3.0 * with.sessions[s].poses;
+    const auto added = static_cast<double>(with.parameters.size()) -
+                       static_cast<double>(without.parameters.size());
     price = kInsteadOfNoise + 0.5 * added * std::log(rows);
   }
   return with.log_likelihood > without.log_likelihood + price;
@@ -73,7 +80,8 @@ Result<IdentifiedSessions> without_idle_changes(const Identify& identify, Identi
 
 }  // namespace
 
-Result<IdentifiedSessions> identify_sessions(const Identify& identify, const std::vector<std::string>& sources,
+Result<IdentifiedSessions> identify_sessions(const Identify& identify,
+                                             const std::vector<std::string>& sources,
                                              const MeasurementBatch& batch,
                                              const std::function<Status(double share)>& go_on) {
   auto calibration = TRY(identify(sources));

@@ -22,22 +22,28 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kChance = 1e-7;                     // of a false jump in a batch
-constexpr double kAsGood = 9.2;                      // twice the log likelihood: 1 in 100
-constexpr double kBeforeSlow = 13.8;                 // twice the log likelihood, 1000 to 1: ahead of what grows slowly
+constexpr double kChance = 1e-7;  // of a false jump in a batch
+constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
+constexpr double kBeforeSlow =
+    13.8;  // twice the log likelihood, 1000 to 1: ahead of what grows slowly
 constexpr std::size_t kMostDerivatives = 2'000'000;  // poses times parameters: 100 MB of equations
 constexpr std::size_t kFewestPoses = 40;             // to look at
 constexpr std::size_t kFewestBeyond = 6;             // poses before a jump, and from it on
-constexpr double kLeastSeen = 1;       // information of a candidate, prior units: below it the poses do not show it
-constexpr double kUsuallyLeft = 1e-3;  // m, of a model: where it leaves more, what jumped may be as much larger
-constexpr double kLittle = 1e-6;       // of the poses' information: a prior that hardly shrinks a size
-constexpr double kWholeBatch = 1;      // of its length: lags of what grows slowly
+constexpr double kLeastSeen =
+    1;  // information of a candidate, prior units: below it the poses do not show it
+constexpr double kUsuallyLeft =
+    1e-3;  // m, of a model: where it leaves more, what jumped may be as much larger
+constexpr double kLittle = 1e-6;   // of the poses' information: a prior that hardly shrinks a size
+constexpr double kWholeBatch = 1;  // of its length: lags of what grows slowly
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
-constexpr Index kWaves = 16;              // half waves over the batch, of which a wandering course is made
-constexpr double kRoughness[] = {1, 2};   // power of the wave number that its amplitudes fall by: a walk, and smoother
-constexpr double kBeforeWandering = 4.6;  // nat, 100 to 1: ahead of the likeliest course of that kind
+constexpr Index kWaves = 16;  // half waves over the batch, of which a wandering course is made
+constexpr double kRoughness[] = {
+    1, 2};  // power of the wave number that its amplitudes fall by: a walk, and smoother
+constexpr double kBeforeWandering =
+    4.6;  // nat, 100 to 1: ahead of the likeliest course of that kind
 
-/// The equations of one pose, in units of sigma: residual, derivatives by what is free (P) and by the kinds (K).
+/// The equations of one pose, in units of sigma: residual, derivatives by what is free (P) and by
+/// the kinds (K).
 struct PoseEquations {
   const Measurement* measurement;
   VectorXd residual;
@@ -50,7 +56,8 @@ struct KindSums {
   MatrixXd own, shared;  // K x K, K x P
   VectorXd along;        // K
 
-  KindSums(Index K, Index P) : own(MatrixXd::Zero(K, K)), shared(MatrixXd::Zero(K, P)), along(VectorXd::Zero(K)) {}
+  KindSums(Index K, Index P)
+      : own(MatrixXd::Zero(K, K)), shared(MatrixXd::Zero(K, P)), along(VectorXd::Zero(K)) {}
   void add(const PoseEquations& pose, double weight = 1) {
     own.noalias() += weight * weight * pose.kinds * pose.kinds.transpose();
     shared.noalias() += weight * pose.kinds * pose.free.transpose();
@@ -77,7 +84,8 @@ class JumpSearch {
     free_sides();
     const Index P = poses_.empty() ? 0 : poses_.front().free.rows();
     MatrixXd information = prior_ * MatrixXd::Identity(P, P);
-    for (const PoseEquations& pose : poses_) information.noalias() += pose.free * pose.free.transpose();
+    for (const PoseEquations& pose : poses_)
+      information.noalias() += pose.free * pose.free.transpose();
     factor_.compute(information);
     settle();
   }
@@ -92,10 +100,13 @@ class JumpSearch {
     const std::vector<Scored> all = all_scored(inflation);
     const auto best = strongest_of(all);
     if (best == all.end()) return std::nullopt;
-    const double chance = std::min(
-        1.0, static_cast<double>(all.size()) * chi_square_tail(best->gain, static_cast<int>(best->kind->count)));
-    if (chance > kChance || best->gain < slow_gain(*best->kind) / inflation + kBeforeSlow) return std::nullopt;
-    if (evidence_of_jump(*best, inflation) < evidence_of_wandering(*best->kind, inflation) + kBeforeWandering)
+    const double chance =
+        std::min(1.0, static_cast<double>(all.size()) *
+                          chi_square_tail(best->gain, static_cast<int>(best->kind->count)));
+    if (chance > kChance || best->gain < slow_gain(*best->kind) / inflation + kBeforeSlow)
+      return std::nullopt;
+    if (evidence_of_jump(*best, inflation) <
+        evidence_of_wandering(*best->kind, inflation) + kBeforeWandering)
       return std::nullopt;
     return told(*best, chance, all);
   }
@@ -121,9 +132,11 @@ class JumpSearch {
     }
     return all;
   }
-  [[nodiscard]] static std::vector<Scored>::const_iterator strongest_of(const std::vector<Scored>& all) {
-    return std::max_element(all.begin(), all.end(),
-                            [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+  [[nodiscard]] static std::vector<Scored>::const_iterator strongest_of(
+      const std::vector<Scored>& all) {
+    return std::max_element(all.begin(), all.end(), [](const Scored& a, const Scored& b) {
+      return a.evidence < b.evidence;
+    });
   }
 
   /// By how much what is free still moves.
@@ -138,7 +151,8 @@ class JumpSearch {
     JumpSearch rest = *this;
     for (std::size_t i = jump.at; i < rest.poses_.size(); ++i) {
       PoseEquations& pose = rest.poses_[i];
-      pose.residual -= pose.kinds.middleRows(jump.kind->first, jump.kind->count).transpose() * jump.size;
+      pose.residual -=
+          pose.kinds.middleRows(jump.kind->first, jump.kind->count).transpose() * jump.size;
     }
     rest.settle();
     return rest;
@@ -173,7 +187,8 @@ class JumpSearch {
         return joint < direction.size() ? direction[joint] : 0;
       };
       const auto comes = [&](double from) {
-        return std::any_of(poses_.begin(), poses_.end(), [&](const auto& pose) { return side(pose) == from; });
+        return std::any_of(poses_.begin(), poses_.end(),
+                           [&](const auto& pose) { return side(pose) == from; });
       };
       if (!comes(1) || !comes(-1)) continue;
       for (PoseEquations& pose : poses_) {
@@ -185,29 +200,36 @@ class JumpSearch {
   }
 
   /// `most_prior`: of the information, at most so much is the prior's.
-  [[nodiscard]] Fitted fit(Index first, Index count, const KindSums& sums, double most_prior = 1e12) const {
+  [[nodiscard]] Fitted fit(Index first, Index count, const KindSums& sums,
+                           double most_prior = 1e12) const {
     const MatrixXd shared = sums.shared.middleRows(first, count);
-    MatrixXd left = sums.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
+    MatrixXd left =
+        sums.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
     if (left.trace() < kLeastSeen * prior_) return {};
-    left.diagonal() += (most_prior * left.diagonal()).cwiseMax(kLittle * prior_).cwiseMin(prior_).eval();
+    left.diagonal() +=
+        (most_prior * left.diagonal()).cwiseMax(kLittle * prior_).cwiseMin(prior_).eval();
     const VectorXd along = sums.along.segment(first, count) - shared * at_rest_;
     const VectorXd size = left.ldlt().solve(along);
     return {along.dot(size), size};
   }
 
-  [[nodiscard]] Scored scored(const ChangeKind& kind, std::size_t at, const Fitted& fitted, double inflation) const {
+  [[nodiscard]] Scored scored(const ChangeKind& kind, std::size_t at, const Fitted& fitted,
+                              double inflation) const {
     const double gain = fitted.gain / inflation;
-    const double price = static_cast<double>(kind.count) * std::log(3.0 * static_cast<double>(poses_.size()));
+    const double price =
+        static_cast<double>(kind.count) * std::log(3.0 * static_cast<double>(poses_.size()));
     return {&kind, at, gain, gain - price, fitted.size};
   }
 
-  /// What the kind gains as something that grows slowly: with one of several lags, steadily, or with the temperature.
+  /// What the kind gains as something that grows slowly: with one of several lags, steadily, or
+  /// with the temperature.
   [[nodiscard]] double slow_gain(const ChangeKind& kind) const {
     const auto n = static_cast<double>(poses_.size());
     double best = gain_with(kind, [n](std::size_t i) { return static_cast<double>(i) / n; });
     for (const double lag : kLags) {
-      best = std::max(
-          best, gain_with(kind, [n, lag](std::size_t i) { return 1 - std::exp(-static_cast<double>(i) / (lag * n)); }));
+      best = std::max(best, gain_with(kind, [n, lag](std::size_t i) {
+                        return 1 - std::exp(-static_cast<double>(i) / (lag * n));
+                      }));
     }
     const auto warmth = [&](std::size_t i) { return poses_[i].measurement->context.temperature; };
     double mean = 0;
@@ -215,7 +237,8 @@ class JumpSearch {
       if (!warmth(i)) return best;
       mean += *warmth(i) / n;
     }
-    return std::max(best, gain_with(kind, [&](std::size_t i) { return 0.1 * (*warmth(i) - mean); }));
+    return std::max(best,
+                    gain_with(kind, [&](std::size_t i) { return 0.1 * (*warmth(i) - mean); }));
   }
   template <typename Course>
   [[nodiscard]] double gain_with(const ChangeKind& kind, const Course& course) const {
@@ -230,14 +253,15 @@ class JumpSearch {
     for (std::size_t i = jump.at; i < poses_.size(); ++i) since.add(poses_[i]);
     const Index first = jump.kind->first, count = jump.kind->count;
     const MatrixXd shared = since.shared.middleRows(first, count);
-    const MatrixXd left = since.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
+    const MatrixXd left =
+        since.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
     const VectorXd along = since.along.segment(first, count) - shared * at_rest_;
     return best_evidence(left / inflation, along / inflation, VectorXd::Ones(count)) -
            std::log(static_cast<double>(poses_.size()));
   }
 
-  /// Nat, of the kind as something that wanders: half waves over the batch, whose amplitudes are likely by a power of
-  /// the wave number and a scale that the data choose.
+  /// Nat, of the kind as something that wanders: half waves over the batch, whose amplitudes are
+  /// likely by a power of the wave number and a scale that the data choose.
   [[nodiscard]] double evidence_of_wandering(const ChangeKind& kind, double inflation) const {
     const Index n = static_cast<Index>(poses_.size()), count = kind.count, all = kWaves * count;
     MatrixXd own = MatrixXd::Zero(all, all), shared = MatrixXd::Zero(all, unknowns());
@@ -246,8 +270,10 @@ class JumpSearch {
       const PoseEquations& pose = poses_[static_cast<std::size_t>(i)];
       MatrixXd columns(all, pose.residual.size());
       for (Index k = 0; k < kWaves; ++k) {
-        const double phase = static_cast<double>((k + 1) * (2 * i + 1)) / static_cast<double>(2 * n);
-        columns.middleRows(k * count, count) = std::cos(kPi * phase) * pose.kinds.middleRows(kind.first, count);
+        const double phase =
+            static_cast<double>((k + 1) * (2 * i + 1)) / static_cast<double>(2 * n);
+        columns.middleRows(k * count, count) =
+            std::cos(kPi * phase) * pose.kinds.middleRows(kind.first, count);
       }
       own.noalias() += columns * columns.transpose();
       shared.noalias() += columns * pose.free.transpose();
@@ -258,19 +284,22 @@ class JumpSearch {
     double best = 0;
     for (const double power : kRoughness) {
       VectorXd amplitude(all);
-      for (Index k = 0; k < all; ++k) amplitude(k) = std::pow(static_cast<double>(1 + k / count), -power);
+      for (Index k = 0; k < all; ++k)
+        amplitude(k) = std::pow(static_cast<double>(1 + k / count), -power);
       best = std::max(best, best_evidence(own / inflation, along / inflation, amplitude));
     }
     return best;
   }
 
-  /// Nat, of numbers that are normal about nothing: standard deviations `amplitude` times the likeliest scale.
+  /// Nat, of numbers that are normal about nothing: standard deviations `amplitude` times the
+  /// likeliest scale.
   [[nodiscard]] static double best_evidence(const MatrixXd& information, const VectorXd& along,
                                             const VectorXd& amplitude) {
     const MatrixXd scaled = amplitude.asDiagonal() * information * amplitude.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (scaled + scaled.transpose()));
     const VectorXd values = eigen.eigenvalues().cwiseMax(0.0);
-    const VectorXd square = (eigen.eigenvectors().transpose() * amplitude.cwiseProduct(along)).cwiseAbs2();
+    const VectorXd square =
+        (eigen.eigenvectors().transpose() * amplitude.cwiseProduct(along)).cwiseAbs2();
     double best = 0;
     for (double scale = 1e-8; scale < 1e3; scale *= 2) {
       const Eigen::ArrayXd grown = 1 + scale * values.array();
@@ -279,8 +308,8 @@ class JumpSearch {
     return best;
   }
 
-  /// How much larger gains are than white noise makes them: the mean over single numbers between halves of the poses by
-  /// each joint's angle.
+  /// How much larger gains are than white noise makes them: the mean over single numbers between
+  /// halves of the poses by each joint's angle.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;
     const Index joints = poses_.front().measurement->context.q.size();
@@ -310,14 +339,16 @@ class JumpSearch {
     const VectorXd size = fit(best.kind->first, best.kind->count, since, kLittle).size;
     double square = 0;
     for (std::size_t i = best.at; i < poses_.size(); ++i) {
-      const VectorXd moved = poses_[i].kinds.middleRows(best.kind->first, best.kind->count).transpose() * size;
+      const VectorXd moved =
+          poses_[i].kinds.middleRows(best.kind->first, best.kind->count).transpose() * size;
       square += moved.head<3>().squaredNorm() / std::pow(poses_[i].inverse_sigma, 2);
     }
     jump.effect = std::sqrt(square / static_cast<double>(poses_.size() - best.at));
     for (const Scored& other : all) {
       if (other.kind == best.kind || other.gain < best.gain - kAsGood) continue;
       const std::string cause = other.kind->spelling + other.kind->behind;
-      if (std::find(jump.could_also_be.begin(), jump.could_also_be.end(), cause) == jump.could_also_be.end())
+      if (std::find(jump.could_also_be.begin(), jump.could_also_be.end(), cause) ==
+          jump.could_also_be.end())
         jump.could_also_be.push_back(cause);
     }
     return jump;
@@ -335,7 +366,8 @@ class JumpSearch {
 /// The poses of each tool and payload.
 std::vector<std::vector<const Measurement*>> by_load(const MeasurementBatch& batch) {
   std::map<std::pair<std::string, std::string>, std::vector<const Measurement*>> loads;
-  for (const Measurement& m : batch.measurements) loads[{m.context.tool, m.context.payload}].push_back(&m);
+  for (const Measurement& m : batch.measurements)
+    loads[{m.context.tool, m.context.payload}].push_back(&m);
   std::vector<std::vector<const Measurement*>> all;
   for (auto& [load, poses] : loads) all.push_back(std::move(poses));
   return all;
@@ -344,9 +376,12 @@ std::vector<std::vector<const Measurement*>> by_load(const MeasurementBatch& bat
 }  // namespace
 
 std::string in_words(const Jump& jump) {
-  const auto words = [](const std::string& source) { return in_words(source.substr(0, source.find('@'))); };
-  std::string text = fmt::format("from pose {} (row {}) on: {}, {:.3f} mm rms at the measured points", jump.pose_id,
-                                 jump.row, words(jump.source), to_mm(jump.effect));
+  const auto words = [](const std::string& source) {
+    return in_words(source.substr(0, source.find('@')));
+  };
+  std::string text =
+      fmt::format("from pose {} (row {}) on: {}, {:.3f} mm rms at the measured points",
+                  jump.pose_id, jump.row, words(jump.source), to_mm(jump.effect));
   for (const std::string& other : jump.could_also_be) text += ", or " + words(other);
   return text;
 }
@@ -362,9 +397,12 @@ std::optional<Jump> jump_within(const CalibrationResult& found, const Measuremen
   return worst;
 }
 
-std::optional<Jump> jump_within(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch) {
-  if (has_sessions(batch) || has_gauges(batch) || batch.measurements.size() < kFewestPoses) return std::nullopt;
-  const auto found = calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), batch, {});
+std::optional<Jump> jump_within(const std::shared_ptr<const Cell>& cell,
+                                const MeasurementBatch& batch) {
+  if (has_sessions(batch) || has_gauges(batch) || batch.measurements.size() < kFewestPoses)
+    return std::nullopt;
+  const auto found =
+      calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), batch, {});
   return found ? jump_within(*found, batch) : std::nullopt;
 }
 

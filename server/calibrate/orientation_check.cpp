@@ -21,20 +21,27 @@ using Quaternion = Eigen::Quaterniond;
 using Quaternions = std::vector<Quaternion>;
 
 // Angles, rms of all poses or of one pose.
-constexpr double kMostOff = from_deg(10);       // no nominal arm, and no mounted tool, is farther off
-constexpr double kWorthAsking = from_deg(0.2);  // below it one way of reading cannot be told from another
-constexpr double kMostCounted = from_deg(30);   // more counts as much: wrong is wrong, and few rows must not decide
-constexpr double kMuchBetter = 0.25;            // of the rms as given: another way of reading that was surely meant
-constexpr double kGon = 0.9;                    // deg
-constexpr double kFarRow = 5;                   // times the median of all poses: a row of another pose
+constexpr double kMostOff = from_deg(10);  // no nominal arm, and no mounted tool, is farther off
+constexpr double kWorthAsking =
+    from_deg(0.2);  // below it one way of reading cannot be told from another
+constexpr double kMostCounted =
+    from_deg(30);  // more counts as much: wrong is wrong, and few rows must not decide
+constexpr double kMuchBetter =
+    0.25;                      // of the rms as given: another way of reading that was surely meant
+constexpr double kGon = 0.9;   // deg
+constexpr double kFarRow = 5;  // times the median of all poses: a row of another pose
 // Positions.
-constexpr double kTellingSpread = 20;      // spread over residual: the base's direction is then known to 3 degrees
-constexpr double kBadPosition = 6;         // times the median residual: a pose that is wrong as a whole
+constexpr double kTellingSpread =
+    20;  // spread over residual: the base's direction is then known to 3 degrees
+constexpr double kBadPosition = 6;  // times the median residual: a pose that is wrong as a whole
 constexpr double kMostBadPositions = 0.1;  // of all: more are no outliers, and none is left out
 // Numbers of poses.
-constexpr std::size_t kFewestOriented = 3;   // of a tool: two orientations agree with too many readings
-constexpr std::size_t kMostTries = 40;       // poses whose own R_FT is tried: half may be wrong, one must be right
-constexpr std::size_t kMostPositions = 300;  // evenly drawn beyond: more do not make the base more certain
+constexpr std::size_t kFewestOriented =
+    3;  // of a tool: two orientations agree with too many readings
+constexpr std::size_t kMostTries =
+    40;  // poses whose own R_FT is tried: half may be wrong, one must be right
+constexpr std::size_t kMostPositions =
+    300;  // evenly drawn beyond: more do not make the base more certain
 
 /// What was measured of one tool.
 struct Oriented {
@@ -45,9 +52,10 @@ struct Oriented {
 
 /// One way in which the numbers may have been meant.
 struct Reading {
-  std::string name;      ///< after "read "
-  Quaternions q_FT;      ///< R_BF' R_WB' R_WT of each pose
-  bool by_order = true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
+  std::string name;  ///< after "read "
+  Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
+  bool by_order =
+      true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
 };
 
 double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
@@ -76,8 +84,8 @@ std::vector<double> nearer(const Reading& one, const Reading& other, const Quate
   return all;
 }
 
-/// The rotation that most poses have in common, each by the nearer of two readings. First the best of those of single
-/// poses, then the mean of the poses near it.
+/// The rotation that most poses have in common, each by the nearer of two readings. First the best
+/// of those of single poses, then the mean of the poses near it.
 Quaternion common(const Reading& one, const Reading& other) {
   const std::size_t n = one.q_FT.size();
   const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
@@ -119,12 +127,14 @@ struct Turned {
 
 double spread_across(const Eigen::Matrix3Xd& p) {
   const Eigen::Matrix3Xd centred = p.colwise() - p.rowwise().mean();
-  const Vector3 singular = Eigen::JacobiSVD<Matrix3>(centred * centred.transpose()).singularValues();
+  const Vector3 singular =
+      Eigen::JacobiSVD<Matrix3>(centred * centred.transpose()).singularValues();
   return std::sqrt(singular(1) / static_cast<double>(p.cols()));
 }
 
 double spread(const Eigen::Matrix3Xd& p) {
-  return std::sqrt((p.colwise() - p.rowwise().mean()).squaredNorm() / static_cast<double>(p.cols()));
+  return std::sqrt((p.colwise() - p.rowwise().mean()).squaredNorm() /
+                   static_cast<double>(p.cols()));
 }
 
 Positions positions_of(const Oriented& group) {
@@ -159,25 +169,30 @@ Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
   if (!found) return {};
   std::vector<double> off;
   for (std::size_t i = 0; i < group.rows.size(); ++i)
-    off.push_back((found->X_WB * (group.X_BF[i] * found->X_FT.translation()) - group.rows[i]->p_W).norm());
+    off.push_back(
+        (found->X_WB * (group.X_BF[i] * found->X_FT.translation()) - group.rows[i]->p_W).norm());
   const double typical = median(off);
-  if (typical > std::max(kNoModelError, kNoModelShare * spread(positions.p_W))) return {std::nullopt, false};
+  if (typical > std::max(kNoModelError, kNoModelShare * spread(positions.p_W)))
+    return {std::nullopt, false};
   if (typical * kTellingSpread > spread_across(positions.p_W)) return {};
   Turned turned{Quaternion(found->X_WB.linear()), std::vector<bool>(off.size(), false)};
   const double limit = std::max(kNoModelError, kBadPosition * typical);
   for (std::size_t i = 0; i < off.size(); ++i) turned.bad[i] = off[i] > limit;
   const auto bad = static_cast<double>(std::count(turned.bad.begin(), turned.bad.end(), true));
-  if (bad > kMostBadPositions * static_cast<double>(off.size())) turned.bad.assign(off.size(), false);
+  if (bad > kMostBadPositions * static_cast<double>(off.size()))
+    turned.bad.assign(off.size(), false);
   return {turned, true};
 }
 
 /// The numbers as `reread` has them, with the base turned by q_WB.
 template <typename Reread>
-Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB, const Reread& reread) {
+Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
+                const Reread& reread) {
   Reading one{std::move(name), {}};
   for (std::size_t i = 0; i < group.rows.size(); ++i) {
     const Quaternion q_BF(group.X_BF[i].linear());
-    one.q_FT.push_back(q_BF.conjugate() * (q_WB.conjugate() * reread(Quaternion(*group.rows[i]->R_WT))));
+    one.q_FT.push_back(q_BF.conjugate() *
+                       (q_WB.conjugate() * reread(Quaternion(*group.rows[i]->R_WT))));
   }
   return one;
 }
@@ -196,23 +211,29 @@ void add_columns(const Oriented& group, const Quaternion& q_WB, std::vector<Read
   };
   for (std::size_t k = 0; k < 3; ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    add(fmt::format("with the other sign of {}", columns[k]), [&](Eigen::Vector4d& q) { q(at) *= -1; });
+    add(fmt::format("with the other sign of {}", columns[k]),
+        [&](Eigen::Vector4d& q) { q(at) *= -1; });
   }
   for (std::size_t i = 0; i < columns.size(); ++i) {
     for (std::size_t j = i + 1; j < columns.size(); ++j) {
-      add(fmt::format("with {} and {} exchanged", columns[i], columns[j]),
-          [&](Eigen::Vector4d& q) { std::swap(q(static_cast<Eigen::Index>(i)), q(static_cast<Eigen::Index>(j))); });
+      add(fmt::format("with {} and {} exchanged", columns[i], columns[j]), [&](Eigen::Vector4d& q) {
+        std::swap(q(static_cast<Eigen::Index>(i)), q(static_cast<Eigen::Index>(j)));
+      });
     }
   }
   for (std::size_t k = 0; k < 3; ++k) {
-    add(fmt::format("as of a left-handed frame (mirrored {} axis)", columns[k][1]), [&](Eigen::Vector4d& q) {
-      for (std::size_t other = 0; other < 3; ++other) q(static_cast<Eigen::Index>(other)) *= other == k ? 1 : -1;
-    });
+    add(fmt::format("as of a left-handed frame (mirrored {} axis)", columns[k][1]),
+        [&](Eigen::Vector4d& q) {
+          for (std::size_t other = 0; other < 3; ++other)
+            q(static_cast<Eigen::Index>(other)) *= other == k ? 1 : -1;
+        });
   }
 }
 
-/// The last joint in another unit, or counted together with one before it: a point on its axis does not show that.
-void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& robot, std::vector<Reading>& all) {
+/// The last joint in another unit, or counted together with one before it: a point on its axis does
+/// not show that.
+void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& robot,
+                    std::vector<Reading>& all) {
   const int last = robot.size() - 1;
   if (robot.joint(last).type != JointType::kRevolute) return;
   const auto add = [&](std::string name, const auto& change) {
@@ -230,8 +251,10 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
   add(fmt::format("with {} in gon", column), [&](JointVector& q) { q(last) *= kGon; });
   for (int by = std::max(0, last - 2); by < last; ++by) {
     if (robot.joint(by).type != JointType::kRevolute) continue;
-    add(fmt::format("with q{}_deg subtracted from {}", by + 1, column), [&](JointVector& q) { q(last) -= q(by); });
-    add(fmt::format("with q{}_deg added to {}", by + 1, column), [&](JointVector& q) { q(last) += q(by); });
+    add(fmt::format("with q{}_deg subtracted from {}", by + 1, column),
+        [&](JointVector& q) { q(last) -= q(by); });
+    add(fmt::format("with q{}_deg added to {}", by + 1, column),
+        [&](JointVector& q) { q(last) += q(by); });
   }
 }
 
@@ -242,7 +265,8 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
       reading("as given", group, q_WB, as_it_is),
       reading("as xyzw", group, q_WB, from_xyzw),
       reading("as the inverse", group, q_WB, inverse),
-      reading("as xyzw and the inverse", group, q_WB, [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
+      reading("as xyzw and the inverse", group, q_WB,
+              [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
       reading("as wxyz under an xyzw header", group, q_WB, from_wxyz),
       reading("as wxyz under an xyzw header and the inverse", group, q_WB,
               [](const Quaternion& q) { return from_wxyz(q).conjugate(); }),
@@ -252,7 +276,8 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
     one.by_order = false;
     all.push_back(std::move(one));
   };
-  add(reading("against the robot's base instead of the tracker", group, Quaternion::Identity(), as_it_is));
+  add(reading("against the robot's base instead of the tracker", group, Quaternion::Identity(),
+              as_it_is));
   add(reading("as the inverse, against the robot's base", group, Quaternion::Identity(), inverse));
   for (int j = 0; j < robot.size(); ++j) {
     if (robot.joint(j).type != JointType::kRevolute) continue;
@@ -266,8 +291,10 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
   }
   for (const bool next : {true, false}) {
     Oriented shifted = group;
-    std::rotate(shifted.X_BF.begin(), next ? shifted.X_BF.begin() + 1 : shifted.X_BF.end() - 1, shifted.X_BF.end());
-    add(reading(next ? "as those of the next row" : "as those of the row before", shifted, q_WB, as_it_is));
+    std::rotate(shifted.X_BF.begin(), next ? shifted.X_BF.begin() + 1 : shifted.X_BF.end() - 1,
+                shifted.X_BF.end());
+    add(reading(next ? "as those of the next row" : "as those of the row before", shifted, q_WB,
+                as_it_is));
   }
   add_last_joint(group, q_WB, robot, all);
   return all;
@@ -276,10 +303,10 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
 /// How well one way of reading fits, alone or together with the numbers as given.
 struct Judged {
   Quaternion q_FT = Quaternion::Identity();  ///< what the poses have in common
-  std::vector<double> off;                   ///< rad, of each pose: from the cell's tool, or from q_FT
-  double scatter = 0;                        ///< rad rms about q_FT
-  double offset = 0;                         ///< rad, of q_FT from the cell's tool; 0 where that is unknown
-  double fit = 0;                            ///< rad rms of both
+  std::vector<double> off;  ///< rad, of each pose: from the cell's tool, or from q_FT
+  double scatter = 0;       ///< rad rms about q_FT
+  double offset = 0;        ///< rad, of q_FT from the cell's tool; 0 where that is unknown
+  double fit = 0;           ///< rad rms of both
 };
 
 Judged judged(const Reading& one, const Reading& other, const std::optional<Pose>& X_FT) {
@@ -293,7 +320,9 @@ Judged judged(const Reading& one, const Reading& other, const std::optional<Pose
   return result;
 }
 
-std::string deg(double radians) { return fmt::format("{:.{}f} deg", to_deg(radians), radians < from_deg(10) ? 2 : 0); }
+std::string deg(double radians) {
+  return fmt::format("{:.{}f} deg", to_deg(radians), radians < from_deg(10) ? 2 : 0);
+}
 
 /// Whether the orientations of one tool follow the joints, for one rotation of the base.
 class Question {
@@ -313,14 +342,19 @@ class Question {
   std::optional<Error> doubt() const {
     if (follow()) return std::nullopt;
     const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
-    const bool one_fits_all = of_best_.fit < kMuchBetter * given_.fit && of_best_.fit < of_both_.fit;
+    const bool one_fits_all =
+        of_best_.fit < kMuchBetter * given_.fit && of_best_.fit < of_both_.fit;
     if (two_orders_ > 0 && !better && !one_fits_all) return of_two_orders();
     const std::vector<std::size_t> far = far_rows();
-    if (given_.scatter <= kMostOff && given_.offset <= kMostOff && far.empty() && !better) return std::nullopt;
-    if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();
-    if (!better && !far.empty() && 2 * far.size() < group_.rows.size() && given_.offset <= kMostOff && !reads_better())
+    if (given_.scatter <= kMostOff && given_.offset <= kMostOff && far.empty() && !better)
+      return std::nullopt;
+    if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better())
+      return of_tool();
+    if (!better && !far.empty() && 2 * far.size() < group_.rows.size() &&
+        given_.offset <= kMostOff && !reads_better())
       return of_rows(far);
-    return doubted(fmt::format("orientations do not follow the joints: {} rms; {}", deg(given_.fit), otherwise()),
+    return doubted(fmt::format("orientations do not follow the joints: {} rms; {}", deg(given_.fit),
+                               otherwise()),
                    given_.fit)
         .with_text(reads_better() ? all_[best_].name : "")
         .next("xyzw order? another tool frame?")
@@ -354,8 +388,10 @@ class Question {
     return far;
   }
   std::string otherwise() const {
-    if (reads_better()) return fmt::format("read {} they would fit to {}", all_[best_].name, deg(of_best_.fit));
-    return fmt::format("no other reading fits either (best: {}, {})", all_[best_].name, deg(of_best_.fit));
+    if (reads_better())
+      return fmt::format("read {} they would fit to {}", all_[best_].name, deg(of_best_.fit));
+    return fmt::format("no other reading fits either (best: {}, {})", all_[best_].name,
+                       deg(of_best_.fit));
   }
   Error of_two_orders() const {
     const Quaternion about = X_FT_ ? Quaternion(X_FT_->linear()) : of_both_.q_FT;
@@ -368,9 +404,10 @@ class Question {
       off.push_back(as_given);
     }
     const double far = off.empty() ? given_.fit : rms(off);
-    return doubted(fmt::format("the first of {} of {} orientations that do not follow the joints: {} rms; read {} they "
-                               "would fit to {}, as the others do",
-                               off.size(), group_.rows.size(), deg(far), all_[two_orders_].name, deg(of_both_.fit)),
+    return doubted(fmt::format("the first of {} of {} orientations that do not follow the joints: "
+                               "{} rms; read {} they would fit to {}, as the others do",
+                               off.size(), group_.rows.size(), deg(far), all_[two_orders_].name,
+                               deg(of_both_.fit)),
                    far)
         .at_row(first)
         .with_text(all_[two_orders_].name)
@@ -379,25 +416,25 @@ class Question {
   }
   Error of_tool() const {
     const Quaternion q = given_.q_FT.w() < 0 ? Quaternion(-given_.q_FT.coeffs()) : given_.q_FT;
-    return doubted(fmt::format("orientations follow the joints to {}, but turned by {} against tool '{}' of the cell "
-                               "file; {}",
+    return doubted(fmt::format("orientations follow the joints to {}, but turned by {} against "
+                               "tool '{}' of the cell file; {}",
                                deg(given_.scatter), deg(given_.offset), group_.tool, otherwise()),
                    given_.offset)
         .with_text(fmt::format("against tool '{}'", group_.tool))
-        .next(fmt::format("another tool frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]", q.w(),
-                          q.x(), q.y(), q.z()))
+        .next(fmt::format(
+            "another tool frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]",
+            q.w(), q.x(), q.y(), q.z()))
         .value();
   }
   Error of_rows(const std::vector<std::size_t>& far) const {
     std::vector<double> off;
     for (const std::size_t i : far) off.push_back(angle(all_.front().q_FT[i], given_.q_FT));
     const Measurement& first = *group_.rows[far.front()];
-    return doubted(
-               fmt::format("pose {} is the first of {} of {} orientations that do not follow the joints: {} rms, the "
-                           "others {}",
-                           first.pose_id, far.size(), group_.rows.size(), deg(rms(off)),
-                           deg(median(angles(all_.front().q_FT, given_.q_FT)))),
-               rms(off))
+    return doubted(fmt::format("pose {} is the first of {} of {} orientations that do not follow "
+                               "the joints: {} rms, the others {}",
+                               first.pose_id, far.size(), group_.rows.size(), deg(rms(off)),
+                               deg(median(angles(all_.front().q_FT, given_.q_FT)))),
+                   rms(off))
         .at_row(first.row)
         .with_text("pose " + first.pose_id)
         .next("xyzw order? another tool frame? the joints of another pose?")
@@ -453,7 +490,8 @@ bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented
   const Positions positions = positions_of(group);
   Eigen::Matrix3Xd p_F(3, positions.p_W.cols());
   for (Eigen::Index i = 0; i < p_F.cols(); ++i)
-    p_F.col(i) = positions.X_BF[static_cast<std::size_t>(i)].inverse() * (X_WB.inverse() * positions.p_W.col(i));
+    p_F.col(i) = positions.X_BF[static_cast<std::size_t>(i)].inverse() *
+                 (X_WB.inverse() * positions.p_W.col(i));
   const Vector3 p_FT = X_FT ? Vector3(X_FT->translation()) : Vector3(p_F.rowwise().mean());
   std::vector<double> off;
   for (Eigen::Index i = 0; i < p_F.cols(); ++i) off.push_back((p_F.col(i) - p_FT).norm());
@@ -489,7 +527,8 @@ std::optional<Error> doubt_of(Oriented group, const Cell& cell, const std::optio
 
 std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell,
                                        const std::optional<Pose>& X_WB) {
-  for (const MeasurementBatch& session : by_session(batch)) {  // each was measured in a world of its own
+  for (const MeasurementBatch& session :
+       by_session(batch)) {  // each was measured in a world of its own
     for (const Oriented& group : by_tool(session, cell.robot)) {
       if (auto doubt = doubt_of(group, cell, X_WB)) return doubt;
     }

@@ -35,35 +35,41 @@ std::vector<std::string> owners(const ErrorSource& source, const Cell& cell) {
 Status check_has_all(const PhysicalModel& model, const Cell& cell) {
   for (const auto& [id, X_FT] : model.tools) {
     if (!cell.tools.contains(id))
-      return refused("cell {}: the model to start from knows tool '{}'", cell.name, id).of("tools").with_text(id);
+      return refused("cell {}: the model to start from knows tool '{}'", cell.name, id)
+          .of("tools")
+          .with_text(id);
   }
   for (const auto& [id, payload] : model.cell->payloads) {
     if (!cell.payloads.contains(id))
-      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id).of("payloads").with_text(id);
+      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id)
+          .of("payloads")
+          .with_text(id);
   }
   return {};
 }
 
 /// Where each parameter of `before` is among those of `after`, the same source in another cell.
-std::vector<Index> places(const ErrorSource& before, const Cell& cell_before, const ErrorSource& after,
-                          const Cell& cell_after) {
+std::vector<Index> places(const ErrorSource& before, const Cell& cell_before,
+                          const ErrorSource& after, const Cell& cell_after) {
   std::vector<Index> place(before.parameters().size());
   const std::vector<std::string> ids = owners(before, cell_before);
   const std::vector<std::string> ids_after = owners(after, cell_after);
   const std::size_t each = ids.empty() ? place.size() : place.size() / ids.size();
   for (std::size_t k = 0; k < place.size(); ++k) {
     const std::size_t owner =
-        ids.empty() ? 0
-                    : static_cast<std::size_t>(std::find(ids_after.begin(), ids_after.end(), ids[k / each]) -
-                                               ids_after.begin());
+        ids.empty()
+            ? 0
+            : static_cast<std::size_t>(
+                  std::find(ids_after.begin(), ids_after.end(), ids[k / each]) - ids_after.begin());
     place[k] = static_cast<Index>(owner * each + k % each);
   }
   return place;
 }
 
-/// The full name of the source that `name` means in the model; a cause means the form that is there. Where the model
-/// has none, it is added, and the indices in `place` move.
-Result<std::string> named_source(PhysicalModel& model, const std::string& name, std::vector<Index>& place) {
+/// The full name of the source that `name` means in the model; a cause means the form that is
+/// there. Where the model has none, it is added, and the indices in `place` move.
+Result<std::string> named_source(PhysicalModel& model, const std::string& name,
+                                 std::vector<Index>& place) {
   std::vector<std::string> names = alternatives(name, *model.cell);
   names.insert(names.begin(), name);
   for (const ErrorSourcePtr& source : model.sources) {
@@ -77,7 +83,8 @@ Result<std::string> named_source(PhysicalModel& model, const std::string& name, 
   return full_name;
 }
 
-/// A flag for each parameter: whether it is of a source in `names` and, of tools and payloads, of one that `batch` has.
+/// A flag for each parameter: whether it is of a source in `names` and, of tools and payloads, of
+/// one that `batch` has.
 std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<std::string>& names,
                                 const MeasurementBatch& batch) {
   std::set<std::string> tools, payloads;
@@ -90,8 +97,8 @@ std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<st
     const std::size_t count = source->parameters().size();
     const std::vector<std::string> ids = owners(*source, *model.cell);
     for (std::size_t k = 0; k < count; ++k) {
-      const bool here =
-          ids.empty() || (source->cause().part == Part::kTool ? tools : payloads).contains(ids[k * ids.size() / count]);
+      const bool here = ids.empty() || (source->cause().part == Part::kTool ? tools : payloads)
+                                           .contains(ids[k * ids.size() / count]);
       chosen.push_back(here && contains(names, source->name()));
     }
   }
@@ -103,20 +110,23 @@ void add_dependence(Refit& refit, const CalibrationProblem& problem) {
   const CalibrationResult& found = refit.result;
   const std::vector<bool> none_held(static_cast<std::size_t>(found.model.values.size()), false);
   const ScaledParameters own = scaled_parameters(found.model, none_held);
-  const Expansion at = expand({found.model, problem.batch}, own, weights_of(found, problem.batch), true, own.prior);
+  const Expansion at =
+      expand({found.model, problem.batch}, own, weights_of(found, problem.batch), true, own.prior);
   MatrixXd information = at.information(refit.anew, refit.anew);
   information.diagonal().array() += 1;
   const Eigen::LLT<MatrixXd> factor(information);
   const VectorXd scale = own.scale(refit.anew);
   const auto R = static_cast<Index>(refit.anew.size());
-  refit.given_rest = scale.asDiagonal() * factor.solve(MatrixXd::Identity(R, R)) * scale.asDiagonal();
+  refit.given_rest =
+      scale.asDiagonal() * factor.solve(MatrixXd::Identity(R, R)) * scale.asDiagonal();
   refit.by_rest = -(scale.asDiagonal() * factor.solve(at.information(refit.anew, Eigen::all)) *
                     own.scale.cwiseInverse().asDiagonal());
   for (const Index k : refit.anew) refit.by_rest.col(k).setZero();
 }
 
 /// Adds the combinations of the rest that were not identifiable before.
-void add_unidentifiable(CalibrationResult& result, const CalibrationResult& known, const std::set<std::string>& anew) {
+void add_unidentifiable(CalibrationResult& result, const CalibrationResult& known,
+                        const std::set<std::string>& anew) {
   std::vector<UnidentifiableCombination> rest = known.unidentifiable;
   std::erase_if(rest, [&](const UnidentifiableCombination& one) {
     return std::all_of(one.parameters.begin(), one.parameters.end(),
@@ -144,7 +154,8 @@ void keep_rest(Refit& refit, const CalibrationResult& known) {
     names.insert(parameter.parameter.name);
   }
   add_unidentifiable(result, known, names);
-  result.rank = static_cast<int>(result.parameters.size()) - static_cast<int>(result.unidentifiable.size());
+  result.rank =
+      static_cast<int>(result.parameters.size()) - static_cast<int>(result.unidentifiable.size());
   result.condition_number = known.condition_number;
   result.observability_index = known.observability_index;
 }
@@ -172,7 +183,8 @@ Result<PhysicalModel> in_cell(const PhysicalModel& model, const std::shared_ptr<
   TRY(check_has_all(model, *cell));
   PhysicalModel moved = model;
   moved.cell = cell;
-  for (const auto& [id, X_FT] : cell->tools) moved.tools.emplace(id, X_FT.value_or(Pose::Identity()));
+  for (const auto& [id, X_FT] : cell->tools)
+    moved.tools.emplace(id, X_FT.value_or(Pose::Identity()));
   std::vector<Index> went;
   Index first = 0;
   for (ErrorSourcePtr& source : moved.sources) {
@@ -195,9 +207,10 @@ struct Anew {
   std::vector<bool> parameters;      ///< a flag each
 };
 
-/// Finds the sources in `only`, adds those that the model has not, and puts their parameters at the priors. `refit`
-/// learns the places and prior variances.
-Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::string>& only, Refit& refit) {
+/// Finds the sources in `only`, adds those that the model has not, and puts their parameters at the
+/// priors. `refit` learns the places and prior variances.
+Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::string>& only,
+                        Refit& refit) {
   Anew anew;
   for (const std::string& name : only) {
     std::string source = TRY(named_source(problem.model, name, refit.place));
@@ -215,11 +228,13 @@ Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::stri
   return anew;
 }
 
-/// Base and tools that are anew start where the poses put them, by the arm as it is known; all else at its prior.
+/// Base and tools that are anew start where the poses put them, by the arm as it is known; all else
+/// at its prior.
 Status place_anew(CalibrationProblem& problem, const Anew& anew, const Refit& refit) {
   const PhysicalModel before = problem.model;
   const std::vector<Parameter> parameters = problem.model.parameters();
-  for (const Index at : refit.anew) problem.model.values(at) = parameters[static_cast<std::size_t>(at)].prior;
+  for (const Index at : refit.anew)
+    problem.model.values(at) = parameters[static_cast<std::size_t>(at)].prior;
   const bool base = corrects(anew.sources, Part::kBase);
   const bool tool = corrects(anew.sources, Part::kTool);
   for (const Measurement& m : problem.batch.measurements) {
@@ -234,10 +249,12 @@ Status place_anew(CalibrationProblem& problem, const Anew& anew, const Refit& re
 }  // namespace
 
 Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const Cell>& cell,
-                    const MeasurementBatch& batch, const std::vector<std::string>& only, CalibrateOptions options) {
+                    const MeasurementBatch& batch, const std::vector<std::string>& only,
+                    CalibrateOptions options) {
   if (batch.measurements.empty())
     return refused("no measurements to calibrate with").in("batch " + batch.id).beyond(0, 1);
-  if (only.empty()) return failure(ErrorCode::kUsage, "no error source is named to be identified anew");
+  if (only.empty())
+    return failure(ErrorCode::kUsage, "no error source is named to be identified anew");
   Refit refit;
   PhysicalModel model = TRY(in_cell(known.model, cell, &refit.place));
   CalibrationProblem problem{std::move(model), batch};
@@ -248,7 +265,8 @@ Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const 
   refit.result = std::move(found);
   for (std::size_t k = 0; k < anew.parameters.size(); ++k) {
     if (!anew.parameters[k])
-      refit.result.model.values(static_cast<Index>(k)) = problem.model.values(static_cast<Index>(k));
+      refit.result.model.values(static_cast<Index>(k)) =
+          problem.model.values(static_cast<Index>(k));
   }
   add_dependence(refit, problem);
   keep_rest(refit, known);

@@ -17,10 +17,11 @@ constexpr int kPoses = 600;     // of the domain, drawn
 constexpr int kDraws = 16;      // of the true error at each
 constexpr int kMostDraws = 50;  // of joint vectors for each pose that is near a measured one
 constexpr std::uint64_t kSeed = 20261123;
-constexpr int kGrid = 20;                // steps on each side of 1
-constexpr double kFarthest = 4;          // standard deviations that the grids reach
-constexpr double kMostlyInDomain = 0.9;  // share of held-out poses; errors of the others say nothing of the domain
-constexpr double kNothing = 1e-18;       // m²: no variance at all
+constexpr int kGrid = 20;        // steps on each side of 1
+constexpr double kFarthest = 4;  // standard deviations that the grids reach
+constexpr double kMostlyInDomain =
+    0.9;  // share of held-out poses; errors of the others say nothing of the domain
+constexpr double kNothing = 1e-18;  // m²: no variance at all
 
 /// Two independent standard normal numbers (Box and Muller 1958).
 std::pair<double, double> normal_pair(SeededRandom& random) {
@@ -34,9 +35,11 @@ Vector3 normal_vector(SeededRandom& random) {
   return {x, y, normal_pair(random).first};
 }
 
-/// L with L L' = the true error's covariance: the stated one without the tracker's noise, never negative.
+/// L with L L' = the true error's covariance: the stated one without the tracker's noise, never
+/// negative.
 Matrix3 root_of_true(const Matrix3& covariance, double tracker_variance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(covariance - tracker_variance * Matrix3::Identity());
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(covariance -
+                                                      tracker_variance * Matrix3::Identity());
   return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
@@ -48,27 +51,34 @@ double quantile_of(const std::vector<double>& rising, double share) {
 }
 
 double share_below(const std::vector<double>& rising, double value) {
-  return static_cast<double>(std::upper_bound(rising.begin(), rising.end(), value) - rising.begin()) /
+  return static_cast<double>(std::upper_bound(rising.begin(), rising.end(), value) -
+                             rising.begin()) /
          static_cast<double>(rising.size());
 }
 
 /// Grid of ln x, x about 1, by its place.
 double grid_value(int place, double stddev) { return kFarthest * stddev * place / kGrid; }
 
-/// Of these coordinates, if the stated deviations are wrong by `factor` and the tracker's sigma by `noise`.
-double log_likelihood(const std::vector<JudgingCoordinate>& coordinates, double factor, double noise) {
+/// Of these coordinates, if the stated deviations are wrong by `factor` and the tracker's sigma by
+/// `noise`.
+double log_likelihood(const std::vector<JudgingCoordinate>& coordinates, double factor,
+                      double noise) {
   double sum = 0;
   for (const JudgingCoordinate& one : coordinates) {
-    const double variance = factor * factor * one.stated_variance + noise * noise * one.tracker_variance + kNothing;
+    const double variance =
+        factor * factor * one.stated_variance + noise * noise * one.tracker_variance + kNothing;
     sum -= 0.5 * (std::log(variance) + one.squared_error / variance);
   }
   return sum;
 }
 
-double of_tracker(const CompensatedModel& model) { return model.cell().tracker.sigma * model.cell().tracker.sigma; }
+double of_tracker(const CompensatedModel& model) {
+  return model.cell().tracker.sigma * model.cell().tracker.sigma;
+}
 
 /// The coordinates of the poses of a batch that are in the domain.
-std::vector<JudgingCoordinate> coordinates_of(const CompensatedModel& model, const MeasurementBatch& batch) {
+std::vector<JudgingCoordinate> coordinates_of(const CompensatedModel& model,
+                                              const MeasurementBatch& batch) {
   std::vector<JudgingCoordinate> all;
   const MeasurementBatch known = known_rows(model, batch);
   if (known.measurements.empty()) return all;
@@ -77,8 +87,8 @@ std::vector<JudgingCoordinate> coordinates_of(const CompensatedModel& model, con
     if (!errors.in_domain[static_cast<std::size_t>(i)]) continue;
     for (int k = 0; k < 3; ++k) {
       const double measured = std::pow(errors.stddev(k, i), 2);
-      all.push_back(
-          {std::pow(errors.compensated(k, i), 2), std::max(0.0, measured - of_tracker(model)), of_tracker(model)});
+      all.push_back({std::pow(errors.compensated(k, i), 2),
+                     std::max(0.0, measured - of_tracker(model)), of_tracker(model)});
     }
   }
   return all;
@@ -96,17 +106,19 @@ std::vector<PoseContext> poses_in_range(const CompensatedModel& model, int count
   const ModelParts& parts = model.parts();
   std::vector<std::pair<std::string, std::string>> trained_with;
   for (const auto& [tool, payload] : parts.trained_with) {
-    const bool there =
-        model.cell().tools.contains(tool) && (payload.empty() || model.cell().payloads.contains(payload));
+    const bool there = model.cell().tools.contains(tool) &&
+                       (payload.empty() || model.cell().payloads.contains(payload));
     if (there) trained_with.emplace_back(tool, payload);
   }
   std::vector<PoseContext> poses;
   SeededRandom random(kSeed);
   if (trained_with.empty()) return poses;
-  for (int drawn = 0; drawn < kMostDraws * count && static_cast<int>(poses.size()) < count; ++drawn) {
+  for (int drawn = 0; drawn < kMostDraws * count && static_cast<int>(poses.size()) < count;
+       ++drawn) {
     PoseContext context;
     context.q = parts.q_min;
-    for (Eigen::Index j = 0; j < context.q.size(); ++j) context.q(j) = random.uniform(parts.q_min(j), parts.q_max(j));
+    for (Eigen::Index j = 0; j < context.q.size(); ++j)
+      context.q(j) = random.uniform(parts.q_min(j), parts.q_max(j));
     if (parts.measured && !parts.measured->is_near(model.cell().robot, context.q)) continue;
     std::tie(context.tool, context.payload) = trained_with[poses.size() % trained_with.size()];
     context.served = true;
@@ -132,7 +144,8 @@ void PositionAccuracy::draw(const std::vector<ErrorPrediction>& poses, double tr
     for (int k = 0; k < kDraws; ++k) {
       const Vector3 error = root * normal_vector(random);
       errors_.push_back(error.norm());
-      if (k == 0) distances_.push_back(std::abs((place - last_place).normalized().dot(error - last_error)));
+      if (k == 0)
+        distances_.push_back(std::abs((place - last_place).normalized().dot(error - last_error)));
       if (k == 0) last_error = error;
     }
     last_place = place;
@@ -148,8 +161,9 @@ void PositionAccuracy::weigh(const std::vector<JudgingCoordinate>& coordinates, 
     const double log_factor = grid_value(f, kDoubt);
     for (int g = -kGrid; g <= kGrid; ++g) {
       const double log_noise = grid_value(g, kNoiseDoubt);
-      logs.push_back(count_as * log_likelihood(coordinates, std::exp(log_factor), std::exp(log_noise)) -
-                     0.5 * (std::pow(log_factor / kDoubt, 2) + std::pow(log_noise / kNoiseDoubt, 2)));
+      logs.push_back(
+          count_as * log_likelihood(coordinates, std::exp(log_factor), std::exp(log_noise)) -
+          0.5 * (std::pow(log_factor / kDoubt, 2) + std::pow(log_noise / kNoiseDoubt, 2)));
     }
   }
   const double most = *std::max_element(logs.begin(), logs.end());
@@ -178,7 +192,8 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
     coordinates = coordinates_of(model, *batch);
     accuracy.judged_by_ = static_cast<int>(coordinates.size() / 3);
   } else if (judges_domain(held_out)) {
-    // Of these poses only the rms is known: each coordinate is taken as the mean of a pose of the domain.
+    // Of these poses only the rms is known: each coordinate is taken as the mean of a pose of the
+    // domain.
     const double squared = std::pow(held_out->compensated.rms, 2) / 3;
     double stated = 0;
     for (const ErrorPrediction& pose : poses) stated += pose.true_stddev_B.squaredNorm() / 3;
@@ -192,7 +207,8 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
 
 double PositionAccuracy::within(double radius) const {
   double share = 0;
-  for (const Factor& one : factors_) share += one.weight * share_below(errors_, radius / one.factor);
+  for (const Factor& one : factors_)
+    share += one.weight * share_below(errors_, radius / one.factor);
   return share;
 }
 
@@ -217,6 +233,8 @@ double PositionAccuracy::factor_at(double share) const {
 
 double PositionAccuracy::least() const { return factor_at(0.025) * quantile_of(errors_, kShare); }
 double PositionAccuracy::most() const { return factor_at(0.975) * quantile_of(errors_, kShare); }
-double PositionAccuracy::of_distances() const { return factor_at(0.975) * quantile_of(distances_, kShare); }
+double PositionAccuracy::of_distances() const {
+  return factor_at(0.975) * quantile_of(distances_, kShare);
+}
 
 }  // namespace trammel

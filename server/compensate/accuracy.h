@@ -5,15 +5,18 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// How far the tool is from where a model says it is, at a pose of its domain that nobody has measured.
+/// How far the tool is from where a model says it is, at a pose of its domain that nobody has
+/// measured.
 ///
-/// The true error t of such a pose is normal with the covariance S(q) that the model states, the tracker's noise taken
-/// out. A statement may be wrong by a factor: t ~ N(0, f² S(q)), ln f ~ N(0, kDoubt²). Poses held out from training
-/// tell f: e = t + noise, noise ~ N(0, g² sigma²), ln g ~ N(0, kNoiseDoubt²), as nobody knows a tracker's sigma better.
-/// Where t is far below the noise they tell little, and the model is believed. `at(share)` is the radius that holds
-/// this share of fresh poses on average over poses, f and g: a beta-expectation tolerance limit (Guttman, Statistical
-/// Tolerance Regions, 1970), which is right in `share` of fresh poses over many models, however few poses judged each.
-/// What it cannot see: a lasting error that an overstated sigma of the tracker hides (hidden()).
+/// The true error t of such a pose is normal with the covariance S(q) that the model states, the
+/// tracker's noise taken out. A statement may be wrong by a factor: t ~ N(0, f² S(q)), ln f ~ N(0,
+/// kDoubt²). Poses held out from training tell f: e = t + noise, noise ~ N(0, g² sigma²), ln g ~
+/// N(0, kNoiseDoubt²), as nobody knows a tracker's sigma better. Where t is far below the noise
+/// they tell little, and the model is believed. `at(share)` is the radius that holds this share of
+/// fresh poses on average over poses, f and g: a beta-expectation tolerance limit (Guttman,
+/// Statistical Tolerance Regions, 1970), which is right in `share` of fresh poses over many models,
+/// however few poses judged each. What it cannot see: a lasting error that an overstated sigma of
+/// the tracker hides (hidden()).
 namespace trammel {
 
 /// What a pose that was not trained on says, m² per axis.
@@ -30,23 +33,25 @@ class PositionAccuracy {
   /// Radius and probability at which it is told: 95 % of positions.
   static constexpr double kShare = 0.95;
 
-  /// By the poses that the model held out; `batch`: more poses, not trained on, with positions, checked against the
-  /// cell. Empty where the model knows no position: it was trained with nothing, or its domain has no pose that this
-  /// cell can ask for.
-  [[nodiscard]] static std::optional<PositionAccuracy> of(const CompensatedModel& model,
-                                                          const std::optional<MeasurementBatch>& batch = {});
+  /// By the poses that the model held out; `batch`: more poses, not trained on, with positions,
+  /// checked against the cell. Empty where the model knows no position: it was trained with
+  /// nothing, or its domain has no pose that this cell can ask for.
+  [[nodiscard]] static std::optional<PositionAccuracy> of(
+      const CompensatedModel& model, const std::optional<MeasurementBatch>& batch = {});
 
   /// m: `share` of fresh poses in the domain are within.
   [[nodiscard]] double at(double share) const;
   /// Share of fresh poses in the domain whose true error is within `radius`, m.
   [[nodiscard]] double within(double radius) const;
-  /// m: at(kShare) if the stated covariances were wrong by as little or as much as is likely (95 % between the two).
+  /// m: at(kShare) if the stated covariances were wrong by as little or as much as is likely (95 %
+  /// between the two).
   [[nodiscard]] double least() const;
   [[nodiscard]] double most() const;
-  /// m: 95 % of distances between two positions are right within this. An upper bound: it takes the errors of the two
-  /// as independent, and those of near positions are alike.
+  /// m: 95 % of distances between two positions are right within this. An upper bound: it takes the
+  /// errors of the two as independent, and those of near positions are alike.
   [[nodiscard]] double of_distances() const;
-  /// m per axis: the lasting error that would not show, because the tracker's sigma may be overstated by kNoiseDoubt.
+  /// m per axis: the lasting error that would not show, because the tracker's sigma may be
+  /// overstated by kNoiseDoubt.
   [[nodiscard]] double hidden() const { return hidden_; }
   /// Poses that were not trained on and judged this; 0: the training's own statistics alone.
   [[nodiscard]] int judged_by() const { return judged_by_; }
@@ -66,8 +71,9 @@ class PositionAccuracy {
   int judged_by_ = 0;
 };
 
-/// Joint vectors within the range of the training poses and near a measured one, drawn evenly, with the tools and
-/// payloads of the training in turn. None where the cell has none of these any more; fewer where hardly any is near.
+/// Joint vectors within the range of the training poses and near a measured one, drawn evenly, with
+/// the tools and payloads of the training in turn. None where the cell has none of these any more;
+/// fewer where hardly any is near.
 [[nodiscard]] std::vector<PoseContext> poses_in_range(const CompensatedModel& model, int count);
 /// Those of them that the model says are in its domain.
 [[nodiscard]] std::vector<PoseContext> poses_of_domain(const CompensatedModel& model, int count);

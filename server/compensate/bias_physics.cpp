@@ -11,8 +11,9 @@ namespace {
 
 /// In any of its forms.
 bool has_source(const PhysicalModel& physics, const std::string& name) {
-  return std::any_of(physics.sources.begin(), physics.sources.end(),
-                     [&](const ErrorSourcePtr& source) { return &source->cause() == find_cause(name); });
+  return std::any_of(
+      physics.sources.begin(), physics.sources.end(),
+      [&](const ErrorSourcePtr& source) { return &source->cause() == find_cause(name); });
 }
 
 ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
@@ -30,7 +31,8 @@ PhysicalModel with_standard_sources(PhysicalModel physics) {
     TRAMMEL_CHECK(source.has_value());
     const auto count = static_cast<Eigen::Index>((*source)->parameters().size());
     const Eigen::Index first = add_source(physics, *std::move(source));
-    physics.values.segment(first, count).setZero();  // not at the priors: the residual was taken without them
+    physics.values.segment(first, count)
+        .setZero();  // not at the priors: the residual was taken without them
   }
   return physics;
 }
@@ -43,10 +45,12 @@ BiasFeatures turned(const BiasFeatures& features) {
     other << rows.bottomRows<3>(), rows.topRows<3>();
     return other;
   };
-  return {swapped(features.by_joint), swapped(features.by_parameter), features.lever_F, features.R_BF, features.gears};
+  return {swapped(features.by_joint), swapped(features.by_parameter), features.lever_F,
+          features.R_BF, features.gears};
 }
 
-BiasPhysics::BiasPhysics(const PhysicalModel& physics) : BiasPhysics(with_standard_sources(physics), AsItIs{}) {}
+BiasPhysics::BiasPhysics(const PhysicalModel& physics)
+    : BiasPhysics(with_standard_sources(physics), AsItIs{}) {}
 
 BiasPhysics::BiasPhysics(PhysicalModel whole, AsItIs) : whole_(std::move(whole)) {
   const std::vector<Parameter> parameters = whole_.parameters();
@@ -55,9 +59,13 @@ BiasPhysics::BiasPhysics(PhysicalModel whole, AsItIs) : whole_(std::move(whole))
     prior_stddev_(static_cast<Eigen::Index>(k)) = parameters[k].prior_scale;
 }
 
-Pose served_base(const PhysicalModel& physics) { return served_arm(physics, physics.tools.begin()->first).X_WB; }
+Pose served_base(const PhysicalModel& physics) {
+  return served_arm(physics, physics.tools.begin()->first).X_WB;
+}
 
-Pose served_tool(const PhysicalModel& physics, const std::string& tool) { return served_arm(physics, tool).X_FT; }
+Pose served_tool(const PhysicalModel& physics, const std::string& tool) {
+  return served_arm(physics, tool).X_FT;
+}
 
 Matrix3 BiasPhysics::turn_to(const PhysicalModel& now) const {
   const auto turned_in_B = [](const PhysicalModel& physics) -> Matrix3 {
@@ -72,16 +80,19 @@ BiasPhysics BiasPhysics::with_tools_of(const PhysicalModel& now) const {
     const Pose X_FT_now = served_tool(now, name);
     const Pose X_FT_then = served_tool(whole_, name);
     if (X_FT_now.matrix() == X_FT_then.matrix()) continue;
-    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // the errors of a tool come before its nominal frame
+    X_FT = X_FT * X_FT_then.inverse() *
+           X_FT_now;  // the errors of a tool come before its nominal frame
   }
   return BiasPhysics(std::move(moved), {});
 }
 
-Vector3 BiasPhysics::beyond_first_order(const PoseContext& context, const Eigen::VectorXd& shift) const {
+Vector3 BiasPhysics::beyond_first_order(const PoseContext& context,
+                                        const Eigen::VectorXd& shift) const {
   Eigen::MatrixXd J_W;
   const Eigen::VectorXd moved = prior_stddev_.cwiseProduct(shift);
   const Vector3 p_W = whole_.pose_W(context, whole_.values, &J_W).translation();
-  const Vector3 moved_W = whole_.pose_W(context, whole_.values + moved, nullptr).translation() - p_W;
+  const Vector3 moved_W =
+      whole_.pose_W(context, whole_.values + moved, nullptr).translation() - p_W;
   return whole_.X_WB.linear().transpose() * (moved_W - J_W.topRows<3>() * moved);
 }
 

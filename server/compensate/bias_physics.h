@@ -14,29 +14,35 @@ namespace trammel {
 [[nodiscard]] Pose served_base(const PhysicalModel& physics);
 [[nodiscard]] Pose served_tool(const PhysicalModel& physics, const std::string& tool);
 
-/// The features of a pose for a bias with blocks: the same function for training and for predicting. Parameters are the
-/// model's own and, where it has not all of them, those of the standard sources `base`, `geometry` and `compliance` at
-/// zero
-/// (`tool` as well where a tool is unknown). So the bias learns what an incomplete model leaves over in the shape of
-/// physics, and what identification left uncertain is part of the bias' uncertainty. Immutable, thread-safe.
+/// The features of a pose for a bias with blocks: the same function for training and for
+/// predicting. Parameters are the model's own and, where it has not all of them, those of the
+/// standard sources `base`, `geometry` and `compliance` at zero
+/// (`tool` as well where a tool is unknown). So the bias learns what an incomplete model leaves
+/// over in the shape of physics, and what identification left uncertain is part of the bias'
+/// uncertainty. Immutable, thread-safe.
 class BiasPhysics {
  public:
   explicit BiasPhysics(const PhysicalModel& physics);
-  /// For a bias that was learned beside another physics: `whole` has all the parameters of that time.
-  [[nodiscard]] static BiasPhysics learned_at(PhysicalModel whole) { return BiasPhysics(std::move(whole), {}); }
-  /// The same arm with the tools of `now`, with all their errors. Tools that did not move stay bit for bit.
+  /// For a bias that was learned beside another physics: `whole` has all the parameters of that
+  /// time.
+  [[nodiscard]] static BiasPhysics learned_at(PhysicalModel whole) {
+    return BiasPhysics(std::move(whole), {});
+  }
+  /// The same arm with the tools of `now`, with all their errors. Tools that did not move stay bit
+  /// for bit.
   [[nodiscard]] BiasPhysics with_tools_of(const PhysicalModel& now) const;
-  /// The rotation from B of then to B of `now`: what was learned belongs to the arm, which a source may have turned in
-  /// B.
+  /// The rotation from B of then to B of `now`: what was learned belongs to the arm, which a source
+  /// may have turned in B.
   [[nodiscard]] Matrix3 turn_to(const PhysicalModel& now) const;
   /// The model with all the parameters.
   [[nodiscard]] const PhysicalModel& whole() const { return whole_; }
 
   /// At the model's values, exact derivatives.
   [[nodiscard]] BiasFeatures at(const PoseContext& context) const;
-  /// m, in B: how far the position moves with `shift` (P, in prior standard deviations of the parameters) beyond the
-  /// first order, which is `at(context).by_parameter * shift`.
-  [[nodiscard]] Vector3 beyond_first_order(const PoseContext& context, const Eigen::VectorXd& shift) const;
+  /// m, in B: how far the position moves with `shift` (P, in prior standard deviations of the
+  /// parameters) beyond the first order, which is `at(context).by_parameter * shift`.
+  [[nodiscard]] Vector3 beyond_first_order(const PoseContext& context,
+                                           const Eigen::VectorXd& shift) const;
 
  private:
   struct AsItIs {};

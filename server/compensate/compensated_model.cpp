@@ -13,7 +13,8 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kIdLength = 12;  // of a model, in digits of its hash: enough to tell every model of a plant
+constexpr std::size_t kIdLength =
+    12;  // of a model, in digits of its hash: enough to tell every model of a plant
 
 Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
@@ -22,46 +23,57 @@ Vector3 column_rms(const Eigen::MatrixXd& rows) {
 /// What came before that pose.
 Status check_history(const PoseContext& context, Eigen::Index joints, std::size_t row) {
   if (context.before && context.before->size() != joints)
-    return refused("model: pose {} of the bias came from {} joints, not {}", row, context.before->size(), joints)
+    return refused("model: pose {} of the bias came from {} joints, not {}", row,
+                   context.before->size(), joints)
         .of("before")
         .beyond(context.before->size(), joints);
   if (context.before && !context.before->allFinite())
-    return refused("model: pose {} of the bias came from joints that are not finite", row).of("before");
+    return refused("model: pose {} of the bias came from joints that are not finite", row)
+        .of("before");
   if (!context.lagged.empty() && context.lagged.size() != kHeatLags.size())
-    return refused("model: pose {} of the bias has {} lagged temperatures, not {}", row, context.lagged.size(),
-                   kHeatLags.size())
+    return refused("model: pose {} of the bias has {} lagged temperatures, not {}", row,
+                   context.lagged.size(), kHeatLags.size())
         .of("lagged_c")
         .beyond(context.lagged.size(), kHeatLags.size());
-  if (!std::all_of(context.lagged.begin(), context.lagged.end(), [](double t) { return std::isfinite(t); }))
-    return refused("model: pose {} of the bias has a lagged temperature that is not finite", row).of("lagged_c");
+  if (!std::all_of(context.lagged.begin(), context.lagged.end(),
+                   [](double t) { return std::isfinite(t); }))
+    return refused("model: pose {} of the bias has a lagged temperature that is not finite", row)
+        .of("lagged_c");
   return {};
 }
 
 /// What an observation of the bias says of its pose, for `joints` joints; `row` counts from 1.
 Status check_context(const PoseContext& context, Eigen::Index joints, std::size_t row) {
-  const auto not_finite = [](const std::optional<double>& value) { return value && !std::isfinite(*value); };
+  const auto not_finite = [](const std::optional<double>& value) {
+    return value && !std::isfinite(*value);
+  };
   const std::vector<int>& directions = context.direction;
   if (!directions.empty() && static_cast<Eigen::Index>(directions.size()) != joints)
-    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints)
+    return refused("model: pose {} of the bias has {} directions for {} joints", row,
+                   directions.size(), joints)
         .of("direction")
         .beyond(directions.size(), joints);
   for (const int direction : directions) {
     if (direction < -1 || direction > 1)
-      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction)
+      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row,
+                     direction)
           .of("direction")
           .beyond(direction, direction < 0 ? -1 : 1);
   }
   if (context.velocity && context.velocity->size() != joints)
-    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints)
+    return refused("model: pose {} of the bias has {} velocities for {} joints", row,
+                   context.velocity->size(), joints)
         .of("velocity")
         .beyond(context.velocity->size(), joints);
   if (context.velocity && !context.velocity->allFinite())
-    return refused("model: pose {} of the bias has a velocity that is not finite", row).of("velocity");
+    return refused("model: pose {} of the bias has a velocity that is not finite", row)
+        .of("velocity");
   TRY(check_history(context, joints, row));
   if (not_finite(context.time))
     return refused("model: pose {} of the bias has a time that is not finite", row).of("time");
   if (not_finite(context.temperature))
-    return refused("model: pose {} of the bias has a temperature that is not finite", row).of("temperature");
+    return refused("model: pose {} of the bias has a temperature that is not finite", row)
+        .of("temperature");
   if (context.index < 0)
     return refused("model: pose {} of the bias has the index {}", row, context.index)
         .of("index")
@@ -73,8 +85,8 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
 Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const BiasPhysics& physics) {
   const BiasState& bias = *parts.bias;
   if (static_cast<Eigen::Index>(parts.bias_contexts.size()) != bias.q.rows()) {
-    return refused("model: {} poses are described for {} observations of the bias", parts.bias_contexts.size(),
-                   bias.q.rows())
+    return refused("model: {} poses are described for {} observations of the bias",
+                   parts.bias_contexts.size(), bias.q.rows())
         .of("bias")
         .beyond(parts.bias_contexts.size(), bias.q.rows());
   }
@@ -83,10 +95,13 @@ Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const Bia
     PoseContext context = parts.bias_contexts[i];
     TRY(check_context(context, bias.q.cols(), i + 1));
     context.q = bias.q.row(static_cast<Eigen::Index>(i)).transpose();
-    const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
+    const bool known_payload =
+        context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
     if (!parts.physics.tools.contains(context.tool) || !known_payload) {
-      return refused("model: the bias learned at tool '{}' and payload '{}', which its cell does not have",
-                     context.tool, context.payload)
+      return refused(
+                 "model: the bias learned at tool '{}' and payload '{}', which its cell does not "
+                 "have",
+                 context.tool, context.payload)
           .of("bias")
           .with_text(context.tool + " " + context.payload);
     }
@@ -96,15 +111,18 @@ Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const Bia
 }
 
 BiasPhysics physics_of_bias(const ModelParts& parts) {
-  return parts.bias_origin ? BiasPhysics::learned_at(parts.bias_origin->physics) : BiasPhysics(parts.physics);
+  return parts.bias_origin ? BiasPhysics::learned_at(parts.bias_origin->physics)
+                           : BiasPhysics(parts.physics);
 }
 
 Status check_origin(const ModelParts& parts) {
   if (!parts.bias_origin) return {};
   const ModelParts::BiasOrigin& origin = *parts.bias_origin;
   const auto P = parts.covariance.rows();
-  if (origin.covariance.rows() != P || origin.covariance.cols() != P || !origin.covariance.allFinite() ||
-      origin.physics.values.size() != origin.physics.parameter_count() || !origin.physics.values.allFinite()) {
+  if (origin.covariance.rows() != P || origin.covariance.cols() != P ||
+      !origin.covariance.allFinite() ||
+      origin.physics.values.size() != origin.physics.parameter_count() ||
+      !origin.physics.values.allFinite()) {
     return refused("model: where its bias was learned does not fit its {} parameters", P);
   }
   return {};
@@ -116,17 +134,21 @@ Status check_fit(const ModelParts& parts) {
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
   if (parts.q_min.size() != n || parts.q_max.size() != n || parts.physics.values.size() != P ||
       parts.covariance.rows() != P || parts.covariance.cols() != P) {
-    return refused("model: {} parameters and {} joint ranges do not fit a robot of {} joints with {} parameters",
-                   parts.physics.values.size(), parts.q_min.size(), n, P);
+    return refused(
+        "model: {} parameters and {} joint ranges do not fit a robot of {} joints with {} "
+        "parameters",
+        parts.physics.values.size(), parts.q_min.size(), n, P);
   }
   if (parts.extrapolation_slope.size() != 0 && parts.extrapolation_slope.size() != n) {
-    return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(), n);
+    return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(),
+                   n);
   }
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
     return refused("model: a parameter is not finite").of("parameters");
   }
   if (!std::isfinite(parts.bias_spread) || parts.bias_spread < 1)
-    return refused("model: a bias_spread of {}, at least 1 is expected", parts.bias_spread).of("bias_spread");
+    return refused("model: a bias_spread of {}, at least 1 is expected", parts.bias_spread)
+        .of("bias_spread");
   TRY(check_origin(parts));
   if (parts.bias && parts.bias->q.cols() != n)
     return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
@@ -136,14 +158,18 @@ Status check_fit(const ModelParts& parts) {
 /// The bias of the orientation, told what that of the position, `of_position`, is told.
 Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_position) {
   if (rotation.kernel != without_flange(of_position.kernel) || rotation.q != of_position.q)
-    return refused("model: the bias of the orientation is not of the same poses and kernel as that of the position");
-  for (const BiasFeatures& features : of_position.features) rotation.features.push_back(turned(features));
+    return refused(
+        "model: the bias of the orientation is not of the same poses and kernel as that of the "
+        "position");
+  for (const BiasFeatures& features : of_position.features)
+    rotation.features.push_back(turned(features));
   return BiasModel::restore(rotation);
 }
 
 }  // namespace
 
-Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside) {
+Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& then,
+                                        Inside* inside) {
   BiasState state = *parts.bias;
   const Result<SpelledBias> spelled = spelled_bias(state.kernel);
   if (spelled && spelled->needs_features()) {
@@ -160,7 +186,8 @@ Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& t
   if (!inside->bias->has_blocks()) inside->bias_size_B = turned_rms(state.residual_B);
   if (!parts.rotation_bias) return {};
   BiasModel rotation = TRY(restored_rotation(*parts.rotation_bias, state));
-  if (!inside->bias_has_parameters) inside->rotation_bias_size_B = turned_rms(parts.rotation_bias->residual_B);
+  if (!inside->bias_has_parameters)
+    inside->rotation_bias_size_B = turned_rms(parts.rotation_bias->residual_B);
   inside->rotation_bias = std::move(rotation);
   return {};
 }
@@ -168,7 +195,8 @@ Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& t
 Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   TRY(check_fit(parts));
   const BiasPhysics then = physics_of_bias(parts);
-  auto inside = std::make_shared<Inside>(parts.bias_origin ? then.with_tools_of(parts.physics) : then);
+  auto inside =
+      std::make_shared<Inside>(parts.bias_origin ? then.with_tools_of(parts.physics) : then);
   if (parts.bias) {
     TRY(restore_biases(parts, then, inside.get()));
   }
@@ -182,21 +210,24 @@ BiasPhysics CompensatedModel::learned_physics() const { return physics_of_bias(p
 
 bool CompensatedModel::learned_with(const std::string& tool, const std::string& payload) const {
   if (parts().trained_with.contains({tool, payload})) return true;
-  if (!inside_->bias || !inside_->bias->needs_features() || inside_->bias->has_blocks()) return false;
+  if (!inside_->bias || !inside_->bias->needs_features() || inside_->bias->has_blocks())
+    return false;
   const auto known = cell().tools.find(tool);
   if (known == cell().tools.end() || !known->second) return false;
   return std::any_of(parts().trained_with.begin(), parts().trained_with.end(),
                      [&](const auto& trained) { return trained.second == payload; });
 }
 
-Status CompensatedModel::check_trained_with(const std::string& tool, const std::string& payload) const {
+Status CompensatedModel::check_trained_with(const std::string& tool,
+                                            const std::string& payload) const {
   if (learned_with(tool, payload)) return {};
   std::string known;
   for (const auto& [one, load] : parts().trained_with) {
     known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);
   }
-  return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
-                 cell().name, tool, payload, known)
+  return refused(
+             "model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}",
+             provenance().id, cell().name, tool, payload, known)
       .of("tool_id")
       .with_text(tool);
 }
@@ -205,8 +236,10 @@ bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
   return batch.as_then || batch_hash(batch) == parts().provenance.batch_hash;
 }
 
-void CompensatedModel::add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,
-                                     const std::vector<ErrorPrediction>& predictions, LevelErrors* errors) const {
+void CompensatedModel::add_rotations(const MeasurementBatch& batch,
+                                     const std::vector<PoseContext>& poses,
+                                     const std::vector<ErrorPrediction>& predictions,
+                                     LevelErrors* errors) const {
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   std::vector<std::size_t> oriented;
@@ -222,11 +255,14 @@ void CompensatedModel::add_rotations(const MeasurementBatch& batch, const std::v
   for (Eigen::Index k = 0; k < n; ++k) {
     const std::size_t i = oriented[static_cast<std::size_t>(k)];
     const Matrix3 R_BT = X_BW.linear() * *batch.measurements[i].R_WT;
-    const auto error_of = [&](const Pose& X_BT) { return rotation_log(R_BT * X_BT.linear().transpose()); };
+    const auto error_of = [&](const Pose& X_BT) {
+      return rotation_log(R_BT * X_BT.linear().transpose());
+    };
     rotation.nominal.col(k) = error_of(predictions[i].X_BT_nominal);
     rotation.calibrated.col(k) = error_of(X_BW * physics.pose_W(completed(poses[i])));
     rotation.compensated.col(k) = error_of(predictions[i].X_BT_predicted);
-    if (predictions[i].rotation_stddev_B) rotation.stddev.col(k) = *predictions[i].rotation_stddev_B;
+    if (predictions[i].rotation_stddev_B)
+      rotation.stddev.col(k) = *predictions[i].rotation_stddev_B;
   }
 }
 
@@ -235,8 +271,11 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  LevelErrors errors{
-      Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
+  LevelErrors errors{Eigen::Matrix3Xd(3, n),
+                     Eigen::Matrix3Xd(3, n),
+                     Eigen::Matrix3Xd(3, n),
+                     Eigen::Matrix3Xd(3, n),
+                     {}};
   const bool own = is_own(batch);
   std::vector<PoseContext> poses;
   for (const Measurement& m : batch.measurements) {
@@ -269,8 +308,11 @@ Eigen::VectorXd stated_sigmas(const MeasurementBatch& batch, const Cell& cell) {
 }
 
 /// `stated`: of the rows that the errors are of.
-GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors, const Eigen::VectorXd& stated) {
-  const auto rms = [](const Eigen::VectorXd& e) { return std::sqrt(e.squaredNorm() / static_cast<double>(e.size())); };
+GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors,
+                        const Eigen::VectorXd& stated) {
+  const auto rms = [](const Eigen::VectorXd& e) {
+    return std::sqrt(e.squaredNorm() / static_cast<double>(e.size()));
+  };
   return {static_cast<int>(errors.rows.size()),
           rms(errors.nominal),
           rms(errors.calibrated),
@@ -305,10 +347,12 @@ Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) c
   evaluation.coverage_95 = coverage_95(errors.compensated, errors.stddev);
   evaluation.coverage_95_stated =
       coverage_95(errors.compensated, stated_sigmas(batch, cell()).transpose().replicate<3, 1>());
-  evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
+  evaluation.in_domain =
+      static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
   if (inside_->bias)
-    evaluation.bias_gain_z = paired_gain(errors.calibrated, errors.compensated, pose_groups(batch)).z();
+    evaluation.bias_gain_z =
+        paired_gain(errors.calibrated, errors.compensated, pose_groups(batch)).z();
   const LevelErrors::Rotations& rotation = errors.rotation;
   if (rotation.nominal.cols() > 0) {
     const auto rms = [](const Eigen::Matrix3Xd& turns) {
@@ -322,8 +366,10 @@ Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) c
   return evaluation;
 }
 
-PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after, const MeasurementBatch& batch) {
-  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated, pose_groups(batch));
+PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
+                       const MeasurementBatch& batch) {
+  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated,
+                     pose_groups(batch));
 }
 
 }  // namespace trammel

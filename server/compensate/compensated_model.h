@@ -27,14 +27,16 @@ struct ErrorPrediction {
   Vector3 true_stddev_B = Vector3::Zero();
   /// Of one measurement, m²; stddev_B is the root of its diagonal.
   Matrix3 covariance_B = Matrix3::Zero();
-  /// Of one measured orientation, rad, about the axes of B; only where the model learned orientations.
+  /// Of one measured orientation, rad, about the axes of B; only where the model learned
+  /// orientations.
   std::optional<Vector3> rotation_stddev_B;
   bool in_domain = false;  ///< false: far from all training poses, or the bias is not fully taken
-  double bias_weight = 0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside the joints' ranges
+  double bias_weight =
+      0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside the joints' ranges
 };
 
-/// Nominal chain, identified error sources and learned bias: what a cell is served with. An immutable value, cheap to
-/// copy, thread-safe.
+/// Nominal chain, identified error sources and learned bias: what a cell is served with. An
+/// immutable value, cheap to copy, thread-safe.
 class CompensatedModel {
  public:
   using Parts = ModelParts;
@@ -45,28 +47,36 @@ class CompensatedModel {
   [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
   [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
 
-  /// Refuses a tool with a payload that no training pose had: what was learned holds for the trained ones only. A bias
-  /// at the flange holds for every tool of the cell file that weighs what a trained one did.
-  [[nodiscard]] Status check_trained_with(const std::string& tool, const std::string& payload) const;
-  /// The error expected at `q`, whose size the caller has checked; tool and payload as resolve_tool() gives them.
+  /// Refuses a tool with a payload that no training pose had: what was learned holds for the
+  /// trained ones only. A bias at the flange holds for every tool of the cell file that weighs what
+  /// a trained one did.
+  [[nodiscard]] Status check_trained_with(const std::string& tool,
+                                          const std::string& payload) const;
+  /// The error expected at `q`, whose size the caller has checked; tool and payload as
+  /// resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
                                         const std::string& payload) const;
   /// The same at many poses, faster for a bias with blocks.
-  [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
+  [[nodiscard]] std::vector<ErrorPrediction> predict_all(
+      const std::vector<PoseContext>& poses) const;
   /// The physics with which the bias was learned.
   [[nodiscard]] BiasPhysics learned_physics() const;
   /// The learned bias, if any, and the features of a pose for it.
   [[nodiscard]] const std::optional<BiasModel>& bias() const { return inside_->bias; }
-  [[nodiscard]] BiasFeatures features(const PoseContext& context) const { return inside_->bias_physics.at(context); }
+  [[nodiscard]] BiasFeatures features(const PoseContext& context) const {
+    return inside_->bias_physics.at(context);
+  }
   /// Target correction, source section 3.4.1.
-  [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
+  [[nodiscard]] Correction correct(const Target& target, const std::string& tool,
+                                   const std::string& payload,
                                    const CorrectOptions& options = {}) const;
   /// Measured minus predicted of every pose at the three levels, 3 x N, m, in B.
   struct LevelErrors {
     Eigen::Matrix3Xd nominal, calibrated, compensated;
     Eigen::Matrix3Xd stddev;  ///< as predicted, of compensated
     std::vector<bool> in_domain;
-    /// The same of the measured orientations, rotation vectors, rad; `stddev` is 3 x 0 where none was learned.
+    /// The same of the measured orientations, rotation vectors, rad; `stddev` is 3 x 0 where none
+    /// was learned.
     struct Rotations {
       Eigen::Matrix3Xd nominal, calibrated, compensated, stddev;
     };
@@ -74,7 +84,8 @@ class CompensatedModel {
   };
   /// All rows must have positions.
   [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
-  /// Measured minus predicted of every gauge, m, at the three levels, and the standard deviation of compensated.
+  /// Measured minus predicted of every gauge, m, at the three levels, and the standard deviation of
+  /// compensated.
   struct GaugeErrors {
     std::vector<std::size_t> rows;  ///< of the batch
     Eigen::VectorXd nominal, calibrated, compensated, stddev;
@@ -82,9 +93,9 @@ class CompensatedModel {
   };
   /// The model must know their anchors, or its cell file where they are (in_world_of()).
   [[nodiscard]] GaugeErrors gauge_errors(const MeasurementBatch& batch) const;
-  /// Figures of the errors on `batch`, which is checked against the cell and not empty. Poses of another batch than the
-  /// model's own are predicted as in service: what began at a training pose has happened, and errors of the tracker do
-  /// not count.
+  /// Figures of the errors on `batch`, which is checked against the cell and not empty. Poses of
+  /// another batch than the model's own are predicted as in service: what began at a training pose
+  /// has happened, and errors of the tracker do not count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
@@ -96,12 +107,13 @@ class CompensatedModel {
     std::optional<BiasModel> bias;
     std::optional<BiasModel> rotation_bias;
     bool bias_has_parameters = false;
-    std::optional<Matrix3> bias_turn;                // of a bias with an origin, BiasPhysics::turn_to()
-    Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses; 0 with blocks
+    std::optional<Matrix3> bias_turn;       // of a bias with an origin, BiasPhysics::turn_to()
+    Vector3 bias_size_B = Vector3::Zero();  // m, rms over the training poses; 0 with blocks
     Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise; 0 with the block `parameters`
   };
   /// Restores the biases that `parts` have; `then`: the physics that they were learned beside.
-  [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside);
+  [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then,
+                                             Inside* inside);
   /// Whether the bias holds for this tool and payload.
   [[nodiscard]] bool learned_with(const std::string& tool, const std::string& payload) const;
   /// What the biases say at a pose.
@@ -120,19 +132,21 @@ class CompensatedModel {
     Eigen::MatrixXd J_W;  ///< 6 x P, by the parameters
     double growth = 0;    ///< m², Domain::growth()
   };
-  /// 3 x 3, in B: what the parameters leave uncertain of a position or rotation with these derivatives (3 x P, in B);
-  /// and the part of it that was identified after the bias was learned.
+  /// 3 x 3, in B: what the parameters leave uncertain of a position or rotation with these
+  /// derivatives (3 x P, in B); and the part of it that was identified after the bias was learned.
   [[nodiscard]] Matrix3 identified(const Eigen::MatrixXd& J_B) const;
   [[nodiscard]] Matrix3 identified_since(const Eigen::MatrixXd& J_B) const;
   /// m²: variance of one axis that the physics leaves over at a pose.
   [[nodiscard]] double unlearned(const CalibratedPose& pose) const;
-  /// `covariance` of one measurement with the bias_spread as far as the bias is taken, the instrument's part as it is.
+  /// `covariance` of one measurement with the bias_spread as far as the bias is taken, the
+  /// instrument's part as it is.
   [[nodiscard]] Matrix3 spread(const Matrix3& covariance, double bias_weight) const;
-  /// Adds what the bias says with the weight that stands in `prediction`; the covariance then, what was unsaid left
-  /// out.
+  /// Adds what the bias says with the weight that stands in `prediction`; the covariance then, what
+  /// was unsaid left out.
   [[nodiscard]] Matrix3 add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,
                                           ErrorPrediction* prediction) const;
-  void add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias, ErrorPrediction* prediction) const;
+  void add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias,
+                         ErrorPrediction* prediction) const;
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
   /// Turned from B of the training into B of today.
   [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
@@ -141,14 +155,15 @@ class CompensatedModel {
     Vector3 shift = Vector3::Zero();
     Matrix3 turn = Matrix3::Identity();
   };
-  [[nodiscard]] LearnedMotion learned_motion(const PoseContext& completed, double bias_weight) const;
+  [[nodiscard]] LearnedMotion learned_motion(const PoseContext& completed,
+                                             double bias_weight) const;
   /// X_BT of the physics alone.
   [[nodiscard]] Pose calibrated_pose_B(const PoseContext& completed) const;
   [[nodiscard]] static Pose moved(const Pose& X_BT, const LearnedMotion& by);
   /// X_BT as predict() has it, without the variances.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
-  /// Covariance of the position, in B, from what a source needs and nobody gave: the side from which a joint is
-  /// approached, the temperature.
+  /// Covariance of the position, in B, from what a source needs and nobody gave: the side from
+  /// which a joint is approached, the temperature.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
   /// The joints that the controller takes for the target without correction.
@@ -162,10 +177,13 @@ class CompensatedModel {
     bool settled = false;
   };
   /// From the joints in `context`, where the tool is predicted to be at `X_BT_predicted`.
-  [[nodiscard]] Approach approach(const Pose& X_BT_wanted, PoseContext context, const Pose& X_BT_predicted,
-                                  double bias_weight, const CorrectOptions& options) const;
-  /// The other branches (conf) on which the target can be corrected; none for an arm whose branches have no numbers.
-  [[nodiscard]] std::vector<int> branches_that_reach(const Target& asked, const Pose& X_BT_wanted, PoseContext context,
+  [[nodiscard]] Approach approach(const Pose& X_BT_wanted, PoseContext context,
+                                  const Pose& X_BT_predicted, double bias_weight,
+                                  const CorrectOptions& options) const;
+  /// The other branches (conf) on which the target can be corrected; none for an arm whose branches
+  /// have no numbers.
+  [[nodiscard]] std::vector<int> branches_that_reach(const Target& asked, const Pose& X_BT_wanted,
+                                                     PoseContext context,
                                                      const CorrectOptions& options) const;
   void add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,
                      const std::vector<ErrorPrediction>& predictions, LevelErrors* errors) const;

@@ -17,9 +17,9 @@ namespace {
 
 constexpr double kRotationTolerance = 1e-7;  // rad: 0.1 µm at 1 m
 constexpr int kHighestConf = 7;              // three signs, inverse_kinematics.h
-constexpr int kJointsNamed = 2;              // of those outside their limits, in one message: more is not read
-constexpr int kDecimalsTold = 9;             // more than a controller takes
-constexpr double kTurnTold = 1e-6;           // rad: less that is left of a rotation is not told
+constexpr int kJointsNamed = 2;   // of those outside their limits, in one message: more is not read
+constexpr int kDecimalsTold = 9;  // more than a controller takes
+constexpr double kTurnTold = 1e-6;  // rad: less that is left of a rotation is not told
 
 /// A joint value with so many decimals that it differs from the limit it is beyond.
 std::string told_from(double limit, double value) {
@@ -50,8 +50,10 @@ std::string limits_text(const Chain& robot, const JointVector& q) {
       outside.push_back(limit_text(joint, i + 1, q(i)));
   }
   const auto named = std::min<std::size_t>(outside.size(), kJointsNamed);
-  const std::string text = fmt::format("{}", fmt::join(outside.begin(), outside.begin() + named, "; "));
-  return outside.size() == named ? text : fmt::format("{} and {} more", text, outside.size() - named);
+  const std::string text =
+      fmt::format("{}", fmt::join(outside.begin(), outside.begin() + named, "; "));
+  return outside.size() == named ? text
+                                 : fmt::format("{} and {} more", text, outside.size() - named);
 }
 
 CorrectionStatus status_of(InverseStatus status) {
@@ -70,7 +72,8 @@ std::string direction_text(const Vector3& direction_B) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
 }
 
-/// Which way the flange cannot go, of the base; of fewer than six joints, which of the ways that they have.
+/// Which way the flange cannot go, of the base; of fewer than six joints, which of the ways that
+/// they have.
 std::string immovable(const Chain& robot, const JointVector& q) {
   const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeFullU);
@@ -83,24 +86,26 @@ std::string immovable(const Chain& robot, const JointVector& q) {
 /// What is left of a rotation that the arm cannot turn away; empty: nothing.
 std::string turn_left(const Chain& robot, const Vector3& missing_B) {
   if (missing_B.norm() < kTurnTold) return "";
-  return fmt::format("{} {:.4f} deg about {} of the base are left",
-                     has_few_joints(robot) ? fmt::format("with {} joints", robot.size()) : "at a singular wrist",
-                     to_deg(missing_B.norm()), direction_text(missing_B));
+  return fmt::format(
+      "{} {:.4f} deg about {} of the base are left",
+      has_few_joints(robot) ? fmt::format("with {} joints", robot.size()) : "at a singular wrist",
+      to_deg(missing_B.norm()), direction_text(missing_B));
 }
 
-/// Whether the arm passes a singularity, to another configuration, from one of these joints to the other: between two
-/// near places its Jacobians then differ in the sense of one motion.
+/// Whether the arm passes a singularity, to another configuration, from one of these joints to the
+/// other: between two near places its Jacobians then differ in the sense of one motion.
 bool changes_configuration(const Chain& robot, const JointVector& from, const JointVector& to) {
   const Eigen::MatrixXd before = flange_motion(robot, from).jacobian;
   const Eigen::MatrixXd after = flange_motion(robot, to).jacobian;
-  const Eigen::MatrixXd both =
-      before.cols() > before.rows() ? Eigen::MatrixXd(before * after.transpose()) : before.transpose() * after;
+  const Eigen::MatrixXd both = before.cols() > before.rows()
+                                   ? Eigen::MatrixXd(before * after.transpose())
+                                   : before.transpose() * after;
   return both.determinant() < 0;
 }
 
 /// Why these joints do not bring the tool to `X_BT`.
-std::string why_not(const Chain& robot, const Pose& X_BT, const Pose& X_FT, const InverseResult& joints,
-                    const std::optional<int>& conf) {
+std::string why_not(const Chain& robot, const Pose& X_BT, const Pose& X_FT,
+                    const InverseResult& joints, const std::optional<int>& conf) {
   switch (joints.status) {
     case InverseStatus::kJointLimit:
       return limits_text(robot, joints.q);
@@ -108,21 +113,25 @@ std::string why_not(const Chain& robot, const Pose& X_BT, const Pose& X_FT, cons
       return "the arm is singular there: " + immovable(robot, joints.q);
     default:
       if (has_few_joints(robot) && point_is_reached(robot, X_BT, X_FT, joints.q)) {
-        const Vector3 missing_B = pose_difference(X_BT, robot.flange_pose(joints.q) * X_FT).tail<3>();
+        const Vector3 missing_B =
+            pose_difference(X_BT, robot.flange_pose(joints.q) * X_FT).tail<3>();
         return fmt::format(
-            "the arm has {} joints and cannot turn the tool so: {:.4f} deg about {} of its base are missing",
+            "the arm has {} joints and cannot turn the tool so: {:.4f} deg about {} of its base "
+            "are missing",
             robot.size(), to_deg(missing_B.norm()), direction_text(missing_B));
       }
-      return conf ? fmt::format("no joints of conf {} bring the tool there", *conf) : "no joints bring the tool there";
+      return conf ? fmt::format("no joints of conf {} bring the tool there", *conf)
+                  : "no joints bring the tool there";
   }
 }
 
 /// The message of a target out of domain.
 std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
   const bool has_blocks = bias && bias->has_blocks();
-  return fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
-                     has_blocks ? ", the blocks of the bias" : "", 100 * weight,
-                     has_blocks ? "its kernel" : "the learned bias");
+  return fmt::format(
+      "too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
+      has_blocks ? ", the blocks of the bias" : "", 100 * weight,
+      has_blocks ? "its kernel" : "the learned bias");
 }
 
 /// How the arm comes to the target.
@@ -139,9 +148,12 @@ PoseContext way_to(const Target& target) {
 double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
 
 /// rms of an error of this mean whose true value spreads by this stddev.
-double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.squaredNorm() + stddev.squaredNorm()); }
+double rms(const Vector3& mean, const Vector3& stddev) {
+  return std::sqrt(mean.squaredNorm() + stddev.squaredNorm());
+}
 
-/// The same of a rotation vector, rad; `stddev` is of one measurement by an instrument of this sigma.
+/// The same of a rotation vector, rad; `stddev` is of one measurement by an instrument of this
+/// sigma.
 double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, double sigma) {
   if (!stddev) return mean.norm();
   return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
@@ -149,19 +161,21 @@ double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, doubl
 
 /// What to expect without correction.
 void expect_before(const ErrorPrediction& before, const Tracker& tracker, Correction& result) {
-  result.error_before =
-      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
+  result.error_before = rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(),
+                            before.true_stddev_B);
   result.error_after = result.error_before;
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
   result.measured_stddev = measured(result.stddev, tracker.sigma);
-  result.turn_before = turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
-                                before.rotation_stddev_B, tracker.sigma_rotation);
+  result.turn_before =
+      turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
+               before.rotation_stddev_B, tracker.sigma_rotation);
   result.turn_after = result.turn_before;
 }
 
-/// What to expect where this much of the way is missing still. The standard deviation is that at the target: a
-/// correction moves it by far less than it is known.
-void expect_after(const ErrorPrediction& before, const Vector6& missing, const Tracker& tracker, Correction& result) {
+/// What to expect where this much of the way is missing still. The standard deviation is that at
+/// the target: a correction moves it by far less than it is known.
+void expect_after(const ErrorPrediction& before, const Vector6& missing, const Tracker& tracker,
+                  Correction& result) {
   result.error_after = rms(missing.head<3>(), before.true_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
   result.measured_stddev = measured(result.stddev, tracker.sigma);
@@ -170,12 +184,14 @@ void expect_after(const ErrorPrediction& before, const Vector6& missing, const T
 
 }  // namespace
 
-Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
+Result<InverseResult> CompensatedModel::nominal_joints(const Target& target,
+                                                       const Pose& X_TF) const {
   const Chain& robot = cell().robot;
   if (target.joint_target) {
     if (!target.seed) return refused("a joint target without joints").of("joints");
     const bool outside = robot.joint_outside_limits(*target.seed).has_value();
-    return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed, 0};
+    return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed,
+                         0};
   }
   if (target.conf) return inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
   if (target.seed && has_few_joints(robot))
@@ -185,15 +201,21 @@ Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, con
 }
 
 CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, PoseContext context,
-                                                      const Pose& X_BT_predicted, double bias_weight,
+                                                      const Pose& X_BT_predicted,
+                                                      double bias_weight,
                                                       const CorrectOptions& options) const {
   const Pose X_TF = parts().physics.tools.at(context.tool).inverse();
-  Approach now{X_BT_wanted, {InverseStatus::kOk, context.q, 0}, pose_difference(X_BT_wanted, X_BT_predicted), 0};
+  Approach now{X_BT_wanted,
+               {InverseStatus::kOk, context.q, 0},
+               pose_difference(X_BT_wanted, X_BT_predicted),
+               0};
   const auto settled = [&] {
-    return now.missing.head<3>().norm() < options.tolerance && now.missing.tail<3>().norm() < kRotationTolerance;
+    return now.missing.head<3>().norm() < options.tolerance &&
+           now.missing.tail<3>().norm() < kRotationTolerance;
   };
-  // What was learned hardly changes over the way of a correction, and takes longer to compute than the physics. So it
-  // is taken from where it was asked for last, and asked for again once the physics has settled.
+  // What was learned hardly changes over the way of a correction, and takes longer to compute than
+  // the physics. So it is taken from where it was asked for last, and asked for again once the
+  // physics has settled.
   context = completed(std::move(context));
   const Pose X_BT_calibrated = calibrated_pose_B(context);
   LearnedMotion learned{X_BT_predicted.translation() - X_BT_calibrated.translation(),
@@ -206,14 +228,16 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   const Pose X_FT = X_TF.inverse();
   std::optional<CorrectedJoints> by_steps;
   if (const auto wrist = closing_wrist(cell().robot, context.q)) {
-    by_steps = correct_in_wrist(cell().robot, X_FT, *wrist, context.q, now.missing, missing_at, options);
+    by_steps =
+        correct_in_wrist(cell().robot, X_FT, *wrist, context.q, now.missing, missing_at, options);
   } else if (has_few_joints(cell().robot)) {
     by_steps = correct_few_joints(cell().robot, X_FT, context.q, now.missing, missing_at, options);
   }
   if (by_steps) {
     now.X_BT_commanded = cell().robot.flange_pose(by_steps->q) * X_FT;
     now.joints.q = by_steps->q;
-    if (cell().robot.joint_outside_limits(by_steps->q)) now.joints.status = InverseStatus::kJointLimit;
+    if (cell().robot.joint_outside_limits(by_steps->q))
+      now.joints.status = InverseStatus::kJointLimit;
     now.missing = by_steps->missing;
     now.iterations = by_steps->iterations;
     now.settled = by_steps->settled;
@@ -222,7 +246,8 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   while (!settled() && now.iterations < options.max_iterations) {
     ++now.iterations;
     now.X_BT_commanded.translation() += now.missing.head<3>();
-    now.X_BT_commanded.linear() = (rotation_exp(now.missing.tail<3>()) * now.X_BT_commanded.linear()).eval();
+    now.X_BT_commanded.linear() =
+        (rotation_exp(now.missing.tail<3>()) * now.X_BT_commanded.linear()).eval();
     now.joints = inverse_kinematics(cell().robot, now.X_BT_commanded * X_TF, context.q);
     if (now.joints.status != InverseStatus::kOk) return now;
     context.q = now.joints.q;
@@ -237,7 +262,8 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
 }
 
 std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, const Pose& X_BT_wanted,
-                                                       PoseContext context, const CorrectOptions& options) const {
+                                                       PoseContext context,
+                                                       const CorrectOptions& options) const {
   std::vector<int> found;
   if (!has_spherical_wrist(cell().robot)) return found;
   const Pose X_BF = X_BT_wanted * parts().physics.tools.at(context.tool).inverse();
@@ -246,12 +272,14 @@ std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, cons
     const Result<InverseResult> joints = inverse_kinematics(cell().robot, X_BF, conf, asked.seed);
     if (!joints || joints->status != InverseStatus::kOk) continue;
     context.q = joints->q;
-    if (approach(X_BT_wanted, context, pose_B(context, 1), 1, options).settled) found.push_back(conf);
+    if (approach(X_BT_wanted, context, pose_B(context, 1), 1, options).settled)
+      found.push_back(conf);
   }
   return found;
 }
 
-Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
+Correction CompensatedModel::correct(const Target& target, const std::string& tool,
+                                     const std::string& payload,
                                      const CorrectOptions& options) const {
   PoseContext context = way_to(target);
   context.tool = tool;
@@ -263,17 +291,19 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return result;
   };
   const auto not_reached = [&](const InverseResult& joints) {
-    return end(
-        status_of(joints.status),
-        with_branch_hint(why_not(cell().robot, result.X_BT_wanted, parts().physics.tools.at(tool), joints, target.conf),
-                         branches_that_reach(target, result.X_BT_wanted, context, options)));
+    return end(status_of(joints.status),
+               with_branch_hint(why_not(cell().robot, result.X_BT_wanted,
+                                        parts().physics.tools.at(tool), joints, target.conf),
+                                branches_that_reach(target, result.X_BT_wanted, context, options)));
   };
 
-  const Result<InverseResult> start = nominal_joints(target, parts().physics.tools.at(tool).inverse());
+  const Result<InverseResult> start =
+      nominal_joints(target, parts().physics.tools.at(tool).inverse());
   if (!start) return end(CorrectionStatus::kRefused, sentence(start.error()));
   context.q = start->q;
   result.X_BT_wanted =
-      target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context) : target.X_BT;
+      target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context)
+                          : target.X_BT;
   // Where nothing is corrected, the wanted pose is commanded.
   result.X_BT_commanded = result.X_BT_wanted;
   result.q = start->q;
@@ -287,16 +317,18 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
 
   // The weight is that at the target: a correction moves too little to change it.
   const double bias_weight = before.bias_weight;
-  const Approach found = approach(result.X_BT_wanted, context, before.X_BT_predicted, bias_weight, options);
+  const Approach found =
+      approach(result.X_BT_wanted, context, before.X_BT_predicted, bias_weight, options);
   result.iterations = found.iterations;
   result.left = found.missing.head<3>().norm();
   if (found.joints.status != InverseStatus::kOk) return not_reached(found.joints);
   if (!found.settled) {
-    return end(CorrectionStatus::kNotConverged,
-               fmt::format("{:.2e} mm left after {} iterations", to_mm(result.left), result.iterations));
+    return end(CorrectionStatus::kNotConverged, fmt::format("{:.2e} mm left after {} iterations",
+                                                            to_mm(result.left), result.iterations));
   }
   if (!in_wrist && changes_configuration(cell().robot, start->q, found.joints.q))
-    return end(CorrectionStatus::kSingular, "corrected, the arm would come to another configuration");
+    return end(CorrectionStatus::kSingular,
+               "corrected, the arm would come to another configuration");
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
   expect_after(before, found.missing, cell().tracker, result);

@@ -9,21 +9,24 @@ namespace {
 
 // Within 6 deg of the singularity a turn of 1 mrad would need 10 mrad of joints 4 and 6 and more.
 constexpr double kBorder = 0.105;
-constexpr double kMostDamping = 0.06;   // of the idle motion, at the singularity: its square is more than what is left
-constexpr int kFreeSteps = 6;           // that choose the idle motion; then it stays, and the rest settles
-constexpr double kMostOfOpening = 0.9;  // that a correction may take: the wrist never opens to the other side
+constexpr double kMostDamping =
+    0.06;  // of the idle motion, at the singularity: its square is more than what is left
+constexpr int kFreeSteps = 6;  // that choose the idle motion; then it stays, and the rest settles
+constexpr double kMostOfOpening =
+    0.9;  // that a correction may take: the wrist never opens to the other side
 
 /// Whatever a correction asks for, cut smoothly so that it never reaches the whole opening.
 double cut(double asked, double opening) {
   const double most = kMostOfOpening * std::abs(opening);
   const double free = most / 2;
   if (std::abs(asked) <= free) return asked;
-  return std::copysign(free + (most - free) * std::tanh((std::abs(asked) - free) / (most - free)), asked);
+  return std::copysign(free + (most - free) * std::tanh((std::abs(asked) - free) / (most - free)),
+                       asked);
 }
 
-/// Steps of the joints: the point comes to where it is missing, of the rotation as much as may be had:
-/// min |J_r d - e_r|² + λ² (idle · (so far + d))²  with  J_p d = e_p,  rails held. After kFreeSteps  idle · d = 0: what
-/// is left of the rotation would keep the idle motion from settling.
+/// Steps of the joints: the point comes to where it is missing, of the rotation as much as may be
+/// had: min |J_r d - e_r|² + λ² (idle · (so far + d))²  with  J_p d = e_p,  rails held. After
+/// kFreeSteps  idle · d = 0: what is left of the rotation would keep the idle motion from settling.
 class WristSteps {
  public:
   WristSteps(const Chain& robot, const Vector3& p_FT, const WristOpening& wrist)
@@ -66,9 +69,10 @@ class WristSteps {
     }
     if (held_) hold(wrist_.idle, 0);
     if (change) hold(wrist_.by_joint, *change - wrist_.by_joint.dot(so_far));
-    return least_with_held(turn.transpose() * turn + square_ * wrist_.idle * wrist_.idle.transpose(),
-                           turn.transpose() * missing.tail<3>() - square_ * wrist_.idle.dot(so_far) * wrist_.idle, held,
-                           values);
+    return least_with_held(
+        turn.transpose() * turn + square_ * wrist_.idle * wrist_.idle.transpose(),
+        turn.transpose() * missing.tail<3>() - square_ * wrist_.idle.dot(so_far) * wrist_.idle,
+        held, values);
   }
 
   const Chain& robot_;
@@ -87,8 +91,8 @@ std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector&
 }
 
 CorrectedJoints correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
-                                 const JointVector& start, const Vector6& missing_at_start, const MissingAt& missing_at,
-                                 const CorrectOptions& options) {
+                                 const JointVector& start, const Vector6& missing_at_start,
+                                 const MissingAt& missing_at, const CorrectOptions& options) {
   WristSteps steps(robot, X_FT.translation(), wrist);
   const auto next = [&](const JointVector& q, const JointVector& so_far, const Vector6& missing) {
     return steps.step(q, so_far, missing);

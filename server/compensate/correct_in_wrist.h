@@ -5,17 +5,20 @@
 #include "server/compensate/joint_steps.h"
 #include "server/robot/wrist.h"
 
-/// Corrections near the wrist's singularity, where not every turn can be corrected: the tool's point comes to where it
-/// is wanted, and the joints stay near those that the controller takes for the target, on the same side of the
-/// singularity. What is left of the rotation grows smoothly towards the singularity, from nothing at the border.
+/// Corrections near the wrist's singularity, where not every turn can be corrected: the tool's
+/// point comes to where it is wanted, and the joints stay near those that the controller takes for
+/// the target, on the same side of the singularity. What is left of the rotation grows smoothly
+/// towards the singularity, from nothing at the border.
 namespace trammel {
 
 /// The wrist where it is so near to its singularity that correct_in_wrist() corrects; else empty.
 [[nodiscard]] std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector& q);
 
 /// From the joints `start`, where `missing_at_start` is missing.
-[[nodiscard]] CorrectedJoints correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
-                                               const JointVector& start, const Vector6& missing_at_start,
-                                               const MissingAt& missing_at, const CorrectOptions& options);
+[[nodiscard]] CorrectedJoints correct_in_wrist(const Chain& robot, const Pose& X_FT,
+                                               const WristOpening& wrist, const JointVector& start,
+                                               const Vector6& missing_at_start,
+                                               const MissingAt& missing_at,
+                                               const CorrectOptions& options);
 
 }  // namespace trammel

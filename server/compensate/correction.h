@@ -11,7 +11,15 @@
 /// A target, and how it is commanded so that the tool lands on it.
 namespace trammel {
 
-enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
+enum class CorrectionStatus {
+  kOk,
+  kOutOfDomain,
+  kJointLimit,
+  kUnreachable,
+  kSingular,
+  kNotConverged,
+  kRefused
+};
 /// As it is written in files and on the wire: `ok`, `out_of_domain`, ...
 [[nodiscard]] std::string_view to_string(CorrectionStatus status);
 
@@ -27,21 +35,25 @@ struct Target {
   std::optional<double> time = {};         ///< s
 };
 
-/// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
-/// Expected errors are root mean squares of the true distance from the target, without the instrument's noise; NaN
-/// where no joints bring the tool there. Their standard deviations are those at the target, before and after: a
-/// correction moves the joints by milliradians, and a standard deviation changes over a length scale of the bias.
+/// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose
+/// is commanded. Expected errors are root mean squares of the true distance from the target,
+/// without the instrument's noise; NaN where no joints bring the tool there. Their standard
+/// deviations are those at the target, before and after: a correction moves the joints by
+/// milliradians, and a standard deviation changes over a length scale of the bias.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();
-  Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
-  JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
-  double error_before = kNothingToSay;     ///< m, to expect without correction
-  double error_after = kNothingToSay;      ///< m, to expect with it; the same where the target is not corrected
-  double stddev = kNothingToSay;           ///< m, of the true position: root mean square of the three axes
-  double measured_stddev = kNothingToSay;  ///< m, likewise of one measurement of it, the instrument's noise included
-  /// rad, angle to expect between the wanted orientation and the true one. Where the model learned no orientations,
-  /// what the error sources say.
+  Pose X_BT_commanded =
+      Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
+  JointVector q;         ///< the controller's joints for it (nominal inverse kinematics), rad
+  double error_before = kNothingToSay;  ///< m, to expect without correction
+  double error_after =
+      kNothingToSay;  ///< m, to expect with it; the same where the target is not corrected
+  double stddev = kNothingToSay;  ///< m, of the true position: root mean square of the three axes
+  double measured_stddev =
+      kNothingToSay;  ///< m, likewise of one measurement of it, the instrument's noise included
+  /// rad, angle to expect between the wanted orientation and the true one. Where the model learned
+  /// no orientations, what the error sources say.
   double turn_before = kNothingToSay;
   double turn_after = kNothingToSay;
   double left = 0;  ///< m, what the iteration left over; part of error_after

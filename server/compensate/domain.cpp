@@ -8,11 +8,13 @@ namespace trammel {
 
 namespace {
 
-constexpr double kDomainMargin = 0.05;  // of a joint's training range: a Latin hypercube leaves as much at its edges
-constexpr double kLeastMargin = 1e-9;   // rad, for a joint that stood still: rounding
-constexpr double kRangeFade = 0.20;     // of the range, from the margin to where nothing is taken
-constexpr double kLeastFade = 0.01;     // rad, for a joint that stood still: several times what a correction moves it
-constexpr double kUnknownShare = 0.5;   // half of the prior variance is left: the bias knows little
+constexpr double kDomainMargin =
+    0.05;  // of a joint's training range: a Latin hypercube leaves as much at its edges
+constexpr double kLeastMargin = 1e-9;  // rad, for a joint that stood still: rounding
+constexpr double kRangeFade = 0.20;    // of the range, from the margin to where nothing is taken
+constexpr double kLeastFade =
+    0.01;  // rad, for a joint that stood still: several times what a correction moves it
+constexpr double kUnknownShare = 0.5;  // half of the prior variance is left: the bias knows little
 constexpr double kLeastFadeOfShare = 2.0;  // times the limit, where the limit itself is high
 constexpr double kKnownExactly = 1e-12;    // of the prior variance; keeps the logarithm finite
 
@@ -40,14 +42,16 @@ double Domain::bias_weight(const JointVector& q, double prior_share) const {
   // Shares span decades, so the fade is one of their logarithm.
   const double limit = std::max(prior_share_limit, kKnownExactly);
   const double unknown = std::max(kUnknownShare, kLeastFadeOfShare * limit);
-  return weight * fading(std::log(std::max(prior_share, kKnownExactly)), std::log(limit), std::log(unknown));
+  return weight *
+         fading(std::log(std::max(prior_share, kKnownExactly)), std::log(limit), std::log(unknown));
 }
 
 double Domain::growth(const JointVector& q, const JointVector& slope, const Chain& robot) const {
   double variance = 0;
   for (Eigen::Index j = 0; j < slope.size(); ++j) {
     const double beyond = std::max(q_min(j) - q(j), q(j) - q_max(j));
-    if (beyond > 0) variance += std::pow(slope(j) * distance_beyond(robot.joint(static_cast<int>(j)), beyond), 2);
+    if (beyond > 0)
+      variance += std::pow(slope(j) * distance_beyond(robot.joint(static_cast<int>(j)), beyond), 2);
   }
   return variance;
 }

@@ -4,25 +4,30 @@
 
 namespace trammel {
 
-/// Where a model's training poses lie. Inside, the learned bias is taken in full; beyond the edge it fades.
+/// Where a model's training poses lie. Inside, the learned bias is taken in full; beyond the edge
+/// it fades.
 struct Domain {
   JointVector q_min, q_max;      ///< range of the training poses, rad
   double prior_share_limit = 0;  ///< of BiasPrediction::prior_share, at the edge
-  double margin = 0.05;          ///< of a joint's range, for in_range(): WhatWasMeasured::range_margin()
+  double margin = 0.05;  ///< of a joint's range, for in_range(): WhatWasMeasured::range_margin()
 
-  /// Whether every joint is within the range of the training poses, or at most the margin of it beyond. Ranges alone
-  /// hold poses that are far from all of them: WhatWasMeasured::is_near() is asked beside.
+  /// Whether every joint is within the range of the training poses, or at most the margin of it
+  /// beyond. Ranges alone hold poses that are far from all of them: WhatWasMeasured::is_near() is
+  /// asked beside.
   [[nodiscard]] bool in_range(const JointVector& q) const;
-  /// How much of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of range, or where nearly
-  /// as little is known as without data. Smooth in q and in `prior_share`.
+  /// How much of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of
+  /// range, or where nearly as little is known as without data. Smooth in q and in `prior_share`.
   [[nodiscard]] double bias_weight(const JointVector& q, double prior_share) const;
-  /// The variance by which one coordinate of the residual grows outside the range, m²: Σ_j (slope_j d_j)², with d_j the
-  /// distance_beyond() of joint j. `slope`: m per rad, of a prismatic joint per m; empty: it does not grow.
-  [[nodiscard]] double growth(const JointVector& q, const JointVector& slope, const Chain& robot) const;
+  /// The variance by which one coordinate of the residual grows outside the range, m²: Σ_j (slope_j
+  /// d_j)², with d_j the distance_beyond() of joint j. `slope`: m per rad, of a prismatic joint per
+  /// m; empty: it does not grow.
+  [[nodiscard]] double growth(const JointVector& q, const JointVector& slope,
+                              const Chain& robot) const;
 };
 
-/// The distance that counts for a joint that is `beyond` its range (rad, m). For a revolute joint it is the chord of
-/// the angle, at most that of half a turn: after a full turn the joint is where it was.
+/// The distance that counts for a joint that is `beyond` its range (rad, m). For a revolute joint
+/// it is the chord of the angle, at most that of half a turn: after a full turn the joint is where
+/// it was.
 [[nodiscard]] double distance_beyond(const Joint& joint, double beyond);
 
 }  // namespace trammel

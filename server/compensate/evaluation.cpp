@@ -47,14 +47,17 @@ ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
   figures.axis_mean = e_B.rowwise().mean();
   if (n > 1) {
     figures.axis_stddev =
-        ((e_B.colwise() - figures.axis_mean).rowwise().squaredNorm() / static_cast<double>(n - 1)).cwiseSqrt();
+        ((e_B.colwise() - figures.axis_mean).rowwise().squaredNorm() / static_cast<double>(n - 1))
+            .cwiseSqrt();
   }
   return figures;
 }
 
-std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
+std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error,
+                                           const Eigen::Matrix3Xd& stddev) {
   const auto z = error.array() / stddev.array();
-  const double mean = (0.5 * z.square() + stddev.array().log()).mean() + 0.5 * std::log(2 * std::numbers::pi);
+  const double mean =
+      (0.5 * z.square() + stddev.array().log()).mean() + 0.5 * std::log(2 * std::numbers::pi);
   return std::isfinite(mean) ? std::optional(mean) : std::nullopt;
 }
 

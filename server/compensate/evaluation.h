@@ -22,45 +22,48 @@ struct ErrorFigures {
 struct OrientationFigures {
   int poses = 0;
   double nominal = 0, calibrated = 0, compensated = 0;
-  std::optional<double>
-      coverage_95;  ///< share of coordinates inside their 95 % interval; of models that learned orientations
+  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; of
+                                      ///< models that learned orientations
 };
 
-/// Errors of rows that tell one number (Gauge), m: measured - predicted of that number. They are no position errors,
-/// and never compared with them.
+/// Errors of rows that tell one number (Gauge), m: measured - predicted of that number. They are no
+/// position errors, and never compared with them.
 struct GaugeFigures {
   int rows = 0;
   double nominal = 0, calibrated = 0, compensated = 0;  ///< rms
   double max = 0;                                       ///< of compensated, magnitude
-  double coverage_95 = 0;                               ///< share of rows inside their 95 % interval
+  double coverage_95 = 0;  ///< share of rows inside their 95 % interval
   int in_domain = 0;
   std::optional<double> coverage_95_stated;  ///< as Evaluation::coverage_95_stated
 };
 
 /// The three levels of one model on the same poses.
 struct Evaluation {
-  int poses = 0;  ///< with a position; 0: of gauges alone, and all figures of positions are not numbers
+  int poses =
+      0;  ///< with a position; 0: of gauges alone, and all figures of positions are not numbers
   ErrorFigures nominal, calibrated, compensated;
   double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
   int in_domain = 0;
-  /// Mean over the coordinates of -log N(error; 0, stddev²), compensated, nat, positions in m; in mm it is 6.9 more
-  /// (nlpd_in_mm()). Smaller is better: it rewards small errors and honest standard deviations. Empty where a standard
-  /// deviation is 0, and in models from before it was kept.
+  /// Mean over the coordinates of -log N(error; 0, stddev²), compensated, nat, positions in m; in
+  /// mm it is 6.9 more (nlpd_in_mm()). Smaller is better: it rewards small errors and honest
+  /// standard deviations. Empty where a standard deviation is 0, and in models from before it was
+  /// kept.
   std::optional<double> nlpd;
   std::optional<OrientationFigures> orientation;  ///< where orientations were measured
   std::optional<GaugeFigures> gauges;             ///< where distances or touches were
-  /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models from before it was
-  /// kept.
+  /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models
+  /// from before it was kept.
   std::optional<double> bias_gain_z;
-  /// Share of coordinates inside the 95 % interval of the stated sigma alone. Intervals that were widened until they
-  /// held show nothing; this share shows whether the model is as good as the instrument. Empty in models from before it
-  /// was kept.
+  /// Share of coordinates inside the 95 % interval of the stated sigma alone. Intervals that were
+  /// widened until they held show nothing; this share shows whether the model is as good as the
+  /// instrument. Empty in models from before it was kept.
   std::optional<double> coverage_95_stated;
 };
 [[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
 
 /// Mean over the coordinates of -log N(error; 0, stddev²), nat; empty where a stddev is 0.
-[[nodiscard]] std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev);
+[[nodiscard]] std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error,
+                                                         const Eigen::Matrix3Xd& stddev);
 /// Share of coordinates inside their 95 % interval; a column for each row that was measured.
 [[nodiscard]] double coverage_95(const Eigen::MatrixXd& error, const Eigen::MatrixXd& stddev);
 

@@ -3,23 +3,29 @@
 #include "server/compensate/joint_steps.h"
 #include "server/robot/inverse_kinematics.h"
 
-/// Arms of fewer than six joints, such as a SCARA, can bring the tool's point to its target but turn the tool in some
-/// ways only. Here the point comes first: it lands where it is wanted, and the tool is turned as nearly as the arm can.
+/// Arms of fewer than six joints, such as a SCARA, can bring the tool's point to its target but
+/// turn the tool in some ways only. Here the point comes first: it lands where it is wanted, and
+/// the tool is turned as nearly as the arm can.
 namespace trammel {
 
 [[nodiscard]] bool has_few_joints(const Chain& robot);
 
-/// Nominal joints near `seed` for a tool wanted at `X_BT`, as inverse_kinematics(). kUnreachable: the point is out of
-/// reach, or more than 0.01 deg of the orientation would be left, which is more than the rounding of a wanted one.
-[[nodiscard]] InverseResult inverse_kinematics_of_few(const Chain& robot, const Pose& X_BT, const Pose& X_FT,
-                                                      const JointVector& seed);
+/// Nominal joints near `seed` for a tool wanted at `X_BT`, as inverse_kinematics(). kUnreachable:
+/// the point is out of reach, or more than 0.01 deg of the orientation would be left, which is more
+/// than the rounding of a wanted one.
+[[nodiscard]] InverseResult inverse_kinematics_of_few(const Chain& robot, const Pose& X_BT,
+                                                      const Pose& X_FT, const JointVector& seed);
 
 /// From the joints `start`, where `missing_at_start` is missing.
-[[nodiscard]] CorrectedJoints correct_few_joints(const Chain& robot, const Pose& X_FT, const JointVector& start,
-                                                 const Vector6& missing_at_start, const MissingAt& missing_at,
+[[nodiscard]] CorrectedJoints correct_few_joints(const Chain& robot, const Pose& X_FT,
+                                                 const JointVector& start,
+                                                 const Vector6& missing_at_start,
+                                                 const MissingAt& missing_at,
                                                  const CorrectOptions& options);
 
-/// Whether these joints of inverse_kinematics_of_few(), kUnreachable, bring the tool's point to where it is wanted.
-[[nodiscard]] bool point_is_reached(const Chain& robot, const Pose& X_BT, const Pose& X_FT, const JointVector& q);
+/// Whether these joints of inverse_kinematics_of_few(), kUnreachable, bring the tool's point to
+/// where it is wanted.
+[[nodiscard]] bool point_is_reached(const Chain& robot, const Pose& X_BT, const Pose& X_FT,
+                                    const JointVector& q);
 
 }  // namespace trammel

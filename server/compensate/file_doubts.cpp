@@ -31,26 +31,31 @@ const Drawing kDrawing[] = {{"q", from_deg(1), "deg", to_deg(1)},
 /// The kind of `d4`; none of `theta7` (of a rail, which stands as it was mounted) or `C2`.
 const Drawing* drawing_of(const std::string& name) {
   const std::size_t digits = name.find_first_of("0123456789");
-  if (digits == std::string::npos || name.find_first_not_of("0123456789", digits) != std::string::npos) return nullptr;
+  if (digits == std::string::npos ||
+      name.find_first_not_of("0123456789", digits) != std::string::npos)
+    return nullptr;
   const std::string_view symbol = std::string_view(name).substr(0, digits);
   for (const Drawing& one : kDrawing)
     if (symbol == one.symbol) return &one;
   return nullptr;
 }
 
-/// Of an error source of the arm: its parameters that are farther off than a robot may be by more than their
-/// uncertainty.
-std::string off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
+/// Of an error source of the arm: its parameters that are farther off than a robot may be by more
+/// than their uncertainty.
+std::string off_drawing(const PhysicalModel& model,
+                        const std::vector<IdentifiedParameter>& parameters) {
   std::string off;
   std::size_t first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
     const std::size_t count = source->parameters().size();
-    for (std::size_t i = first; i < first + count && source->cause().part == causes::Part::kLinks; ++i) {
+    for (std::size_t i = first; i < first + count && source->cause().part == causes::Part::kLinks;
+         ++i) {
       const IdentifiedParameter& one = parameters[i];
       const Drawing* drawing = drawing_of(one.parameter.name);
       if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
-      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ", one.parameter.name,
-                         drawing->per_si * one.value, drawing->unit, drawing->per_si * drawing->limit);
+      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ",
+                         one.parameter.name, drawing->per_si * one.value, drawing->unit,
+                         drawing->per_si * drawing->limit);
     }
     first += count;
   }
@@ -64,7 +69,8 @@ std::string rows_of(const std::vector<SuspectPose>& suspects) {
   for (const SuspectPose& pose : suspects) rows.push_back(pose.row);
   std::sort(rows.begin(), rows.end());
   const std::size_t shown = std::min(rows.size(), kMost);
-  const std::string text = fmt::format("{}", fmt::join(rows.begin(), rows.begin() + static_cast<long>(shown), ", "));
+  const std::string text =
+      fmt::format("{}", fmt::join(rows.begin(), rows.begin() + static_cast<long>(shown), ", "));
   return shown < rows.size() ? fmt::format("{} and {} more", text, rows.size() - shown) : text;
 }
 
@@ -77,24 +83,26 @@ std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspect
   const bool many = static_cast<double>(count) > kMany * (static_cast<double>(count) + others);
   double worst = 0;
   for (const SuspectPose& pose : suspects) worst = std::max(worst, pose.distance);
-  return Note{"rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
-              fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly {}: {} {}; "
-                          "measure {} again",
-                          count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
-                          count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
+  return Note{
+      "rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
+      fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly "
+                  "{}: {} {}; measure {} again",
+                  count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
+                  count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
 }
 
-std::optional<Note> robot_off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
+std::optional<Note> robot_off_drawing(const PhysicalModel& model,
+                                      const std::vector<IdentifiedParameter>& parameters) {
   const std::string off = off_drawing(model, parameters);
   if (off.empty()) return std::nullopt;
   // A model of the wrong robot file fits positions and is of no use for corrected poses.
   return Note{
       kOffDrawing, Severity::kStop,
       fmt::format(
-          "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
-          "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
-          "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
-          "confirm-robot)",
+          "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the "
+          "cell file the one that was measured (null in its place finds it)? Where the file is not "
+          "the controller's, corrected poses land off by the difference, since the controller "
+          "solves them with its own arm: compare them (trammel confirm-robot)",
           off)};
 }
 

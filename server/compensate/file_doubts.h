@@ -11,14 +11,15 @@ namespace trammel {
 /// Of a robot file that cannot be this robot's: no corrected pose can be promised.
 constexpr const char* kOffDrawing = "robot_off_drawing";
 
-/// Of rows that were measured beside `others` and do not fit them: which, and by how much. More than a tenth are no
-/// single mistakes, and stop a model. Empty where there are none.
-[[nodiscard]] std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others);
+/// Of rows that were measured beside `others` and do not fit them: which, and by how much. More
+/// than a tenth are no single mistakes, and stop a model. Empty where there are none.
+[[nodiscard]] std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects,
+                                                       int others);
 
-/// Of a robot file with a number that is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
-/// zero), by what was identified: `parameters` of `model`. It stops a model. Whoever looks at a calibration asks here:
-/// a training, and a diagnosis.
-[[nodiscard]] std::optional<Note> robot_off_drawing(const PhysicalModel& model,
-                                                    const std::vector<IdentifiedParameter>& parameters);
+/// Of a robot file with a number that is farther off than a robot is off its drawing (3 mm, 3 mrad,
+/// 1 degree of a zero), by what was identified: `parameters` of `model`. It stops a model. Whoever
+/// looks at a calibration asks here: a training, and a diagnosis.
+[[nodiscard]] std::optional<Note> robot_off_drawing(
+    const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace trammel {
 
 namespace {
 
-/// The arm and the covariance of its parameters, with the anchors of its cell file where it has none of its own.
+/// The arm and the covariance of its parameters, with the anchors of its cell file where it has
+/// none of its own.
 struct Gauging {
   PhysicalModel physics;
   Eigen::MatrixXd covariance;
@@ -20,9 +21,11 @@ struct Gauging {
 Gauging gauging_of(const ModelParts& parts) {
   Gauging gauging{parts.physics, parts.covariance};
   const auto& sources = gauging.physics.sources;
-  if (std::any_of(sources.begin(), sources.end(), [](const auto& source) { return source->name() == kAnchors; }))
+  if (std::any_of(sources.begin(), sources.end(),
+                  [](const auto& source) { return source->name() == kAnchors; }))
     return gauging;
-  Result<ErrorSourcePtr> anchors = make_instrument_source(std::string(kAnchors), *parts.physics.cell);
+  Result<ErrorSourcePtr> anchors =
+      make_instrument_source(std::string(kAnchors), *parts.physics.cell);
   TRAMMEL_CHECK(anchors);
   const auto P = gauging.physics.values.size();
   const auto more = static_cast<Eigen::Index>((*anchors)->parameters().size());
@@ -34,20 +37,22 @@ Gauging gauging_of(const ModelParts& parts) {
   return gauging;
 }
 
-/// A value at one pose, and its variance beside the instrument's noise where a bias has a part in it.
+/// A value at one pose, and its variance beside the instrument's noise where a bias has a part in
+/// it.
 struct Told {
   double value = 0, variance = 0;
 };
 
 /// By the tool as it is predicted with its bias.
-Told told_with_bias(const ErrorPrediction& prediction, const Gauge& gauge, const PlacedAnchor& anchor,
-                    const PhysicalModel& physics) {
+Told told_with_bias(const ErrorPrediction& prediction, const Gauge& gauge,
+                    const PlacedAnchor& anchor, const PhysicalModel& physics) {
   const GaugedLength length = gauged_length(gauge.kind, *anchor.said, anchor.p_W(physics.values),
                                             physics.X_WB * prediction.X_BT_predicted.translation());
   const Vector3 along_B = physics.X_WB.linear().transpose() * length.by_point_W;
   const double tracker = physics.cell->tracker.sigma * physics.cell->tracker.sigma;
   return {length.value + anchor.zero_at(physics.values),
-          std::max(0.0, along_B.dot(prediction.covariance_B * along_B) - tracker * along_B.squaredNorm())};
+          std::max(0.0, along_B.dot(prediction.covariance_B * along_B) -
+                            tracker * along_B.squaredNorm())};
 }
 
 double nominal_of(const PhysicalModel& physics, const PoseContext& context, const Gauge& gauge,
@@ -73,7 +78,8 @@ CompensatedModel::GaugeErrors CompensatedModel::gauge_errors(const MeasurementBa
     if (batch.measurements[i].gauge) errors.rows.push_back(i);
   }
   const auto n = static_cast<Eigen::Index>(errors.rows.size());
-  for (Eigen::VectorXd* one : {&errors.nominal, &errors.calibrated, &errors.compensated, &errors.stddev})
+  for (Eigen::VectorXd* one :
+       {&errors.nominal, &errors.calibrated, &errors.compensated, &errors.stddev})
     one->resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[errors.rows[static_cast<std::size_t>(i)]];
@@ -101,7 +107,8 @@ CompensatedModel::GaugeErrors CompensatedModel::gauge_errors(const MeasurementBa
     Eigen::RowVectorXd J;
     const double calibrated = predicted_gauge(physics, poses[0], gauge, physics.values, &J);
     // Without a bias what the anchors and the arm leave uncertain is known together.
-    variance += inside_->bias ? with_bias.variance : (J * gauging.covariance * J.transpose()).value();
+    variance +=
+        inside_->bias ? with_bias.variance : (J * gauging.covariance * J.transpose()).value();
     errors.nominal(i) = gauge.value - nominal_of(physics, poses[0], gauge, anchor);
     errors.calibrated(i) = gauge.value - calibrated;
     errors.compensated(i) = gauge.value - (inside_->bias ? with_bias.value : calibrated);

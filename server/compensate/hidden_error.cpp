@@ -15,11 +15,13 @@ constexpr double kAll = 0.995;
 constexpr double kChanged = 1.1;  // times what is promised
 constexpr int kAsked = 40;        // poses of the domain
 
-/// m² per axis: the variance of the true error that the model states, mean over some poses of its domain.
+/// m² per axis: the variance of the true error that the model states, mean over some poses of its
+/// domain.
 double stated_variance(const CompensatedModel& model) {
   const std::vector<PoseContext> poses = poses_in_range(model, kAsked);
   double sum = 0;
-  for (const ErrorPrediction& one : model.predict_all(poses)) sum += one.true_stddev_B.squaredNorm() / 3;
+  for (const ErrorPrediction& one : model.predict_all(poses))
+    sum += one.true_stddev_B.squaredNorm() / 3;
   return poses.empty() ? 0 : sum / static_cast<double>(poses.size());
 }
 
@@ -29,7 +31,8 @@ double left_within_sigma(const ModelParts& parts) {
   const double freedom = 3.0 * parts.training.poses - parts.rank;
   if (freedom < kFreedom) return 0;
   const double left = parts.training.calibrated.rms * std::sqrt(parts.training.poses / freedom);
-  // Rows that are means of repeats, or state a sigma of their own, have a smaller one, and do not all lie within it.
+  // Rows that are means of repeats, or state a sigma of their own, have a smaller one, and do not
+  // all lie within it.
   const bool all_inside = parts.training.coverage_95_stated.value_or(0) > kAll;
   return all_inside && left < kOverstated * parts.physics.cell->tracker.sigma ? left : 0;
 }

@@ -9,8 +9,9 @@ constexpr double kRegular = 1e-12;
 
 }  // namespace
 
-CorrectedJoints settle_joints(JointVector start, const Vector6& missing_at_start, const JointStep& next,
-                              const MissingAt& missing_at, double tolerance, int max_iterations) {
+CorrectedJoints settle_joints(JointVector start, const Vector6& missing_at_start,
+                              const JointStep& next, const MissingAt& missing_at, double tolerance,
+                              int max_iterations) {
   CorrectedJoints now{start, missing_at_start};
   bool asked_here = true;  // what was learned
   while (true) {
@@ -27,8 +28,8 @@ CorrectedJoints settle_joints(JointVector start, const Vector6& missing_at_start
   }
 }
 
-Eigen::VectorXd least_with_held(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, const Eigen::MatrixXd& held,
-                                const Eigen::VectorXd& values) {
+Eigen::VectorXd least_with_held(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                                const Eigen::MatrixXd& held, const Eigen::VectorXd& values) {
   const Eigen::Index n = H.rows();
   const Eigen::Index m = held.rows();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n + m, n + m);

@@ -7,11 +7,13 @@
 
 namespace trammel {
 
-/// Whether the model was trained with the tool and the payload of this measurement, and both are still in its cell.
+/// Whether the model was trained with the tool and the payload of this measurement, and both are
+/// still in its cell.
 [[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
 
-/// Whether the model learned from this row of a batch: it is the batch that it was trained on or refitted with, but for
-/// the rows that its column `set` holds out; or its bias was learned at these joints, to the last digit.
+/// Whether the model learned from this row of a batch: it is the batch that it was trained on or
+/// refitted with, but for the rows that its column `set` holds out; or its bias was learned at
+/// these joints, to the last digit.
 class LearnedFrom {
  public:
   /// `hash`: batch_hash() of the batch as it came.
@@ -24,6 +26,7 @@ class LearnedFrom {
 };
 
 /// The rows that the model knows().
-[[nodiscard]] MeasurementBatch known_rows(const CompensatedModel& model, const MeasurementBatch& batch);
+[[nodiscard]] MeasurementBatch known_rows(const CompensatedModel& model,
+                                          const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -30,7 +30,8 @@ std::string excerpt(std::string_view text) { return shown_short(text, 120); }
 /// Whether the file is of the format that is read.
 Status check_format(const Members& members, const std::string& where) {
   const auto said = members.find("trammel_model");
-  if (said == members.end()) return refused("not a Trammel model: no trammel_model").in(where).of("trammel_model");
+  if (said == members.end())
+    return refused("not a Trammel model: no trammel_model").in(where).of("trammel_model");
   if (said->second == std::to_string(kFormat)) return {};
   return refused("model format {}, this program reads {}", excerpt(said->second), kFormat)
       .in(where)
@@ -38,13 +39,16 @@ Status check_format(const Members& members, const std::string& where) {
       .with_text(excerpt(said->second));
 }
 
-/// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing one.
+/// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing
+/// one.
 Status check_keys(const Members& members, const std::string& where) {
-  static const std::set<std::string_view> kKeys = {"content", "hash",       "self_test",    "self_test_hash",
-                                                   "stamp",   "stamp_hash", "trammel_model"};
+  static const std::set<std::string_view> kKeys = {
+      "content", "hash", "self_test", "self_test_hash", "stamp", "stamp_hash", "trammel_model"};
   for (const auto& [key, value] : members) {
     if (!kKeys.contains(key))
-      return refused("not a Trammel model: unknown key {}", excerpt(key)).in(where).of(excerpt(key));
+      return refused("not a Trammel model: unknown key {}", excerpt(key))
+          .in(where)
+          .of(excerpt(key));
   }
   for (const std::string_view key : kKeys) {
     if (!members.contains(std::string(key)))
@@ -54,13 +58,17 @@ Status check_keys(const Members& members, const std::string& where) {
 }
 
 /// Whether `by` is the hash of `of`, both as their bytes stand in the file.
-Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
+Status check_hash(const Members& members, const std::string& of, const std::string& by,
+                  const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
   if (members.at(by) == '"' + hash + '"') return {};
-  return refused("damaged: its {} is {}, its {} has {}", by, excerpt(members.at(by)), of, hash).in(where).of(by);
+  return refused("damaged: its {} is {}, its {} has {}", by, excerpt(members.at(by)), of, hash)
+      .in(where)
+      .of(by);
 }
 
-/// Whether no byte was changed since the file was written. Looks at the bytes, before anything is made of them.
+/// Whether no byte was changed since the file was written. Looks at the bytes, before anything is
+/// made of them.
 Status check_undamaged(const Members& members, const std::string& where) {
   TRY(check_format(members, where));
   TRY(check_keys(members, where));
@@ -69,11 +77,13 @@ Status check_undamaged(const Members& members, const std::string& where) {
   return check_hash(members, "self_test", "self_test_hash", where);
 }
 
-Result<CompensatedModel> checked_model(const Members& members, const std::string& where, ModelTexts texts) {
+Result<CompensatedModel> checked_model(const Members& members, const std::string& where,
+                                       ModelTexts texts) {
   TRY(check_undamaged(members, where));
   const Json content = Json::parse(members.at("content"));
   const Json stamp = Json::parse(members.at("stamp"));
-  const Status can_be_told = texts == ModelTexts::kChecked ? model_file::check_texts(content, stamp) : Status();
+  const Status can_be_told =
+      texts == ModelTexts::kChecked ? model_file::check_texts(content, stamp) : Status();
   if (!can_be_told) return Failure(can_be_told.error()).in(where);
   ModelParts parts = TRY(model_file::parts_from(content, stamp, where));
   const Status possible = model_file::check_parts(parts);
@@ -83,7 +93,8 @@ Result<CompensatedModel> checked_model(const Members& members, const std::string
     const Status same = model_file::check_self_test(*model, Json::parse(members.at("self_test")));
     if (!same) model = tl::make_unexpected(same.error());
   }
-  return std::move(model).map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
+  return std::move(model).map_error(
+      [&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
 }  // namespace
@@ -103,7 +114,8 @@ std::string serialize(const CompensatedModel& model) {
   return file.dump();
 }
 
-Result<CompensatedModel> deserialize(const std::string& text, const std::string& where, ModelTexts texts) {
+Result<CompensatedModel> deserialize(const std::string& text, const std::string& where,
+                                     ModelTexts texts) {
   try {
     return json_members(text, where).and_then([&](const Members& members) {
       return checked_model(members, where, texts);
@@ -111,7 +123,8 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
   } catch (const Json::exception& error) {
     return refused("not a Trammel model: {}", excerpt(error.what())).in(where);
   } catch (const std::bad_alloc&) {
-    return failure(ErrorCode::kTooLarge, "its {} bytes ask for more memory than there is", text.size())
+    return failure(ErrorCode::kTooLarge, "its {} bytes ask for more memory than there is",
+                   text.size())
         .in(where)
         .with_value(text.size());
   }
@@ -126,7 +139,8 @@ Result<std::string> undamaged_hash(const std::string& text, const std::string& w
 }
 
 Result<CompensatedModel> load_model(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return deserialize(text, path); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return deserialize(text, path); });
 }
 
 }  // namespace trammel

@@ -13,15 +13,17 @@ namespace trammel {
 /// How much is asked of the names, sentences and times of a model, which change no answer.
 enum class ModelTexts {
   kChecked,   ///< of a file from outside: see check_texts()
-  kAsTheyAre  ///< of a model that was accepted before: it goes on, and whoever shows them cleans them
+  kAsTheyAre  ///< of a model that was accepted before: it goes on, and whoever shows them cleans
+              ///< them
 };
-/// The model that `text` holds; `where` names the file in messages. Refuses a text that is no model, whose hash does
-/// not fit its content, or whose numbers or texts no model can have.
-[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where,
+/// The model that `text` holds; `where` names the file in messages. Refuses a text that is no
+/// model, whose hash does not fit its content, or whose numbers or texts no model can have.
+[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text,
+                                                   const std::string& where,
                                                    ModelTexts texts = ModelTexts::kChecked);
 [[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
-/// Whether no byte of a model's text was changed since it was written, by its own hashes; returns that of its content.
-/// Cheap: makes no model of it.
+/// Whether no byte of a model's text was changed since it was written, by its own hashes; returns
+/// that of its content. Cheap: makes no model of it.
 [[nodiscard]] Result<std::string> undamaged_hash(const std::string& text, const std::string& where);
 
 }  // namespace trammel

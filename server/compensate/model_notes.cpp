@@ -21,12 +21,15 @@ namespace {
 
 using Severity = Note::Severity;
 
-constexpr double kNothing = 1e-9;    // m, rad: a parameter whose prior moves the tool by less has no effect
-constexpr double kElsewhere = 1e-3;  // m: a tool that moved by more turns through other errors of the arm
-constexpr double kSameRms = 1e-9;    // relative
-constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
+constexpr double kNothing =
+    1e-9;  // m, rad: a parameter whose prior moves the tool by less has no effect
+constexpr double kElsewhere =
+    1e-3;  // m: a tool that moved by more turns through other errors of the arm
+constexpr double kSameRms = 1e-9;  // relative
+constexpr int kAskedPoses = 5;     // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
-constexpr int kAfterEverything = 1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
+constexpr int kAfterEverything =
+    1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
 
 /// A pose with everything recorded that a source may need.
 PoseContext eventful(const CompensatedModel::Parts& parts, int k) {
@@ -61,16 +64,18 @@ Eigen::VectorXd effects(const CompensatedModel::Parts& parts) {
       most = most.cwiseMax(J.colwise().lpNorm<Eigen::Infinity>().transpose());
     }
   }
-  for (std::size_t i = 0; i < parameters.size(); ++i) most(static_cast<Eigen::Index>(i)) *= parameters[i].prior_scale;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    most(static_cast<Eigen::Index>(i)) *= parameters[i].prior_scale;
   return most;
 }
 
 bool carries_nothing(const CompensatedModel::Parts& parts) {
   const Cell& cell = *parts.physics.cell;
-  const bool loaded = std::any_of(parts.trained_with.begin(), parts.trained_with.end(), [&](const auto& used) {
-    const auto payload = cell.payloads.find(used.second);
-    return payload != cell.payloads.end() && payload->second.mass > 0;
-  });
+  const bool loaded =
+      std::any_of(parts.trained_with.begin(), parts.trained_with.end(), [&](const auto& used) {
+        const auto payload = cell.payloads.find(used.second);
+        return payload != cell.payloads.end() && payload->second.mass > 0;
+      });
   return !loaded && !cell.robot.has_link_masses();
 }
 
@@ -89,7 +94,8 @@ std::string so_it_is(const CompensatedModel::Parts& parts, const ErrorSource& id
 std::string what_would_give_way() {
   std::string text;
   for (const CauseRecord* record : all_causes()) {
-    if (record->gives_way) text += fmt::format("{}no {}", text.empty() ? "" : ", ", record->plain_name);
+    if (record->gives_way)
+      text += fmt::format("{}no {}", text.empty() ? "" : ", ", record->plain_name);
   }
   return text;
 }
@@ -109,11 +115,12 @@ std::string idle_sentence(const CompensatedModel::Parts& parts, const ErrorSourc
   const CauseRecord& cause = source.cause();
   const std::string name = in_words(source.name());
   if (cause.needs.payload && !cause.gives_way)
-    return fmt::format("{} does nothing here: nothing gives way under a load ({})", name, what_would_give_way());
+    return fmt::format("{} does nothing here: nothing gives way under a load ({})", name,
+                       what_would_give_way());
   if (cause.gives_way && carries_nothing(parts)) {
     return fmt::format(
-        "{} does nothing here: neither link masses nor a payload with a mass are given, {}; give payloads: {{NAME: "
-        "{{mass_kg: ..., cog_mm: [x, y, z]}}}} in the cell file",
+        "{} does nothing here: neither link masses nor a payload with a mass are given, {}; give "
+        "payloads: {{NAME: {{mass_kg: ..., cog_mm: [x, y, z]}}}} in the cell file",
         name, so_it_is(parts, source));
   }
   return fmt::format("{} does nothing here: at these poses it has nothing to act on", name);
@@ -125,7 +132,8 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<Note>& n
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    if (count > 0 && !is_of_instruments(*source) && effect.segment(first, count).maxCoeff() < kNothing)
+    if (count > 0 && !is_of_instruments(*source) &&
+        effect.segment(first, count).maxCoeff() < kNothing)
       notes.push_back({"idle_source", Severity::kInfo, idle_sentence(parts, *source)});
     first += count;
   }
@@ -133,10 +141,10 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<Note>& n
 
 void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
   if (confirmation_of(cell)) return;
-  notes.push_back({kNotConfirmed, Severity::kInfo,
-                   "nobody has compared the robot file with the controller (trammel confirm-robot): where a length in "
-                   "it is not the "
-                   "controller's, corrected poses land off by the difference"});
+  notes.push_back(
+      {kNotConfirmed, Severity::kInfo,
+       "nobody has compared the robot file with the controller (trammel confirm-robot): where a "
+       "length in it is not the controller's, corrected poses land off by the difference"});
 }
 
 /// m: what is left of an axis of a training pose, or of a gauge, and what was stated for it.
@@ -144,8 +152,8 @@ struct LeftOver {
   double left = 0, stated = 0;
 };
 
-/// `rms` is of all rows. The discrepancy counts neither what the rows' own sigmas explain nor single bad poses, and the
-/// rms counts no bias.
+/// `rms` is of all rows. The discrepancy counts neither what the rows' own sigmas explain nor
+/// single bad poses, and the rms counts no bias.
 LeftOver left_over(const CompensatedModel::Parts& parts, double rms, double stated) {
   return {std::min(rms, std::hypot(parts.discrepancy, stated)), stated};
 }
@@ -154,7 +162,8 @@ LeftOver left_over(const CompensatedModel::Parts& parts, double rms, double stat
 double stated_of_gauges(const Cell& cell) {
   double stated = 0;
   if (const Result<Anchors> anchors = anchors_of(cell)) {
-    for (const auto& [id, anchor] : *anchors) stated = std::max(stated, anchor.sigma.value_or(cell.tracker.sigma));
+    for (const auto& [id, anchor] : *anchors)
+      stated = std::max(stated, anchor.sigma.value_or(cell.tracker.sigma));
   }
   return stated > 0 ? stated : cell.tracker.sigma;
 }
@@ -166,7 +175,8 @@ LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   if (parts.training.poses > 0)
     worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), cell.tracker.sigma);
   if (!parts.training.gauges) return worst;
-  const LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
+  const LeftOver gauges =
+      left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
   return gauges.left * worst.stated > worst.left * gauges.stated ? gauges : worst;
 }
 
@@ -177,33 +187,38 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
   if (!(times >= kLeads)) return;
   notes.push_back(
       {"left_over_sigma", times >= kStops ? Severity::kStop : Severity::kWarning,
-       fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm an axis, stated {:.3f} mm): "
-                   "the intervals "
-                   "were widened to fit, so their coverage does not show that the model is right (trammel diagnose)",
+       fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm an "
+                   "axis, stated {:.3f} mm): the intervals were widened to fit, so their coverage "
+                   "does not show that the model is right (trammel diagnose)",
                    times, to_mm(worst.left), to_mm(worst.stated))});
 }
 
-/// What the physics leaves is the most that the instrument's own error can be. Where more is stated, an error of the
-/// arm is taken for the instrument's. Said where that changes a promise: without a bias it is promised with
-/// (hidden_by_sigma()), and that is for information.
+/// What the physics leaves is the most that the instrument's own error can be. Where more is
+/// stated, an error of the arm is taken for the instrument's. Said where that changes a promise:
+/// without a bias it is promised with (hidden_by_sigma()), and that is for information.
 void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   const bool counted = parts.discrepancy > 0;
-  const double left = !parts.bias ? (counted ? left_within_sigma(parts) : 0) : hidden_by_sigma(model);
+  const double left =
+      !parts.bias ? (counted ? left_within_sigma(parts) : 0) : hidden_by_sigma(model);
   if (left == 0) return;
   notes.push_back(
       {"sigma_overstated", parts.bias ? Severity::kWarning : Severity::kInfo,
-       fmt::format("{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: {}; state "
-                   "the instrument's own sigma (tracker: sigma_mm) and train again",
-                   to_mm(left), to_mm(parts.physics.cell->tracker.sigma),
-                   parts.bias ? "what the arm errs may be taken for the instrument's error, and is not promised"
-                              : "all that is left is taken for the arm's error, which makes what is promised larger")});
+       fmt::format(
+           "{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: "
+           "{}; state the instrument's own sigma (tracker: sigma_mm) and train again",
+           to_mm(left), to_mm(parts.physics.cell->tracker.sigma),
+           parts.bias
+               ? "what the arm errs may be taken for the instrument's error, and is not promised"
+               : "all that is left is taken for the arm's error, which makes what is promised "
+                 "larger")});
 }
 
 /// The drawing knows no number of the batch, so nothing can make its errors small.
 void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const Evaluation& training = parts.training;
-  if (auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma, training.poses))
+  if (auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma,
+                                        training.poses))
     notes.push_back({"computed_positions", Severity::kWarning, *std::move(text)});
 }
 
@@ -216,7 +231,8 @@ void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& no
 }
 
 void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
-  for (const CellDoubt& doubt : doubts_of(cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
+  for (const CellDoubt& doubt : doubts_of(cell))
+    notes.push_back({doubt.code, Severity::kWarning, doubt.text});
 }
 
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
@@ -225,12 +241,13 @@ void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
   const PhysicalModel& then = parts.bias_origin->physics;
   for (const auto& [name, X_FT] : parts.physics.tools) {
     const double moved =
-        (served_tool(parts.physics, name).translation() - served_tool(then, name).translation()).norm();
+        (served_tool(parts.physics, name).translation() - served_tool(then, name).translation())
+            .norm();
     if (moved < kElsewhere) continue;
     notes.push_back({"tool_moved", Severity::kInfo,
-                     fmt::format("the bias was learned with tool '{}' {:.1f} mm from where it is now: its kernel does "
-                                 "not follow what turns the "
-                                 "flange to the new point; learn it anew (--bias) where that matters",
+                     fmt::format("the bias was learned with tool '{}' {:.1f} mm from where it is "
+                                 "now: its kernel does not follow what turns the flange to the new "
+                                 "point; learn it anew (--bias) where that matters",
                                  name, to_mm(moved))});
   }
 }
@@ -244,21 +261,23 @@ void add_changes(const CompensatedModel& model, std::vector<Note>& notes) {
 
 void add_sessions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const LeftOutSession& session : parts.sessions_left_out)
-    notes.push_back({"session_left_out", Severity::kWarning,
-                     fmt::format("nothing was learned from session {}: {}", session.id, session.why)});
+    notes.push_back(
+        {"session_left_out", Severity::kWarning,
+         fmt::format("nothing was learned from session {}: {}", session.id, session.why)});
   for (const SessionSetting& session : parts.sessions) {
     if (session.scale != 0) {
       notes.push_back(
           {"session_scale", Severity::kInfo,
-           fmt::format("session {} measured lengths {:.1f} ppm {} than session {}: it has a scale of its own",
-                       session.id, 1e6 * std::abs(session.scale), session.scale < 0 ? "longer" : "shorter",
-                       parts.sessions.back().id)});
+           fmt::format("session {} measured lengths {:.1f} ppm {} than session {}: it has a scale "
+                       "of its own",
+                       session.id, 1e6 * std::abs(session.scale),
+                       session.scale < 0 ? "longer" : "shorter", parts.sessions.back().id)});
     }
     if (session.own_noise == 0 && session.own_noise_rotation == 0) continue;
     notes.push_back(
         {"session_noisier", Severity::kInfo,
-         fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: it counts "
-                     "for less",
+         fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: "
+                     "it counts for less",
                      session.id, to_mm(session.own_noise), to_deg(session.own_noise_rotation))});
   }
 }
@@ -269,17 +288,19 @@ long measured_numbers(const Evaluation& training) {
   return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);
 }
 
-/// A fit of r combinations to n numbers leaves sqrt(1 - r/n) of their rms: below n = 2 r more than a third is hidden.
+/// A fit of r combinations to n numbers leaves sqrt(1 - r/n) of their rms: below n = 2 r more than
+/// a third is hidden.
 void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const long numbers = measured_numbers(parts.training);
-  if (!parts.provenance.refits.empty() || parts.training.poses == 0 || numbers >= 2L * parts.rank) return;
+  if (!parts.provenance.refits.empty() || parts.training.poses == 0 || numbers >= 2L * parts.rank)
+    return;
   const double each = static_cast<double>(numbers) / parts.training.poses;
   const double enough = std::ceil(2.0 * static_cast<double>(parts.parameters.size()) / each);
   notes.push_back(
       {"too_few_poses", Severity::kWarning,
-       fmt::format("{} combinations of parameters were fitted to {} measured numbers of {} poses: what is left at "
-                   "these poses is "
-                   "small by that alone and does not tell how well others are met; train on {:.0f} poses or more",
+       fmt::format("{} combinations of parameters were fitted to {} measured numbers of {} poses: "
+                   "what is left at these poses is small by that alone and does not tell how well "
+                   "others are met; train on {:.0f} poses or more",
                    parts.rank, numbers, parts.training.poses, enough)});
 }
 
@@ -287,9 +308,9 @@ void add_sides(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const std::string side = one_sided(parts.measured);
   if (side.empty()) return;
   notes.push_back({kOneSide, Severity::kWarning,
-                   fmt::format("the arm came to the training poses {} only: nothing is promised of poses that it comes "
-                               "to from the other side, where the play of the gears puts the tool elsewhere "
-                               "(trammel plan goes both ways)",
+                   fmt::format("the arm came to the training poses {} only: nothing is promised of "
+                               "poses that it comes to from the other side, where the play of the "
+                               "gears puts the tool elsewhere (trammel plan goes both ways)",
                                side)});
 }
 
@@ -305,11 +326,13 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_left_over(model.parts(), notes);
   add_overstated(model, notes);
   add_computed_positions(model.parts(), notes);
-  if (auto rows = rows_that_do_not_fit(model.parts().suspects, model.parts().provenance.training_poses))
+  if (auto rows =
+          rows_that_do_not_fit(model.parts().suspects, model.parts().provenance.training_poses))
     notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
-  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters)) notes.push_back(*std::move(off));
+  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters))
+    notes.push_back(*std::move(off));
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);
   add_confirmation(model.cell(), notes);
@@ -329,7 +352,8 @@ std::optional<Note> stop_of(const CompensatedModel& model) {
   return std::move(notes.front());
 }
 
-std::vector<Note> warnings_of(const CompensatedModel& model, const std::optional<Evaluation>& evaluation) {
+std::vector<Note> warnings_of(const CompensatedModel& model,
+                              const std::optional<Evaluation>& evaluation) {
   std::vector<Note> all = notes_of(model);
   const std::optional<std::string> doubt = evaluation ? doubt_of_bias(*evaluation) : std::nullopt;
   if (doubt) all.push_back({"bias_doubtful", Severity::kWarning, *doubt});
@@ -341,11 +365,12 @@ std::optional<std::string> doubt_of_bias(const Evaluation& evaluation) {
   const double without = evaluation.calibrated.rms;
   // Without a bias the two are the same up to rounding.
   const bool worse = with > without * (1 + kSameRms) || (evaluation.bias_gain_z && with >= without);
-  const bool by_chance = evaluation.bias_gain_z && *evaluation.bias_gain_z <= PairedGain::kBeyondChance;
+  const bool by_chance =
+      evaluation.bias_gain_z && *evaluation.bias_gain_z <= PairedGain::kBeyondChance;
   if (!worse && !by_chance) return std::nullopt;
   return fmt::format("the bias {} here: {:.4f} mm with it, {:.4f} mm without on {} poses{}",
-                     worse ? "does not help" : "is not shown to help", to_mm(with), to_mm(without), evaluation.poses,
-                     worse ? "" : ", no more than chance would make of it");
+                     worse ? "does not help" : "is not shown to help", to_mm(with), to_mm(without),
+                     evaluation.poses, worse ? "" : ", no more than chance would make of it");
 }
 
 }  // namespace trammel

@@ -27,7 +27,8 @@ struct RefitRecord {
   int poses = 0;
 };
 
-/// Where a model comes from. `refits` tells what was identified anew since it was trained, in that order.
+/// Where a model comes from. `refits` tells what was identified anew since it was trained, in that
+/// order.
 struct ModelProvenance {
   std::string id;     ///< first 12 characters of the hash
   std::string hash;   ///< SHA-256 of the model's content
@@ -65,37 +66,49 @@ struct ModelParts {
   double observability_index = 0;  ///< see CalibrationResult, as the next two
   std::vector<SuspectPose> suspects;
   std::vector<double> cost_record;
-  /// Of several sessions: what belongs to each, the newest last, in whose world the base stands; empty: there was one.
+  /// Of several sessions: what belongs to each, the newest last, in whose world the base stands;
+  /// empty: there was one.
   std::vector<SessionSetting> sessions;
-  bool sessions_as_given = false;  ///< no clock told their order: they are in that in which they were given
+  bool sessions_as_given =
+      false;  ///< no clock told their order: they are in that in which they were given
   std::vector<LeftOutSession> sessions_left_out;
-  std::vector<Change> changes;  ///< of the arm between these sessions; their sources are among those of the physics
-  double discrepancy = 0;       ///< m per axis, see CalibrationResult
-  std::optional<BiasChoice> bias_choice;   ///< where the bias was `auto`: what was tried and what it is worth
-  std::optional<BiasState> bias;           ///< without features, which follow from the physics and bias_contexts
-  std::optional<BiasState> rotation_bias;  ///< of the same poses: residuals are rotation vectors in B, rad
-  /// For a bias that was kept while sources were identified anew: the physics that it was learned beside, with all the
-  /// parameters that its blocks knew; and P x P, SI, the covariance of the parameters identified since, which the bias
-  /// does not know.
+  std::vector<Change>
+      changes;  ///< of the arm between these sessions; their sources are among those of the physics
+  double discrepancy = 0;  ///< m per axis, see CalibrationResult
+  std::optional<BiasChoice>
+      bias_choice;  ///< where the bias was `auto`: what was tried and what it is worth
+  std::optional<BiasState>
+      bias;  ///< without features, which follow from the physics and bias_contexts
+  std::optional<BiasState>
+      rotation_bias;  ///< of the same poses: residuals are rotation vectors in B, rad
+  /// For a bias that was kept while sources were identified anew: the physics that it was learned
+  /// beside, with all the parameters that its blocks knew; and P x P, SI, the covariance of the
+  /// parameters identified since, which the bias does not know.
   struct BiasOrigin {
     PhysicalModel physics;
     Eigen::MatrixXd covariance;
   };
   std::optional<BiasOrigin> bias_origin;
-  int oriented_poses = 0;                   ///< where only some poses had an orientation and none is learned: how many
-  std::vector<PoseContext> bias_contexts;   ///< of the bias' observations; empty without blocks
-  std::optional<double> temperature_mean;   ///< degrees Celsius, of the training poses; empty where not recorded
-  double temperature_stddev = 0;            ///< K
-  JointVector q_min, q_max;                 ///< range of the training poses, rad
-  std::optional<WhatWasMeasured> measured;  ///< of the training poses; empty in models from before it was recorded
-  JointVector extrapolation_slope;          ///< see Domain::growth(); empty in models from before it was learned
-  double prior_share_limit = 0;             ///< a pose in domain has no larger prior share
-  double bias_spread = 1;  ///< times the standard deviation of what a pose misses, the instrument's aside
-  std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
-  ModelProvenance provenance;                                  ///< id and hash are filled in by make()
-  Evaluation training;                                         ///< on its training poses
-  std::optional<Evaluation> validation;                        ///< on poses held out from training
-  std::optional<ErrorBudget> budget;  ///< at the training poses; empty where none has a position
+  int oriented_poses =
+      0;  ///< where only some poses had an orientation and none is learned: how many
+  std::vector<PoseContext> bias_contexts;  ///< of the bias' observations; empty without blocks
+  std::optional<double>
+      temperature_mean;  ///< degrees Celsius, of the training poses; empty where not recorded
+  double temperature_stddev = 0;  ///< K
+  JointVector q_min, q_max;       ///< range of the training poses, rad
+  std::optional<WhatWasMeasured>
+      measured;  ///< of the training poses; empty in models from before it was recorded
+  JointVector
+      extrapolation_slope;  ///< see Domain::growth(); empty in models from before it was learned
+  double prior_share_limit = 0;  ///< a pose in domain has no larger prior share
+  double bias_spread =
+      1;  ///< times the standard deviation of what a pose misses, the instrument's aside
+  std::set<std::pair<std::string, std::string>>
+      trained_with;                      ///< tool and payload of each training pose
+  ModelProvenance provenance;            ///< id and hash are filled in by make()
+  Evaluation training;                   ///< on its training poses
+  std::optional<Evaluation> validation;  ///< on poses held out from training
+  std::optional<ErrorBudget> budget;     ///< at the training poses; empty where none has a position
 };
 
 }  // namespace trammel

@@ -13,7 +13,11 @@ namespace {
 Error in_cell_file(Error why, const char* key, const Cell& cell, const std::string& file) {
   why.field.clear();
   why.row = row_of_model_key(cell, key);
-  return Failure(std::move(why)).as(ErrorCode::kRefused).under(fmt::format("model: {}", key)).in(file).value();
+  return Failure(std::move(why))
+      .as(ErrorCode::kRefused)
+      .under(fmt::format("model: {}", key))
+      .in(file)
+      .value();
 }
 
 std::vector<Error> check_sources(const Cell& cell) {
@@ -23,7 +27,8 @@ std::vector<Error> check_sources(const Cell& cell) {
     if (!made) problems.push_back(made.error());
   }
   if (!problems.empty()) return problems;
-  const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
+  const auto together =
+      make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
   if (!together) problems.push_back(together.error());
   return problems;
 }

@@ -14,8 +14,10 @@ struct SpecUse {
   bool bias = true;
 };
 
-/// What a training would refuse of the cell's own `model`: a bias that is none, an error source that is unknown, stands
-/// twice or asks for what the cell has not. Each error is kRefused and names `file`, row and key.
-[[nodiscard]] std::vector<Error> check_model_spec(const Cell& cell, const std::string& file, SpecUse use = {});
+/// What a training would refuse of the cell's own `model`: a bias that is none, an error source
+/// that is unknown, stands twice or asks for what the cell has not. Each error is kRefused and
+/// names `file`, row and key.
+[[nodiscard]] std::vector<Error> check_model_spec(const Cell& cell, const std::string& file,
+                                                  SpecUse use = {});
 
 }  // namespace trammel

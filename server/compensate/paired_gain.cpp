@@ -16,7 +16,8 @@ namespace {
 double signed_rank_z(const Eigen::VectorXd& differences) {
   if (!differences.allFinite()) return 0;
   std::vector<double> d;
-  std::copy_if(differences.begin(), differences.end(), std::back_inserter(d), [](double one) { return one != 0; });
+  std::copy_if(differences.begin(), differences.end(), std::back_inserter(d),
+               [](double one) { return one != 0; });
   std::sort(d.begin(), d.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
   double sum = 0;
   for (std::size_t first = 0, last = 0; first < d.size(); first = last) {
@@ -24,8 +25,8 @@ double signed_rank_z(const Eigen::VectorXd& differences) {
     const double rank = 0.5 * static_cast<double>(first + 1 + last);
     for (std::size_t i = first; i < last; ++i) sum += std::copysign(rank, d[i]);
   }
-  // The variance of ranks without ties. That of mean ranks is smaller: nine equal differences would pass in 2 of 100
-  // cases.
+  // The variance of ranks without ties. That of mean ranks is smaller: nine equal differences would
+  // pass in 2 of 100 cases.
   const auto n = static_cast<double>(d.size());
   return d.empty() ? 0 : sum / std::sqrt(n * (n + 1) * (2 * n + 1) / 6);
 }
@@ -66,9 +67,11 @@ PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& a
 }
 
 std::string to_string(const PairedGain& gain) {
-  return fmt::format("{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit {:.2f}){}",
-                     to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses, verdict(gain), gain.z(),
-                     PairedGain::kBeyondChance, judged_without(gain.left_out));
+  return fmt::format(
+      "{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit "
+      "{:.2f}){}",
+      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses, verdict(gain), gain.z(),
+      PairedGain::kBeyondChance, judged_without(gain.left_out));
 }
 
 std::string judged_without(const std::vector<std::string>& poses) {

@@ -19,17 +19,18 @@ BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   return now;
 }
 
-/// Sets the prior shares to those with the arm as it was learned: a tool that has moved since makes no pose an unknown
-/// one. The motion of the tool's point is in the covariance.
-void share_as_learned(const BiasModel& bias, const BiasPhysics& then, const std::vector<PoseContext>& poses,
-                      const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& now,
+/// Sets the prior shares to those with the arm as it was learned: a tool that has moved since makes
+/// no pose an unknown one. The motion of the tool's point is in the covariance.
+void share_as_learned(const BiasModel& bias, const BiasPhysics& then,
+                      const std::vector<PoseContext>& poses, const Eigen::MatrixXd& q,
+                      const std::vector<BiasFeatures>& now,
                       std::vector<BiasPrediction>& predictions) {
   std::vector<BiasFeatures> as_learned;
   bool moved = false;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     as_learned.push_back(then.at(poses[i]));
-    moved =
-        moved || as_learned.back().by_parameter != now[i].by_parameter || as_learned.back().lever_F != now[i].lever_F;
+    moved = moved || as_learned.back().by_parameter != now[i].by_parameter ||
+            as_learned.back().lever_F != now[i].lever_F;
   }
   if (!moved) return;
   const std::vector<BiasPrediction> known = bias.predict_all(q, as_learned);
@@ -67,7 +68,8 @@ std::vector<CompensatedModel::Learned> CompensatedModel::turn(std::vector<Learne
   return all;
 }
 
-std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vector<PoseContext>& poses) const {
+std::vector<CompensatedModel::Learned> CompensatedModel::learned(
+    const std::vector<PoseContext>& poses) const {
   const BiasModel& bias = *inside_->bias;
   Eigen::MatrixXd q(static_cast<Eigen::Index>(poses.size()), cell().robot.size());
   std::vector<PoseContext> contexts;
@@ -90,7 +92,8 @@ std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vect
   return turn(std::move(all));
 }
 
-std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<PoseContext>& poses) const {
+std::vector<ErrorPrediction> CompensatedModel::predict_all(
+    const std::vector<PoseContext>& poses) const {
   std::vector<Learned> all;
   if (inside_->bias) all = learned(poses);
   std::vector<ErrorPrediction> predictions;
@@ -106,7 +109,8 @@ Vector3 taken(const Vector3& mean_B, const Vector3& nearby_B, double weight) {
   return (mean_B - nearby_B) + weight * nearby_B;
 }
 
-Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& features, double weight) {
+Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& features,
+              double weight) {
   const Vector3 mean_B = bias.mean_B(q, features);
   if (!bias.has_blocks()) return weight * mean_B;
   return weight == 1 ? mean_B : taken(mean_B, bias.nearby_mean_all_B(q.transpose()).row(0), weight);
@@ -114,11 +118,13 @@ Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& f
 
 }  // namespace
 
-CompensatedModel::LearnedMotion CompensatedModel::learned_motion(const PoseContext& context, double bias_weight) const {
+CompensatedModel::LearnedMotion CompensatedModel::learned_motion(const PoseContext& context,
+                                                                 double bias_weight) const {
   LearnedMotion motion;
   if (!inside_->bias) return motion;
   const std::optional<BiasModel>& rotation = inside_->rotation_bias;
-  const BiasFeatures of_position = inside_->bias->needs_features() ? features(context) : BiasFeatures{};
+  const BiasFeatures of_position =
+      inside_->bias->needs_features() ? features(context) : BiasFeatures{};
   const Matrix3 turn = inside_->bias_turn.value_or(Matrix3::Identity());
   motion.shift = turn * taken(*inside_->bias, context.q, of_position, bias_weight);
   if (!rotation) return motion;
@@ -167,7 +173,8 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
   for (const ErrorSourcePtr& source : physics.sources) {
     const ContextNeeds needs = source->needs();
     warm = warm || needs.temperature;
-    if (needs.before && !context.before && source->joint() >= 0) add(come_from_afar(context, source->joint()));
+    if (needs.before && !context.before && source->joint() >= 0)
+      add(come_from_afar(context, source->joint()));
     if (!needs.direction || !context.direction.empty()) continue;
     PoseContext approached = context;
     approached.direction.assign(static_cast<std::size_t>(context.q.size()), 0);
@@ -184,31 +191,39 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
 
 namespace {
 
-/// How uncertain a pose is beside its bias: of the position, m and m², or of the rotation, rad and rad².
+/// How uncertain a pose is beside its bias: of the position, m and m², or of the rotation, rad and
+/// rad².
 struct Uncertainty {
   Matrix3 identified;  ///< covariance that the parameters leave
   Matrix3 since;       ///< the part of it that was identified after the bias was learned
   double metrology;    ///< variance of one axis: the instrument's
-  double unlearned;    ///< variance of one axis where no bias is taken: what the physics leaves over
-  double growth;       ///< variance of one axis that grows with the distance from the training poses
-  Vector3 bias_size;   ///< rms of the bias over the training poses, where no slope was learned
+  double unlearned;   ///< variance of one axis where no bias is taken: what the physics leaves over
+  double growth;      ///< variance of one axis that grows with the distance from the training poses
+  Vector3 bias_size;  ///< rms of the bias over the training poses, where no slope was learned
 };
 
 /// Covariance of one measurement.
-/// - Noise is never less than the instrument's: a fit to few poses takes some of the noise for signal.
-/// - What the parameters leave uncertain: a bias that has the parameters (`has_parameters`) counts it itself. Any other
+/// - Noise is never less than the instrument's: a fit to few poses takes some of the noise for
+/// signal.
+/// - What the parameters leave uncertain: a bias that has the parameters (`has_parameters`) counts
+/// it itself. Any other
 ///   bias corrects it as far as the bias is taken and knows the pose; the rest counts in full.
 /// - No bias corrects what was identified after it was learned.
-/// - What of the bias is not taken may be missing. It is as large as the bias is there, or was at the training poses.
-/// - The bias' own covariance stays: far from its poses a kernel has its prior, blocks what the data left them.
-Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters, const Uncertainty& of) {
+/// - What of the bias is not taken may be missing. It is as large as the bias is there, or was at
+/// the training poses.
+/// - The bias' own covariance stays: far from its poses a kernel has its prior, blocks what the
+/// data left them.
+Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters,
+                  const Uncertainty& of) {
   const Vector3 known = bias.stddev_B.cwiseAbs2();
   const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(of.metrology);
   const Vector3 untaken = bias.nearby_B.cwiseAbs2().cwiseMax(of.bias_size.cwiseAbs2());
   const double left_of_identified = has_parameters ? 0 : weight * bias.prior_share + (1 - weight);
-  Matrix3 covariance = bias.covariance_B + left_of_identified * of.identified + (1 - left_of_identified) * of.since;
+  Matrix3 covariance =
+      bias.covariance_B + left_of_identified * of.identified + (1 - left_of_identified) * of.since;
   covariance.diagonal() += weight * noise + (1 - weight) * noise.cwiseMax(of.unlearned) +
-                           (1 - weight) * (1 - weight) * untaken + Vector3::Constant((1 - weight) * of.growth);
+                           (1 - weight) * (1 - weight) * untaken +
+                           Vector3::Constant((1 - weight) * of.growth);
   return covariance;
 }
 
@@ -247,7 +262,8 @@ Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const Bi
                  .growth = 0,
                  .bias_size = inside_->bias_size_B};
   if (inside_->bias->has_blocks()) {
-    // With blocks the slope is of what the bias misses beyond its own covariance; else it is of the physics.
+    // With blocks the slope is of what the bias misses beyond its own covariance; else it is of the
+    // physics.
     of.unlearned = of.metrology;
     of.growth = pose.growth;
   }
@@ -260,15 +276,17 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
   const double weight = prediction->bias_weight;
   const Eigen::MatrixXd J_B = pose.X_BW.linear() * pose.J_W.bottomRows<3>();
   const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
-  prediction->X_BT_predicted.linear() =
-      (rotation_exp(taken(bias.mean_B, bias.nearby_B, weight)) * prediction->X_BT_predicted.linear()).eval();
+  prediction->X_BT_predicted.linear() = (rotation_exp(taken(bias.mean_B, bias.nearby_B, weight)) *
+                                         prediction->X_BT_predicted.linear())
+                                            .eval();
   const Uncertainty of{.identified = identified(J_B),
                        .since = identified_since(J_B),
                        .metrology = instrument,
                        .unlearned = instrument,
                        .growth = 0,
                        .bias_size = inside_->rotation_bias_size_B};
-  prediction->rotation_stddev_B = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
+  prediction->rotation_stddev_B =
+      with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
 }
 
 ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned) const {
@@ -278,13 +296,14 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   ErrorPrediction prediction;
   prediction.X_BT_nominal = pose.X_BW * physics.nominal_pose_W(context);
   prediction.X_BT_predicted = pose.X_BW * physics.pose_W(context, physics.values, &pose.J_W);
-  const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
+  const Matrix3 unsaid =
+      covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
   Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
   const bool trained_with = learned_with(context.tool, context.payload);
   const std::optional<WhatWasMeasured>& measured = parts().measured;
   if (measured) domain.margin = measured->range_margin();
-  prediction.in_domain =
-      trained_with && domain.in_range(context.q) && (!measured || measured->is_near(cell().robot, context.q));
+  prediction.in_domain = trained_with && domain.in_range(context.q) &&
+                         (!measured || measured->is_near(cell().robot, context.q));
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 
   Matrix3 covariance;
@@ -295,10 +314,14 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
     const double share = learned->position.prior_share;
     prediction.in_domain &= share <= parts().prior_share_limit;
     prediction.bias_weight = trained_with ? domain.bias_weight(context.q, share) : 0.0;
-    covariance = spread(add_position_bias(pose, learned->position, &prediction), prediction.bias_weight) + unsaid;
+    covariance =
+        spread(add_position_bias(pose, learned->position, &prediction), prediction.bias_weight) +
+        unsaid;
     if (inside_->bias_has_parameters && prediction.bias_weight < 1) {
-      // Near its poses the bias has learned this; part of it went into the weights, so its direction is not known.
-      const Vector3 left_B = inside_->bias_physics.beyond_first_order(context, inside_->bias->parameter_weights());
+      // Near its poses the bias has learned this; part of it went into the weights, so its
+      // direction is not known.
+      const Vector3 left_B =
+          inside_->bias_physics.beyond_first_order(context, inside_->bias->parameter_weights());
       covariance.diagonal().array() += (1 - prediction.bias_weight) * left_B.squaredNorm();
     }
     if (learned->rotation) add_rotation_bias(pose, *learned->rotation, &prediction);
@@ -307,7 +330,8 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   prediction.stddev_B = covariance.diagonal().cwiseSqrt();
   const double metrology = cell().tracker.sigma * cell().tracker.sigma;
   prediction.true_stddev_B = (covariance.diagonal().array() - metrology).max(0.0).sqrt();
-  prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
+  prediction.error_B =
+      prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
   return prediction;
 }
 

@@ -30,19 +30,21 @@ void add_runs(const VectorXd& values, ResidualOrder& order) {
   const auto count = static_cast<double>(n);
   order.runs += runs;
   order.expected += both / count + 1;
-  order.stddev = std::hypot(order.stddev, std::sqrt(both * (both - count) / (count * count * (count - 1))));
+  order.stddev =
+      std::hypot(order.stddev, std::sqrt(both * (both - count) / (count * count * (count - 1))));
 }
 
 double correlation_of_next(const Eigen::MatrixXd& rows) {
   const Eigen::MatrixXd centred = rows.colwise() - rows.rowwise().mean();
   const Index n = centred.cols();
   if (n < 2 || centred.isZero(0)) return 0;
-  return centred.leftCols(n - 1).cwiseProduct(centred.rightCols(n - 1)).sum() / centred.squaredNorm();
+  return centred.leftCols(n - 1).cwiseProduct(centred.rightCols(n - 1)).sum() /
+         centred.squaredNorm();
 }
 
 /// m: how far each pose is off in the direction in which the joint moves the tool.
-VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batch, const Eigen::Matrix3Xd& residual_B,
-                     int joint) {
+VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batch,
+                     const Eigen::Matrix3Xd& residual_B, int joint) {
   const Chain& robot = model.cell().robot;
   VectorXd along(residual_B.cols());
   for (Index i = 0; i < along.size(); ++i) {
@@ -54,8 +56,8 @@ VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batc
   return along;
 }
 
-/// Poses, and what is left of each in the mean of the rows at its joint vector: rows of one pose keep one sign, and
-/// that is no structure.
+/// Poses, and what is left of each in the mean of the rows at its joint vector: rows of one pose
+/// keep one sign, and that is no structure.
 std::pair<MeasurementBatch, Eigen::Matrix3Xd> one_a_pose(const MeasurementBatch& batch,
                                                          const Eigen::Matrix3Xd& residual_B) {
   const std::vector<PoseGroup> poses = pose_groups(batch);
@@ -70,13 +72,15 @@ std::pair<MeasurementBatch, Eigen::Matrix3Xd> one_a_pose(const MeasurementBatch&
   return {std::move(first), std::move(mean_B)};
 }
 
-ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch, const VectorXd& along, int joint) {
+ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch,
+                             const VectorXd& along, int joint) {
   std::vector<Index> sorted(static_cast<std::size_t>(along.size()));
   std::iota(sorted.begin(), sorted.end(), Index{0});
   const auto angle = [&](Index i) {
     return robot.gear_angles(batch.measurements[static_cast<std::size_t>(i)].context.q)(joint);
   };
-  std::stable_sort(sorted.begin(), sorted.end(), [&](Index a, Index b) { return angle(a) < angle(b); });
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](Index a, Index b) { return angle(a) < angle(b); });
   ResidualOrder order;
   order.joint = joint;
   const VectorXd in_order = along(sorted);
@@ -87,7 +91,8 @@ ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch, 
 
 }  // namespace
 
-std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const MeasurementBatch& given,
+std::vector<ResidualOrder> residual_orders(const CompensatedModel& model,
+                                           const MeasurementBatch& given,
                                            const Eigen::Matrix3Xd& residual_of_rows_B) {
   const auto [batch, residual_B] = one_a_pose(given, residual_of_rows_B);
   ResidualOrder rows;
@@ -97,25 +102,28 @@ std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const 
   const Chain& robot = model.cell().robot;
   for (int joint = 0; joint < robot.size(); ++joint) {
     if (robot.joint(joint).type == JointType::kRevolute)
-      orders.push_back(order_of_joint(robot, batch, along_joint(model, batch, residual_B, joint), joint));
+      orders.push_back(
+          order_of_joint(robot, batch, along_joint(model, batch, residual_B, joint), joint));
   }
   return orders;
 }
 
 std::optional<ResidualOrder> most_structured(const std::vector<ResidualOrder>& orders) {
-  const auto farthest = std::max_element(orders.begin(), orders.end(),
-                                         [](const ResidualOrder& a, const ResidualOrder& b) { return a.z() < b.z(); });
-  if (farthest == orders.end() || farthest->z() <= ResidualOrder::kBeyondChance) return std::nullopt;
+  const auto farthest = std::max_element(
+      orders.begin(), orders.end(),
+      [](const ResidualOrder& a, const ResidualOrder& b) { return a.z() < b.z(); });
+  if (farthest == orders.end() || farthest->z() <= ResidualOrder::kBeyondChance)
+    return std::nullopt;
   return *farthest;
 }
 
 std::string in_words(const ResidualOrder& order) {
-  const std::string by = order.joint < 0 ? "from row to row" : fmt::format("in the order of joint {}", order.joint + 1);
+  const std::string by = order.joint < 0 ? "from row to row"
+                                         : fmt::format("in the order of joint {}", order.joint + 1);
   return fmt::format(
-      "what the calibrated model leaves here is no noise: {} it keeps its sign, {:.0f} stretches where noise makes "
-      "{:.0f} "
-      "± {:.0f} (run test), correlation from one pose to the next {:.2f}; the parameters are less certain than their "
-      "U(k=2) says",
+      "what the calibrated model leaves here is no noise: {} it keeps its sign, {:.0f} stretches "
+      "where noise makes {:.0f} ± {:.0f} (run test), correlation from one pose to the next {:.2f}; "
+      "the parameters are less certain than their U(k=2) says",
       by, order.runs, order.expected, 2 * order.stddev, order.correlation);
 }
 

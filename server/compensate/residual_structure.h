@@ -10,9 +10,10 @@
 /// Whether what a model leaves over is noise, or a function of something.
 namespace trammel {
 
-/// What residuals look like in one order of the poses: that of the rows, or that of one joint's angle. Noise changes
-/// its sign as often as a coin does; what wanders with the order changes it less often (Wald and Wolfowitz, On a test
-/// whether two samples are from the same population, 1940).
+/// What residuals look like in one order of the poses: that of the rows, or that of one joint's
+/// angle. Noise changes its sign as often as a coin does; what wanders with the order changes it
+/// less often (Wald and Wolfowitz, On a test whether two samples are from the same population,
+/// 1940).
 struct ResidualOrder {
   int joint = -1;          ///< 0-based; -1: the order of the rows
   double runs = 0;         ///< number of stretches of one sign
@@ -26,17 +27,19 @@ struct ResidualOrder {
   static constexpr double kBeyondChance = 3.72;
 };
 
-/// All orders of a batch (its rows, then each joint that turns), for residuals in B (3 x N). In the order of the rows
-/// it is the three axes together. In that of a joint it is how far the tool is off in the direction in which the joint
-/// moves it.
-[[nodiscard]] std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const MeasurementBatch& batch,
+/// All orders of a batch (its rows, then each joint that turns), for residuals in B (3 x N). In the
+/// order of the rows it is the three axes together. In that of a joint it is how far the tool is
+/// off in the direction in which the joint moves it.
+[[nodiscard]] std::vector<ResidualOrder> residual_orders(const CompensatedModel& model,
+                                                         const MeasurementBatch& batch,
                                                          const Eigen::Matrix3Xd& residual_B);
 
 /// The order that is farthest from noise, if one is beyond chance.
-[[nodiscard]] std::optional<ResidualOrder> most_structured(const std::vector<ResidualOrder>& orders);
+[[nodiscard]] std::optional<ResidualOrder> most_structured(
+    const std::vector<ResidualOrder>& orders);
 
-/// `what the calibrated model leaves is no noise: in the order of joint 2 it keeps its sign (...): its parameters are
-/// less certain than their U(k=2) says`
+/// `what the calibrated model leaves is no noise: in the order of joint 2 it keeps its sign (...):
+/// its parameters are less certain than their U(k=2) says`
 [[nodiscard]] std::string in_words(const ResidualOrder& order);
 
 }  // namespace trammel

@@ -7,6 +7,9 @@
 namespace trammel {
 
 ServedModel::ServedModel(std::string of_cell, int of_version, CompensatedModel served)
-    : cell(std::move(of_cell)), version(of_version), model(std::move(served)), notes(notes_of(model)) {}
+    : cell(std::move(of_cell)),
+      version(of_version),
+      model(std::move(served)),
+      notes(notes_of(model)) {}
 
 }  // namespace trammel

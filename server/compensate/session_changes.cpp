@@ -21,10 +21,13 @@ std::pair<double, std::string> shown(const Parameter& parameter) {
 }
 
 /// Without the row at which it began: `slip3`.
-std::string plain_name(const Parameter& parameter) { return parameter.name.substr(0, parameter.name.find('@')); }
+std::string plain_name(const Parameter& parameter) {
+  return parameter.name.substr(0, parameter.name.find('@'));
+}
 
 /// Places of the parameters of these sources.
-std::vector<Eigen::Index> places_of(const PhysicalModel& physics, const std::vector<std::string>& sources) {
+std::vector<Eigen::Index> places_of(const PhysicalModel& physics,
+                                    const std::vector<std::string>& sources) {
   std::vector<Eigen::Index> places;
   Eigen::Index next = 0;
   for (const ErrorSourcePtr& source : physics.sources) {
@@ -40,19 +43,22 @@ std::vector<SessionChange::Size> sizes_of(const IdentifiedTogether& found, const
   for (const Eigen::Index place : places_of(found.physics, {change.source})) {
     const IdentifiedParameter& one = found.parameters[static_cast<std::size_t>(place)];
     const auto [scale, unit] = shown(one.parameter);
-    sizes.push_back({plain_name(one.parameter), unit, scale * one.value, kExpanded * scale * one.stddev});
+    sizes.push_back(
+        {plain_name(one.parameter), unit, scale * one.value, kExpanded * scale * one.stddev});
   }
   return sizes;
 }
 
 /// How far a zero has wandered: the sum of its steps.
-std::vector<SessionChange::Size> sum_of_steps(const IdentifiedTogether& found, const Change& change) {
+std::vector<SessionChange::Size> sum_of_steps(const IdentifiedTogether& found,
+                                              const Change& change) {
   const std::vector<Eigen::Index> places = places_of(found.physics, change.steps);
   if (places.empty()) return {};
   const Parameter& first = found.parameters[static_cast<std::size_t>(places.front())].parameter;
   const auto [scale, unit] = shown(first);
   double sum = 0;
-  for (const Eigen::Index place : places) sum += found.parameters[static_cast<std::size_t>(place)].value;
+  for (const Eigen::Index place : places)
+    sum += found.parameters[static_cast<std::size_t>(place)].value;
   const double stddev = std::sqrt(std::max(0.0, found.covariance(places, places).sum()));
   return {{plain_name(first), unit, scale * sum, kExpanded * scale * stddev}};
 }
@@ -71,20 +77,20 @@ std::string what_changed(const SessionChange& change) {
   switch (change.course) {
     case SessionChange::Course::kWanders:
       return fmt::format(
-          "slow drift: {}, {:.4f} mrad from session to session (a random walk); since session {} it has moved by {} "
-          "(U, k=2)",
+          "slow drift: {}, {:.4f} mrad from session to session (a random walk); since session {} "
+          "it has moved by {} (U, k=2)",
           cause_in_words(change.source), change.rate, change.session_id,
           change.sizes.empty() ? "an unknown amount" : number_of(change.sizes.front()));
     case SessionChange::Course::kThatAlone:
       return fmt::format(
-          "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat elsewhere ({}; U, k=2): "
-          "the sessions after it are as those before",
+          "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat "
+          "elsewhere ({}; U, k=2): the sessions after it are as those before",
           change.session_id, change.pose_id, numbers_of(change.sizes));
     case SessionChange::Course::kSince:
       break;
   }
-  return fmt::format("since session {} (pose {}): {} ({}; U, k=2)", change.session_id, change.pose_id,
-                     cause_in_words(change.source), numbers_of(change.sizes));
+  return fmt::format("since session {} (pose {}): {} ({}; U, k=2)", change.session_id,
+                     change.pose_id, cause_in_words(change.source), numbers_of(change.sizes));
 }
 
 SessionChange told(const IdentifiedTogether& found, const Change& change) {
@@ -119,24 +125,26 @@ std::vector<SessionChange> session_changes(const IdentifiedTogether& found) {
 
 std::vector<SessionChange> session_changes(const CompensatedModel& model) {
   const ModelParts& parts = model.parts();
-  return session_changes(IdentifiedTogether{parts.physics, parts.parameters, parts.covariance, parts.sessions,
-                                            parts.changes, parts.sessions_as_given});
+  return session_changes(IdentifiedTogether{parts.physics, parts.parameters, parts.covariance,
+                                            parts.sessions, parts.changes,
+                                            parts.sessions_as_given});
 }
 
 std::string sentence(const SessionChange& change) {
   std::string text = what_changed(change);
   std::vector<std::string> others;
   for (const std::string& other : change.could_also_be) others.push_back(cause_in_words(other));
-  if (!others.empty()) text += fmt::format("; ambiguous: it could also be {}", fmt::join(others, " or "));
+  if (!others.empty())
+    text += fmt::format("; ambiguous: it could also be {}", fmt::join(others, " or "));
   return change.rests_on_order ? text + kRestsOnOrder : text;
 }
 
-std::optional<std::string> note_on_order(const std::vector<SessionSetting>& sessions, bool as_given) {
+std::optional<std::string> note_on_order(const std::vector<SessionSetting>& sessions,
+                                         bool as_given) {
   if (!as_given || sessions.empty()) return std::nullopt;
   return fmt::format(
-      "the sessions stand in the order in which they were given, since not all of them have absolute times: {} is "
-      "taken "
-      "for the newest, and what changed is dated by that order",
+      "the sessions stand in the order in which they were given, since not all of them have "
+      "absolute times: {} is taken for the newest, and what changed is dated by that order",
       sessions.back().id);
 }
 
@@ -147,6 +155,8 @@ NamedCause named_cause(const std::string& source) {
   return {spelled.substr(0, colon), std::atoi(spelled.c_str() + colon + 1)};
 }
 
-std::string cause_in_words(const std::string& source) { return in_words(source.substr(0, source.find('@'))); }
+std::string cause_in_words(const std::string& source) {
+  return in_words(source.substr(0, source.find('@')));
+}
 
 }  // namespace trammel

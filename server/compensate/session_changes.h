@@ -45,12 +45,14 @@ struct IdentifiedTogether {
 [[nodiscard]] std::vector<SessionChange> session_changes(const IdentifiedTogether& found);
 [[nodiscard]] std::vector<SessionChange> session_changes(const CompensatedModel& model);
 
-/// For people: `since session lt-08 (pose p1): lost zero in joint 3 (q3 -0.2000 ± 0.0040 mrad; U, k=2)`.
+/// For people: `since session lt-08 (pose p1): lost zero in joint 3 (q3 -0.2000 ± 0.0040 mrad; U,
+/// k=2)`.
 [[nodiscard]] std::string sentence(const SessionChange& change);
 
-/// The order of the sessions says what is before and what after, and which of them is today's. Empty where the
-/// instruments' clocks told it, and where there is one session.
-[[nodiscard]] std::optional<std::string> note_on_order(const std::vector<SessionSetting>& sessions, bool as_given);
+/// The order of the sessions says what is before and what after, and which of them is today's.
+/// Empty where the instruments' clocks told it, and where there is one session.
+[[nodiscard]] std::optional<std::string> note_on_order(const std::vector<SessionSetting>& sessions,
+                                                       bool as_given);
 
 /// A source as the contract names it: the cause, and the joint where it concerns one.
 struct NamedCause {

@@ -14,19 +14,26 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNeighbour = 0.95;   // of the poses have their neighbour within the distance that counts
-constexpr double kBeyond = 1.5;       // times it: fresh poses lie between the measured ones, and a little outside
+constexpr double kNeighbour =
+    0.95;  // of the poses have their neighbour within the distance that counts
+constexpr double kBeyond =
+    1.5;  // times it: fresh poses lie between the measured ones, and a little outside
 constexpr double kFew = 4;            // among n poses the distance is known to 1 + 4/n
 constexpr double kLeastReach = 0.05;  // of the region's diagonal, where poses stand in clusters
-constexpr Eigen::Index kFewestOfTail = 12, kLeastTail = 2, kMostTail = 6;  // places; of a tail the outermost ones
-constexpr double kTailScales = 7;      // 1 of 1000 places is farther out; the reach ends it sooner where they are many
+constexpr Eigen::Index kFewestOfTail = 12, kLeastTail = 2,
+                       kMostTail = 6;  // places; of a tail the outermost ones
+constexpr double kTailScales =
+    7;  // 1 of 1000 places is farther out; the reach ends it sooner where they are many
 constexpr double kUsualMargin = 0.05;  // of a joint's range
-constexpr double kMarginOfFew = 45;    // over n² places, beside it: what a Latin hypercube of n leaves at its edges
+constexpr double kMarginOfFew =
+    45;  // over n² places, beside it: what a Latin hypercube of n leaves at its edges
 constexpr double kMostMargin = 0.1;
-constexpr double kRounding = 1e-6;      // m
-constexpr Eigen::Index kPlaces = 2000;  // at most, evenly among the poses: each prediction looks at all of them
-constexpr int kCells = 24;              // of the box along each axis
-constexpr double kBothSides = 0.1;      // of the poses that say it come from the rarer side, or a joint has but one
+constexpr double kRounding = 1e-6;  // m
+constexpr Eigen::Index kPlaces =
+    2000;                   // at most, evenly among the poses: each prediction looks at all of them
+constexpr int kCells = 24;  // of the box along each axis
+constexpr double kBothSides =
+    0.1;  // of the poses that say it come from the rarer side, or a joint has but one
 constexpr const char* kNotOnRecord = "not on record";
 
 double nearest(const Eigen::Matrix3Xd& places, const Vector3& place) {
@@ -49,16 +56,18 @@ std::vector<double> distances_to_neighbours(Eigen::Matrix3Xd places) {
 /// 16 x N, m: how far each place is in each direction of the outline.
 Eigen::MatrixXd along_outline(const Eigen::Matrix3Xd& places) {
   constexpr int kCount = WhatWasMeasured::kDirections;
-  const Eigen::ArrayXd angle = Eigen::ArrayXd::LinSpaced(kCount + 1, 0, 2 * std::numbers::pi).head(kCount);
+  const Eigen::ArrayXd angle =
+      Eigen::ArrayXd::LinSpaced(kCount + 1, 0, 2 * std::numbers::pi).head(kCount);
   Eigen::MatrixX2d directions(kCount, 2);
   directions << angle.cos().matrix(), angle.sin().matrix();
   return directions * places.topRows<2>();
 }
 
-/// 16, m: how far others of the same kind come beyond the outermost place in each direction of the outline, by how
-/// thinly the last places there are spread: times the mean by which they exceed the next one (of a tail that falls off
-/// exponentially, its scale). As far as the direction leads away from the base's axis: what lies behind it is another
-/// region, however few the places in front are.
+/// 16, m: how far others of the same kind come beyond the outermost place in each direction of the
+/// outline, by how thinly the last places there are spread: times the mean by which they exceed the
+/// next one (of a tail that falls off exponentially, its scale). As far as the direction leads away
+/// from the base's axis: what lies behind it is another region, however few the places in front
+/// are.
 Eigen::VectorXd beyond_outermost(const Eigen::MatrixXd& along) {
   const Eigen::VectorXd outermost = along.rowwise().maxCoeff();
   const double farthest = outermost.maxCoeff();
@@ -69,7 +78,8 @@ Eigen::VectorXd beyond_outermost(const Eigen::MatrixXd& along) {
     std::vector<double> places(static_cast<std::size_t>(along.cols()));
     Eigen::VectorXd::Map(places.data(), along.cols()) = along.row(d).transpose();
     std::partial_sort(places.begin(), places.begin() + last + 1, places.end(), std::greater<>());
-    const double scale = Eigen::VectorXd::Map(places.data(), last).mean() - places[static_cast<std::size_t>(last)];
+    const double scale =
+        Eigen::VectorXd::Map(places.data(), last).mean() - places[static_cast<std::size_t>(last)];
     beyond(d) = kTailScales * scale * std::clamp(outermost(d) / farthest, 0.0, 1.0);
   }
   return beyond;
@@ -83,7 +93,8 @@ void add_reach(WhatWasMeasured& measured) {
   const auto within = [&](double share) {
     return distances[static_cast<std::size_t>(share * static_cast<double>(distances.size() - 1))];
   };
-  const double least = kLeastReach * (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
+  const double least =
+      kLeastReach * (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
   const double few = 1 + kFew / static_cast<double>(places.cols());
   measured.reach = std::max(kBeyond * few * within(kNeighbour), least) + kRounding;
   const Eigen::MatrixXd along = along_outline(places);
@@ -101,7 +112,8 @@ std::vector<Eigen::Index> rows_to_keep(const MeasurementBatch& batch) {
 }
 
 /// m³ of the box within `reach` of a place.
-double volume_near(const Eigen::Matrix3Xd& places, const Vector3& lower, const Vector3& upper, double reach) {
+double volume_near(const Eigen::Matrix3Xd& places, const Vector3& lower, const Vector3& upper,
+                   double reach) {
   const Vector3 cell = (upper - lower) / kCells;
   int near = 0;
   for (int i = 0; i < kCells * kCells * kCells; ++i) {
@@ -143,13 +155,16 @@ std::optional<std::string> joints_of(const WhatWasMeasured& measured, Side side)
   return fmt::format(" in joint{} {}", joints.size() == 1 ? "" : "s", fmt::join(joints, " "));
 }
 
-/// `from both sides in joints 1 2, from above in joint 3`, of these sides; `every` begins what holds for all joints.
-std::string sides_text(const WhatWasMeasured& measured, const std::vector<std::pair<Side, const char*>>& sides,
-                       const char* every) {
+/// `from both sides in joints 1 2, from above in joint 3`, of these sides; `every` begins what
+/// holds for all joints.
+std::string sides_text(const WhatWasMeasured& measured,
+                       const std::vector<std::pair<Side, const char*>>& sides, const char* every) {
   std::string text;
   for (const auto& [side, name] : sides) {
     const auto joints = joints_of(measured, side);
-    if (joints) text += (text.empty() ? "" : ", ") + (joints->empty() ? every + std::string(name) : name + *joints);
+    if (joints)
+      text += (text.empty() ? "" : ", ") +
+              (joints->empty() ? every + std::string(name) : name + *joints);
   }
   return text;
 }
@@ -163,12 +178,12 @@ std::string cubic_metres(double volume) {
 std::string volume_text(const WhatWasMeasured& measured) {
   std::string text;
   for (int k = 0; k < 3; ++k)
-    text += fmt::format("{}{} {:.0f} to {:.0f}", k == 0 ? "" : ", ", "xyz"[k], to_mm(measured.lower(k)),
-                        to_mm(measured.upper(k)));
+    text += fmt::format("{}{} {:.0f} to {:.0f}", k == 0 ? "" : ", ", "xyz"[k],
+                        to_mm(measured.lower(k)), to_mm(measured.upper(k)));
   text += " mm of the tool from the robot's base";
   if (!measured.reach) return text;
-  return text + fmt::format(", {} of this box within {:.0f} mm of a measured place", cubic_metres(measured.volume),
-                            to_mm(*measured.reach));
+  return text + fmt::format(", {} of this box within {:.0f} mm of a measured place",
+                            cubic_metres(measured.volume), to_mm(*measured.reach));
 }
 
 }  // namespace
@@ -176,7 +191,8 @@ std::string volume_text(const WhatWasMeasured& measured) {
 bool WhatWasMeasured::is_near(const Chain& robot, const JointVector& q) const {
   if (!reach) return true;
   const Vector3 place = robot.flange_pose(q).translation();
-  const bool inside = outline.size() == 0 || (along_outline(place).array() <= outline.array()).all();
+  const bool inside =
+      outline.size() == 0 || (along_outline(place).array() <= outline.array()).all();
   return inside && nearest(flange_B, place) <= *reach;
 }
 
@@ -203,24 +219,30 @@ WhatWasMeasured what_was_measured(const PhysicalModel& physics, const Measuremen
   measured.flange_B.resize(3, static_cast<Eigen::Index>(rows.size()));
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const JointVector& q = batch.measurements[static_cast<std::size_t>(rows[k])].context.q;
-    measured.flange_B.col(static_cast<Eigen::Index>(k)) = physics.cell->robot.flange_pose(q).translation();
+    measured.flange_B.col(static_cast<Eigen::Index>(k)) =
+        physics.cell->robot.flange_pose(q).translation();
   }
   add_reach(measured);
   if (measured.reach)
-    measured.volume = volume_near(tool_B(Eigen::all, rows), measured.lower, measured.upper, *measured.reach);
+    measured.volume =
+        volume_near(tool_B(Eigen::all, rows), measured.lower, measured.upper, *measured.reach);
   return measured;
 }
 
 std::string one_sided(const std::optional<WhatWasMeasured>& measured) {
-  return measured ? sides_text(*measured, {{Side::kAbove, "from above"}, {Side::kBelow, "from below"}}, "") : "";
+  return measured ? sides_text(*measured,
+                               {{Side::kAbove, "from above"}, {Side::kBelow, "from below"}}, "")
+                  : "";
 }
 
 MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured, const Cell& cell) {
   const std::string instrument = papers_of(cell).value_or(CellPapers{}).instrument;
-  MeasuredWords words{kNotOnRecord, kNotOnRecord, kNotOnRecord,
-                      fmt::format("{}, {:.4g} mm (1 sigma, per axis) as stated",
-                                  instrument.empty() ? "an instrument that the cell file does not name" : instrument,
-                                  to_mm(cell.tracker.sigma))};
+  MeasuredWords words{
+      kNotOnRecord, kNotOnRecord, kNotOnRecord,
+      fmt::format(
+          "{}, {:.4g} mm (1 sigma, per axis) as stated",
+          instrument.empty() ? "an instrument that the cell file does not name" : instrument,
+          to_mm(cell.tracker.sigma))};
   if (!measured) return words;
   words.sides = sides_text(*measured,
                            {{Side::kBoth, "from both sides"},
@@ -230,18 +252,19 @@ MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured, const Cel
                            "every joint ");
   words.temperature = !measured->temperature ? "not measured"
                                              : fmt::format("{:.1f} to {:.1f} degrees Celsius",
-                                                           measured->temperature->first, measured->temperature->second);
+                                                           measured->temperature->first,
+                                                           measured->temperature->second);
   words.volume = volume_text(*measured);
   return words;
 }
 
 std::string in_words(const std::optional<WhatWasMeasured>& measured, const Cell& cell) {
   const MeasuredWords words = words_of(measured, cell);
-  const std::string poses = measured
-                                ? fmt::format("{} training pose{}", measured->poses, measured->poses == 1 ? "" : "s")
-                                : std::string("training poses of which the model tells little");
-  return fmt::format("{}; sides of approach: {}; temperature: {}; volume: {}; instrument: {}", poses, words.sides,
-                     words.temperature, words.volume, words.instrument);
+  const std::string poses =
+      measured ? fmt::format("{} training pose{}", measured->poses, measured->poses == 1 ? "" : "s")
+               : std::string("training poses of which the model tells little");
+  return fmt::format("{}; sides of approach: {}; temperature: {}; volume: {}; instrument: {}",
+                     poses, words.sides, words.temperature, words.volume, words.instrument);
 }
 
 }  // namespace trammel

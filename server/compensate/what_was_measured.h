@@ -18,33 +18,39 @@ struct WhatWasMeasured {
     int rising = 0, falling = 0;
   };
   int poses = 0;
-  std::vector<Approaches> approaches;                        ///< of each joint
-  std::optional<std::pair<double, double>> temperature;      ///< degrees Celsius, least and most; empty: not recorded
-  Vector3 lower = Vector3::Zero(), upper = Vector3::Zero();  ///< corners of a box in B that the tool was in, m
-  double volume = 0;          ///< m³: the part of the box within `reach` of a place where the tool was
+  std::vector<Approaches> approaches;  ///< of each joint
+  std::optional<std::pair<double, double>>
+      temperature;  ///< degrees Celsius, least and most; empty: not recorded
+  Vector3 lower = Vector3::Zero(),
+          upper = Vector3::Zero();  ///< corners of a box in B that the tool was in, m
+  double volume = 0;  ///< m³: the part of the box within `reach` of a place where the tool was
   Eigen::Matrix3Xd flange_B;  ///< places of the nominal flange, m
-  /// m: a pose whose flange is farther from all of them is another region of the robot. Empty where one joint vector
-  /// was measured, which tells no distance.
+  /// m: a pose whose flange is farther from all of them is another region of the robot. Empty where
+  /// one joint vector was measured, which tells no distance.
   std::optional<double> reach;
-  /// m: how far the places go in 16 horizontal directions, x of B first, and a little farther. A pose beyond is out of
-  /// the outline that they have from above: where places are few, their reach alone goes round to the robot's other
-  /// side. Empty without a reach, and in models from before it was kept.
+  /// m: how far the places go in 16 horizontal directions, x of B first, and a little farther. A
+  /// pose beyond is out of the outline that they have from above: where places are few, their reach
+  /// alone goes round to the robot's other side. Empty without a reach, and in models from before
+  /// it was kept.
   Eigen::VectorXd outline;
   static constexpr int kDirections = 16;
 
-  /// Whether the nominal flange at `q` is within reach of a place where it was measured, and inside their outline.
+  /// Whether the nominal flange at `q` is within reach of a place where it was measured, and inside
+  /// their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
-  /// Of a joint's range, how far beyond that of these poses others of the same kind come: a twentieth, more where they
-  /// are few.
+  /// Of a joint's range, how far beyond that of these poses others of the same kind come: a
+  /// twentieth, more where they are few.
   [[nodiscard]] double range_margin() const;
 };
 
-/// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances between the poses
-/// themselves: 1.5 times that within which 95 % of them have a neighbour, more where they are few, and no less than a
-/// twentieth of the region. The outline goes beyond the places by the median distance between neighbours, and away from
-/// the base by more where the outermost places are thinly spread: never towards the far side. What stands at one joint
-/// vector is one place and no neighbour of itself.
-[[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch);
+/// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances
+/// between the poses themselves: 1.5 times that within which 95 % of them have a neighbour, more
+/// where they are few, and no less than a twentieth of the region. The outline goes beyond the
+/// places by the median distance between neighbours, and away from the base by more where the
+/// outermost places are thinly spread: never towards the far side. What stands at one joint vector
+/// is one place and no neighbour of itself.
+[[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics,
+                                                const MeasurementBatch& batch);
 
 /// The same for people, each part by itself. Of a model without it, parts are `not on record`.
 struct MeasuredWords {
@@ -53,12 +59,14 @@ struct MeasuredWords {
   std::string volume;       ///< `x 600 to 1200, y ... mm of the tool from the robot's base, ...`
   std::string instrument;   ///< `laser tracker 17, 0.015 mm (1 sigma, per axis) as stated`
 };
-[[nodiscard]] MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured, const Cell& cell);
+[[nodiscard]] MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured,
+                                     const Cell& cell);
 /// All of it: `80 training poses; sides of approach: every joint from both sides; ...`
-[[nodiscard]] std::string in_words(const std::optional<WhatWasMeasured>& measured, const Cell& cell);
+[[nodiscard]] std::string in_words(const std::optional<WhatWasMeasured>& measured,
+                                   const Cell& cell);
 
-/// `from above`, `from above in joints 1 2, from below in joint 3`: of joints that came to nearly all poses from one
-/// side. Empty where there is none.
+/// `from above`, `from above in joints 1 2, from below in joint 3`: of joints that came to nearly
+/// all poses from one side. Empty where there is none.
 [[nodiscard]] std::string one_sided(const std::optional<WhatWasMeasured>& measured);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::size_t kFarthest = 5;
 constexpr std::size_t kNext = 12;
-constexpr double kNear = 0.1;  // of the joints' ranges at work, in every joint: such a pose tells the same
+constexpr double kNear =
+    0.1;  // of the joints' ranges at work, in every joint: such a pose tells the same
 
 std::vector<PoseContext> known_to(const CompensatedModel& in_force, const CompensatedModel* other,
                                   const std::vector<PoseContext>& poses) {
@@ -39,7 +40,8 @@ void compare(const std::vector<PoseContext>& poses, const std::vector<ErrorPredi
              const std::vector<ErrorPrediction>& then, WorkAsked& work) {
   double square = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const double step = (then[i].X_BT_predicted.translation() - now[i].X_BT_predicted.translation()).norm();
+    const double step =
+        (then[i].X_BT_predicted.translation() - now[i].X_BT_predicted.translation()).norm();
     square += step * step;
     work.farthest.push_back({poses[i], step});
   }

@@ -26,7 +26,8 @@ struct WorkAsked {
     double difference = 0;  ///< m
   };
   std::vector<Step> farthest;
-  /// Where the model in force is least sure, no two of them near each other: the poses to measure next.
+  /// Where the model in force is least sure, no two of them near each other: the poses to measure
+  /// next.
   std::vector<PoseContext> measure_next;
 };
 

@@ -17,7 +17,8 @@ namespace {
 const SessionSetting* known_session(const CompensatedModel& model, const std::string& name) {
   const std::vector<SessionSetting>& sessions = model.parts().sessions;
   const auto found =
-      std::find_if(sessions.begin(), sessions.end(), [&](const SessionSetting& session) { return session.id == name; });
+      std::find_if(sessions.begin(), sessions.end(),
+                   [&](const SessionSetting& session) { return session.id == name; });
   return found == sessions.end() ? nullptr : &*found;
 }
 
@@ -34,10 +35,12 @@ const SessionSetting* known_session(const CompensatedModel& model, const Measure
 /// Where the rows themselves put the session's world.
 Result<Pose> located(const CompensatedModel& model, const MeasurementBatch& session) {
   const MeasurementBatch rows = known_rows(model, session);
-  if (rows.measurements.empty()) return refused("the model knows none of its tools").in("session " + session.id);
+  if (rows.measurements.empty())
+    return refused("the model knows none of its tools").in("session " + session.id);
   const Pose X_WB = model.parts().physics.X_WB;
   Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(rows.measurements.size()));
-  for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = rows.measurements[static_cast<std::size_t>(i)].p_W;
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i)
+    p_W.col(i) = rows.measurements[static_cast<std::size_t>(i)].p_W;
   const Eigen::Matrix3Xd p_B = X_WB.inverse() * p_W - model.errors_B(rows).compensated;
   const Result<Pose> X_SB = fit_transform(p_W, p_B);
   if (!X_SB) return Failure(X_SB.error()).in("session " + session.id);
@@ -49,7 +52,8 @@ constexpr double kSlack = 1e-4;            // m
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after all sessions
 
 /// m rms, of what the model leaves of the rows, taken into W so.
-double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Similarity& into_W, int index) {
+double left_of(const CompensatedModel& model, const MeasurementBatch& session,
+               const Similarity& into_W, int index) {
   MeasurementBatch rows = known_rows(model, session);
   rows.as_then = true;
   if (rows.measurements.empty()) return 0;
@@ -60,9 +64,10 @@ double left_of(const CompensatedModel& model, const MeasurementBatch& session, c
   return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
 }
 
-/// Whether the rows were measured from where the model knows the session of that name to have stood: names are used
-/// again.
-bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session, const SessionSetting& known) {
+/// Whether the rows were measured from where the model knows the session of that name to have
+/// stood: names are used again.
+bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session,
+                    const SessionSetting& known) {
   const Result<Pose> X_WS = located(model, session);
   if (!X_WS) return true;
   return left_of(model, session, known.into_W(), known.first) <=
@@ -71,7 +76,8 @@ bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& sessi
 
 /// The batch is one session.
 MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& batch) {
-  const std::string& said = batch.measurements.empty() ? batch.id : batch.measurements.front().session_id;
+  const std::string& said =
+      batch.measurements.empty() ? batch.id : batch.measurements.front().session_id;
   const SessionSetting* known = known_session(model, batch, said);
   if (known == nullptr || !is_same_set_up(model, batch, *known)) return batch;
   MeasurementBatch here = batch;
@@ -87,17 +93,19 @@ MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& b
 
 namespace {
 
-/// Refuses gauges that the model cannot tell: where several set-ups are to be placed, and of an anchor whose place
-/// neither it nor its cell file knows.
+/// Refuses gauges that the model cannot tell: where several set-ups are to be placed, and of an
+/// anchor whose place neither it nor its cell file knows.
 Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return {};
-  if (has_sessions(batch)) return require_positions(batch, "placing several set-ups of the instrument");
+  if (has_sessions(batch))
+    return require_positions(batch, "placing several set-ups of the instrument");
   const Anchors anchors = TRY(anchors_of(model.cell()));
   for (const Measurement& m : batch.measurements) {
     if (!m.gauge || placed_anchor(model.parts().physics, m.gauge->anchor).said != nullptr) continue;
     const auto known = anchors.find(m.gauge->anchor);
     if (known != anchors.end() && known->second.p_W) continue;
-    return refused("model {} does not know where anchor '{}' is", model.provenance().id, m.gauge->anchor)
+    return refused("model {} does not know where anchor '{}' is", model.provenance().id,
+                   m.gauge->anchor)
         .in("batch " + batch.id)
         .at_row(m.row)
         .of("anchor_id")
@@ -132,7 +140,8 @@ Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatc
   }
   world.batch = aligned(batch, settings, model.cell().tracker);
   world.batch.as_then = !model.parts().changes.empty();
-  for (Measurement& m : world.batch.measurements) m.context.index = index[static_cast<std::size_t>(m.session)];
+  for (Measurement& m : world.batch.measurements)
+    m.context.index = index[static_cast<std::size_t>(m.session)];
   return world;
 }
 

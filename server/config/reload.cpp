@@ -11,11 +11,14 @@ void take(const char* key, Value& present, const Value& file, std::vector<std::s
 }
 
 template <typename Value>
-void leave(const char* key, const Value& present, const Value& file, std::vector<std::string>* later) {
+void leave(const char* key, const Value& present, const Value& file,
+           std::vector<std::string>* later) {
   if (present != file) later->emplace_back(key);
 }
 
-bool same_files(const Cell& a, const Cell& b) { return a.cell_yaml == b.cell_yaml && a.robot_yaml == b.robot_yaml; }
+bool same_files(const Cell& a, const Cell& b) {
+  return a.cell_yaml == b.cell_yaml && a.robot_yaml == b.robot_yaml;
+}
 
 void take_cells(ServedCells& present, const ServedCells& file, ReloadPlan* plan) {
   for (const auto& [name, cell] : file) {
@@ -26,7 +29,8 @@ void take_cells(ServedCells& present, const ServedCells& file, ReloadPlan* plan)
   }
 }
 
-void leave_cells(const ServedCells& present, const ServedCells& file, std::vector<std::string>* later) {
+void leave_cells(const ServedCells& present, const ServedCells& file,
+                 std::vector<std::string>* later) {
   for (const auto& [name, cell] : present) {
     const auto found = file.find(name);
     if (found == file.end()) later->push_back(fmt::format("cells: {} (left out)", name));
@@ -48,7 +52,8 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   take("dds: queued_requests", now.dds.queued_requests, file.dds.queued_requests, &plan.now);
   take("dds: queued_mb", now.dds.queued_mb, file.dds.queued_mb, &plan.now);
   take("dds: cell_share", now.dds.cell_share, file.dds.cell_share, &plan.now);
-  take("trainer: queue_capacity", now.trainer.queue_capacity, file.trainer.queue_capacity, &plan.now);
+  take("trainer: queue_capacity", now.trainer.queue_capacity, file.trainer.queue_capacity,
+       &plan.now);
   take("trainer: keep_models", now.trainer.keep.models, file.trainer.keep.models, &plan.now);
   take("trainer: keep_batches", now.trainer.keep.batches, file.trainer.keep.batches, &plan.now);
   take("trainer: keep_answers", now.trainer.keep.answers, file.trainer.keep.answers, &plan.now);
@@ -64,15 +69,19 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("http: port", present.http.port, file.http.port, &plan.later);
   leave("record", present.dds.record, file.dds.record, &plan.later);
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
-  leave("dds: discovery_servers", present.dds.discovery_servers, file.dds.discovery_servers, &plan.later);
+  leave("dds: discovery_servers", present.dds.discovery_servers, file.dds.discovery_servers,
+        &plan.later);
   leave("dds: ros2", present.dds.ros2, file.dds.ros2, &plan.later);
   leave("dds: security", present.dds.security, file.dds.security, &plan.later);
   leave("dds: compute_workers", present.dds.compute_workers, file.dds.compute_workers, &plan.later);
   leave("dds: max_clients", present.dds.max_clients, file.dds.max_clients, &plan.later);
   leave("trainer: max_poses", present.trainer.max_poses, file.trainer.max_poses, &plan.later);
-  leave("trainer: validation_share", present.trainer.validation_share, file.trainer.validation_share, &plan.later);
-  leave("trainer: accept_ratio", present.trainer.accept_ratio, file.trainer.accept_ratio, &plan.later);
-  leave("trainer: memory_mb", present.trainer.compute.memory_mb, file.trainer.compute.memory_mb, &plan.later);
+  leave("trainer: validation_share", present.trainer.validation_share,
+        file.trainer.validation_share, &plan.later);
+  leave("trainer: accept_ratio", present.trainer.accept_ratio, file.trainer.accept_ratio,
+        &plan.later);
+  leave("trainer: memory_mb", present.trainer.compute.memory_mb, file.trainer.compute.memory_mb,
+        &plan.later);
   leave("trainer: cpu_s", present.trainer.compute.cpu_s, file.trainer.compute.cpu_s, &plan.later);
   leave("log: file", present.log.file, file.log.file, &plan.later);
   leave_cells(present.cells, file.cells, &plan.later);

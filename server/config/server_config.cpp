@@ -16,36 +16,43 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMaxName = 64;  // likewise, bytes
-constexpr int kLeastMemory = 64;      // MiB, of a job: what the program itself takes, and something to compute with
-constexpr int kMaxDomain = 232;       // above it the port numbers of DDS overflow
+constexpr int kLeastMemory =
+    64;  // MiB, of a job: what the program itself takes, and something to compute with
+constexpr int kMaxDomain = 232;  // above it the port numbers of DDS overflow
 
-int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
+int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower,
+                   int upper) {
   const int value = map.integer(key, otherwise);
   if (value < lower || value > upper)
-    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper).beyond(value, value < lower ? lower : upper));
+    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper)
+                        .beyond(value, value < lower ? lower : upper));
   return value;
 }
 
-double number_within(const YamlMap& map, const std::string& key, double otherwise, double lower, double upper) {
+double number_within(const YamlMap& map, const std::string& key, double otherwise, double lower,
+                     double upper) {
   const double value = map.number(key, otherwise);
   if (value < lower || value > upper)
-    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper).beyond(value, value < lower ? lower : upper));
+    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper)
+                        .beyond(value, value < lower ? lower : upper));
   return value;
 }
 
 std::string server_id(const YamlMap& map, const std::string& key) {
   const std::string id = map.text(key);
   const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
-           c == '-';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
   };
   if (id.empty() || id.size() > kMaxName || !std::all_of(id.begin(), id.end(), allowed)) {
-    map.refuse(key, refused("'{}', expected 1 to {} letters, digits, '.', '_', '-'", id, kMaxName).with_text(id));
+    map.refuse(key, refused("'{}', expected 1 to {} letters, digits, '.', '_', '-'", id, kMaxName)
+                        .with_text(id));
   }
   return id;
 }
 
-/// What the file agrees to. A word that cannot be read is refused by itself; the address is not blamed for it.
+/// What the file agrees to. A word that cannot be read is refused by itself; the address is not
+/// blamed for it.
 struct Consent {
   bool network = true;
   bool without_security = true;
@@ -58,8 +65,8 @@ Consent consent(const YamlMap& map) {
   return given;
 }
 
-/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed, and unless it is said who may do
-/// what there, or that everybody may do everything.
+/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed, and unless it
+/// is said who may do what there, or that everybody may do everything.
 std::string address(const YamlMap& map, const std::string& otherwise, const Consent& given) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
@@ -68,14 +75,16 @@ std::string address(const YamlMap& map, const std::string& otherwise, const Cons
   }
   const bool loopback = (ntohl(parsed.s_addr) >> 24) == 127;
   if (!loopback && !given.network) {
-    map.refuse("address",
-               refused("{} leaves this host", text).with_text(text).next("say allow_network: true if that is meant"));
+    map.refuse("address", refused("{} leaves this host", text)
+                              .with_text(text)
+                              .next("say allow_network: true if that is meant"));
   }
   if (!loopback && map.is_null("security") && !given.without_security) {
-    map.refuse("address", refused("whoever reaches {} could change models", text)
-                              .with_text(text)
-                              .next("name certificates (security: FOLDER, see deploy/security/README.md), or say "
-                                    "without_security: true if that is meant"));
+    map.refuse("address",
+               refused("whoever reaches {} could change models", text)
+                   .with_text(text)
+                   .next("name certificates (security: FOLDER, see deploy/security/README.md), or "
+                         "say without_security: true if that is meant"));
   }
   return text;
 }
@@ -91,49 +100,64 @@ std::vector<HostPort> discovery_servers(const YamlMap& map, const DdsOptions& dd
     if (std::find(places.begin(), places.end(), *place) != places.end())
       map.refuse(key, refused("{} is given twice", text).with_text(text));
     if (dds.address.starts_with("127.") && !place->address.starts_with("127."))
-      map.refuse(key, refused("{} is not on this host, and nobody there can come to {}", text, dds.address)
-                          .with_text(text)
-                          .next("say the address that clients come to (address, allow_network)"));
+      map.refuse(
+          key, refused("{} is not on this host, and nobody there can come to {}", text, dds.address)
+                   .with_text(text)
+                   .next("say the address that clients come to (address, allow_network)"));
     places.push_back(*place);
   }
   if (places.size() > kMostDiscoveryServers)
     map.refuse(key, refused("{} discovery servers, limit {}", places.size(), kMostDiscoveryServers)
-                        .beyond(static_cast<double>(places.size()), static_cast<double>(kMostDiscoveryServers)));
+                        .beyond(static_cast<double>(places.size()),
+                                static_cast<double>(kMostDiscoveryServers)));
   return places;
 }
 
 void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOptions& dds) {
-  map.only({"domain", "address", "allow_network", "without_security", "security", "port", "discovery_servers",
-            "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests", "queued_mb",
-            "cell_share", "ros2"});
+  map.only({"domain", "address", "allow_network", "without_security", "security", "port",
+            "discovery_servers", "compute_workers", "max_clients", "client_requests", "client_mb",
+            "queued_requests", "queued_mb", "cell_share", "ros2"});
   map.attempt([&] {
-    dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
+    dds.domain = static_cast<std::uint32_t>(
+        integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
   const Consent given = consent(map);
   map.attempt([&] { dds.address = address(map, dds.address, given); });
-  map.attempt([&] { dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535)); });
+  map.attempt([&] {
+    dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535));
+  });
   map.attempt([&] { dds.discovery_servers = discovery_servers(map, dds); });
   map.attempt([&] {
     if (!map.is_null("security")) dds.security = (folder / map.text("security")).string();
   });
-  map.attempt([&] { dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64); });
-  map.attempt([&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
-  map.attempt([&] { dds.client_requests = integer_within(map, "client_requests", dds.client_requests, 1, 10000); });
+  map.attempt([&] {
+    dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64);
+  });
+  map.attempt(
+      [&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
+  map.attempt([&] {
+    dds.client_requests = integer_within(map, "client_requests", dds.client_requests, 1, 10000);
+  });
   map.attempt([&] { dds.client_mb = integer_within(map, "client_mb", dds.client_mb, 40, 65536); });
-  map.attempt([&] { dds.queued_requests = integer_within(map, "queued_requests", dds.queued_requests, 1, 1000000); });
+  map.attempt([&] {
+    dds.queued_requests = integer_within(map, "queued_requests", dds.queued_requests, 1, 1000000);
+  });
   map.attempt([&] { dds.queued_mb = integer_within(map, "queued_mb", dds.queued_mb, 80, 65536); });
   map.attempt([&] { dds.cell_share = number_within(map, "cell_share", dds.cell_share, 0.5, 1); });
   map.attempt([&] { dds.ros2 = map.boolean("ros2", dds.ros2); });
   if (dds.ros2 && !dds.security.empty())
-    map.refuse("ros2", refused("ROS 2 nodes have no role, so that nobody may let them in beside `security`"));
+    map.refuse(
+        "ros2",
+        refused("ROS 2 nodes have no role, so that nobody may let them in beside `security`"));
 }
 
 std::string word_of(const YamlMap& map, const std::string& key, const std::string& otherwise,
                     const std::vector<std::string>& known) {
   const std::string word = map.text(key, otherwise);
   if (std::find(known.begin(), known.end(), word) == known.end())
-    map.refuse(key,
-               refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known)).with_text(word));
+    map.refuse(
+        key, refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known))
+                 .with_text(word));
   return word;
 }
 
@@ -144,33 +168,44 @@ void read_record(const YamlMap& map, const std::filesystem::path& folder, Record
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
-  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s",
-            "keep_models", "keep_batches", "keep_answers"});
-  map.attempt([&] { trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000); });
-  map.attempt([&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
-  map.attempt(
-      [&] { trainer.validation_share = number_within(map, "validation_share", trainer.validation_share, 0.05, 0.5); });
-  map.attempt([&] { trainer.accept_ratio = number_within(map, "accept_ratio", trainer.accept_ratio, 0.1, 10); });
+  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb",
+            "cpu_s", "keep_models", "keep_batches", "keep_answers"});
   map.attempt([&] {
-    trainer.seed = static_cast<std::uint64_t>(
-        integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
+    trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000);
+  });
+  map.attempt(
+      [&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
+  map.attempt([&] {
+    trainer.validation_share =
+        number_within(map, "validation_share", trainer.validation_share, 0.05, 0.5);
+  });
+  map.attempt([&] {
+    trainer.accept_ratio = number_within(map, "accept_ratio", trainer.accept_ratio, 0.1, 10);
+  });
+  map.attempt([&] {
+    trainer.seed = static_cast<std::uint64_t>(integer_within(
+        map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
   });
   KeepRule& keep = trainer.keep;
   map.attempt([&] { keep.models = integer_within(map, "keep_models", keep.models, 0, 1000000); });
-  map.attempt([&] { keep.batches = integer_within(map, "keep_batches", keep.batches, 0, 1000000); });
-  map.attempt([&] { keep.answers = integer_within(map, "keep_answers", keep.answers, 0, 1000000); });
+  map.attempt(
+      [&] { keep.batches = integer_within(map, "keep_batches", keep.batches, 0, 1000000); });
+  map.attempt(
+      [&] { keep.answers = integer_within(map, "keep_answers", keep.answers, 0, 1000000); });
   ComputeOptions& compute = trainer.compute;
   map.attempt([&] {
     const int memory = integer_within(map, "memory_mb", compute.memory_mb, 0, 1 << 24);
     if (memory != 0 && memory < kLeastMemory)
-      map.refuse("memory_mb",
-                 refused("{}, limit 0 or {} to {}", memory, kLeastMemory, 1 << 24).beyond(memory, kLeastMemory));
+      map.refuse("memory_mb", refused("{}, limit 0 or {} to {}", memory, kLeastMemory, 1 << 24)
+                                  .beyond(memory, kLeastMemory));
     compute.memory_mb = memory;
   });
-  map.attempt([&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
+  map.attempt(
+      [&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
-/// Pages and metrics stay on this host: whoever reads them from elsewhere goes through a server that asks who he is.
+/// Pages and metrics stay on this host: whoever reads them from elsewhere goes through a server
+/// that asks who he is.
 void read_http(const YamlMap& map, HttpOptions& http) {
   map.only({"address", "port"});
   map.attempt([&] {
@@ -178,17 +213,21 @@ void read_http(const YamlMap& map, HttpOptions& http) {
     in_addr parsed{};
     const bool is_address = ::inet_pton(AF_INET, http.address.c_str(), &parsed) == 1;
     if (!is_address || ntohl(parsed.s_addr) >> 24 != 127)
-      map.refuse("address", refused("'{}', expected 127.x.x.x: pages and metrics stay on this host", http.address)
+      map.refuse("address", refused("'{}', expected 127.x.x.x: pages and metrics stay on this host",
+                                    http.address)
                                 .with_text(http.address));
   });
   map.attempt([&] {
-    if (!map.is_null("port")) http.port = static_cast<std::uint16_t>(integer_within(map, "port", 0, 1024, 65535));
+    if (!map.is_null("port"))
+      http.port = static_cast<std::uint16_t>(integer_within(map, "port", 0, 1024, 65535));
   });
 }
 
 void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
   map.only({"level", "file", "format"});
-  map.attempt([&] { log.level = word_of(map, "level", log.level, {"debug", "info", "warn", "error"}); });
+  map.attempt([&] {
+    log.level = word_of(map, "level", log.level, {"debug", "info", "warn", "error"});
+  });
   map.attempt([&] { log.format = word_of(map, "format", log.format, {"text", "json"}); });
   map.attempt([&] {
     if (!map.is_null("file")) log.file = (folder / map.text("file")).string();
@@ -219,9 +258,11 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
   if (map.has("replica"))
-    map.refuse("replica", "no server follows another one; give all of them one `store: postgresql://...` instead");
-  map.only({"version", "server", "cells", "store", "cache", "models_in_memory_mb", "serves", "trains", "record", "dds",
-            "trainer", "log", "http"});
+    map.refuse(
+        "replica",
+        "no server follows another one; give all of them one `store: postgresql://...` instead");
+  map.only({"version", "server", "cells", "store", "cache", "models_in_memory_mb", "serves",
+            "trains", "record", "dds", "trainer", "log", "http"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -233,8 +274,9 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] { config.cache = (folder / map.text("cache", "trammel-cache")).string(); });
   map.attempt([&] {
     const auto otherwise = static_cast<int>(config.models_in_memory >> 20);
-    config.models_in_memory =
-        static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
+    config.models_in_memory = static_cast<std::size_t>(integer_within(map, "models_in_memory_mb",
+                                                                      otherwise, 64, 1'000'000))
+                              << 20;
   });
   map.attempt([&] { config.serves = map.boolean("serves", true); });
   map.attempt([&] {
@@ -262,7 +304,8 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
 /// A start waits for no pipe.
 Result<Cell> read_cell_file(const std::string& cell_file) {
   std::error_code unknown;
-  if (std::filesystem::exists(cell_file, unknown) && !std::filesystem::is_regular_file(cell_file, unknown))
+  if (std::filesystem::exists(cell_file, unknown) &&
+      !std::filesystem::is_regular_file(cell_file, unknown))
     return refused("no file, but a pipe, a device or a folder").in(cell_file);
   return read_cell(cell_file);
 }
@@ -273,7 +316,9 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& p
     auto cell = read_cell_file(cell_file);
     if (!cell) {
       for (Error& one : apart(cell.error())) {
-        problems.push_back(Failure(std::move(one)).next(fmt::format("{} names it as one of its cells", path)).value());
+        problems.push_back(Failure(std::move(one))
+                               .next(fmt::format("{} names it as one of its cells", path))
+                               .value());
       }
       continue;
     }

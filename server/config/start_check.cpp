@@ -19,8 +19,9 @@ namespace {
 
 /// Whether the section was read without errors. A value that was refused is not checked further.
 bool was_read(const ServerReading& server, const std::string& section) {
-  return std::none_of(server.problems.begin(), server.problems.end(),
-                      [&](const Error& problem) { return problem.field.starts_with(section + ":"); });
+  return std::none_of(server.problems.begin(), server.problems.end(), [&](const Error& problem) {
+    return problem.field.starts_with(section + ":");
+  });
 }
 
 /// The error `found` in the path or address at `key`, told as an error of the server file.
@@ -35,7 +36,8 @@ Error at_key(const std::string& key, const std::string& path, Error found) {
 void look_at_cells(const ServerConfig& config, StartCheck& check) {
   const auto cells = cells_at_start(config.store, config.cells);
   if (!cells) {
-    check.notes.push_back("what the cells would be served with is not known: " + sentence(cells.error()));
+    check.notes.push_back("what the cells would be served with is not known: " +
+                          sentence(cells.error()));
     return;
   }
   for (const CellAtStart& one : *cells) {
@@ -46,7 +48,8 @@ void look_at_cells(const ServerConfig& config, StartCheck& check) {
         check.notes.push_back(one.why);
         break;
       case CellAtStart::State::kOlderServed:
-        check.notes.push_back(fmt::format("cell {} would be served with an older version: {}", one.cell, one.why));
+        check.notes.push_back(
+            fmt::format("cell {} would be served with an older version: {}", one.cell, one.why));
         break;
       case CellAtStart::State::kUntrained:
         check.notes.push_back(fmt::format("cell {} has no model yet", one.cell));
@@ -57,12 +60,15 @@ void look_at_cells(const ServerConfig& config, StartCheck& check) {
   }
 }
 
-bool is_held(const Status& status) { return !status && status.error().code == ErrorCode::kConflict; }
+bool is_held(const Status& status) {
+  return !status && status.error().code == ErrorCode::kConflict;
+}
 
 /// Notes what is wrong with the values of one server file.
 class Verdict {
  public:
-  Verdict(const std::string& path, StoreToCheck store, StartCheck& check) : path_(path), store_(store), check_(check) {}
+  Verdict(const std::string& path, StoreToCheck store, StartCheck& check)
+      : path_(path), store_(store), check_(check) {}
 
   void add(const char* key, const Status& status) {
     if (!status) check_.problems.push_back(at_key(key, path_, status.error()));
@@ -70,14 +76,15 @@ class Verdict {
   /// What another process holds is no problem beside a copy of the store.
   void add_holdable(const char* key, const Status& status) {
     if (store_ == StoreToCheck::kOwn || !is_held(status)) return add(key, status);
-    check_.notes.push_back(
-        fmt::format("{} is in use, which does not matter to this check: {}", key, sentence(status.error())));
+    check_.notes.push_back(fmt::format("{} is in use, which does not matter to this check: {}", key,
+                                       sentence(status.error())));
   }
 
   /// A database that is away is no problem either: the service starts without it.
   void add_store(const Status& store) {
     if (store || store.error().code != ErrorCode::kUnreachable) return add_holdable("store", store);
-    check_.notes.push_back("the store is away, and the service would serve copies: " + sentence(store.error()));
+    check_.notes.push_back("the store is away, and the service would serve copies: " +
+                           sentence(store.error()));
   }
 
  private:
@@ -94,9 +101,11 @@ StartCheck check_start(const ServerReading& server, const std::string& path, Sto
   Verdict verdict(path, whose, check);
   const Status store = config.store.empty() ? Status() : check_store(config.store);
   Status port;
-  if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
+  if (was_read(server, "dds"))
+    port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
   if (is_held(store) && is_held(port)) {
-    check.notes.push_back(fmt::format("{}: runs already, it seems: {}", path, sentence(store.error())));
+    check.notes.push_back(
+        fmt::format("{}: runs already, it seems: {}", path, sentence(store.error())));
   } else {
     verdict.add_store(store);
     verdict.add_holdable(is_held(port) ? "dds: port" : "dds: address", port);
@@ -108,7 +117,8 @@ StartCheck check_start(const ServerReading& server, const std::string& path, Sto
   verdict.add("record: folder", check_records(config.dds.record));
   std::error_code error;
   const bool is_there = store || is_held(store);
-  const bool has_content = is_postgres_url(config.store) || std::filesystem::exists(config.store, error);
+  const bool has_content =
+      is_postgres_url(config.store) || std::filesystem::exists(config.store, error);
   if (is_there && has_content) look_at_cells(config, check);
   return check;
 }

@@ -8,7 +8,8 @@ namespace trammel {
 /// A request that has been answered, for the log. Its texts come from outside.
 struct CallReport {
   std::string operation;
-  std::string client;   ///< who sent it: the subject of the certificate; without one the DDS participant, in hex
+  std::string client;   ///< who sent it: the subject of the certificate; without one the DDS
+                        ///< participant, in hex
   std::string request;  ///< the DDS writer that sent it, and its number
   std::string trace;    ///< the client's own name for it; may be empty
   std::string cell;

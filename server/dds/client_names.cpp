@@ -9,17 +9,20 @@ namespace trammel {
 namespace {
 
 /// For the log, whatever a stranger writes: printable and short.
-std::string claim_of(const std::string& name, const std::string& claimed, const std::string& address) {
+std::string claim_of(const std::string& name, const std::string& claimed,
+                     const std::string& address) {
   constexpr std::size_t kLongest = 160;
   const std::string where = address.empty() ? "" : ", at " + shown_short(address);
   if (!name.empty()) return fmt::format("says it is {}{}", shown_short(name, kLongest), where);
   if (claimed.empty()) return "shows no certificate" + where;
-  return fmt::format("says it is {}, which does not fit its GUID{}", shown_short(claimed, kLongest), where);
+  return fmt::format("says it is {}, which does not fit its GUID{}", shown_short(claimed, kLongest),
+                     where);
 }
 
 }  // namespace
 
-void ClientNames::announced(const std::string& participant, const std::string& claimed, const std::string& address) {
+void ClientNames::announced(const std::string& participant, const std::string& claimed,
+                            const std::string& address) {
   const std::string name = wire::confirmed_subject(claimed, participant);
   const MutexLock lock(mutex_);
   if (name.empty() && known_.size() >= kClaims && !known_.contains(participant)) return;
@@ -46,7 +49,8 @@ std::string ClientNames::refused(const std::string& participant) {
 
 void ClientNames::left(const std::string& participant, Time now) {
   const MutexLock lock(mutex_);
-  std::erase_if(known_, [&](const auto& one) { return one.second.left && now - *one.second.left > kKept; });
+  std::erase_if(known_,
+                [&](const auto& one) { return one.second.left && now - *one.second.left > kKept; });
   const auto found = known_.find(participant);
   if (found == known_.end()) return;
   if (found->second.is_in) {

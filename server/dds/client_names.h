@@ -9,7 +9,8 @@
 
 namespace trammel {
 
-/// The names of participants that DDS-Security has let in: the subjects of their certificates. Thread-safe.
+/// The names of participants that DDS-Security has let in: the subjects of their certificates.
+/// Thread-safe.
 class ClientNames {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -18,11 +19,13 @@ class ClientNames {
   /// Of how many participants at once it is kept what they say, where that is no name that fits.
   static constexpr std::size_t kClaims = 4096;
 
-  /// What a participant says of itself, before it is let in. Only a name that fits its GUID counts. `address`: where it
-  /// says that it can be reached.
-  void announced(const std::string& participant, const std::string& claimed, const std::string& address = "");
+  /// What a participant says of itself, before it is let in. Only a name that fits its GUID counts.
+  /// `address`: where it says that it can be reached.
+  void announced(const std::string& participant, const std::string& claimed,
+                 const std::string& address = "");
   void let_in(const std::string& participant);
-  /// What the participant has said of itself, which nobody could confirm: `says it is CN=anna,O=Works, at 10.1.0.7`.
+  /// What the participant has said of itself, which nobody could confirm: `says it is
+  /// CN=anna,O=Works, at 10.1.0.7`.
   std::string refused(const std::string& participant);
   void left(const std::string& participant, Time now = std::chrono::steady_clock::now());
 

@@ -27,11 +27,13 @@ double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
 }
 
 /// As clients can show it.
-std::int64_t told_time(std::int64_t unix_s) { return unix_s < 0 || unix_s > kLastTime ? kNoTime : unix_s; }
+std::int64_t told_time(std::int64_t unix_s) {
+  return unix_s < 0 || unix_s > kLastTime ? kNoTime : unix_s;
+}
 
 /// The times of a model, and what follows from them.
-void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measured_at, std::int64_t now_unix_s,
-               wire::ModelInfo& info) {
+void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measured_at,
+               std::int64_t now_unix_s, wire::ModelInfo& info) {
   const std::int64_t trained = told_time(trained_at);
   const std::int64_t measured = told_time(measured_at.value_or(kNoTime));
   info.trained_at_unix_s(trained);
@@ -42,8 +44,12 @@ void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measu
 }
 
 /// A foreign text as a reply can carry it, whatever it is.
-std::string told(const std::string& text, std::size_t most_bytes) { return cut(shown(text), most_bytes); }
-std::string told_sentence(const std::string& text) { return cut(shown_lines(text), wire::MAX_SENTENCE); }
+std::string told(const std::string& text, std::size_t most_bytes) {
+  return cut(shown(text), most_bytes);
+}
+std::string told_sentence(const std::string& text) {
+  return cut(shown_lines(text), wire::MAX_SENTENCE);
+}
 
 wire::NoteSeverity to_wire(Note::Severity severity) {
   switch (severity) {
@@ -57,7 +63,9 @@ wire::NoteSeverity to_wire(Note::Severity severity) {
   TRAMMEL_CHECK(false);
 }
 
-double mm_or_unknown(const std::optional<double>& length) { return length ? to_mm(*length) : kUnknown; }
+double mm_or_unknown(const std::optional<double>& length) {
+  return length ? to_mm(*length) : kUnknown;
+}
 
 }  // namespace
 
@@ -80,7 +88,8 @@ Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where) {
   if (!p_mm.allFinite() || !rotation.coeffs().allFinite())
     return refused("the pose is not finite").in(where).of("pose");
   if (std::abs(rotation.norm() - 1) > kQuaternionTolerance) {
-    return refused("the quaternion has length {:.4f}, must be 1 within {}", rotation.norm(), kQuaternionTolerance)
+    return refused("the quaternion has length {:.4f}, must be 1 within {}", rotation.norm(),
+                   kQuaternionTolerance)
         .in(where)
         .of("pose")
         .beyond(rotation.norm(), 1);
@@ -97,9 +106,11 @@ wire::Joints to_wire(const JointVector& q, const Chain& chain) {
   return joints;
 }
 
-Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where) {
+Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain,
+                              const std::string& where) {
   if (static_cast<int>(joints.size()) != chain.size()) {
-    return refused("{} joint values, the robot {} has {}", joints.size(), chain.name(), chain.size())
+    return refused("{} joint values, the robot {} has {}", joints.size(), chain.name(),
+                   chain.size())
         .in(where)
         .of("joints_rad")
         .beyond(joints.size(), chain.size());
@@ -118,18 +129,23 @@ Status read_approach(const wire::Approach& approach, const Chain& chain, const s
                      PoseContext& context) {
   const auto& directions = approach.directions();
   if (!directions.empty() && static_cast<int>(directions.size()) != chain.size()) {
-    return refused("{} directions, the robot {} has {} joints", directions.size(), chain.name(), chain.size())
+    return refused("{} directions, the robot {} has {} joints", directions.size(), chain.name(),
+                   chain.size())
         .in(where)
         .of("directions")
         .beyond(directions.size(), chain.size());
   }
   for (const std::int16_t direction : directions) {
     if (direction < -1 || direction > 1)
-      return refused("direction {} is not one of -1, 0, 1", direction).in(where).of("directions").with_value(direction);
+      return refused("direction {} is not one of -1, 0, 1", direction)
+          .in(where)
+          .of("directions")
+          .with_value(direction);
   }
-  for (const auto& [value, field] :
-       {std::pair(approach.temperature_c(), "temperature_c"), std::pair(approach.time_s(), "time_s")}) {
-    if (std::isinf(value)) return refused("{} is not finite", field).in(where).of(field).with_value(value);
+  for (const auto& [value, field] : {std::pair(approach.temperature_c(), "temperature_c"),
+                                     std::pair(approach.time_s(), "time_s")}) {
+    if (std::isinf(value))
+      return refused("{} is not finite", field).in(where).of(field).with_value(value);
   }
   if (std::abs(approach.temperature_c()) > kTemperatureLimit) {
     return refused("temperature {} C, limit {}", approach.temperature_c(), kTemperatureLimit)
@@ -230,7 +246,8 @@ wire::JobOutcome to_wire(const JobOutcome& outcome) {
   if (outcome.code) result.code(trammel::to_wire(*outcome.code));
   result.why(told_sentence(outcome.why));
   result.next(told_sentence(outcome.next));
-  result.peak_memory_mb(outcome.peak_memory ? static_cast<double>(*outcome.peak_memory) / kBytesPerMb : kUnknown);
+  result.peak_memory_mb(
+      outcome.peak_memory ? static_cast<double>(*outcome.peak_memory) / kBytesPerMb : kUnknown);
   result.processor_time_s(outcome.processor_time.value_or(kUnknown));
   return result;
 }
@@ -255,7 +272,8 @@ wire::Job to_wire(const JobProgress& progress) {
       job.stage(wire::JOB_DONE);
       break;
     case JobStage::kFailed:
-      job.stage(progress.outcome.verdict == JobVerdict::kCancelled ? wire::JOB_CANCELLED : wire::JOB_FAILED);
+      job.stage(progress.outcome.verdict == JobVerdict::kCancelled ? wire::JOB_CANCELLED
+                                                                   : wire::JOB_FAILED);
       break;
   }
   job.what(told_sentence(progress.what));
@@ -288,8 +306,10 @@ wire::JobKind to_wire(JobKind kind) {
 wire::Job to_wire(const Trainer::DatedJob& dated) {
   wire::Job job = to_wire(dated.progress);
   job.kind(to_wire(dated.asked.kind));
-  const std::size_t batches = std::min<std::size_t>(dated.asked.batch_ids.size(), wire::MAX_BATCHES);
-  for (std::size_t i = 0; i < batches; ++i) job.batch_ids().push_back(told(dated.asked.batch_ids[i], wire::MAX_ID));
+  const std::size_t batches =
+      std::min<std::size_t>(dated.asked.batch_ids.size(), wire::MAX_BATCHES);
+  for (std::size_t i = 0; i < batches; ++i)
+    job.batch_ids().push_back(told(dated.asked.batch_ids[i], wire::MAX_ID));
   job.created_unix_s(dated.asked.created_at);
   job.started_unix_s(dated.asked.started_at.value_or(kNoTime));
   job.finished_unix_s(dated.asked.finished_at.value_or(kNoTime));
@@ -400,7 +420,8 @@ std::string requester(const wire::RequestHeader& header) {
   return trace.empty() ? text : text + " " + trace;
 }
 
-std::string in_few_words(const std::string& verb, const std::string& cell, const std::vector<std::string>& rest) {
+std::string in_few_words(const std::string& verb, const std::string& cell,
+                         const std::vector<std::string>& rest) {
   std::string all;
   for (const std::string& one : rest) all += fmt::format("{}:{}", one.size(), one);
   return fmt::format("{} {} {}", verb, cell, sha256_hex(all));
@@ -429,7 +450,9 @@ std::string request_id_text(const wire::SampleIdentity& id) {
 }
 
 std::int64_t unix_now_s() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::seconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 }  // namespace trammel

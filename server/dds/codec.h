@@ -15,21 +15,25 @@
 namespace trammel {
 
 [[nodiscard]] wire::PoseMm to_wire(const Pose& X);
-/// Refuses non-finite numbers and a quaternion whose length differs from 1 by more than 1e-3. `where` names the pose in
-/// the error.
+/// Refuses non-finite numbers and a quaternion whose length differs from 1 by more than 1e-3.
+/// `where` names the pose in the error.
 [[nodiscard]] Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where);
 
 [[nodiscard]] wire::Joints to_wire(const JointVector& q, const Chain& chain);
-/// Refuses non-finite numbers and a number of joints that is not the robot's. `where` names the vector in the error.
-[[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where);
+/// Refuses non-finite numbers and a number of joints that is not the robot's. `where` names the
+/// vector in the error.
+[[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain,
+                                            const std::string& where);
 
-/// Refuses directions that are not one of -1, 0, +1 for each joint, and infinite numbers. What is not known stays so.
-[[nodiscard]] Status read_approach(const wire::Approach& approach, const Chain& chain, const std::string& where,
-                                   PoseContext& context);
+/// Refuses directions that are not one of -1, 0, +1 for each joint, and infinite numbers. What is
+/// not known stays so.
+[[nodiscard]] Status read_approach(const wire::Approach& approach, const Chain& chain,
+                                   const std::string& where, PoseContext& context);
 
 /// The first MAX_NOTES.
 [[nodiscard]] std::vector<wire::Note> to_wire(const std::vector<Note>& notes);
-[[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s);
+[[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force,
+                                      std::int64_t now_unix_s);
 [[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);
 /// As it is published: without its batches and times, which to_wire(DatedJob) has.
 [[nodiscard]] wire::Job to_wire(const JobProgress& progress);
@@ -53,7 +57,9 @@ void put_error(const wire::Fault& fault, wire::ReplyHeader& header);
 template <typename Reply>
 [[nodiscard]] Reply unsupported(const std::string& field) {
   Reply reply;
-  put_error(wire::Fault{wire::RESULT_UNSUPPORTED, "this server does not do that", {}, field, {}, {}}, reply.header());
+  put_error(
+      wire::Fault{wire::RESULT_UNSUPPORTED, "this server does not do that", {}, field, {}, {}},
+      reply.header());
   return reply;
 }
 
@@ -65,7 +71,8 @@ template <typename Reply>
 
 [[nodiscard]] std::int64_t unix_now_s();
 
-/// The answer to the same request, where `reply`, a Reply, is too large for the wire or holds what it cannot carry.
+/// The answer to the same request, where `reply`, a Reply, is too large for the wire or holds what
+/// it cannot carry.
 template <typename Reply>
 [[nodiscard]] std::shared_ptr<void> instead_of(const void* reply) {
   const wire::ReplyHeader& meant = static_cast<const Reply*>(reply)->header();

@@ -67,7 +67,8 @@ void count_in(WorkFigures& work, const Correction& correction) {
 /// Its targets are known, its model is taken.
 class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetReply> {
  public:
-  PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent, WorkCounts& work)
+  PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent,
+                       WorkCounts& work)
       : subject_(std::move(subject)), targets_(std::move(targets)), recent_(recent), work_(work) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
     reply_.corrections().resize(targets_.size());
@@ -80,7 +81,8 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
       const Correction correction = model.correct(targets_[i], subject_.tool, subject_.payload);
       reply_.corrections()[i] = to_wire(correction, model.cell().robot);
       count_in(work, correction);
-      if (i == first && correction.q.size() > 0) remember(correction.q);  // one of each portion stands for it
+      if (i == first && correction.q.size() > 0)
+        remember(correction.q);  // one of each portion stands for it
     }
     work_.add(subject_.served->cell, work);
   }
@@ -116,7 +118,8 @@ Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& 
     const auto target = TRY(from_wire(wanted[i], chain, fmt::format("target {}", i + 1)));
     targets.push_back(target);
   }
-  return std::make_unique<PortionedCorrections>(std::move(subject), std::move(targets), trainer_.recent_poses(), work_);
+  return std::make_unique<PortionedCorrections>(std::move(subject), std::move(targets),
+                                                trainer_.recent_poses(), work_);
 }
 
 Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {

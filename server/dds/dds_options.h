@@ -12,21 +12,26 @@ namespace trammel {
 /// Domain, address, ports and name of the service on DDS. The default talks to this host only.
 struct DdsOptions {
   std::uint32_t domain = 0;
-  std::string address = "127.0.0.1";        ///< IPv4 of the only interface that is used
-  std::uint16_t port = 17500;               ///< UDP; clients look for the server here; one server per port
-  std::vector<HostPort> discovery_servers;  ///< they tell clients of `address` and `port`; position = number
-  std::string security;                     ///< folder of idl/transport/security.h; empty: everybody is believed
-  std::string server_id = "trammel";        ///< unique among servers; 1 to 64 letters, digits, `.`, `_`, `-`
+  std::string address = "127.0.0.1";  ///< IPv4 of the only interface that is used
+  std::uint16_t port = 17500;  ///< UDP; clients look for the server here; one server per port
+  std::vector<HostPort>
+      discovery_servers;  ///< they tell clients of `address` and `port`; position = number
+  std::string security;   ///< folder of idl/transport/security.h; empty: everybody is believed
+  std::string server_id =
+      "trammel";  ///< unique among servers; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
-  int compute_workers = 2;     ///< threads for PredictError, and as many for CorrectTarget
-  int max_clients = 256;       ///< reply channels at a time; when more clients come, those take turns that do nothing
-  int client_requests = 64;    ///< requests of one client that may wait: predictions, corrections, others
-  int client_mb = 64;          ///< memory that they may take, all together
+  int compute_workers = 2;  ///< threads for PredictError, and as many for CorrectTarget
+  int max_clients =
+      256;  ///< reply channels at a time; when more clients come, those take turns that do nothing
+  int client_requests =
+      64;              ///< requests of one client that may wait: predictions, corrections, others
+  int client_mb = 64;  ///< memory that they may take, all together
   int queued_requests = 4096;  ///< requests of all clients that may wait, likewise
   int queued_mb = 256;         ///< memory that they may take, all together
   RecordOptions record = {};   ///< of predictions and corrections
   double cell_share = 0.5;     ///< of these two, for the requests of one cell
-  bool ros2 = false;  ///< whether ROS 2 nodes are answered, too (idl/transport/ros2.h); not together with `security`
+  bool ros2 = false;  ///< whether ROS 2 nodes are answered, too (idl/transport/ros2.h); not
+                      ///< together with `security`
 };
 
 }  // namespace trammel

@@ -37,19 +37,22 @@ using Clock = std::chrono::steady_clock;
 
 Status check_names(const DdsOptions& options, const Trainer& trainer) {
   if (!wire::valid_partition(options.server_id)) {
-    return failure(ErrorCode::kUsage, "server id `{}`: must be 1 to {} letters, digits, `.`, `_`, `-`",
+    return failure(ErrorCode::kUsage,
+                   "server id `{}`: must be 1 to {} letters, digits, `.`, `_`, `-`",
                    options.server_id, wire::MAX_NAME)
         .of("server")
         .with_text(options.server_id);
   }
   if (trainer.cells().size() > wire::MAX_CELLS) {
-    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS)
+    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(),
+                   wire::MAX_CELLS)
         .of("cells")
         .beyond(trainer.cells().size(), wire::MAX_CELLS);
   }
   for (const auto& [name, cell] : trainer.cells()) {
     if (name.empty() || name.size() > wire::MAX_NAME) {
-      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME)
+      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name,
+                     wire::MAX_NAME)
           .of("cell")
           .with_text(name);
     }
@@ -94,8 +97,8 @@ TurnLimits limits_of_changes(const DdsOptions& options) {
   return limits;
 }
 
-/// Threads that start while this lives get its name. The library does not name its threads, and `top` and debuggers
-/// show names.
+/// Threads that start while this lives get its name. The library does not name its threads, and
+/// `top` and debuggers show names.
 class ThreadName {
  public:
   explicit ThreadName(const char* name) {
@@ -121,7 +124,8 @@ Result<std::optional<wire::Security>> security_of(const std::string& folder) {
 
 class DdsService::Running {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
+  [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options,
+                                                              Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
                                                               const PacketListener& packet_listener,
                                                               const CallListener& call_listener) {
@@ -143,13 +147,15 @@ class DdsService::Running {
                                                    security},
                                                   events.get()));
     wire::dds::Subscriber* subscriber = participant->create_subscriber(wire::subscriber_qos({}));
-    if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
+    if (subscriber == nullptr)
+      return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
     auto topics = TRY(StateTopics::open(*participant));
     auto echo = TRY(StatusEcho::open(*participant, *subscriber, topics.status_writer(), *heard));
     library.reset();
 
-    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(port), std::move(events),
-                                                 std::move(participant), *subscriber, topics, std::move(echo)));
+    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(port),
+                                                 std::move(events), std::move(participant),
+                                                 *subscriber, topics, std::move(echo)));
     running->core_.listener = call_listener;
     auto recorder = TRY(RequestRecorder::open(options.record));
     running->recorder_ = std::move(recorder);
@@ -157,12 +163,13 @@ class DdsService::Running {
     running->handlers_.set_names(&running->events_->names());
     TRY(running->open_endpoints());
     for (Lane* lane : running->lanes()) lane->start();
-    running->replies_thread_ =
-        std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
+    running->replies_thread_ = std::jthread(
+        [r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
     running->packets_.emplace(dropped);
     running->dropped_ = dropped;
     running->packet_listener_ = packet_listener;
-    running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
+    running->status_thread_ =
+        std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
     TRY(running->tell_place());
     return running;
@@ -172,7 +179,8 @@ class DdsService::Running {
     beacon_.reset();
     watchdog_.reset();
     status_thread_ = {};
-    tell_refused(Clock::now() + PacketReport::kAtMostEvery);  // also what would have been told later
+    tell_refused(Clock::now() +
+                 PacketReport::kAtMostEvery);  // also what would have been told later
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
     for (Lane* lane : lanes()) lane->stop();
@@ -194,7 +202,8 @@ class DdsService::Running {
 
   void publish_model(const std::string& cell) {
     {
-      const MutexLock lock(publishing_of(cell));  // the last model published must be the one in force
+      const MutexLock lock(
+          publishing_of(cell));  // the last model published must be the one in force
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
@@ -233,9 +242,10 @@ class DdsService::Running {
   [[nodiscard]] Movement movement() const { return {true, watchdog_->still()}; }
 
  private:
-  Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry, PortLock port,
-          std::unique_ptr<ServiceEvents> events, wire::ParticipantPtr participant, wire::dds::Subscriber& subscriber,
-          const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
+  Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry,
+          PortLock port, std::unique_ptr<ServiceEvents> events, wire::ParticipantPtr participant,
+          wire::dds::Subscriber& subscriber, const StateTopics& topics,
+          std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
         store_(store),
@@ -247,8 +257,8 @@ class DdsService::Running {
         topics_(topics),
         echo_(std::move(echo)),
         channels_(
-            *participant_, static_cast<std::size_t>(options.max_clients), [events = events_.get()] { events->wake(); },
-            replying_),
+            *participant_, static_cast<std::size_t>(options.max_clients),
+            [events = events_.get()] { events->wake(); }, replying_),
         room_(room_limits(options)),
         predictions_(compute_limits(options), room_),
         corrections_(compute_limits(options), room_),
@@ -299,7 +309,9 @@ class DdsService::Running {
     return publishing_[cell];
   }
 
-  [[nodiscard]] std::array<Lane*, 4> lanes() { return {&predictions_, &corrections_, &reads_, &changes_}; }
+  [[nodiscard]] std::array<Lane*, 4> lanes() {
+    return {&predictions_, &corrections_, &reads_, &changes_};
+  }
 
   void tell_status(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "status");
@@ -314,7 +326,8 @@ class DdsService::Running {
       tell_refused(Clock::now());
       const bool clients_wait = channels_.tend();
       ++status_steps_;
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
       news = events_->wait(stop, clients_wait ? std::min(left, wire::kAnnouncement) : left);
       channels_.heard(news.readers);
     }
@@ -324,25 +337,32 @@ class DdsService::Running {
   void tell_refused(Clock::time_point now) {
     if (!packets_) return;  // the start has failed
     if (const auto dropped = packets_->due(now)) packet_listener_("packets_dropped", *dropped);
-    for (const std::string& refused : events_->strangers_due(now)) packet_listener_("participant_refused", refused);
+    for (const std::string& refused : events_->strangers_due(now))
+      packet_listener_("participant_refused", refused);
   }
 
-  /// The threads of this service and of the library that the watchdog watches. Each counts its own work.
-  [[nodiscard]] std::vector<MovingPart> moving_parts(const std::shared_ptr<wire::HeardOfItself>& heard) const {
+  /// The threads of this service and of the library that the watchdog watches. Each counts its own
+  /// work.
+  [[nodiscard]] std::vector<MovingPart> moving_parts(
+      const std::shared_ptr<wire::HeardOfItself>& heard) const {
     using Mark = std::optional<std::uint64_t>;
-    std::vector<MovingPart> parts = {{"discovery", [heard]() -> Mark { return heard->announcements.load(); }},
-                                     {"receiving", [this]() -> Mark { return echo_->heard(); }},
-                                     {"taking requests", [this] { return core_.taking.oldest(); }},
-                                     {"replying", [this] { return replying_.oldest(); }},
-                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
-                                     {"status", [this]() -> Mark { return status_steps_.load(); }}};
+    std::vector<MovingPart> parts = {
+        {"discovery", [heard]() -> Mark { return heard->announcements.load(); }},
+        {"receiving", [this]() -> Mark { return echo_->heard(); }},
+        {"taking requests", [this] { return core_.taking.oldest(); }},
+        {"replying", [this] { return replying_.oldest(); }},
+        {"replies", [this]() -> Mark { return channels_.looks(); }},
+        {"status", [this]() -> Mark { return status_steps_.load(); }}};
     parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
     parts.push_back({"reading requests", [this] { return reads_.unseen(); }});
     parts.push_back({"changing requests", [this] { return changes_.unseen(); }});
-    // A portion of these takes milliseconds. Who waits for them is told at once; an end would lose what others compute.
-    parts.push_back({"computing predictions", [this] { return predictions_.oldest_portion(); }, false});
-    parts.push_back({"computing corrections", [this] { return corrections_.oldest_portion(); }, false});
+    // A portion of these takes milliseconds. Who waits for them is told at once; an end would lose
+    // what others compute.
+    parts.push_back(
+        {"computing predictions", [this] { return predictions_.oldest_portion(); }, false});
+    parts.push_back(
+        {"computing corrections", [this] { return corrections_.oldest_portion(); }, false});
     return parts;
   }
 
@@ -363,7 +383,8 @@ class DdsService::Running {
     status.misdirected(core_.counts.misdirected);
     status.unreadable(*core_.unreadable);
     status.lost(core_.counts.lost);
-    status.trouble(cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
+    status.trouble(
+        cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
     status.record(store_.shared_identity());
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
@@ -388,8 +409,8 @@ class DdsService::Running {
   ServiceCore core_;
   std::unique_ptr<RequestRecorder> recorder_;  // null: nothing is recorded
   Mutex publishing_mutex_;
-  std::map<std::string, Mutex> publishing_
-      TRAMMEL_GUARDED_BY(publishing_mutex_);  // by cell, nothing leaves it; a cell publishes one model at a time
+  // By cell; nothing leaves it. A cell publishes one model at a time.
+  std::map<std::string, Mutex> publishing_ TRAMMEL_GUARDED_BY(publishing_mutex_);
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::shared_ptr<const wire::DropCounts> dropped_;
@@ -407,14 +428,17 @@ Status check_security(const std::string& folder) {
 
 Status check_records(const RecordOptions& options) { return RequestRecorder::check(options); }
 
-DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry)
+DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store,
+                       const ModelRegistry& registry)
     : options_(std::move(options)), trainer_(trainer), store_(store), registry_(registry) {}
 
 DdsService::~DdsService() { stop(); }
 
 void DdsService::set_call_listener(CallListener listener) { call_listener_ = std::move(listener); }
 
-void DdsService::set_packet_listener(PacketListener listener) { packet_listener_ = std::move(listener); }
+void DdsService::set_packet_listener(PacketListener listener) {
+  packet_listener_ = std::move(listener);
+}
 
 Status DdsService::start() {
   {
@@ -422,7 +446,8 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = TRY(Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_));
+  auto started =
+      TRY(Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_));
   {
     const MutexLock lock(mutex_);
     running_ = std::move(started);

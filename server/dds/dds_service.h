@@ -15,37 +15,40 @@
 
 namespace trammel {
 
-/// What start() would refuse in the folder of certificates and permissions (idl/transport/security.h); nothing where it
-/// is empty.
+/// What start() would refuse in the folder of certificates and permissions
+/// (idl/transport/security.h); nothing where it is empty.
 [[nodiscard]] Status check_security(const std::string& folder);
 /// Whether requests can be recorded there; makes nothing.
 [[nodiscard]] Status check_records(const RecordOptions& options);
 
-/// Told of what did not reach the service: `packets_dropped` or `participant_refused`, and a sentence.
+/// Told of what did not reach the service: `packets_dropped` or `participant_refused`, and a
+/// sentence.
 using PacketListener = std::function<void(const char* event, const std::string& what)>;
 
-/// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
-/// requests (schedule/lane.h: DdsOptions::compute_workers for each of PredictError and CorrectTarget, some for what
-/// reads and some for what changes), one that sends replies which had to wait, and one that publishes its status every
-/// second. stop() ends them all. A watchdog ends the process when these threads or the library's hang (watchdog.h).
-/// Thread-safe.
+/// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the
+/// threads that work on requests (schedule/lane.h: DdsOptions::compute_workers for each of
+/// PredictError and CorrectTarget, some for what reads and some for what changes), one that sends
+/// replies which had to wait, and one that publishes its status every second. stop() ends them all.
+/// A watchdog ends the process when these threads or the library's hang (watchdog.h). Thread-safe.
 class DdsService {
  public:
   /// `trainer`, `store` and `registry` outlive the service.
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
-  /// Called with an event and a sentence for the log when packets have been dropped (idl/guard) or participants
-  /// refused, each at most once a minute and what is left at stop(), in a thread of the service or in that of stop().
-  /// Set it before start().
+  /// Called with an event and a sentence for the log when packets have been dropped (idl/guard) or
+  /// participants refused, each at most once a minute and what is left at stop(), in a thread of
+  /// the service or in that of stop(). Set it before start().
   void set_packet_listener(PacketListener listener);
-  /// Called when a request was to change something, or was refused, in the thread that answers it. Set it before
-  /// start().
+  /// Called when a request was to change something, or was refused, in the thread that answers it.
+  /// Set it before start().
   void set_call_listener(CallListener listener);
-  /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses a port that is
-  /// taken, an address that this host does not have, and a server or cell name that the wire does not allow.
+  /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses
+  /// a port that is taken, an address that this host does not have, and a server or cell name that
+  /// the wire does not allow.
   [[nodiscard]] Status start();
-  /// Lets running requests finish, publishes that the server stops, and leaves DDS. May be started again.
+  /// Lets running requests finish, publishes that the server stops, and leaves DDS. May be started
+  /// again.
   void stop();
 
   /// Before start() and after stop(), these do nothing.
@@ -64,7 +67,8 @@ class DdsService {
 
  private:
   class Running;
-  /// Calls `work(running)` if the service runs. Holds no lock during the call: to publish a large model takes a while.
+  /// Calls `work(running)` if the service runs. Holds no lock during the call: to publish a large
+  /// model takes a while.
   template <typename Work>
   void while_running(const Work& work);
 
@@ -77,7 +81,8 @@ class DdsService {
   Mutex mutex_;
   Condition published_;  // publishing_ has decreased
   std::unique_ptr<Running> running_ TRAMMEL_GUARDED_BY(mutex_);
-  int publishing_ TRAMMEL_GUARDED_BY(mutex_) = 0;  // threads in while_running(), each without the lock
+  int publishing_ TRAMMEL_GUARDED_BY(mutex_) =
+      0;  // threads in while_running(), each without the lock
 };
 
 }  // namespace trammel

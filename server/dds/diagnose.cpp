@@ -11,10 +11,12 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   TRY(subjects_.cell(request.about()));
   const auto job = TRY(trainer_.diagnose(
       cell, request.batch_id(), request.csv(), false,
-      ChangeId{request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
+      ChangeId{request.change_id().to_string(),
+               in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
                who(request.header())}));
   wire::DiagnoseReply reply;
-  if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
+  if (const auto served = registry_.in_force(cell))
+    reply.model(to_wire(*served, true, unix_now_s()));
   reply.job(job);
   return reply;
 }
@@ -25,14 +27,18 @@ Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest& 
   std::optional<double> tolerance;
   if (!std::isnan(request.tolerance_mm())) tolerance = request.tolerance_mm();
   if (tolerance && !(*tolerance > 0 && std::isfinite(*tolerance))) {
-    return failure(ErrorCode::kUsage, "a tolerance of {} mm", *tolerance).of("tolerance_mm").beyond(*tolerance, 0);
+    return failure(ErrorCode::kUsage, "a tolerance of {} mm", *tolerance)
+        .of("tolerance_mm")
+        .beyond(*tolerance, 0);
   }
-  const auto job = TRY(trainer_.check(
-      cell, request.batch_id(), request.csv(), tolerance,
-      ChangeId{request.change_id().to_string(), in_few_words("check", cell, {request.batch_id(), request.csv()}),
-               who(request.header())}));
+  const auto job =
+      TRY(trainer_.check(cell, request.batch_id(), request.csv(), tolerance,
+                         ChangeId{request.change_id().to_string(),
+                                  in_few_words("check", cell, {request.batch_id(), request.csv()}),
+                                  who(request.header())}));
   wire::CheckHealthReply reply;
-  if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
+  if (const auto served = registry_.in_force(cell))
+    reply.model(to_wire(*served, true, unix_now_s()));
   reply.job(job);
   return reply;
 }

@@ -25,35 +25,40 @@ struct Subject {
   std::string tool, payload;  ///< resolved
 };
 
-/// Looks up the cell, tool, payload and model that a request's context names. Keeps the stored versions that were asked
-/// for last in memory. Thread-safe.
+/// Looks up the cell, tool, payload and model that a request's context names. Keeps the stored
+/// versions that were asked for last in memory. Thread-safe.
 class SubjectFinder {
  public:
-  SubjectFinder(const Trainer& trainer, const ModelRegistry& registry) : trainer_(trainer), registry_(registry) {}
+  SubjectFinder(const Trainer& trainer, const ModelRegistry& registry)
+      : trainer_(trainer), registry_(registry) {}
 
-  /// The cell's description. Refuses an unknown cell, tool or payload. Refuses a controller that compensates: models
-  /// are trained on data from one that does not.
+  /// The cell's description. Refuses an unknown cell, tool or payload. Refuses a controller that
+  /// compensates: models are trained on data from one that does not.
   [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const wire::Context& context) const;
-  /// As cell(). Also refuses a cell without a model in force, an unknown version, and a model id that is not in force.
+  /// As cell(). Also refuses a cell without a model in force, an unknown version, and a model id
+  /// that is not in force.
   [[nodiscard]] Result<Subject> find(const wire::Context& context);
 
  private:
-  [[nodiscard]] Result<std::shared_ptr<const ServedModel>> version(const std::string& cell, int version);
+  [[nodiscard]] Result<std::shared_ptr<const ServedModel>> version(const std::string& cell,
+                                                                   int version);
 
   const Trainer& trainer_;
   const ModelRegistry& registry_;
   Mutex mutex_;
-  std::deque<std::shared_ptr<const ServedModel>> loaded_ TRAMMEL_GUARDED_BY(mutex_);  // newest first
+  std::deque<std::shared_ptr<const ServedModel>> loaded_
+      TRAMMEL_GUARDED_BY(mutex_);  // newest first
 };
 
-/// Answers requests: a decoded request in, a reply or an error out. No DDS. The caller fills in the headers.
-/// Thread-safe.
+/// Answers requests: a decoded request in, a reply or an error out. No DDS. The caller fills in the
+/// headers. Thread-safe.
 class Handlers {
  public:
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
-  /// The names of clients; null: nobody has one. They outlive the requests. Set before there are any.
+  /// The names of clients; null: nobody has one. They outlive the requests. Set before there are
+  /// any.
   void set_names(const ClientNames* names) { names_ = names; }
   /// The subject of the certificate of a DDS participant; empty: it has shown none.
   [[nodiscard]] std::string name_of(const std::string& participant) const;
@@ -70,14 +75,16 @@ class Handlers {
   [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
   [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);
   /// Accepted means stored: see Trainer::submit.
-  [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
+  [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(
+      const wire::SubmitMeasurementsRequest& request);
   [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
   /// Queues a diagnosis: see Trainer::diagnose.
   [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
   [[nodiscard]] Result<wire::CheckHealthReply> answer(const wire::CheckHealthRequest& request);
   [[nodiscard]] Result<wire::ReadModelsReply> answer(const wire::ReadModelsRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
-  [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
+  [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(
+      const wire::ReleaseBatchesRequest& request);
 
  private:
   /// Who sent the request, for the audit trail: the name, the participant, the trace.
@@ -85,10 +92,12 @@ class Handlers {
   /// The job.
   [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
   /// The version activated, gone back to or imported; 0: none.
-  [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<int> changed(const std::string& cell,
+                                    const wire::ManageModelsRequest& request);
   [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job, const ChangeId& by);
   /// The job, or 0.
-  [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
+  [[nodiscard]] Result<std::int64_t> released(const std::string& cell,
+                                              const wire::ReleaseBatchesRequest& request);
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
                                                    const wire::ReadModelsRequest& request) const;
   [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;
@@ -97,11 +106,13 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
   /// What was lately asked of the cell, by the model in force and by `version` beside it; 0: alone.
   [[nodiscard]] Result<wire::ReadModelsReply> replayed(const std::string& cell, int version) const;
-  [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell, const std::string& id) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell,
+                                                       const std::string& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> audit_of(const std::string& cell, std::int64_t since,
                                                        std::size_t most) const;
-  [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job,
+                                                          bool page) const;
   [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
   /// Of one cell or (empty) of all: the newest `most` checks of each since then.
   [[nodiscard]] Result<wire::ReadModelsReply> health_of(const std::string& cell, std::int64_t since,

@@ -11,7 +11,8 @@ std::optional<std::string> PacketReport::due(Time now) {
     const auto reason = static_cast<wire::Dropped>(i);
     const std::uint64_t count = counts_->of(reason);
     if (count == told_[i]) continue;
-    reasons += fmt::format("{}{} ({})", reasons.empty() ? "" : ", ", wire::name_of(reason), count - told_[i]);
+    reasons += fmt::format("{}{} ({})", reasons.empty() ? "" : ", ", wire::name_of(reason),
+                           count - told_[i]);
     told_[i] = count;
   }
   if (reasons.empty()) return std::nullopt;
@@ -32,8 +33,8 @@ std::vector<std::string> StrangerReport::due(PacketReport::Time now) {
   std::vector<std::string> lines;
   for (const auto& [who, stranger] : strangers_) {
     lines.push_back(
-        fmt::format("a participant without the right certificate or permissions was refused: {} ({} {}, "
-                    "the last of {})",
+        fmt::format("a participant without the right certificate or permissions was refused: {} "
+                    "({} {}, the last of {})",
                     who, stranger.tries, stranger.tries == 1 ? "try" : "tries", stranger.guid));
   }
   strangers_.clear();

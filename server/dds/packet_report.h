@@ -19,9 +19,11 @@ class PacketReport {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::seconds kAtMostEvery{60};
 
-  explicit PacketReport(std::shared_ptr<const wire::DropCounts> counts) : counts_(std::move(counts)) {}
+  explicit PacketReport(std::shared_ptr<const wire::DropCounts> counts)
+      : counts_(std::move(counts)) {}
 
-  /// What is new since the last report, by reason; empty when nothing is, or when the last report is too young.
+  /// What is new since the last report, by reason; empty when nothing is, or when the last report
+  /// is too young.
   [[nodiscard]] std::optional<std::string> due(Time now);
 
  private:
@@ -30,8 +32,8 @@ class PacketReport {
   std::optional<Time> told_at_;
 };
 
-/// Counts the participants that DDS-Security refused (no certificate, one of another authority, one that was revoked)
-/// and says who they were, at most once a minute. Not thread-safe.
+/// Counts the participants that DDS-Security refused (no certificate, one of another authority, one
+/// that was revoked) and says who they were, at most once a minute. Not thread-safe.
 class StrangerReport {
  public:
   /// More than these in a minute are told as one.
@@ -39,7 +41,8 @@ class StrangerReport {
 
   /// `who`: what it says of itself. A participant tries again and again, under one GUID.
   void refused(const std::string& who, const std::string& guid);
-  /// One sentence for each who was refused since the last report; empty where the last report is too young.
+  /// One sentence for each who was refused since the last report; empty where the last report is
+  /// too young.
   [[nodiscard]] std::vector<std::string> due(PacketReport::Time now);
   [[nodiscard]] std::uint64_t tries() const { return tries_; }
 
@@ -49,7 +52,8 @@ class StrangerReport {
     std::string guid = {};
   };
   std::uint64_t tries_ = 0;
-  std::map<std::string, Stranger> strangers_;  // since the last report, by what they say of themselves
+  std::map<std::string, Stranger>
+      strangers_;  // since the last report, by what they say of themselves
   std::optional<PacketReport::Time> told_at_;
 };
 

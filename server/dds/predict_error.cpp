@@ -22,7 +22,8 @@ wire::PredictedError to_wire(const ErrorPrediction& prediction) {
   item.dx_mm(to_mm(prediction.error_B.x()));
   item.dy_mm(to_mm(prediction.error_B.y()));
   item.dz_mm(to_mm(prediction.error_B.z()));
-  const Vector3 turn = pose_difference(prediction.X_BT_predicted, prediction.X_BT_nominal).tail<3>();
+  const Vector3 turn =
+      pose_difference(prediction.X_BT_predicted, prediction.X_BT_nominal).tail<3>();
   item.rx_rad(turn.x());
   item.ry_rad(turn.y());
   item.rz_rad(turn.z());
@@ -46,7 +47,8 @@ wire::PredictedError to_wire(const ErrorPrediction& prediction) {
 }
 
 /// The pose as the model is asked for it; refuses what the cell's arm cannot do.
-Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject, const std::string& where) {
+Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject,
+                               const std::string& where) {
   const Cell& cell = subject.served->model.cell();
   auto q = TRY(from_wire(wanted.joints_rad(), cell.robot, where));
   PoseContext pose;
@@ -55,7 +57,8 @@ Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subjec
   pose.payload = subject.payload;
   pose.served = true;
   TRY(read_approach(wanted.approach(), cell.robot, where, pose));
-  if (const Status possible = check_pose(pose, cell); !possible) return Failure(possible.error()).in(where);
+  if (const Status possible = check_pose(pose, cell); !possible)
+    return Failure(possible.error()).in(where);
   return pose;
 }
 

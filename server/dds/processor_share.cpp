@@ -16,7 +16,8 @@ namespace {
 /// Closes its descriptor.
 struct Opened {
   int descriptor;
-  explicit Opened(const char* path, int flags = 0) : descriptor(::open(path, O_RDONLY | O_CLOEXEC | flags)) {}
+  explicit Opened(const char* path, int flags = 0)
+      : descriptor(::open(path, O_RDONLY | O_CLOEXEC | flags)) {}
   ~Opened() {
     if (descriptor >= 0) ::close(descriptor);
   }
@@ -24,13 +25,15 @@ struct Opened {
   Opened& operator=(const Opened&) = delete;
 };
 
-/// Calls `use` with the name of each entry of a folder, `.` and `..` too. readdir() would take memory from the heap.
+/// Calls `use` with the name of each entry of a folder, `.` and `..` too. readdir() would take
+/// memory from the heap.
 template <typename Use>
 void for_each_entry(const char* folder, const Use& use) {
   const Opened opened(folder, O_DIRECTORY);
   alignas(dirent64) std::array<char, 4096> entries{};
   while (true) {
-    const long length = ::syscall(SYS_getdents64, opened.descriptor, entries.data(), entries.size());
+    const long length =
+        ::syscall(SYS_getdents64, opened.descriptor, entries.data(), entries.size());
     if (length <= 0) return;
     for (long at = 0; at < length;) {
       const auto* entry = reinterpret_cast<const dirent64*>(entries.data() + at);

@@ -33,12 +33,13 @@ Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches)
 }
 
 /// What the store has of a cell's checks, and of how its model in force was judged.
-Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry, const std::string& cell,
-                             std::int64_t since, std::size_t most) {
+Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry,
+                             const std::string& cell, std::int64_t since, std::size_t most) {
   const auto checks = TRY(store.health_checks(cell, std::max<std::int64_t>(since, 0), most));
   const auto record = TRY(store.in_force_record(cell));
   CellHealth health{cell};
-  for (const StoredCheck& one : checks) health.checks.push_back({one.job, one.at, one.batch_ids, one.findings});
+  for (const StoredCheck& one : checks)
+    health.checks.push_back({one.job, one.at, one.batch_ids, one.findings});
   const auto model = registry.in_force(cell);
   if (!model) return health;
   ServedOnRecord& served = health.served.emplace();
@@ -72,7 +73,8 @@ Status check_fits(const std::string& what, std::size_t bytes) {
 
 Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const std::string& cell = request.about().cell();
-  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
+  const bool of_all = request.what() == wire::READ_JOBS ||
+                      request.what() == wire::READ_QUARANTINE ||
                       request.what() == wire::READ_BATCHES || request.what() == wire::READ_AUDIT ||
                       request.what() == wire::READ_HEALTH;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
@@ -83,11 +85,13 @@ Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   }
   auto reply = read(cell, request);
   if (!reply) return reply;
-  if (const auto served = registry_.in_force(cell)) reply->in_force(to_wire(*served, true, unix_now_s()));
+  if (const auto served = registry_.in_force(cell))
+    reply->in_force(to_wire(*served, true, unix_now_s()));
   return reply;
 }
 
-Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModelsRequest& request) const {
+Result<ReadModelsReply> Handlers::read(const std::string& cell,
+                                       const ReadModelsRequest& request) const {
   switch (request.what()) {
     case wire::READ_MODELS:
       return models_of(cell);
@@ -125,7 +129,8 @@ Result<ReadModelsReply> Handlers::job_of(std::int64_t job) const {
 Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
   const auto models = TRY(store_.models(cell));
   const auto batches = TRY(store_.batches(cell));
-  std::map<std::string, std::string> hashes;  // by batch; of several batches together none is stored
+  std::map<std::string, std::string>
+      hashes;  // by batch; of several batches together none is stored
   for (const StoredBatch& batch : batches) hashes[batch.id] = batch.hash;
   ReadModelsReply reply;
   const auto served = registry_.in_force(cell);
@@ -134,17 +139,20 @@ Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
     reply.models().push_back(to_wire(models[i], now));
     const auto hash = hashes.find(models[i].batch_id);
     if (hash != hashes.end()) reply.models().back().batch_hash(hash->second);
-    if (served && served->version == models[i].version) reply.models().back().notes(to_wire(served->notes));
+    if (served && served->version == models[i].version)
+      reply.models().back().notes(to_wire(served->notes));
   }
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::exported(const std::string& cell, int asked) const {
   const auto in_force = registry_.in_force(cell);
-  if (asked == 0 && !in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
+  if (asked == 0 && !in_force)
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
   const int version = asked == 0 ? in_force->version : asked;
-  const auto model = TRY(in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
-                                                                  : store_.model(cell, version));
+  const auto model =
+      TRY(in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                   : store_.model(cell, version));
   ReadModelsReply reply;
   reply.version(version);
   reply.text(serialize(model));
@@ -154,11 +162,14 @@ Result<ReadModelsReply> Handlers::exported(const std::string& cell, int asked) c
 
 Result<ReadModelsReply> Handlers::replayed(const std::string& cell, int version) const {
   const auto in_force = registry_.in_force(cell);
-  if (!in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
-  const auto other = TRY(version == 0 || version == in_force->version ? Result<CompensatedModel>(in_force->model)
-                                                                      : store_.model(cell, version));
+  if (!in_force)
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
+  const auto other =
+      TRY(version == 0 || version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                       : store_.model(cell, version));
   const WorkVersions versions{cell, in_force->version, version};
-  const WorkAsked work = work_asked(in_force->model, version == 0 ? nullptr : &other, trainer_.recent_poses().of(cell));
+  const WorkAsked work = work_asked(in_force->model, version == 0 ? nullptr : &other,
+                                    trainer_.recent_poses().of(cell));
   ReadModelsReply reply;
   reply.version(in_force->version);
   reply.text(work_json(work, versions, in_force->model.cell().robot).dump());
@@ -182,19 +193,24 @@ Result<ReadModelsReply> Handlers::batch_of(const std::string& cell, const std::s
   return reply;
 }
 
-Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since, std::size_t most) const {
+Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since,
+                                           std::size_t most) const {
   const auto trail = TRY(store_.audit({cell, std::max<std::int64_t>(since, 0), most}));
   ReadModelsReply reply;
-  reply.text(audit_json(trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  reply.text(
+      audit_json(trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the audit trail", reply.text().size()); !fits)
     return Failure(fits.error()).next("ask for fewer rows");
   return reply;
 }
 
-Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int64_t job, bool page) const {
+Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int64_t job,
+                                              bool page) const {
   const auto asked = TRY(trainer_.progress(job));
   if (asked.cell != cell)
-    return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
+    return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell)
+        .of("job")
+        .with_value(job);
   auto found = TRY(trainer_.diagnosis(job));
   ReadModelsReply reply;
   if (page) reply.page_html(std::move(found.page));
@@ -210,7 +226,8 @@ Result<ReadModelsReply> Handlers::fleet() const {
   const auto jobs = TRY(trainer_.jobs(""));
   for (const Trainer::DatedJob& job : jobs) {
     if (job.asked.kind != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
-    if (const auto found = trainer_.diagnosis(job.asked.id)) checks[job.asked.cell] = found->findings;
+    if (const auto found = trainer_.diagnosis(job.asked.id))
+      checks[job.asked.cell] = found->findings;
   }
   std::vector<FleetEntry> cells;
   for (const auto& [name, cell] : trainer_.cells()) {
@@ -222,12 +239,14 @@ Result<ReadModelsReply> Handlers::fleet() const {
     cells.push_back(std::move(entry));
   }
   ReadModelsReply reply;
-  reply.text(fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  reply.text(
+      fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   TRY(check_fits("the fleet", reply.text().size()));
   return reply;
 }
 
-Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_t since, std::size_t most) const {
+Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_t since,
+                                            std::size_t most) const {
   nlohmann::ordered_json cells = nlohmann::ordered_json::array();
   for (const auto& [name, known] : trainer_.cells()) {
     if (!cell.empty() && name != cell) continue;

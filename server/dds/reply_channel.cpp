@@ -14,18 +14,24 @@ constexpr std::size_t kMostKept = 1024;  // also when it never is
 constexpr std::size_t kDeletedAtOnce = 4;
 
 /// The first two octets of a participant's id name the maker of its library (RTPS 2.3, 9.3.1.5).
-bool follows_to_another_partition(const std::string& participant) { return participant.starts_with("\x01\x0f"); }
+bool follows_to_another_partition(const std::string& participant) {
+  return participant.starts_with("\x01\x0f");
+}
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched, InsteadOf instead)
+ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched,
+                         InsteadOf instead)
     : publisher_(publisher), matched_(std::move(matched)), instead_(std::move(instead)) {}
 
-std::shared_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
+std::shared_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher,
+                                               wire::dds::Topic* topic,
                                                std::function<void()> matched, InsteadOf instead) {
-  std::shared_ptr<ReplyWriter> result(new ReplyWriter(publisher, std::move(matched), std::move(instead)));
-  result->writer_ = publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
-                                                wire::dds::StatusMask::publication_matched());
+  std::shared_ptr<ReplyWriter> result(
+      new ReplyWriter(publisher, std::move(matched), std::move(instead)));
+  result->writer_ =
+      publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
+                                  wire::dds::StatusMask::publication_matched());
   return result->writer_ == nullptr ? nullptr : result;
 }
 
@@ -39,7 +45,8 @@ ReplyWriter::~ReplyWriter() {
   if (writer_ != nullptr) publisher_.delete_datawriter(writer_);
 }
 
-void ReplyWriter::on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) {
+void ReplyWriter::on_publication_matched(wire::dds::DataWriter*,
+                                         const wire::dds::PublicationMatchedStatus& status) {
   readers_ = status.current_count;
   if (status.current_count_change > 0) matched_();
 }
@@ -60,15 +67,18 @@ ReplyChannel::Writer ReplyChannel::writer(const std::string& topic) const {
 }
 
 bool ReplyChannel::is_in_use() const {
-  return std::any_of(writers_.begin(), writers_.end(), [](const auto& one) { return one.second.use_count() > 1; });
+  return std::any_of(writers_.begin(), writers_.end(),
+                     [](const auto& one) { return one.second.use_count() > 1; });
 }
 
 bool ReplyChannel::has_readers() const {
-  return std::any_of(writers_.begin(), writers_.end(), [](const auto& one) { return one.second->has_reader(); });
+  return std::any_of(writers_.begin(), writers_.end(),
+                     [](const auto& one) { return one.second->has_reader(); });
 }
 
 bool ReplyChannel::move_to(const std::string& partition) {
-  if (publisher_->set_qos(wire::publisher_qos(partition)) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
+  if (publisher_->set_qos(wire::publisher_qos(partition)) !=
+      eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
     return false;
   partition_ = partition;
   return true;
@@ -77,13 +87,15 @@ bool ReplyChannel::move_to(const std::string& partition) {
 void ParkedChannels::park(Channel channel, Time now) {
   last_parked_ = now;
   if (channel->publisher() == nullptr) return;
-  if (channel->has_readers() && !channel->move_to(kNowhere)) return;  // its client has not left, but gets no replies
+  if (channel->has_readers() && !channel->move_to(kNowhere))
+    return;  // its client has not left, but gets no replies
   parked_.push_back(std::move(channel));
 }
 
-ParkedChannels::Channel ParkedChannels::take(const std::string& participant, const std::string& partition) {
-  const auto own =
-      std::find_if(parked_.begin(), parked_.end(), [&](const Channel& one) { return one->partition() == partition; });
+ParkedChannels::Channel ParkedChannels::take(const std::string& participant,
+                                             const std::string& partition) {
+  const auto own = std::find_if(parked_.begin(), parked_.end(),
+                                [&](const Channel& one) { return one->partition() == partition; });
   if (own != parked_.end()) {
     Channel channel = std::move(*own);
     parked_.erase(own);
@@ -98,8 +110,8 @@ ParkedChannels::Channel ParkedChannels::take(const std::string& participant, con
 bool ParkedChannels::tend(Time now) {
   const std::size_t most = now - last_parked_ > kQuiet ? kKept : kMostKept;
   if (parked_.size() <= most) return false;
-  parked_.erase(parked_.begin(),
-                parked_.begin() + static_cast<std::ptrdiff_t>(std::min(kDeletedAtOnce, parked_.size() - most)));
+  parked_.erase(parked_.begin(), parked_.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                       kDeletedAtOnce, parked_.size() - most)));
   return parked_.size() > most;
 }
 

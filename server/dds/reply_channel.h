@@ -21,15 +21,17 @@ using InsteadOf = std::function<std::shared_ptr<void>(const void* reply)>;
 class ReplyWriter final : private wire::dds::DataWriterListener {
  public:
   /// Null when DDS refuses. `matched` is called when a reader has been matched, in a thread of DDS.
-  [[nodiscard]] static std::shared_ptr<ReplyWriter> make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
-                                                         std::function<void()> matched, InsteadOf instead = nullptr);
+  [[nodiscard]] static std::shared_ptr<ReplyWriter> make(wire::dds::Publisher& publisher,
+                                                         wire::dds::Topic* topic,
+                                                         std::function<void()> matched,
+                                                         InsteadOf instead = nullptr);
   ~ReplyWriter() override;
   ReplyWriter(const ReplyWriter&) = delete;
   ReplyWriter& operator=(const ReplyWriter&) = delete;
 
   [[nodiscard]] bool has_reader() const { return readers_ > 0; }
-  /// Does not wait for the reader: what it does not take in time is overwritten. A reply that does not fit on the wire
-  /// is replaced by an error. False: nothing was written.
+  /// Does not wait for the reader: what it does not take in time is overwritten. A reply that does
+  /// not fit on the wire is replaced by an error. False: nothing was written.
   [[nodiscard]] bool write(void* reply);
 
  private:
@@ -72,13 +74,15 @@ class ReplyChannel {
   std::map<std::string, Writer> writers_;  // by topic
 };
 
-/// The channels of clients that have left, kept for others. Deleting a writer tells all clients so, and the library
-/// removes that news from its history when the last of them has heard it. If the last one is dead, that happens as its
-/// lease ends, and may meet the thread that sends old news to a newcomer: each then holds the lock that the other
-/// wants, for ever. So while clients come and go a channel moves to the next client, and the rest is deleted when
-/// nobody has left for a while. Other libraries than Fast DDS do not follow a writer to another partition: their
-/// clients get new channels. Whoever comes again under its name gets its own one: its readers are matched with those
-/// writers as soon as it hears of them, and what another writer sends meanwhile they do not hear. Not thread-safe.
+/// The channels of clients that have left, kept for others. Deleting a writer tells all clients so,
+/// and the library removes that news from its history when the last of them has heard it. If the
+/// last one is dead, that happens as its lease ends, and may meet the thread that sends old news to
+/// a newcomer: each then holds the lock that the other wants, for ever. So while clients come and
+/// go a channel moves to the next client, and the rest is deleted when nobody has left for a while.
+/// Other libraries than Fast DDS do not follow a writer to another partition: their clients get new
+/// channels. Whoever comes again under its name gets its own one: its readers are matched with
+/// those writers as soon as it hears of them, and what another writer sends meanwhile they do not
+/// hear. Not thread-safe.
 class ParkedChannels {
  public:
   using Time = std::chrono::steady_clock::time_point;

@@ -56,7 +56,8 @@ bool ReplyChannels::tend() {
     const MutexLock lock(mutex_);
     changes = book_.changes(Clock::now());
     somebody_waits = book_.somebody_waits() || !closed_.empty();
-    const auto used = std::partition(closed_.begin(), closed_.end(), [](const auto& one) { return one->is_in_use(); });
+    const auto used = std::partition(closed_.begin(), closed_.end(),
+                                     [](const auto& one) { return one->is_in_use(); });
     unused.assign(std::make_move_iterator(used), std::make_move_iterator(closed_.end()));
     closed_.erase(used, closed_.end());
   }
@@ -79,7 +80,8 @@ void ReplyChannels::open(const ChannelBook::Change& change) {
   {
     const MutexLock lock(mutex_);
     of = topics_.at(change.topic);
-    if (const auto found = channels_.find(change.partition); found != channels_.end()) channel = found->second;
+    if (const auto found = channels_.find(change.partition); found != channels_.end())
+      channel = found->second;
   }
   if (!channel) channel = parked_.take(change.participant, change.partition);
   if (!channel) channel = std::make_shared<ReplyChannel>(participant_, change.partition);
@@ -137,7 +139,8 @@ void ReplyChannels::answered(const std::string& partition) {
   book_.answered(partition, Clock::now());
 }
 
-ReplyChannels::Writer ReplyChannels::writer(const std::string& participant, const std::string& partition,
+ReplyChannels::Writer ReplyChannels::writer(const std::string& participant,
+                                            const std::string& partition,
                                             const std::string& topic) const {
   const auto channel = channels_.find(partition);
   if (channel == channels_.end() || !book_.listens(participant, partition)) return nullptr;
@@ -145,8 +148,10 @@ ReplyChannels::Writer ReplyChannels::writer(const std::string& participant, cons
   return found && found->has_reader() ? found : nullptr;
 }
 
-void ReplyChannels::put(Outbox& outbox, const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
-  const Parcel parcel{to.participant, to.partition, to.topic, std::move(reply), bytes, Clock::now() + kReplyPatience};
+void ReplyChannels::put(Outbox& outbox, const ReplyAddress& to, std::shared_ptr<void> reply,
+                        std::size_t bytes) {
+  const Parcel parcel{to.participant,   to.partition, to.topic,
+                      std::move(reply), bytes,        Clock::now() + kReplyPatience};
   if (!book_.may_listen(to.participant, to.partition) || !outbox.put(parcel)) ++unheard_;
 }
 
@@ -163,7 +168,8 @@ void ReplyChannels::send(const ReplyAddress& to, std::shared_ptr<void> reply, st
 void ReplyChannels::post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
   {
     const MutexLock lock(mutex_);
-    put(writer(to.participant, to.partition, to.topic) ? posted_ : kept_, to, std::move(reply), bytes);
+    put(writer(to.participant, to.partition, to.topic) ? posted_ : kept_, to, std::move(reply),
+        bytes);
   }
   due_.notify_all();
 }
@@ -186,14 +192,16 @@ void ReplyChannels::add_ready(std::list<Parcel> parcels, std::vector<Ready>* rea
 
 std::vector<ReplyChannels::Ready> ReplyChannels::wait_for_ready(const std::stop_token& stop) {
   MutexLock lock(mutex_);
-  due_.wait_for(lock, stop, kLook, [this]() TRAMMEL_REQUIRES(mutex_) { return has_matched_ || !posted_.empty(); });
+  due_.wait_for(lock, stop, kLook,
+                [this]() TRAMMEL_REQUIRES(mutex_) { return has_matched_ || !posted_.empty(); });
   unheard_ += kept_.expire(Clock::now());
   std::vector<Ready> ready;
   if (has_matched_) {
-    add_ready(
-        kept_.take(kWrittenAtOnce, [this](const Parcel& one) TRAMMEL_REQUIRES(
-                                       mutex_) { return writer(one.client, one.partition, one.topic) != nullptr; }),
-        &ready);
+    add_ready(kept_.take(kWrittenAtOnce,
+                         [this](const Parcel& one) TRAMMEL_REQUIRES(mutex_) {
+                           return writer(one.client, one.partition, one.topic) != nullptr;
+                         }),
+              &ready);
     has_matched_ = ready.size() == kWrittenAtOnce;
   }
   add_ready(posted_.take(kWrittenAtOnce, [](const Parcel&) { return true; }), &ready);

@@ -23,21 +23,24 @@
 
 namespace trammel {
 
-/// The reply channels: a publisher in the partition of each client, and a writer for each topic that it listens to.
-/// They are made when discovery finds the client's readers, and only then; ChannelBook says who has one. A reply to a
-/// reader that is not matched yet waits in an outbox, for a bounded time. Thread-safe.
+/// The reply channels: a publisher in the partition of each client, and a writer for each topic
+/// that it listens to. They are made when discovery finds the client's readers, and only then;
+/// ChannelBook says who has one. A reply to a reader that is not matched yet waits in an outbox,
+/// for a bounded time. Thread-safe.
 class ReplyChannels final : public ReplySink {
  public:
-  /// `wants_tending`: called when tend() has something to do. `writing` watches over what is written.
-  ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity, std::function<void()> wants_tending,
-                WorkUnderWay& writing);
+  /// `wants_tending`: called when tend() has something to do. `writing` watches over what is
+  /// written.
+  ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity,
+                std::function<void()> wants_tending, WorkUnderWay& writing);
 
-  /// Adds a topic of replies, and what is answered `instead` of one that cannot be written. Call it before any other
-  /// function.
+  /// Adds a topic of replies, and what is answered `instead` of one that cannot be written. Call it
+  /// before any other function.
   void add_topic(wire::dds::Topic* topic, InsteadOf instead);
   /// What discovery has found since.
   void heard(const std::vector<ReaderEvent>& events);
-  /// Opens and closes channels. Call it from one thread only. True while clients wait for a channel.
+  /// Opens and closes channels. Call it from one thread only. True while clients wait for a
+  /// channel.
   bool tend();
 
   /// A request that is not answered yet: its client keeps its channel.
@@ -54,7 +57,8 @@ class ReplyChannels final : public ReplySink {
     const std::string partition_;
   };
   /// Null when another participant listens in the partition: it would get the reply.
-  [[nodiscard]] std::shared_ptr<Expectation> expect(const std::string& participant, const std::string& partition);
+  [[nodiscard]] std::shared_ptr<Expectation> expect(const std::string& participant,
+                                                    const std::string& partition);
 
   /// Writes the reply, or keeps it until the client's reader is matched.
   void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override;
@@ -62,7 +66,8 @@ class ReplyChannels final : public ReplySink {
   /// Writes what was posted, and what was kept once its reader is matched, until `stop`.
   void deliver(const std::stop_token& stop);
 
-  /// How often deliver() has looked; it does at least twice a second. For the watchdog: takes no lock.
+  /// How often deliver() has looked; it does at least twice a second. For the watchdog: takes no
+  /// lock.
   [[nodiscard]] std::uint64_t looks() const { return looks_; }
   /// Replies that were dropped because nobody listened.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }
@@ -100,9 +105,11 @@ class ReplyChannels final : public ReplySink {
     wire::dds::Topic* topic = nullptr;
     InsteadOf instead;
   };
-  std::map<std::string, ReplyTopic> topics_ TRAMMEL_GUARDED_BY(mutex_);                       // by name
-  std::map<std::string, std::shared_ptr<ReplyChannel>> channels_ TRAMMEL_GUARDED_BY(mutex_);  // by partition
-  std::vector<std::shared_ptr<ReplyChannel>> closed_ TRAMMEL_GUARDED_BY(mutex_);  // perhaps still in use by a sender
+  std::map<std::string, ReplyTopic> topics_ TRAMMEL_GUARDED_BY(mutex_);  // by name
+  std::map<std::string, std::shared_ptr<ReplyChannel>> channels_
+      TRAMMEL_GUARDED_BY(mutex_);  // by partition
+  std::vector<std::shared_ptr<ReplyChannel>> closed_
+      TRAMMEL_GUARDED_BY(mutex_);  // perhaps still in use by a sender
   ChannelBook book_ TRAMMEL_GUARDED_BY(mutex_);
   Outbox posted_ TRAMMEL_GUARDED_BY(mutex_);
   Outbox kept_ TRAMMEL_GUARDED_BY(mutex_);  // until their reader is matched

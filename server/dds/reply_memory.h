@@ -12,7 +12,8 @@
 
 namespace trammel {
 
-/// The last replies by request id. A repeat of a request gets the same reply and is not carried out again. Thread-safe.
+/// The last replies by request id. A repeat of a request gets the same reply and is not carried out
+/// again. Thread-safe.
 template <typename Reply>
 class ReplyMemory {
  public:
@@ -46,8 +47,8 @@ class ReplyMemory {
   std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// The requests that are being answered, so that a repeat is not carried out beside them: it gets the same answer once
-/// more. Thread-safe.
+/// The requests that are being answered, so that a repeat is not carried out beside them: it gets
+/// the same answer once more. Thread-safe.
 class UnderWay {
   enum class Stand { kFirst, kRepeat, kOther };
 
@@ -66,7 +67,8 @@ class UnderWay {
     [[nodiscard]] bool is_first() const { return stand_ == Stand::kFirst; }
     /// Something else is being answered under the same id.
     [[nodiscard]] bool is_other() const { return stand_ == Stand::kOther; }
-    /// Of the first: whether a repeat has come that has no answer yet; it counts as answered then. False is the end.
+    /// Of the first: whether a repeat has come that has no answer yet; it counts as answered then.
+    /// False is the end.
     [[nodiscard]] bool has_repeat() { return all_.take_repeat(request_); }
 
    private:

@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// How long a reply is kept for a reader that is not matched: DDS matches it within a few announcements, or never.
+/// How long a reply is kept for a reader that is not matched: DDS matches it within a few
+/// announcements, or never.
 inline constexpr auto kReplyPatience = wire::kLease;
 
 /// Where a reply goes.
@@ -22,7 +23,8 @@ struct ReplyAddress {
 class ReplySink {
  public:
   virtual ~ReplySink() = default;
-  /// Sends the reply, at once where that is possible. `reply` is a sample of the topic's type, of about so many bytes.
+  /// Sends the reply, at once where that is possible. `reply` is a sample of the topic's type, of
+  /// about so many bytes.
   virtual void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;
   /// The same for threads that must not write: another one does.
   virtual void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;

@@ -29,15 +29,15 @@ namespace trammel {
 struct CallCounts {
   std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
   std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
-  std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY: there was no time or no room
-  std::atomic<std::uint64_t> lost{0};      ///< by a DDS reader, before anybody saw them
+  std::atomic<std::uint64_t> shed{0};  ///< answered with RESULT_BUSY: there was no time or no room
+  std::atomic<std::uint64_t> lost{0};  ///< by a DDS reader, before anybody saw them
   /// Not answered: another client listens where the reply was to go.
   std::atomic<std::uint64_t> misdirected{0};
 };
 
 /// Of a request that claims to be of another DDS writer than the one that sent it.
-[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
-                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(
+    const wire::RequestHeader& header, const eprosima::fastrtps::rtps::GUID_t& writer) {
   if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
   return wire::Fault{wire::RESULT_WRONG_IDENTITY,
                      "request_id must hold the GUID of the writer that sends it",
@@ -54,7 +54,8 @@ inline const wire::Fault kIdIsUsed{
 /// A DDS participant, as request ids begin.
 [[nodiscard]] inline std::string participant_text(const std::string& participant) {
   std::string text;
-  for (const char byte : participant) text += fmt::format("{:02x}", static_cast<unsigned char>(byte));
+  for (const char byte : participant)
+    text += fmt::format("{:02x}", static_cast<unsigned char>(byte));
   return text;
 }
 
@@ -70,8 +71,9 @@ struct CallContext {
   Handlers& handlers;
   ReplySink& replies;
   CallCounts& counts;
-  ReplyMemory<Reply> memory{kRepliesRemembered};  ///< of operations that change something, by request id
-  ReplyMemory<Reply> lately{kLately};             ///< of long computations, by writer and request id
+  ReplyMemory<Reply> memory{
+      kRepliesRemembered};             ///< of operations that change something, by request id
+  ReplyMemory<Reply> lately{kLately};  ///< of long computations, by writer and request id
   UnderWay under_way = {};
   RequestRecorder* recorder = nullptr;
   CallListener listener = {};  ///< told of what was to change something, and of what was refused
@@ -87,10 +89,10 @@ class Call final : public Job {
   /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
   static constexpr bool kComputes = AsksForTargets<Request> || AsksForPoses<Request>;
 
-  /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids. `while_under_way`
-  /// is kept until the call is over.
-  Call(CallContext<Operation>& context, std::unique_ptr<Request> request, ReplyAddress to, const std::string& sent,
-       std::shared_ptr<void> while_under_way)
+  /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids.
+  /// `while_under_way` is kept until the call is over.
+  Call(CallContext<Operation>& context, std::unique_ptr<Request> request, ReplyAddress to,
+       const std::string& sent, std::shared_ptr<void> while_under_way)
       : context_(context),
         request_(std::move(request)),
         to_(std::move(to)),
@@ -98,11 +100,12 @@ class Call final : public Job {
         while_under_way_(std::move(while_under_way)),
         answering_(context.under_way, sent, request_->content) {}
 
-  /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for it.
+  /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for
+  /// it.
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
 
-  /// Instead of begin(), where something else is being answered under its id: what was answered under it before is
-  /// repeated, all else is refused. True: it is answered so.
+  /// Instead of begin(), where something else is being answered under its id: what was answered
+  /// under it before is repeated, all else is refused. True: it is answered so.
   [[nodiscard]] bool is_answered_for_its_id() {
     if (!answering_.is_other()) return false;
     if (!find_known()) refuse(kIdIsUsed);
@@ -239,16 +242,19 @@ class Call final : public Job {
   void remember() {
     if (kComputes) context_.lately.remember(sent_, request_->content, reply_);
     if (happens_once(*request_)) {
-      context_.memory.remember(request_id_text(request_->header().request_id()), request_->content, reply_);
+      context_.memory.remember(request_id_text(request_->header().request_id()), request_->content,
+                               reply_);
     }
   }
 
   void record() const {
     if constexpr (kComputes) {
       if (context_.recorder == nullptr) return;
-      const auto kept = std::make_shared<std::pair<typename Operation::Request::type, Reply>>(*request_, reply_);
-      context_.recorder->record([kept, at = unix_now_s()] { return record_line(kept->first, kept->second, at); },
-                                bytes_of_request(*request_) + bytes_of_reply(reply_));
+      const auto kept =
+          std::make_shared<std::pair<typename Operation::Request::type, Reply>>(*request_, reply_);
+      context_.recorder->record(
+          [kept, at = unix_now_s()] { return record_line(kept->first, kept->second, at); },
+          bytes_of_request(*request_) + bytes_of_reply(reply_));
     }
   }
 
@@ -258,8 +264,9 @@ class Call final : public Job {
     const wire::RequestHeader& header = request_->header();
     const std::string name = context_.handlers.name_of(to_.participant);
     context_.listener({Operation::kName, name.empty() ? participant_text(to_.participant) : name,
-                       request_id_text(header.request_id()), header.trace_id().to_string(), request_->about().cell(),
-                       changes, reply_.header().message(), result_word(reply_.header().result())});
+                       request_id_text(header.request_id()), header.trace_id().to_string(),
+                       request_->about().cell(), changes, reply_.header().message(),
+                       result_word(reply_.header().result())});
   }
 
   /// Returns how many were answered: with the repeats that have come meanwhile.

@@ -32,7 +32,8 @@ struct ServiceCore {
   RequestRecorder* recorder = nullptr;  ///< null: nothing is recorded
   CallCounts counts{};
   /// Dropped: not even the header could be read.
-  std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
+  std::shared_ptr<std::atomic<std::uint64_t>> unreadable =
+      std::make_shared<std::atomic<std::uint64_t>>(0);
   WorkUnderWay taking{};  ///< takes of requests from DDS readers
 };
 
@@ -52,7 +53,8 @@ class RequestEndpointBase {
 
 /// What the schedule must know of a request of this participant.
 template <typename Operation, typename Request>
-[[nodiscard]] Ask ask_of(const Trainer& trainer, const Request& request, const std::string& participant) {
+[[nodiscard]] Ask ask_of(const Trainer& trainer, const Request& request,
+                         const std::string& participant) {
   /// How long a request waits for its turn whose client does not say how long it waits.
   constexpr std::chrono::milliseconds kPatience{5000};
   const std::string& cell = request.about().cell();
@@ -70,25 +72,30 @@ template <typename Operation, typename Request>
   return ask;
 }
 
-/// One operation and its DDS reader. The DDS listener takes each request out of the reader at once, so that none is
-/// pushed out by others, and queues it or has it answered RESULT_BUSY.
+/// One operation and its DDS reader. The DDS listener takes each request out of the reader at once,
+/// so that none is pushed out by others, and queues it or has it answered RESULT_BUSY.
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:
   using Request = wire::Received<typename Operation::Request::type>;
 
-  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lanes lanes) {
-    const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
+  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core,
+                                                                         Lanes lanes) {
+    const auto request_topic =
+        wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
     const auto reply_topic = make_sent_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
     core.channels.add_topic(*reply_topic, instead_of<typename Operation::Reply::type>);
-    std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core, lanes, (*reply_topic)->get_name()));
-    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
-    endpoint->reader_ = core.subscriber.create_datareader(*request_topic, wire::call_reader_qos(wire::kRequestDepth),
-                                                          endpoint.get(), heard);
+    std::unique_ptr<RequestEndpoint> endpoint(
+        new RequestEndpoint(core, lanes, (*reply_topic)->get_name()));
+    const auto heard = wire::dds::StatusMask::data_available()
+                       << wire::dds::StatusMask::sample_lost();
+    endpoint->reader_ = core.subscriber.create_datareader(
+        *request_topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
     if (endpoint->reader_ == nullptr) {
-      return failure(ErrorCode::kInternal, "cannot create the reader of {} requests", Operation::kName);
+      return failure(ErrorCode::kInternal, "cannot create the reader of {} requests",
+                     Operation::kName);
     }
     return endpoint;
   }
@@ -108,7 +115,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
       : core_(core),
         lanes_(lanes),
-        context_{core.server_id, std::move(reply_topic), core.handlers, core.channels, core.counts} {
+        context_{core.server_id, std::move(reply_topic), core.handlers, core.channels,
+                 core.counts} {
     context_.listener = core.listener;
     context_.recorder = core.recorder;
   }
@@ -129,27 +137,30 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
   bool take(wire::dds::DataReader& reader, Request& request, wire::dds::SampleInfo& info) {
     const WorkUnderWay::Piece piece = core_.taking.begin();
-    return reader.take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+    return reader.take_next_sample(&request, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
   /// In the thread that receives all requests: it must not wait, nor write.
   void receive(std::unique_ptr<Request> request, const eprosima::fastrtps::rtps::GUID_t& writer) {
     const std::string wanted = request->header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
-    const ReplyAddress to{wire::participant_of(writer), request->header().reply_partition().to_string(),
-                          context_.reply_topic};
+    const ReplyAddress to{wire::participant_of(writer),
+                          request->header().reply_partition().to_string(), context_.reply_topic};
     auto expectation = core_.channels.expect(to.participant, to.partition);
     if (!expectation) {
       ++core_.counts.misdirected;
       return;
     }
     if (!request->fault) request->fault = fault_of_identity(request->header(), writer);
-    const std::string sent = to.participant +
-                             std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
-                             request_id_text(request->header().request_id());
+    const std::string sent =
+        to.participant +
+        std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
+        request_id_text(request->header().request_id());
     Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
     Ask ask = ask_of<Operation>(core_.trainer, *request, to.participant);
-    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
+    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent,
+                                                        std::move(expectation));
     if (call->is_answered_for_its_id() || !call->is_first()) return;
     if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
   }

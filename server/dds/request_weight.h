@@ -55,13 +55,15 @@ template <typename Reply>
   if constexpr (requires { reply.corrections(); }) bytes += kAnswered * reply.corrections().size();
   if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
   if constexpr (requires { reply.models(); }) bytes += kAnswered * reply.models().size();
-  if constexpr (requires { reply.jobs(); }) bytes += kAnswered * (reply.jobs().size() + reply.batches().size());
+  if constexpr (requires { reply.jobs(); })
+    bytes += kAnswered * (reply.jobs().size() + reply.batches().size());
   if constexpr (requires { reply.text(); }) bytes += reply.text().size() + reply.page_html().size();
   return bytes;
 }
 
-/// Whose changes come one after the other: those of a cell. To read a model that is imported takes seconds and changes
-/// nothing yet: the cell does not wait for it, and imports come one at a time, for the memory.
+/// Whose changes come one after the other: those of a cell. To read a model that is imported takes
+/// seconds and changes nothing yet: the cell does not wait for it, and imports come one at a time,
+/// for the memory.
 template <typename Request>
 [[nodiscard]] std::string turn_of(const Request& request, const std::string& cell) {
   if constexpr (requires { request.model_text(); }) {
@@ -72,11 +74,14 @@ template <typename Request>
 
 /// Requests that cost alike: of one cell, with the same action.
 template <typename Request>
-[[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
+[[nodiscard]] std::string work_of(const Request& request, const std::string& cell,
+                                  const char* operation) {
   std::string work = cell + '/' + operation;
-  if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
+  if constexpr (HasAction<Request>)
+    work += '/' + std::to_string(static_cast<int>(request.action()));
   if constexpr (IsQuestion<Request>) work += '/' + std::to_string(static_cast<int>(request.what()));
-  if constexpr (requires { request.what(); }) work += '/' + std::to_string(static_cast<int>(request.what()));
+  if constexpr (requires { request.what(); })
+    work += '/' + std::to_string(static_cast<int>(request.what()));
   return work;
 }
 

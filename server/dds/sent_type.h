@@ -4,8 +4,8 @@
 
 namespace trammel {
 
-/// The type of replies on the side of the server. What a client would drop is not written, so that the server can
-/// answer otherwise.
+/// The type of replies on the side of the server. What a client would drop is not written, so that
+/// the server can answer otherwise.
 template <typename PubSubType>
 class SentType final : public wire::SafeType<PubSubType> {
  public:

@@ -21,9 +21,11 @@ std::string claimed_subject(const eprosima::fastrtps::rtps::IdentityToken& token
 
 /// Where the participant says that it can be reached; empty: it does not say.
 std::string claimed_address(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
-  for (const auto* locators : {&participant.metatraffic_locators.unicast, &participant.default_locators.unicast}) {
+  for (const auto* locators :
+       {&participant.metatraffic_locators.unicast, &participant.default_locators.unicast}) {
     for (const auto& locator : *locators) {
-      if (locator.kind == LOCATOR_KIND_UDPv4) return eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
+      if (locator.kind == LOCATOR_KIND_UDPv4)
+        return eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
     }
   }
   return {};
@@ -48,10 +50,12 @@ void ServiceEvents::wake() {
   changed_.notify_one();
 }
 
-ServiceEvents::News ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
+ServiceEvents::News ServiceEvents::wait(const std::stop_token& stop,
+                                        std::chrono::milliseconds limit) {
   MutexLock lock(mutex_);
-  changed_.wait_for(lock, stop, limit,
-                    [this]() TRAMMEL_REQUIRES(mutex_) { return woken_ || !readers_.empty() || !left_.empty(); });
+  changed_.wait_for(lock, stop, limit, [this]() TRAMMEL_REQUIRES(mutex_) {
+    return woken_ || !readers_.empty() || !left_.empty();
+  });
   woken_ = false;
   News news{std::exchange(status_changed_, false), std::exchange(readers_, {})};
   // Last: no participant comes back under the same name.
@@ -67,8 +71,11 @@ void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
   if (info.status != Info::DISCOVERED_READER && info.status != Info::REMOVED_READER) return;
   const std::string topic = info.info.topicName().to_string();
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
-  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
-  const auto kind = info.status == Info::REMOVED_READER ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
+  if (!topic.ends_with("_Reply") || partitions.size() != 1 ||
+      !wire::valid_partition(partitions.front()))
+    return;
+  const auto kind =
+      info.status == Info::REMOVED_READER ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
   {
     const MutexLock lock(mutex_);
     if (readers_.size() >= kMaxReaders) return;
@@ -77,12 +84,13 @@ void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
   changed_.notify_one();
 }
 
-void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
-                                             eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
+void ServiceEvents::on_participant_discovery(
+    wire::dds::DomainParticipant*, eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
   const std::string participant = wire::participant_of(info.info.m_guid);
   if (info.status != Info::REMOVED_PARTICIPANT && info.status != Info::DROPPED_PARTICIPANT) {
-    names_.announced(participant, claimed_subject(info.info.identity_token_), claimed_address(info.info));
+    names_.announced(participant, claimed_subject(info.info.identity_token_),
+                     claimed_address(info.info));
     return;
   }
   names_.left(participant);
@@ -103,8 +111,8 @@ std::vector<std::string> ServiceEvents::strangers_due(PacketReport::Time now) {
   return strangers_.due(now);
 }
 
-void ServiceEvents::onParticipantAuthentication(wire::dds::DomainParticipant*,
-                                                eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) {
+void ServiceEvents::onParticipantAuthentication(
+    wire::dds::DomainParticipant*, eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ParticipantAuthenticationInfo;
   const std::string participant = wire::participant_of(info.guid);
   if (info.status == Info::AUTHORIZED_PARTICIPANT) {

@@ -16,14 +16,16 @@
 
 namespace trammel {
 
-/// What discovery has found of a client. Of a participant that has left, only the participant is told.
+/// What discovery has found of a client. Of a participant that has left, only the participant is
+/// told.
 struct ReaderEvent {
   enum class Kind { kFound, kLost, kLeft } kind;
   ReplyReader reader;
 };
 
-/// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
-/// the participants that have left, and the names of those that were let in. Thread-safe.
+/// What the status thread of a service waits for. As the participant's listener it notes the
+/// readers of replies, and the participants that have left, and the names of those that were let
+/// in. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
   /// The status is to be published.
@@ -50,8 +52,9 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
   void on_participant_discovery(wire::dds::DomainParticipant* participant,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
-  void onParticipantAuthentication(wire::dds::DomainParticipant* participant,
-                                   eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
+  void onParticipantAuthentication(
+      wire::dds::DomainParticipant* participant,
+      eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
 
   ClientNames names_;
   mutable Mutex mutex_;

@@ -9,7 +9,8 @@ Status open_writer(const Result<wire::dds::Topic*>& topic, wire::dds::Publisher&
                    const wire::dds::DataWriterQos& qos, wire::dds::DataWriter*& writer) {
   if (!topic) return tl::make_unexpected(topic.error());
   writer = publisher.create_datawriter(*topic, qos);
-  if (writer == nullptr) return failure(ErrorCode::kInternal, "cannot create the writer of {}", (*topic)->get_name());
+  if (writer == nullptr)
+    return failure(ErrorCode::kInternal, "cannot create the writer of {}", (*topic)->get_name());
   return {};
 }
 
@@ -17,17 +18,19 @@ Status open_writer(const Result<wire::dds::Topic*>& topic, wire::dds::Publisher&
 
 Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant) {
   wire::dds::Publisher* publisher = participant.create_publisher(wire::publisher_qos({}));
-  if (publisher == nullptr) return failure(ErrorCode::kInternal, "cannot create the publisher of the state topics");
+  if (publisher == nullptr)
+    return failure(ErrorCode::kInternal, "cannot create the publisher of the state topics");
   StateTopics topics;
-  Status opened = open_writer(wire::make_state_topic<wire::ServiceStatusTopic>(participant), *publisher,
-                              wire::service_status_writer_qos(), topics.service_status_);
+  Status opened =
+      open_writer(wire::make_state_topic<wire::ServiceStatusTopic>(participant), *publisher,
+                  wire::service_status_writer_qos(), topics.service_status_);
   if (opened) {
-    opened = open_writer(wire::make_contract_topic(participant), *publisher, wire::service_status_writer_qos(),
-                         topics.contract_);
+    opened = open_writer(wire::make_contract_topic(participant), *publisher,
+                         wire::service_status_writer_qos(), topics.contract_);
   }
   if (opened) {
-    opened = open_writer(wire::make_state_topic<wire::TrainingProgressTopic>(participant), *publisher,
-                         wire::progress_writer_qos(), topics.training_progress_);
+    opened = open_writer(wire::make_state_topic<wire::TrainingProgressTopic>(participant),
+                         *publisher, wire::progress_writer_qos(), topics.training_progress_);
   }
   if (opened) {
     opened = open_writer(wire::make_state_topic<wire::ModelStatusTopic>(participant), *publisher,

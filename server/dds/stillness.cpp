@@ -5,7 +5,8 @@
 
 namespace trammel {
 
-Stillness::Stillness(std::vector<MovingPart> parts, Duration tick, Duration limit) : tick_(tick), limit_(limit) {
+Stillness::Stillness(std::vector<MovingPart> parts, Duration tick, Duration limit)
+    : tick_(tick), limit_(limit) {
   for (MovingPart& part : parts) watched_.push_back({std::move(part), std::nullopt, Duration(0)});
 }
 

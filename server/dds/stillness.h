@@ -14,13 +14,15 @@ namespace trammel {
 /// A part of the service that must keep moving.
 struct MovingPart {
   const char* name;
-  /// A number that changes with every piece of work done; empty while there is no work. Never waits.
+  /// A number that changes with every piece of work done; empty while there is no work. Never
+  /// waits.
   std::function<std::optional<std::uint64_t>()> mark;
   bool ends_process = true;  ///< false: its stillness is told and nothing more
 };
 
-/// Tells which parts, 64 at most, have stopped. A look may come late because the process was stopped or the machine was
-/// busy. A late look counts as one tick only, so that such pauses do not look like a hang. Not thread-safe.
+/// Tells which parts, 64 at most, have stopped. A look may come late because the process was
+/// stopped or the machine was busy. A late look counts as one tick only, so that such pauses do not
+/// look like a hang. Not thread-safe.
 class Stillness {
  public:
   using Duration = std::chrono::milliseconds;
@@ -28,9 +30,11 @@ class Stillness {
   /// look() is called every `tick`. A part that has not moved for `limit` has stopped.
   Stillness(std::vector<MovingPart> parts, Duration tick, Duration limit);
 
-  /// Returns the names of the parts that have stopped. `since_last` is the time since the last look, by a steady clock.
+  /// Returns the names of the parts that have stopped. `since_last` is the time since the last
+  /// look, by a steady clock.
   [[nodiscard]] std::vector<const char*> look(Duration since_last);
-  /// Those that had not moved for `time` at the last look, a bit each, in their order; also those that end nothing.
+  /// Those that had not moved for `time` at the last look, a bit each, in their order; also those
+  /// that end nothing.
   [[nodiscard]] std::uint64_t still_for(Duration time) const;
 
  private:
@@ -43,7 +47,8 @@ class Stillness {
   Duration tick_, limit_;
 };
 
-/// The pieces of work that are under way. Each is short: one that stays long hangs. Thread-safe, without a lock.
+/// The pieces of work that are under way. Each is short: one that stays long hangs. Thread-safe,
+/// without a lock.
 class WorkUnderWay {
  public:
   /// One piece, from its making to its end.

@@ -30,13 +30,17 @@ Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& con
         .with_text(context.cell());
   }
   if (context.controller_compensates()) {
-    return refused("cell {}: models are trained with a controller that does not compensate, this one does",
-                   context.cell())
+    return refused(
+               "cell {}: models are trained with a controller that does not compensate, this one "
+               "does",
+               context.cell())
         .of("controller_compensates");
   }
   const Cell& cell = *found->second;
   if (!context.tool().empty() && !cell.tools.contains(context.tool())) {
-    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool()).of("tool").with_text(context.tool());
+    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool())
+        .of("tool")
+        .with_text(context.tool());
   }
   if (!context.payload().empty() && !cell.payloads.contains(context.payload())) {
     return refused("cell {}: unknown payload `{}`", context.cell(), context.payload())
@@ -58,7 +62,8 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
         .next("try again in a second");
   }
   Subject subject{in_force, true, {}, {}};
-  if (const auto wanted = version_number(context.model()); wanted && (!in_force || in_force->version != *wanted)) {
+  if (const auto wanted = version_number(context.model());
+      wanted && (!in_force || in_force->version != *wanted)) {
     auto stored = TRY(version(context.cell(), *wanted));
     subject.served = std::move(stored);
     subject.in_force = false;
@@ -66,10 +71,12 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
     return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell())
         .of("cell")
         .with_text(context.cell());
-  } else if (!wanted && !context.model().empty() && context.model() != in_force->model.provenance().id &&
+  } else if (!wanted && !context.model().empty() &&
+             context.model() != in_force->model.provenance().id &&
              context.model() != in_force->model.provenance().hash) {
-    return failure(ErrorCode::kConflict, "cell {}: model `{}` is not in force, {} (version {}) is", context.cell(),
-                   context.model(), in_force->model.provenance().id, in_force->version)
+    return failure(ErrorCode::kConflict, "cell {}: model `{}` is not in force, {} (version {}) is",
+                   context.cell(), context.model(), in_force->model.provenance().id,
+                   in_force->version)
         .of("model")
         .with_text(context.model());
   }
@@ -83,11 +90,13 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
   return subject;
 }
 
-Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell, int version) {
+Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell,
+                                                                  int version) {
   {
     const MutexLock lock(mutex_);
-    const auto found = std::find_if(loaded_.begin(), loaded_.end(),
-                                    [&](const auto& m) { return m->cell == cell && m->version == version; });
+    const auto found = std::find_if(loaded_.begin(), loaded_.end(), [&](const auto& m) {
+      return m->cell == cell && m->version == version;
+    });
     if (found != loaded_.end()) return *found;
   }
   // Without the lock: other requests do not wait while a model is read.

@@ -11,16 +11,21 @@ namespace {
 Status check_training(const wire::TrainRequest& request) {
   if (request.kind() == wire::TRAIN_BATCHES) {
     if (request.csv().empty()) return {};
-    return failure(ErrorCode::kUsage, "a training is of stored batches").of("csv").next("submit the batch first");
+    return failure(ErrorCode::kUsage, "a training is of stored batches")
+        .of("csv")
+        .next("submit the batch first");
   }
   if (request.batch_ids().size() > 1) {
     return failure(ErrorCode::kUsage, "{} batches to diagnose, limit 1", request.batch_ids().size())
         .of("batch_ids")
         .beyond(request.batch_ids().size(), 1);
   }
-  for (const auto& [text, field] : {std::pair(request.level(), "level"), std::pair(request.bias(), "bias")}) {
+  for (const auto& [text, field] :
+       {std::pair(request.level(), "level"), std::pair(request.bias(), "bias")}) {
     if (text.empty()) continue;
-    return failure(ErrorCode::kUsage, "what a diagnosis finds is trained beside what the model in force has").of(field);
+    return failure(ErrorCode::kUsage,
+                   "what a diagnosis finds is trained beside what the model in force has")
+        .of(field);
   }
   return {};
 }
@@ -38,14 +43,15 @@ std::string Handlers::who(const wire::RequestHeader& header) const {
   return name.empty() ? requester(header) : name + " " + requester(header);
 }
 
-Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
+Result<wire::SubmitMeasurementsReply> Handlers::answer(
+    const wire::SubmitMeasurementsRequest& request) {
   TRY(subjects_.cell(request.about()));
   if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
-  const auto job =
-      TRY(trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
-                          request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
-                                                                  : request.change_id().to_string(),
-                          who(request.header())));
+  const auto job = TRY(trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
+                                       request.change_id().to_string().empty()
+                                           ? request_id_text(request.header().request_id())
+                                           : request.change_id().to_string(),
+                                       who(request.header())));
   wire::SubmitMeasurementsReply reply;
   reply.job(job);
   return reply;
@@ -68,14 +74,15 @@ Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
   const bool diagnosed = request.kind() == wire::TRAIN_DIAGNOSED;
   TRY(check_training(request));
   const auto expected = TRY(expected_version(request.change()));
-  ChangeId id{
-      request.change().id().to_string(),
-      in_few_words(diagnosed ? "diagnose and train" : "train", cell,
-                   {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}),
-      who(request.header())};
+  ChangeId id{request.change().id().to_string(),
+              in_few_words(diagnosed ? "diagnose and train" : "train", cell,
+                           {fmt::format("{}", fmt::join(batches, "\n")), request.level(),
+                            request.bias(), request.csv()}),
+              who(request.header())};
   id.expected_version = expected;
   if (!diagnosed)
-    return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);
+    return trainer_.retrain(cell, batches, request.level(), request.bias(),
+                            Trainer::Quarantine::kStays, id);
   return trainer_.diagnose(cell, batches.empty() ? "" : batches.front(), request.csv(), true, id);
 }
 

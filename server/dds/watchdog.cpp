@@ -22,12 +22,14 @@ using Clock = std::chrono::steady_clock;
   std::array<char, 256> names{};
   for (const char* name : stopped) {
     const std::size_t length = std::strlen(names.data());
-    std::snprintf(names.data() + length, names.size() - length, "%s%s", length == 0 ? "" : ", ", name);
+    std::snprintf(names.data() + length, names.size() - length, "%s%s", length == 0 ? "" : ", ",
+                  name);
   }
   std::array<char, 512> line{};
-  std::snprintf(line.data(), line.size(),
-                "trammeld: hangs: no progress for %.1f s in: %s; ends at once, to be started again\n",
-                static_cast<double>(Watchdog::kLimit.count()) / 1000, names.data());
+  std::snprintf(
+      line.data(), line.size(),
+      "trammeld: hangs: no progress for %.1f s in: %s; ends at once, to be started again\n",
+      static_cast<double>(Watchdog::kLimit.count()) / 1000, names.data());
   end_at_once(line.data());
 }
 
@@ -66,7 +68,8 @@ void Watchdog::watch(const std::stop_token& stop) {
     never.wait_for(lock, stop, kTick, [] { return false; });
     const Clock::time_point now = Clock::now();
     const auto passed = std::min<Clock::duration>(now - last, kTick) * given_.since_last();
-    const auto stopped = stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(passed));
+    const auto stopped =
+        stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(passed));
     last = now;
     still_ = stillness_.still_for(kLong);
     looked_ = now.time_since_epoch();

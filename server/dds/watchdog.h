@@ -16,23 +16,27 @@ namespace trammel {
 /// Exit code of a process that ends because it hangs. A restart may help.
 inline constexpr int kExitHung = 70;
 
-/// Writes `line` to standard error if that needs no waiting, and ends the process at once. Runs no destructor and takes
-/// no lock: the thread that hangs may hold any lock.
+/// Writes `line` to standard error if that needs no waiting, and ends the process at once. Runs no
+/// destructor and takes no lock: the thread that hangs may hold any lock.
 [[noreturn]] void end_at_once(const char* line);
 
-/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was given the processor:
-/// one that is slow on a crowded machine does not hang. A daemon that has ended is started again by its supervisor; one
-/// that hangs is not. Checks from its own thread until it is destroyed.
+/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was
+/// given the processor: one that is slow on a crowded machine does not hang. A daemon that has
+/// ended is started again by its supervisor; one that hangs is not. Checks from its own thread
+/// until it is destroyed.
 class Watchdog {
  public:
   static constexpr std::chrono::milliseconds kTick{250};
-  static constexpr std::chrono::milliseconds kLimit{2500};  ///< the slowest part moves once a second
+  static constexpr std::chrono::milliseconds kLimit{
+      2500};  ///< the slowest part moves once a second
 
-  static constexpr std::chrono::milliseconds kLong{1750};  ///< without a movement: told, within two periods of a second
+  static constexpr std::chrono::milliseconds kLong{
+      1750};  ///< without a movement: told, within two periods of a second
 
   explicit Watchdog(std::vector<MovingPart> parts);
 
-  /// The parts that have not moved for kLong; `watchdog` where it has not looked itself for as long. Takes no lock.
+  /// The parts that have not moved for kLong; `watchdog` where it has not looked itself for as
+  /// long. Takes no lock.
   [[nodiscard]] std::vector<std::string> still() const;
 
  private:
@@ -41,7 +45,8 @@ class Watchdog {
   const std::vector<MovingPart> parts_;
   Stillness stillness_;
   std::atomic<std::uint64_t> still_{0};  // as Stillness::still_for()
-  std::atomic<std::chrono::steady_clock::duration> looked_{std::chrono::steady_clock::now().time_since_epoch()};
+  std::atomic<std::chrono::steady_clock::duration> looked_{
+      std::chrono::steady_clock::now().time_since_epoch()};
   ProcessorShare given_;
   std::jthread thread_;
 };

@@ -42,8 +42,8 @@ struct Placed {
   [[nodiscard]] const std::vector<SessionSetting>& sessions() const { return calibration.sessions; }
 };
 
-/// The cell's sources, and the frames that the cell does not say: a base that was stood by these very poses is free
-/// beside whatever else explains them.
+/// The cell's sources, and the frames that the cell does not say: a base that was stood by these
+/// very poses is free beside whatever else explains them.
 std::vector<std::string> with_unknown_frames(const Cell& cell) {
   constexpr const char* kBase = "base";
   std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
@@ -52,19 +52,20 @@ std::vector<std::string> with_unknown_frames(const Cell& cell) {
   return sources;
 }
 
-/// The cell's sources, and play of every joint that was approached from both sides: sessions that came from different
-/// sides differ by it, and nothing changed between them.
+/// The cell's sources, and play of every joint that was approached from both sides: sessions that
+/// came from different sides differ by it, and nothing changed between them.
 std::vector<std::string> sources_with_play(const Cell& cell, const MeasurementBatch& batch) {
   std::vector<std::string> sources = spelled_out(with_unknown_frames(cell), cell);
   for (const std::string& source : candidate_sources(cell, batch, nullptr)) {
     const bool is_play = cause_spelled(source).search == causes::SearchFamily::kPlay;
-    if (is_play && std::find(sources.begin(), sources.end(), source) == sources.end()) sources.push_back(source);
+    if (is_play && std::find(sources.begin(), sources.end(), source) == sources.end())
+      sources.push_back(source);
   }
   return sources;
 }
 
-/// By the arm as the cell's sources have it, and what changed on it between two sessions: what a change does is no
-/// noise of the sessions after it.
+/// By the arm as the cell's sources have it, and what changed on it between two sessions: what a
+/// change does is no noise of the sessions after it.
 Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                       const DiagnoseOptions& options) {
   if (!has_sessions(batch.rows())) return Placed();
@@ -72,9 +73,11 @@ Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatc
   const Identify identify = [&](const std::vector<std::string>& sources) {
     return calibrate(cell, sources, merged, {});
   };
-  return identify_sessions(
-             identify, sources_with_play(*cell, merged), merged,
-             [&](double) { return report_progress(options, "asking what changed between the sessions", 0); })
+  return identify_sessions(identify, sources_with_play(*cell, merged), merged,
+                           [&](double) {
+                             return report_progress(options,
+                                                    "asking what changed between the sessions", 0);
+                           })
       .map([&](IdentifiedSessions found) {
         return Placed{std::move(found.calibration), std::move(found.changes), !batch.rows().clock};
       });
@@ -90,11 +93,14 @@ const CauseRecord& set_up_anew() {
   return **found;
 }
 
-/// Whether the search has no cause that acts as the change does: it looks for what begins at a pose and stays.
-bool is_beside_the_search(const Change& change) { return is_of_one_session(change) || change.rate > 0; }
+/// Whether the search has no cause that acts as the change does: it looks for what begins at a pose
+/// and stays.
+bool is_beside_the_search(const Change& change) {
+  return is_of_one_session(change) || change.rate > 0;
+}
 
-/// The cell's sources, and from each session on a tracker that was set up anew: nothing that this explains is evidence.
-/// So is what the search could not name of what changed between the sessions.
+/// The cell's sources, and from each session on a tracker that was set up anew: nothing that this
+/// explains is evidence. So is what the search could not name of what changed between the sessions.
 std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
   std::vector<std::string> sources = with_unknown_frames(cell);
   for (std::size_t s = 1; s < placed.sessions().size(); ++s)
@@ -109,7 +115,8 @@ std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
 Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
                               const std::vector<SessionSetting>& sessions) {
   TRY(require_positions(batch.rows(), "diagnose"));
-  if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
+  if (auto doubt = reading_doubt(batch.rows(), cell))
+    return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();
@@ -161,31 +168,38 @@ Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
   return {};
 }
 
-/// Causes that a training adds by itself, and that the search cannot see: without any payload the gears that give way
-/// do nothing until the links weigh something. Their own effect is no evidence of another cause.
+/// Causes that a training adds by itself, and that the search cannot see: without any payload the
+/// gears that give way do nothing until the links weigh something. Their own effect is no evidence
+/// of another cause.
 std::vector<const CauseRecord*> added_unseen(const std::shared_ptr<const Cell>& cell,
-                                             const std::vector<std::string>& sources, const MeasurementBatch& batch) {
+                                             const std::vector<std::string>& sources,
+                                             const MeasurementBatch& batch) {
   const auto& payloads = cell->payloads;
-  if (std::any_of(payloads.begin(), payloads.end(), [](const auto& one) { return one.second.mass > 0; })) return {};
-  const Result<CalibrationResult> trained = calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
+  if (std::any_of(payloads.begin(), payloads.end(),
+                  [](const auto& one) { return one.second.mass > 0; }))
+    return {};
+  const Result<CalibrationResult> trained =
+      calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
   std::vector<const CauseRecord*> added;
   for (std::size_t s = 0; trained && s < trained->model.sources.size(); ++s) {
     const CauseRecord& cause = trained->model.sources[s]->cause();
-    const bool is_listed = std::find(sources.begin(), sources.end(), cause.spelling) != sources.end();
+    const bool is_listed =
+        std::find(sources.begin(), sources.end(), cause.spelling) != sources.end();
     if (cause.added_by_data && !cause.needs.temperature && !is_listed) added.push_back(&cause);
   }
   return added;
 }
 
-Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const PreparedBatch& prepared,
-                              const Placed& placed, const DiagnoseOptions& options, Diagnosis& diagnosis) {
+Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell,
+                              const PreparedBatch& prepared, const Placed& placed,
+                              const DiagnoseOptions& options, Diagnosis& diagnosis) {
   TRY(report_progress(options, "calibrating", 0));
   std::vector<std::string> sources = sources_of(*cell, placed);
   for (const CauseRecord* cause : added_unseen(cell, sources, prepared.train)) {
     sources.emplace_back(cause->spelling);
-    diagnosis.limits.push_back(
-        fmt::format("{} ({}): in no file, found from these poses as training finds it, and no finding here",
-                    in_words(std::string(cause->spelling)), cause->spelling));
+    diagnosis.limits.push_back(fmt::format(
+        "{} ({}): in no file, found from these poses as training finds it, and no finding here",
+        in_words(std::string(cause->spelling)), cause->spelling));
   }
   Result<SearchResult> result = search_causes(cell, sources, prepared.train, options);
   if (!result) return result;
@@ -193,20 +207,22 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const Pre
   return result;
 }
 
-/// Where all rows together lead to no arm: takes those out that fit none on which the others agree, as a training does,
-/// and lists them. Whether there are any.
+/// Where all rows together lead to no arm: takes those out that fit none on which the others agree,
+/// as a training does, and lists them. Whether there are any.
 bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, const Error& refusal,
                PreparedBatch& prepared, Diagnosis& diagnosis) {
   const std::vector<std::string> sources = sources_of(*cell, placed);
-  std::optional<Agreement> agreement =
-      agreement_of(cell, sources, prepared.train, Result<CalibrationResult>(tl::make_unexpected(refusal)));
+  std::optional<Agreement> agreement = agreement_of(
+      cell, sources, prepared.train, Result<CalibrationResult>(tl::make_unexpected(refusal)));
   if (!agreement) return false;
   Result<CalibrationResult> found = calibrate(cell, sources, agreement->agreeing, {});
   if (!found) return false;
   add_suspects(agreement->others, *found);
   const auto& agreeing = agreement->agreeing.measurements;
   for (const SuspectPose& one : found->suspects) {
-    if (std::any_of(agreeing.begin(), agreeing.end(), [&](const Measurement& m) { return m.row == one.row; })) continue;
+    if (std::any_of(agreeing.begin(), agreeing.end(),
+                    [&](const Measurement& m) { return m.row == one.row; }))
+      continue;
     diagnosis.suspects.push_back({.pose_id = one.pose_id,
                                   .row = one.row,
                                   .distance = one.distance,
@@ -221,50 +237,56 @@ bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, co
 /// What changed on the arm between two sessions, and on what that rests.
 void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
   const CalibrationResult& by = placed.calibration;
-  diagnosis.between_sessions =
-      session_changes({by.model, by.parameters, by.covariance, by.sessions, placed.changes, placed.as_given});
-  if (auto order = note_on_order(by.sessions, placed.as_given)) diagnosis.limits.push_back(std::move(*order));
+  diagnosis.between_sessions = session_changes(
+      {by.model, by.parameters, by.covariance, by.sessions, placed.changes, placed.as_given});
+  if (auto order = note_on_order(by.sessions, placed.as_given))
+    diagnosis.limits.push_back(std::move(*order));
 }
 
 /// What changed and is no finding: what the search has no cause for, or did not name.
 std::string told_of_sessions(const Diagnosis& diagnosis) {
   std::string text;
   for (const SessionChange& change : diagnosis.between_sessions) {
-    const bool is_found =
-        change.course == SessionChange::Course::kSince &&
-        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
-                    [&](const Finding& finding) { return finding.since_session == change.session_id; });
+    const bool is_found = change.course == SessionChange::Course::kSince &&
+                          std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                                      [&](const Finding& finding) {
+                                        return finding.since_session == change.session_id;
+                                      });
     if (!is_found) text += "; " + sentence(change);
   }
   return text;
 }
 
-/// What began in the middle of the batch, where nothing known explains it: too large for the search, whose effects are
-/// held against what is left.
+/// What began in the middle of the batch, where nothing known explains it: too large for the
+/// search, whose effects are held against what is left.
 std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                          const Diagnosis& diagnosis) {
   if (diagnosis.verdict != Verdict::kUnknown) return "";
   const auto jump = jump_within(cell, batch.in_order_of_time(cell->robot).rows());
   if (!jump) return "";
   return fmt::format(
-      " But something changed in the middle of the batch, {}: give the poses before and after it by "
-      "themselves.",
+      " But something changed in the middle of the batch, {}: give the poses before and after it "
+      "by themselves.",
       in_words(*jump));
 }
 
 /// What was done to which files.
-void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed, Diagnosis& diagnosis) {
+void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed,
+                     Diagnosis& diagnosis) {
   diagnosis.batch_hash = batch.hash();
   diagnosis.cell_hash = sha256_hex(cell.cell_yaml + cell.robot_yaml);
   diagnosis.seed = seed;
 }
 
 /// Where the error of the drawing comes from: by what the cell lists, and the geometry in any case.
-void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis) {
+void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                 Diagnosis& diagnosis) {
   std::vector<std::string> sources = with_unknown_frames(*cell);
   const std::string geometry(cause_correcting(causes::Part::kLinks).spelling);
-  if (std::find(sources.begin(), sources.end(), geometry) == sources.end()) sources.push_back(geometry);
-  const Result<CalibrationResult> found = calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
+  if (std::find(sources.begin(), sources.end(), geometry) == sources.end())
+    sources.push_back(geometry);
+  const Result<CalibrationResult> found =
+      calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
   if (found) diagnosis.budget = error_budget(*found, batch);
 }
 
@@ -286,7 +308,8 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, prepared, diagnosis);
   tell_held_out(explained, prepared, diagnosis);
-  tell_findings(explained, prepared, diagnosis.batch, remainder_of(explained, prepared, diagnosis), diagnosis);
+  tell_findings(explained, prepared, diagnosis.batch, remainder_of(explained, prepared, diagnosis),
+                diagnosis);
   doubt_beside_parallel_axes(cell->robot, diagnosis);
   tell_since(batch.rows(), diagnosis);
   tell_noise(explained, prepared, diagnosis);
@@ -297,25 +320,29 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
 
   std::vector<Step> steps;
   steps.push_back({"asking what could not have been seen", 0.72, [&] {
-                     tell_blindness(explained, families, *cell, prepared.surrogates, diagnosis.batch, diagnosis);
+                     tell_blindness(explained, families, *cell, prepared.surrogates,
+                                    diagnosis.batch, diagnosis);
                      tell_periodograms(explained, diagnosis);
                    }});
-  steps.push_back({"planning the next poses", 0.8, [&] { tell_next_poses(explained, options, diagnosis); }});
+  steps.push_back(
+      {"planning the next poses", 0.8, [&] { tell_next_poses(explained, options, diagnosis); }});
   if (options.recovery) {
-    steps.push_back({"hiding effects in the poses", 0.85,
-                     [&] { tell_recovery(explained, families, options.seed + kRecoveryDraw, diagnosis); }});
+    steps.push_back({"hiding effects in the poses", 0.85, [&] {
+                       tell_recovery(explained, families, options.seed + kRecoveryDraw, diagnosis);
+                     }});
   }
   steps.push_back({"looking at what is left", 0.95, [&] {
                      tell_left_over(explained, options.seed, diagnosis);
-                     tell_limits(explained, prepared, as_recorded(prepared.surrogates, found.all), diagnosis);
+                     tell_limits(explained, prepared, as_recorded(prepared.surrogates, found.all),
+                                 diagnosis);
                      tell_budget(cell, prepared.train, diagnosis);
                      tell_file_doubts(cell, prepared.train, diagnosis);
                    }});
   TRY(run(steps, options));
   tell_sessions(together, diagnosis);
   doubt_changes(batch.rows(), diagnosis);
-  diagnosis.sentence = file_doubts_said(diagnosis) + sentence_for(diagnosis) + told_of_sessions(diagnosis) +
-                       told_of_jump(cell, batch, diagnosis);
+  diagnosis.sentence = file_doubts_said(diagnosis) + sentence_for(diagnosis) +
+                       told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
   return diagnosis;
 }
 

@@ -18,7 +18,8 @@ std::string in_words(const Cause& cause) {
   if (!cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
   if (cause.pose_id.empty()) return words;
   const bool begins = record->lasting == causes::Lasting::kFromAPose;
-  return words + fmt::format(fmt::runtime(begins ? " from pose {} on" : ", pose {}"), cause.pose_id);
+  return words +
+         fmt::format(fmt::runtime(begins ? " from pose {} on" : ", pose {}"), cause.pose_id);
 }
 
 std::string kind_in_words(const Cause& cause) {
@@ -37,7 +38,9 @@ constexpr const char* kMissed = "pose that the simulation misses";
 }  // namespace
 
 std::string called(const Cause& cause, bool is_in_doubt) {
-  return may_show_what_lacks(cause, is_in_doubt) ? fmt::format("{}, pose {}", kMissed, cause.pose_id) : in_words(cause);
+  return may_show_what_lacks(cause, is_in_doubt)
+             ? fmt::format("{}, pose {}", kMissed, cause.pose_id)
+             : in_words(cause);
 }
 
 std::string kind_called(const Cause& cause, bool is_in_doubt) {
@@ -51,7 +54,9 @@ Cause cause_at(const CauseRecord& record, int joint) {
   return cause;
 }
 
-Cause unknown_cause(int joint) { return cause_at(cause_that_stands_for(causes::StandsFor::kNoKnownCause), joint); }
+Cause unknown_cause(int joint) {
+  return cause_at(cause_that_stands_for(causes::StandsFor::kNoKnownCause), joint);
+}
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {

@@ -11,31 +11,34 @@
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/catalogue.h"
 
-/// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
+/// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what
+/// cannot be told.
 namespace trammel {
 
-/// The smallest p-value that is given: no tail of a few hundred draws or permutations is known further.
+/// The smallest p-value that is given: no tail of a few hundred draws or permutations is known
+/// further.
 inline constexpr double kLeastPValue = 1e-6;
 
 /// One physical cause, named as the contract spells it.
 struct Cause {
-  std::string cause;                 ///< `gear_transmission`, `tool`, `outlier`, ...
-  int joint = -1;                    ///< 0-based; -1 where it concerns the whole arm
-  std::string parameter = {};        ///< `C3`, `d6`: where one number of the cause is meant; else empty
-  std::string pose_id = {};          ///< the pose at which it begins, or that is out; else empty
+  std::string cause;           ///< `gear_transmission`, `tool`, `outlier`, ...
+  int joint = -1;              ///< 0-based; -1 where it concerns the whole arm
+  std::string parameter = {};  ///< `C3`, `d6`: where one number of the cause is meant; else empty
+  std::string pose_id = {};    ///< the pose at which it begins, or that is out; else empty
   std::optional<double> order = {};  ///< cycles a joint turn, of gear_transmission
 
   friend bool operator==(const Cause&, const Cause&) = default;
 };
-/// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
+/// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose,
+/// no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
-/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`. No order. A cause
-/// that only another version of the program knows comes as it is spelled.
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41
+/// on`. No order. A cause that only another version of the program knows comes as it is spelled.
 [[nodiscard]] std::string in_words(const Cause& cause);
 /// The same without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
-/// What a finding is called, all of it or without joint and pose. A pose that is out and may show what the simulation
-/// lacks is no bad one.
+/// What a finding is called, all of it or without joint and pose. A pose that is out and may show
+/// what the simulation lacks is no bad one.
 [[nodiscard]] std::string called(const Cause& cause, bool is_in_doubt);
 [[nodiscard]] std::string kind_called(const Cause& cause, bool is_in_doubt);
 /// What is known of it, wherever on the arm it is.
@@ -63,21 +66,26 @@ struct PossibleBeginning {
 /// A cause that the simulation lacks.
 struct Finding {
   Cause cause;
-  std::string source = {};  ///< as a cell file's list of error sources would spell it; empty for an outlier
+  std::string source =
+      {};  ///< as a cell file's list of error sources would spell it; empty for an outlier
   std::vector<Estimate> parameters = {};
-  /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in the order of
-  /// measuring.
+  /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in
+  /// the order of measuring.
   std::vector<PossibleBeginning> may_begin_at = {};
-  std::string since_session = {};     ///< of a batch of several sessions: the one in which it began
-  double effect_rms = 0;              ///< m, Euclidean, over the poses: what it does that nothing else in the model can
+  std::string since_session = {};  ///< of a batch of several sessions: the one in which it began
+  double effect_rms =
+      0;  ///< m, Euclidean, over the poses: what it does that nothing else in the model can
   ErrorFigures held_out_before = {};  ///< without this cause, the others found in place
   ErrorFigures held_out_after = {};   ///< with it
   double held_out_gain = 0;           ///< m: rms before - after
-  double strength = 0;                ///< lambda: whitened effect that nothing else in the model explains, squared
-  double p_value = 1;                 ///< chance that the best of all candidates scores as much with nothing to find
-  double naming_frequency = 1;        ///< share of bootstrap repetitions that name this cause
+  double strength =
+      0;  ///< lambda: whitened effect that nothing else in the model explains, squared
+  double p_value =
+      1;  ///< chance that the best of all candidates scores as much with nothing to find
+  double naming_frequency = 1;            ///< share of bootstrap repetitions that name this cause
   std::vector<Cause> could_also_be = {};  ///< explain it as well; empty: named
-  bool whole = true;  ///< false: the best known shape of it, and `unknown` among could_also_be: more than noise is left
+  bool whole = true;  ///< false: the best known shape of it, and `unknown` among could_also_be:
+                      ///< more than noise is left
   std::string action = {};  ///< for the shop floor
 };
 
@@ -102,10 +110,12 @@ struct LeftOver {
 /// A cause that this batch could not have shown, or only from some size on.
 struct Unseen {
   Cause cause;
-  double outside = 0;                ///< share of its effect that the cell's own error sources do not absorb, [0, 1]
-  std::optional<double> detectable;  ///< m rms over the poses: smallest effect that would be noticed; empty: none would
+  double outside =
+      0;  ///< share of its effect that the cell's own error sources do not absorb, [0, 1]
+  std::optional<double> detectable;    ///< m rms over the poses: smallest effect that would be
+                                       ///< noticed; empty: none would
   std::optional<double> identifiable;  ///< m rms: smallest that would be named
-  std::string needs;                   ///< what would show it: `approach from both sides`, ...; empty: nothing
+  std::string needs;  ///< what would show it: `approach from both sides`, ...; empty: nothing
 };
 
 /// Causes that these poses cannot tell apart.
@@ -119,7 +129,8 @@ struct Periodogram {
   int joint = 0;  ///< 0-based
   Eigen::VectorXd order;
   Eigen::VectorXd strength;  ///< lambda at each order, before anything was added
-  double limit = 0;          ///< the 1 % line: what the best order of all joints reaches by chance in 1 of 100 batches
+  double limit =
+      0;  ///< the 1 % line: what the best order of all joints reaches by chance in 1 of 100 batches
 };
 
 /// A step from the measured error to the repeatability.
@@ -141,12 +152,13 @@ struct NextPoses {
   std::vector<JointVector> q;    ///< rad; empty: none, for the reason in
   std::string none_because;      ///< for people
   std::vector<Cause> separates;  ///< the causes confounded now
-  double stddev_now = 0;         ///< of the confounded combination, relative to the finding's own size
-  double stddev_expected = 0;    ///< with these poses
-  double stddev_random = 0;      ///< with as many random ones
+  double stddev_now = 0;  ///< of the confounded combination, relative to the finding's own size
+  double stddev_expected = 0;  ///< with these poses
+  double stddev_random = 0;    ///< with as many random ones
 };
 
-/// How large an effect must be to be named at these poses: measured by hiding it in simulated noise.
+/// How large an effect must be to be named at these poses: measured by hiding it in simulated
+/// noise.
 struct Recovery {
   Cause cause;
   Eigen::VectorXd effect_rms;  ///< m, sizes hidden
@@ -162,9 +174,10 @@ struct Dependence {
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNothing;
-  std::string sentence;   ///< the verdict for people, graded by the evidence
-  int poses = 0;          ///< repeats merged
-  double noise = 0;       ///< m per axis: standard deviation of a pose that no cause explains, whatever its reason
+  std::string sentence;  ///< the verdict for people, graded by the evidence
+  int poses = 0;         ///< repeats merged
+  double noise =
+      0;  ///< m per axis: standard deviation of a pose that no cause explains, whatever its reason
   double instrument = 0;  ///< m per axis: standard deviation that is stated for a measurement
   std::string noise_from;
   LeftOver left_position, left_rotation;  ///< m; rad
@@ -174,7 +187,8 @@ struct Diagnosis {
   std::optional<ErrorFigures> held_out_before_without, held_out_after_without;
   std::string held_out_how;  ///< `validation rows` or `8 blocks, each predicted from the others`
   std::vector<Finding> findings;
-  std::vector<SessionChange> between_sessions;  ///< what changed on the arm from one set-up to another; findings, too
+  std::vector<SessionChange>
+      between_sessions;  ///< what changed on the arm from one set-up to another; findings, too
   Unexplained unexplained;
   std::vector<Inseparable> not_separable;
   std::vector<Unseen> could_not_have_seen;
@@ -182,8 +196,8 @@ struct Diagnosis {
   NextPoses next_poses;
   std::vector<Dependence> leftover;
   std::vector<std::string> limits;  ///< what the batch does not record, and what that rules out
-  /// Rows that were left out since all together lead to no arm, and what is doubtful of the robot file:
-  /// `sentence` begins with it.
+  /// Rows that were left out since all together lead to no arm, and what is doubtful of the robot
+  /// file: `sentence` begins with it.
   std::vector<Note> notes;
   /// Where the error of the drawing comes from, by the cell's error sources and the geometry.
   std::optional<ErrorBudget> budget;
@@ -195,7 +209,8 @@ struct Diagnosis {
   MeasurementBatch batch;              ///< as used
   Eigen::Matrix3Xd residual_before_B;  ///< 3 x poses, m: measured - calibrated
   Eigen::Matrix3Xd residual_after_B;
-  std::vector<std::string> sources_before, sources_after;  ///< lists of error sources as a cell file spells them
+  std::vector<std::string> sources_before,
+      sources_after;  ///< lists of error sources as a cell file spells them
   std::string batch_hash, cell_hash;
   std::uint64_t seed = 0;
 };

@@ -1,28 +1,32 @@
-// Batch triage. The model: a measured pose, six numbers or three of a position alone, differs from what the model in
-// force predicts by
+// Batch triage. The model: a measured pose, six numbers or three of a position alone, differs from
+// what the model in force predicts by
 //
 //   r_i = J_i delta + A_i theta + e_i,    delta ~ N(0, C),    e_i ~ N(0, S_i),
 //
-// with delta what calibration left uncertain of the model's own parameters (C is its posterior covariance), S_i the
-// variance that the model expects of this very pose (measurement, learned bias, discrepancy; not below what its own
-// held-out poses showed, of positions and of orientations), and theta what one alternative sets free: six numbers of
-// the base, six of the tool, four of the payload, one zero of a joint, or all that the model knows of the arm. Every
+// with delta what calibration left uncertain of the model's own parameters (C is its posterior
+// covariance), S_i the variance that the model expects of this very pose (measurement, learned
+// bias, discrepancy; not below what its own held-out poses showed, of positions and of
+// orientations), and theta what one alternative sets free: six numbers of the base, six of the
+// tool, four of the payload, one zero of a joint, or all that the model knows of the arm. Every
 // alternative is fitted in full (the sources' exact derivatives, Gauss-Newton) and scored by
 //
 //   sum_i min(|S_i^-1/2 r_i|^2, c_i) + delta' C^-1 delta + k log m,    c_i = m_i log m + 2 log n,
 //
 // m_i numbers of pose i and m of all:
-// minus twice the log likelihood with Schwarz's price for the k directions of theta that the poses show. A pose that
-// costs more than c_i is cheaper as one with m_i free numbers of its own: a single bad pose, chosen among n.
+// minus twice the log likelihood with Schwarz's price for the k directions of theta that the poses
+// show. A pose that costs more than c_i is cheaper as one with m_i free numbers of its own: a
+// single bad pose, chosen among n.
 //
-// Whether an alternative *explains* the batch is asked of its inliers' chi^2, not of its rank among alternatives; among
-// those that explain it the lowest score wins, and whatever comes within kDoubt of it could be it as well. Simple
-// stories come first: one cause; then one cause while the tracker stands elsewhere, as it does whenever it was set up
-// again; then one cause that begins in the middle of the batch.
+// Whether an alternative *explains* the batch is asked of its inliers' chi^2, not of its rank among
+// alternatives; among those that explain it the lowest score wins, and whatever comes within kDoubt
+// of it could be it as well. Simple stories come first: one cause; then one cause while the tracker
+// stands elsewhere, as it does whenever it was set up again; then one cause that begins in the
+// middle of the batch.
 //
-// What is identifiable: a turned base is a slipped joint 1 (both turn about its axis), a shifted tool is the last link;
-// the payload shows through compliance only and is no alternative where the model has none. A tool that is turned about
-// its own point shows in the orientations alone; a model that never saw one says nothing of them.
+// What is identifiable: a turned base is a slipped joint 1 (both turn about its axis), a shifted
+// tool is the last link; the payload shows through compliance only and is no alternative where the
+// model has none. A tool that is turned about its own point shows in the orientations alone; a
+// model that never saw one says nothing of them.
 #include "server/diagnose/triage.h"
 
 #include <algorithm>
@@ -92,7 +96,9 @@ class Judge {
     const int n = comparison_.poses();
     const std::size_t kinds = alternatives_.from(1, "").size();
     for (std::size_t kind = 0; kind < kinds; ++kind) {
-      const auto at = [&](int first) { return std::move(alternatives_.from(first, pose_id(first))[kind]); };
+      const auto at = [&](int first) {
+        return std::move(alternatives_.from(first, pose_id(first))[kind]);
+      };
       const auto score = [&](int first) { return comparison_.fit(at(first)).score; };
       int best = 0;
       double least = 0;
@@ -116,7 +122,8 @@ class Judge {
     return comparison_.batch().measurements[static_cast<std::size_t>(pose)].pose_id;
   }
 
-  /// What the best alternative is to be held against: where the tracker stands elsewhere too, that alone.
+  /// What the best alternative is to be held against: where the tracker stands elsewhere too, that
+  /// alone.
   [[nodiscard]] Fit without_the_cause(const Tried& none, const Alternative& best) const;
   [[nodiscard]] Triage told(const Tried& none) const;
   [[nodiscard]] std::string sentence(const Triage& triage) const;
@@ -151,10 +158,14 @@ Triage Judge::told(const Tried& none) const {
     triage.tracker_elsewhere = best.alternative.tracker_elsewhere;
     triage.learn = !best.alternative.harmful;
     const Fit before = without_the_cause(none, best.alternative);
-    triage.effect_rms = std::sqrt((before.residual - best.fit.residual).squaredNorm() / comparison_.poses());
-    triage.effect_rotation_rms = std::sqrt((before.turn - best.fit.turn).squaredNorm() / comparison_.poses());
+    triage.effect_rms =
+        std::sqrt((before.residual - best.fit.residual).squaredNorm() / comparison_.poses());
+    triage.effect_rotation_rms =
+        std::sqrt((before.turn - best.fit.turn).squaredNorm() / comparison_.poses());
     for (std::size_t k = 1; k < tried_.size(); ++k) {
-      if (tried_[k].fit.score > best.fit.score + kDoubt || tried_[k].alternative.cause.cause.empty()) continue;
+      if (tried_[k].fit.score > best.fit.score + kDoubt ||
+          tried_[k].alternative.cause.cause.empty())
+        continue;
       triage.could_also_be.push_back(tried_[k].alternative.cause);
       triage.learn = triage.learn && !tried_[k].alternative.harmful;
     }
@@ -182,30 +193,37 @@ std::string how_much(const Triage& triage) {
 }
 
 std::string Judge::sentence(const Triage& triage) const {
-  const std::string bad =
-      triage.outliers.empty() ? "" : fmt::format("; bad poses: {}", fmt::join(triage.outliers, ", "));
+  const std::string bad = triage.outliers.empty()
+                              ? ""
+                              : fmt::format("; bad poses: {}", fmt::join(triage.outliers, ", "));
   switch (triage.verdict) {
     case TriageVerdict::kClean:
-      return fmt::format("as the model in force expects it ({:.2f} of the expected deviation)", triage.misfit);
+      return fmt::format("as the model in force expects it ({:.2f} of the expected deviation)",
+                         triage.misfit);
     case TriageVerdict::kPoisoned:
       return fmt::format(
-          "{} off the model in force ({:.3g} times the expected deviation), and nothing known explains it",
+          "{} off the model in force ({:.3g} times the expected deviation), and nothing known "
+          "explains it",
           how_much(triage), triage.misfit);
     case TriageVerdict::kExplained:
       break;
   }
   if (record_of(triage.cause).search == causes::SearchFamily::kPose) {
-    return fmt::format("as the model in force expects it but for single poses: {}", fmt::join(triage.outliers, ", "));
+    return fmt::format("as the model in force expects it but for single poses: {}",
+                       fmt::join(triage.outliers, ", "));
   }
-  std::string text = triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
+  std::string text =
+      triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
   text += what_happened(triage.cause);
   // How far poses lie apart as two set-ups see them says nothing of the robot.
-  const bool set_up_anew = triage.cause.pose_id.empty() && batch_triage::moves_base(record_of(triage.cause));
+  const bool set_up_anew =
+      triage.cause.pose_id.empty() && batch_triage::moves_base(record_of(triage.cause));
   if (!set_up_anew) text += fmt::format(" ({})", how_much(triage));
   if (triage.tracker_elsewhere) text += ", and the tracker stands elsewhere";
   for (const Cause& other : triage.could_also_be) {
-    text +=
-        "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + what_happened(other);
+    text += "; or " +
+            (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) +
+            what_happened(other);
   }
   return text + bad;
 }
@@ -224,7 +242,9 @@ std::string_view to_string(TriageVerdict verdict) {
   return "poisoned";
 }
 
-Triage triage(const CompensatedModel& model, const CheckedBatch& batch) { return triage(model, batch, model.cell()); }
+Triage triage(const CompensatedModel& model, const CheckedBatch& batch) {
+  return triage(model, batch, model.cell());
+}
 
 Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const Cell& cell) {
   MeasurementBatch batch = known_rows(model, checked.rows());
@@ -237,8 +257,8 @@ Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const 
   }
   if (batch.measurements.size() < kFewestPoses) {
     Triage too_few;
-    too_few.sentence =
-        fmt::format("{} poses are too few to be held against the model in force", batch.measurements.size());
+    too_few.sentence = fmt::format("{} poses are too few to be held against the model in force",
+                                   batch.measurements.size());
     return too_few;
   }
   if (has_sessions(batch)) {

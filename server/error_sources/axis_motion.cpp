@@ -23,7 +23,8 @@ Seat seat_of(const ArmState& state, int joint) {
   const auto moves_along = [&](int row) -> Vector3 { return J.col(row).head<3>(); };
   Seat seat;
   seat.R = state.X_WB.linear();
-  for (int axis = 0; axis < 3; ++axis) seat.turns.push_back({rows.base(3 + axis), Vector3::Unit(axis)});
+  for (int axis = 0; axis < 3; ++axis)
+    seat.turns.push_back({rows.base(3 + axis), Vector3::Unit(axis)});
   for (int i = 0; i < joint; ++i) {
     const Vector3 x = moves_along(rows.a(i));
     const Vector3 z = moves_along(rows.d(i + 1));
@@ -37,8 +38,8 @@ Seat seat_of(const ArmState& state, int joint) {
 }
 
 /// Everything beyond the axis moves by as much, and with it the tool.
-void shift_axis(int joint, const AxisMotion& rates, const Vector3& along, ArmState& state, StateJacobian* jacobian,
-                int first_column) {
+void shift_axis(int joint, const AxisMotion& rates, const Vector3& along, ArmState& state,
+                StateJacobian* jacobian, int first_column) {
   const Seat seat = seat_of(state, joint);
   const Vector3 moved = seat.R * along;
   state.tip_W.head<3>() += moved;
@@ -50,14 +51,15 @@ void shift_axis(int joint, const AxisMotion& rates, const Vector3& along, ArmSta
   jacobian->add_block(rows.tip(0), first_column, seat.R * rates.topRows<3>());
 }
 
-void tilt_base(const AxisMotion& rates, const Eigen::Vector2d& about, ArmState& state, StateJacobian* jacobian,
-               int first_column) {
+void tilt_base(const AxisMotion& rates, const Eigen::Vector2d& about, ArmState& state,
+               StateJacobian* jacobian, int first_column) {
   const Matrix3 about_x = Eigen::AngleAxisd(about(0), Vector3::UnitX()).toRotationMatrix();
   const Matrix3 about_y = Eigen::AngleAxisd(about(1), Vector3::UnitY()).toRotationMatrix();
   Eigen::Matrix<double, 3, 2> axes;
   axes << state.X_WB.linear().col(0), state.X_WB.linear() * about_x.col(1);
   state.X_WB.linear() = (state.X_WB.linear() * about_x * about_y).eval();
-  if (jacobian != nullptr) jacobian->add_block(jacobian->rows.base(3), first_column, axes * rates.bottomRows<2>());
+  if (jacobian != nullptr)
+    jacobian->add_block(jacobian->rows.base(3), first_column, axes * rates.bottomRows<2>());
 }
 
 /// By twist and tilt of the link before.
@@ -73,8 +75,8 @@ void tilt_axis(int joint, const AxisMotion& rates, const Eigen::Vector2d& about,
 
 }  // namespace
 
-void move_axis(int joint, const AxisMotion& rates, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-               StateJacobian* jacobian, int first_column) {
+void move_axis(int joint, const AxisMotion& rates, const Eigen::Ref<const Eigen::VectorXd>& values,
+               ArmState& state, StateJacobian* jacobian, int first_column) {
   const Eigen::Matrix<double, 5, 1> motion = rates * values;
   shift_axis(joint, rates, motion.head<3>(), state, jacobian, first_column);
   if (joint > 0) {

@@ -15,11 +15,12 @@ constexpr double kRadial = 0.02;  // mm, prior of a first harmonic: bearings of 
 constexpr double kAxial = 0.01;   // mm
 constexpr double kTilt = 5e-5;    // rad
 
-/// An axis that wobbles in its bearing: what turns with joint J is shifted across (radial) and along (axial) the axis,
-/// and tilted, by the joint's angle, as seen from the link before. Shift and tilt across the axis are a complex number,
-/// x + iy in the frame of the link before: a sum of c_m exp(i m q). m = 0 is a shift of the link before, m = 1 one of
-/// the link that follows: both are geometry. What is left of the harmonics 1 to 3 is m = -1, 2, -2, 3 and -3, and the
-/// axial shift, whose constant is geometry, too. None of it is an error of the joint's angle.
+/// An axis that wobbles in its bearing: what turns with joint J is shifted across (radial) and
+/// along (axial) the axis, and tilted, by the joint's angle, as seen from the link before. Shift
+/// and tilt across the axis are a complex number, x + iy in the frame of the link before: a sum of
+/// c_m exp(i m q). m = 0 is a shift of the link before, m = 1 one of the link that follows: both
+/// are geometry. What is left of the harmonics 1 to 3 is m = -1, 2, -2, 3 and -3, and the axial
+/// shift, whose constant is geometry, too. None of it is an error of the joint's angle.
 class AxisWobble final : public ErrorSource {
  public:
   explicit AxisWobble(const SourceSpec& spec) : name_(spec.text), joint_(spec.joint) {
@@ -29,14 +30,16 @@ class AxisWobble final : public ErrorSource {
         orders_.push_back(order);
         const std::string which = fmt::format("{}_{}", joint_ + 1, order);
         for (const char* axis : {"x", "y"})
-          parameters_.push_back(length_parameter(fmt::format("radial_{}{}", axis, which), kRadial / h));
+          parameters_.push_back(
+              length_parameter(fmt::format("radial_{}{}", axis, which), kRadial / h));
         for (const char* axis : {"x", "y"})
           parameters_.push_back(angle_parameter(fmt::format("tilt_{}{}", axis, which), kTilt / h));
       }
     }
     for (int h = 1; h <= kHarmonics; ++h) {
       for (const char* wave : {"sin", "cos"})
-        parameters_.push_back(length_parameter(fmt::format("axial_{}{}_{}", wave, joint_ + 1, h), kAxial / h));
+        parameters_.push_back(
+            length_parameter(fmt::format("axial_{}{}_{}", wave, joint_ + 1, h), kAxial / h));
     }
   }
   const CauseRecord& cause() const override { return causes::axis_runout(); }
@@ -47,8 +50,8 @@ class AxisWobble final : public ErrorSource {
     return fmt::format("axis {} runs out and tilts in its bearing as the joint turns", joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     const double q = state.chain->drive().row(joint_) * context.q;
     move_axis(joint_, rates_at(q), values, state, jacobian, first_column);
   }
@@ -64,7 +67,8 @@ class AxisWobble final : public ErrorSource {
       rates.block<2, 2>(3, column + 2) = wave;
       column += 4;
     }
-    for (int h = 1; h <= kHarmonics; ++h, column += 2) rates.block<1, 2>(2, column) << std::sin(h * q), std::cos(h * q);
+    for (int h = 1; h <= kHarmonics; ++h, column += 2)
+      rates.block<1, 2>(2, column) << std::sin(h * q), std::cos(h * q);
     return rates;
   }
 
@@ -98,14 +102,17 @@ const CauseRecord& causes::axis_runout() {
                  {.cause = "geometry", .surprise = kLessExpected}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by =
-          "poses all around this axis at different postures of the joints beyond it; of the last axis "
-          "orientations, or two tools",
+          "poses all around this axis at different postures of the joints beyond it; of the last "
+          "axis orientations, or two tools",
       .action = "have the bearing of this axis looked at, or compensate it",
-      .figures = {{"radial_x", "mm", "shift across the axis that goes around so many times a turn, its part along x"},
+      .figures = {{"radial_x", "mm",
+                   "shift across the axis that goes around so many times a turn, its part along x"},
                   {"radial_y", "mm", "its part along y"},
-                  {"tilt_x", "rad", "tilt of the axis that goes around so many times a turn, its part about x"},
+                  {"tilt_x", "rad",
+                   "tilt of the axis that goes around so many times a turn, its part about x"},
                   {"tilt_y", "rad", "its part about y"},
-                  {"axial_sin", "mm", "shift along the axis by the sine of a multiple of the joint's angle"},
+                  {"axial_sin", "mm",
+                   "shift along the axis by the sine of a multiple of the joint's angle"},
                   {"axial_cos", "mm", "by its cosine"}},
       .of_turning_joint = true,
   };

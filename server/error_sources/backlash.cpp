@@ -7,28 +7,29 @@ namespace trammel {
 
 namespace {
 
-/// Play in a gear: the joint lags behind its motor by half the play, and more under load: delta q = -dir (b + k |tau|),
-/// where dir is the direction of approach. If all poses are approached from one side, it cannot be told from a joint
-/// zero.
+/// Play in a gear: the joint lags behind its motor by half the play, and more under load: delta q =
+/// -dir (b + k |tau|), where dir is the direction of approach. If all poses are approached from one
+/// side, it cannot be told from a joint zero.
 class Backlash final : public ErrorSource {
  public:
   explicit Backlash(const SourceSpec& spec)
       : name_(spec.text),
         joint_(spec.joint),
         parameters_({angle_parameter(fmt::format("b{}", spec.joint + 1), 2e-4),
-                     {fmt::format("bt{}", spec.joint + 1), "rad/Nmm", to_rad_per_nmm(1), 0, from_rad_per_nmm(1e-10)}}) {
-  }
+                     {fmt::format("bt{}", spec.joint + 1), "rad/Nmm", to_rad_per_nmm(1), 0,
+                      from_rad_per_nmm(1e-10)}}) {}
   const CauseRecord& cause() const override { return causes::backlash(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
   std::string explanation() const override {
-    return fmt::format("the gear of joint {} has play: the joint depends on the side it is approached from",
-                       joint_ + 1);
+    return fmt::format(
+        "the gear of joint {} has play: the joint depends on the side it is approached from",
+        joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     if (context.direction.empty()) return;
     // Approached upwards, the joint lags and stands below the angle of its motor.
     const double direction = -context.direction[static_cast<std::size_t>(joint_)];
@@ -49,7 +50,9 @@ class Backlash final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<Backlash>(spec); }
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) {
+  return std::make_shared<Backlash>(spec);
+}
 
 }  // namespace
 
@@ -69,7 +72,8 @@ const CauseRecord& causes::backlash() {
       .told_apart_by = remedies::kBothSides,
       .shown_by = "approaching the poses from both sides of this joint",
       .action = "approach every target from one side of this joint, or have its gear adjusted",
-      .figures = {{"b", "rad", "half the play"}, {"bt", "rad/Nmm", "how much more of it for each unit of torque"}},
+      .figures = {{"b", "rad", "half the play"},
+                  {"bt", "rad/Nmm", "how much more of it for each unit of torque"}},
   };
   return record;
 }

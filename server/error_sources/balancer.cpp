@@ -8,16 +8,19 @@ namespace trammel {
 namespace {
 
 constexpr int kHarmonics = 6;
-constexpr double kTorquePerLength = 100;  // Nm/m^4: of a balancer's first harmonic, over the fourth power of the reach
+constexpr double kTorquePerLength =
+    100;  // Nm/m^4: of a balancer's first harmonic, over the fourth power of the reach
 
-/// A spring, a gas spring or a counterweight that holds a joint: a torque that is a function of the joint's angle
-/// alone, as a Fourier series. It shows through the joint's compliance. Its constant part is the joint's zero. Its
-/// first harmonic is that of a link's weight as long as the joint's axis stays level.
+/// A spring, a gas spring or a counterweight that holds a joint: a torque that is a function of the
+/// joint's angle alone, as a Fourier series. It shows through the joint's compliance. Its constant
+/// part is the joint's zero. Its first harmonic is that of a link's weight as long as the joint's
+/// axis stays level.
 class Balancer final : public ErrorSource {
  public:
   Balancer(const SourceSpec& spec, const Chain& chain) : name_(spec.text), joint_(spec.joint) {
     double reach = 0;
-    for (int i = 0; i < chain.size(); ++i) reach += std::hypot(chain.joint(i).link.d, chain.joint(i).link.a);
+    for (int i = 0; i < chain.size(); ++i)
+      reach += std::hypot(chain.joint(i).link.d, chain.joint(i).link.a);
     for (int h = 1; h <= kHarmonics; ++h) {
       const double prior = kTorquePerLength * std::pow(reach, 4) / (h * h);
       parameters_.push_back({fmt::format("balance_sin{}.{}", joint_ + 1, h), "Nm", 1, 0, prior});
@@ -29,18 +32,21 @@ class Balancer final : public ErrorSource {
   int joint() const override { return joint_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
-    return fmt::format("a spring or counterweight loads joint {}, by the joint's angle", joint_ + 1);
+    return fmt::format("a spring or counterweight loads joint {}, by the joint's angle",
+                       joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
-    if (state.spring_torque.size() == 0) state.spring_torque = JointArray::Zero(state.chain->size());
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
+    if (state.spring_torque.size() == 0)
+      state.spring_torque = JointArray::Zero(state.chain->size());
     for (int h = 1; h <= kHarmonics; ++h) {
       const double rate[] = {std::sin(h * context.q(joint_)), std::cos(h * context.q(joint_))};
       for (int k = 0; k < 2; ++k) {
         const int column = 2 * h - 2 + k;
         state.spring_torque(joint_) += rate[k] * values(column);
-        if (jacobian != nullptr) jacobian->add(jacobian->rows.spring(joint_), first_column + column, rate[k]);
+        if (jacobian != nullptr)
+          jacobian->add(jacobian->rows.spring(joint_), first_column + column, rate[k]);
       }
     }
   }
@@ -70,7 +76,9 @@ const CauseRecord& causes::balancer() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kLoad, 3},
       .forms = {{"balancer", make}},
-      .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}, {.cause = "self_weight"}},
+      .rivals = {{.cause = "joint_map"},
+                 {.cause = "encoder_eccentricity"},
+                 {.cause = "self_weight"}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by = "more poses over this joint's range",
       .action = "have the balancer's pressure or spring checked, or compensate it",

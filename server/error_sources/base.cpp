@@ -5,14 +5,17 @@ namespace trammel {
 
 namespace {
 
-/// The base is not at its nominal pose: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0) Rx(alpha0), eq. (3.5).
-/// Calibration centres the prior on the localised base, because the base is measured and not known from drawings.
+/// The base is not at its nominal pose: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0)
+/// Rx(alpha0), eq. (3.5). Calibration centres the prior on the localised base, because the base is
+/// measured and not known from drawings.
 class Base final : public ErrorSource {
  public:
   const CauseRecord& cause() const override { return causes::base(); }
   std::string name() const override { return "base"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return "the robot base stands elsewhere than the cell file says"; }
+  std::string explanation() const override {
+    return "the robot base stands elsewhere than the cell file says";
+  }
 
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
@@ -31,9 +34,10 @@ class Base final : public ErrorSource {
   }
 
  private:
-  const std::vector<Parameter> parameters_ = {length_parameter("x0", 2),      length_parameter("y0", 2),
-                                              length_parameter("z0", 2),      angle_parameter("gamma0", 5e-3),
-                                              angle_parameter("beta0", 5e-3), angle_parameter("alpha0", 5e-3)};
+  const std::vector<Parameter> parameters_ = {
+      length_parameter("x0", 2),      length_parameter("y0", 2),
+      length_parameter("z0", 2),      angle_parameter("gamma0", 5e-3),
+      angle_parameter("beta0", 5e-3), angle_parameter("alpha0", 5e-3)};
 };
 
 Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_shared<Base>(); }

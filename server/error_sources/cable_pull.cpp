@@ -18,10 +18,11 @@ struct Range {
   double lower = 0, upper = 0;
 };
 
-/// A cable or hose package that two joints wind up together, as joints 4 and 6 of a wrist: it pulls by the sum s of
-/// their angles, so its energy is U(s), and both joints feel the same torque -U'(s). They give way to it through their
-/// gearboxes' compliances. The torque is a polynomial of s over what the joints' limits allow, in Chebyshev's form;
-/// beyond the limits it stays. Its constant part is the zeros of the two joints.
+/// A cable or hose package that two joints wind up together, as joints 4 and 6 of a wrist: it pulls
+/// by the sum s of their angles, so its energy is U(s), and both joints feel the same torque
+/// -U'(s). They give way to it through their gearboxes' compliances. The torque is a polynomial of
+/// s over what the joints' limits allow, in Chebyshev's form; beyond the limits it stays. Its
+/// constant part is the zeros of the two joints.
 class CablePull final : public ErrorSource {
  public:
   CablePull(const SourceSpec& spec, int other, const Chain& chain)
@@ -30,7 +31,8 @@ class CablePull final : public ErrorSource {
     pulled_ = chain.bars().row(joint_) + chain.bars().row(other_);
     range_ = range_of(chain);
     double reach = 0;
-    for (int i = 0; i < chain.size(); ++i) reach += std::hypot(chain.joint(i).link.d, chain.joint(i).link.a);
+    for (int i = 0; i < chain.size(); ++i)
+      reach += std::hypot(chain.joint(i).link.d, chain.joint(i).link.a);
     for (int k = 1; k <= kDegrees; ++k) {
       parameters_.push_back({fmt::format("pull{}.{}_{}", joint_ + 1, other_ + 1, k), "Nm", 1, 0,
                              kTorquePerArea * reach * reach / (k * k)});
@@ -41,19 +43,22 @@ class CablePull final : public ErrorSource {
   int joint() const override { return joint_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
-    return fmt::format("cables that joints {} and {} wind up together pull at both", joint_ + 1, other_ + 1);
+    return fmt::format("cables that joints {} and {} wind up together pull at both", joint_ + 1,
+                       other_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
-    if (state.spring_torque.size() == 0) state.spring_torque = JointArray::Zero(state.chain->size());
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
+    if (state.spring_torque.size() == 0)
+      state.spring_torque = JointArray::Zero(state.chain->size());
     const std::array<double, kDegrees> polynomials = polynomials_at(sum_.dot(context.q));
     for (int k = 0; k < kDegrees; ++k) {
       for (int joint = 0; joint < state.chain->size(); ++joint) {
         const double rate = pulled_(joint) * polynomials[static_cast<std::size_t>(k)];
         if (rate == 0) continue;
         state.spring_torque(joint) += rate * values(k);
-        if (jacobian != nullptr) jacobian->add(jacobian->rows.spring(joint), first_column + k, rate);
+        if (jacobian != nullptr)
+          jacobian->add(jacobian->rows.spring(joint), first_column + k, rate);
       }
     }
   }
@@ -78,7 +83,8 @@ class CablePull final : public ErrorSource {
     const double half = (range_.upper - range_.lower) / 2;
     const double u = half > 0 ? std::clamp((sum - range_.lower) / half - 1, -1.0, 1.0) : 0;
     std::array<double, kDegrees> all{};
-    for (int k = 0; k < kDegrees; ++k) all[static_cast<std::size_t>(k)] = std::cos((k + 1) * std::acos(u));
+    for (int k = 0; k < kDegrees; ++k)
+      all[static_cast<std::size_t>(k)] = std::cos((k + 1) * std::acos(u));
     return all;
   }
 
@@ -110,10 +116,16 @@ const CauseRecord& causes::cable_pull() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kJoints, 11},
       .forms = {{"cable_pull", make}},
-      .rivals = {{.cause = "joint_coupling"}, {.cause = "balancer"}, {.cause = "joint_map"}, {.cause = "compliance"}},
+      .rivals = {{.cause = "joint_coupling"},
+                 {.cause = "balancer"},
+                 {.cause = "joint_map"},
+                 {.cause = "compliance"}},
       .told_apart_by = remedies::kWiderRange,
-      .shown_by = "poses over the range of both joints, and gearbox compliance among the error sources",
-      .action = "give the cables more slack, or compensate their pull; identify again when they are laid anew",
+      .shown_by =
+          "poses over the range of both joints, and gearbox compliance among the error sources",
+      .action =
+          "give the cables more slack, or compensate their pull; identify again when they are laid "
+          "anew",
       .figures = {{"pull", "Nm", "torque with a polynomial of the sum of both angles"}},
       .takes_numbers = true,
       .of_turning_joint = true,

@@ -36,7 +36,8 @@ class Catalogue {
 
  private:
   mutable Mutex mutex_;
-  std::shared_ptr<const Records> records_ TRAMMEL_GUARDED_BY(mutex_) = std::make_shared<Records>(shipped());
+  std::shared_ptr<const Records> records_ TRAMMEL_GUARDED_BY(mutex_) =
+      std::make_shared<Records>(shipped());
 };
 
 /// Made at its first use: static initialisers of a program may come first.
@@ -46,13 +47,14 @@ Catalogue& catalogue() {
 }
 
 bool is_spelled(const CauseRecord& record, std::string_view name) {
-  return record.spelling == name || std::any_of(record.forms.begin(), record.forms.end(),
-                                                [&](const causes::Form& form) { return form.spelling == name; });
+  return record.spelling == name ||
+         std::any_of(record.forms.begin(), record.forms.end(),
+                     [&](const causes::Form& form) { return form.spelling == name; });
 }
 
 const CauseRecord* found_in(const Records& records, std::string_view name) {
-  const auto found =
-      std::find_if(records.begin(), records.end(), [&](const CauseRecord* one) { return is_spelled(*one, name); });
+  const auto found = std::find_if(records.begin(), records.end(),
+                                  [&](const CauseRecord* one) { return is_spelled(*one, name); });
   return found == records.end() ? nullptr : *found;
 }
 
@@ -76,19 +78,25 @@ namespace {
 template <typename Value>
 const CauseRecord& first_with(Value CauseRecord::*member, Value value) {
   const auto records = catalogue().records();
-  const auto found =
-      std::find_if(records->begin(), records->end(), [&](const CauseRecord* one) { return one->*member == value; });
+  const auto found = std::find_if(records->begin(), records->end(),
+                                  [&](const CauseRecord* one) { return one->*member == value; });
   TRAMMEL_CHECK(found != records->end());
   return **found;
 }
 
 }  // namespace
 
-const CauseRecord& first_searched_by(causes::SearchFamily family) { return first_with(&CauseRecord::search, family); }
+const CauseRecord& first_searched_by(causes::SearchFamily family) {
+  return first_with(&CauseRecord::search, family);
+}
 
-const CauseRecord& cause_that_stands_for(causes::StandsFor what) { return first_with(&CauseRecord::stands_for, what); }
+const CauseRecord& cause_that_stands_for(causes::StandsFor what) {
+  return first_with(&CauseRecord::stands_for, what);
+}
 
-const CauseRecord& cause_correcting(causes::Part part) { return first_with(&CauseRecord::part, part); }
+const CauseRecord& cause_correcting(causes::Part part) {
+  return first_with(&CauseRecord::part, part);
+}
 
 namespace {
 
@@ -120,8 +128,8 @@ class Missing {
   void want_forms() {
     for (const causes::Form& form : record_.forms)
       want(!form.spelling.empty() && form.make != nullptr, "forms: a spelling and a maker each");
-    const bool described =
-        record_.search != causes::SearchFamily::kNone && record_.search != causes::SearchFamily::kPose;
+    const bool described = record_.search != causes::SearchFamily::kNone &&
+                           record_.search != causes::SearchFamily::kPose;
     want(!described || !record_.forms.empty(), "forms: an error source that it is searched by");
     want(record_.forms.empty() || record_.acts.on != causes::ActsOn::kNothing, "acts");
     want(record_.forms.size() < 2 || record_.forms_differ != nullptr, "forms_differ");
@@ -129,18 +137,23 @@ class Missing {
   void want_rivals() {
     want(!record_.rivals.empty(), "rivals");
     for (const causes::Rival& rival : record_.rivals)
-      want(find_cause(rival.cause) != nullptr, fmt::format("rivals: no cause is spelled '{}'", rival.cause));
+      want(find_cause(rival.cause) != nullptr,
+           fmt::format("rivals: no cause is spelled '{}'", rival.cause));
   }
   void want_scope() {
-    want(record_.scope != causes::Scope::kJoint || !record_.plain_name_of_joint.empty(), "plain_name_of_joint");
+    want(record_.scope != causes::Scope::kJoint || !record_.plain_name_of_joint.empty(),
+         "plain_name_of_joint");
     const bool is_step = record_.lasting == causes::Lasting::kFromAPose;
-    want(!is_step || record_.whole_batch.has_value(), "whole_batch: what a batch shows that it began before");
-    want(!is_step || whole_of(record_) != nullptr, "rivals: what it would be from the first pose on");
+    want(!is_step || record_.whole_batch.has_value(),
+         "whole_batch: what a batch shows that it began before");
+    want(!is_step || whole_of(record_) != nullptr,
+         "rivals: what it would be from the first pose on");
   }
 
   void want_added(const causes::AddedByData& added) {
     want(find_cause(added.beside) != nullptr, "added_by_data: the cause that shows it");
-    want(added.is_known != nullptr && !added.note.empty(), "added_by_data: where it is known, and a note");
+    want(added.is_known != nullptr && !added.note.empty(),
+         "added_by_data: where it is known, and a note");
   }
 
   const CauseRecord& record_;
@@ -154,7 +167,8 @@ std::vector<std::string> missing_in(const CauseRecord& record) { return Missing(
 AddedCause::AddedCause(const CauseRecord& record) : record_(record) {
   catalogue().change([&](Records& records) {
     TRAMMEL_CHECK(found_in(records, record.spelling) == nullptr);
-    for (const causes::Form& form : record.forms) TRAMMEL_CHECK(found_in(records, form.spelling) == nullptr);
+    for (const causes::Form& form : record.forms)
+      TRAMMEL_CHECK(found_in(records, form.spelling) == nullptr);
     records.push_back(&record);
   });
 }

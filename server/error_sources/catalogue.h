@@ -6,13 +6,15 @@
 
 #include "server/error_sources/cause.h"
 
-/// The known causes: the shipped ones (shipped_causes.h) and those that a program adds. Thread-safe.
+/// The known causes: the shipped ones (shipped_causes.h) and those that a program adds.
+/// Thread-safe.
 namespace trammel {
 
 /// All of them, in the order in which diagnosis looks for them.
 [[nodiscard]] std::vector<const CauseRecord*> all_causes();
 
-/// The cause that `spelling` names. It may be the spelling of the cause, of one of its forms, or of a source in a list
+/// The cause that `spelling` names. It may be the spelling of the cause, of one of its forms, or of
+/// a source in a list
 /// (`joint_slip:2@40`). Null if it is unknown.
 [[nodiscard]] const CauseRecord* find_cause(std::string_view spelling);
 
@@ -28,11 +30,13 @@ namespace trammel {
 /// The cause whose parameters correct that part of the nominal cell. It is a bug if there is none.
 [[nodiscard]] const CauseRecord& cause_correcting(causes::Part part);
 
-/// What is missing in a record, in words for its author; empty if it is complete. Its rivals must be known causes.
+/// What is missing in a record, in words for its author; empty if it is complete. Its rivals must
+/// be known causes.
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);
 
-/// Registers a cause after the shipped ones, until this object is destroyed. `record` must outlive everything that is
-/// made in that time. No other cause may have its spelling or that of one of its forms.
+/// Registers a cause after the shipped ones, until this object is destroyed. `record` must outlive
+/// everything that is made in that time. No other cause may have its spelling or that of one of its
+/// forms.
 class AddedCause {
  public:
   explicit AddedCause(const CauseRecord& record);

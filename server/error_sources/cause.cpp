@@ -5,9 +5,10 @@
 namespace trammel {
 
 const causes::Rival* whole_of(const CauseRecord& record) {
-  const auto whole = std::find_if(record.rivals.begin(), record.rivals.end(), [](const causes::Rival& rival) {
-    return rival.likeness == causes::Likeness::kFromTheFirstPose;
-  });
+  const auto whole =
+      std::find_if(record.rivals.begin(), record.rivals.end(), [](const causes::Rival& rival) {
+        return rival.likeness == causes::Likeness::kFromTheFirstPose;
+      });
   return whole == record.rivals.end() ? nullptr : &*whole;
 }
 

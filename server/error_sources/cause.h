@@ -8,9 +8,9 @@
 
 #include "server/base/result.h"
 
-/// The description of a physical cause of error: everything that calibration, diagnosis, planning, training and the
-/// pages need to know of it, except its effect on the arm. Each record stands beside its physics, in the file of the
-/// cause.
+/// The description of a physical cause of error: everything that calibration, diagnosis, planning,
+/// training and the pages need to know of it, except its effect on the arm. Each record stands
+/// beside its physics, in the file of the cause.
 namespace trammel {
 
 class ErrorSource;
@@ -30,12 +30,14 @@ struct ContextNeeds {
 
 /// `gear_transmission:3@48.5+97`: a cause, its joint, and further numbers.
 struct SourceSpec {
-  std::string text;        ///< as spelled
-  std::string name;        ///< the cause, or its form
-  int joint = -1;          ///< 0-based; -1 where none is named
-  std::vector<double> at;  ///< after the @: orders, or the pose (1-based row of the batch) at which it begins
+  std::string text;  ///< as spelled
+  std::string name;  ///< the cause, or its form
+  int joint = -1;    ///< 0-based; -1 where none is named
+  std::vector<double>
+      at;  ///< after the @: orders, or the pose (1-based row of the batch) at which it begins
 };
-using SourceMaker = Result<std::shared_ptr<const ErrorSource>> (*)(const SourceSpec& spec, const Cell& cell);
+using SourceMaker = Result<std::shared_ptr<const ErrorSource>> (*)(const SourceSpec& spec,
+                                                                   const Cell& cell);
 
 /// The members of a record.
 namespace causes {
@@ -75,7 +77,8 @@ enum class SearchFamily {
 enum class StandsFor {
   kACause,           ///< one physical cause
   kNoKnownCause,     ///< an effect that no known cause explains
-  kArmNotAsModelled  ///< any number of the arm's causes together: the arm differs from the model in force
+  kArmNotAsModelled  ///< any number of the arm's causes together: the arm differs from the model in
+                     ///< force
 };
 
 /// Whether a cause may be wrong in single parameters only.
@@ -95,18 +98,20 @@ enum class Likeness {
   kSpecialCase,       ///< the other is a special case of this one
   kSimplerCase,       ///< a special case; preferred if it explains nearly as much
   kDoubtfulCase,      ///< a special case; if neither is clearly better, neither is certain
-  kWhereConstant,     ///< the other has the same effect if the quantity that this one depends on never changes
-  kImitator,          ///< an unrelated cause that looks like this one at some poses
+  kWhereConstant,  ///< the other has the same effect if the quantity that this one depends on never
+                   ///< changes
+  kImitator,       ///< an unrelated cause that looks like this one at some poses
 };
 struct Rival {
   std::string_view cause;
   Likeness likeness = Likeness::kImitator;
-  std::string_view parameter = {};  ///< one of its parameters, `{}` for the joint; empty: the whole cause
-  double surprise = 0;              ///< nat: penalty on this cause while the model has no source of the rival
+  std::string_view parameter =
+      {};               ///< one of its parameters, `{}` for the joint; empty: the whole cause
+  double surprise = 0;  ///< nat: penalty on this cause while the model has no source of the rival
 };
 
-/// What to measure so that a cause can be told from its rivals. Of the remedies of two causes, the one with the lower
-/// rank is named.
+/// What to measure so that a cause can be told from its rivals. Of the remedies of two causes, the
+/// one with the lower rank is named.
 struct Remedy {
   int rank = 0;
   std::string_view text;
@@ -133,7 +138,8 @@ struct Figure {
 /// What is reported if a step happened before the first pose of a new batch.
 struct WholeBatch {
   std::string_view sentence;  ///< for people; `{}` for the joint
-  bool harmful = false;  ///< a model must not learn from such a batch: it would learn an error that is not the robot's
+  bool harmful = false;  ///< a model must not learn from such a batch: it would learn an error that
+                         ///< is not the robot's
 };
 
 /// Marks a cause whose effect is shown as an example.
@@ -142,15 +148,16 @@ struct Example {
   int joint = -1;  ///< 0-based; -1: any
 };
 
-/// Marks a cause that training adds by itself where the measurements make it much more likely, beside another one.
+/// Marks a cause that training adds by itself where the measurements make it much more likely,
+/// beside another one.
 struct AddedByData {
-  std::string_view beside;             ///< the cause that shows it; it must be among the error sources
+  std::string_view beside;  ///< the cause that shows it; it must be among the error sources
   bool (*is_known)(const Cell& cell);  ///< whether the cell's files say it; if so it is not added
   std::string_view note;               ///< for people, where a model has it
 };
 
-/// The order in which causes act on the arm: in the order given here, then by `turn`, then in the order of
-/// registration.
+/// The order in which causes act on the arm: in the order given here, then by `turn`, then in the
+/// order of registration.
 enum class ActsOn { kNothing, kBase, kLinks, kTool, kJoints, kLoad, kLoadedArm };
 struct Acting {
   ActsOn on = ActsOn::kNothing;
@@ -166,10 +173,10 @@ struct Form {
 }  // namespace causes
 
 struct CauseRecord {
-  std::string_view spelling;    ///< in files and programs: `gear_transmission`
-  std::string_view plain_name;  ///< for people: `gear ripple`
-  std::string_view
-      plain_name_of_joint;  ///< the same for one joint: `gear ripple in joint {}`; empty if it has no joint
+  std::string_view spelling;             ///< in files and programs: `gear_transmission`
+  std::string_view plain_name;           ///< for people: `gear ripple`
+  std::string_view plain_name_of_joint;  ///< the same for one joint: `gear ripple in joint {}`;
+                                         ///< empty if it has no joint
   causes::Scope scope;
   causes::Lasting lasting;
   ContextNeeds needs;
@@ -178,18 +185,19 @@ struct CauseRecord {
   std::vector<causes::Form> forms;  ///< the usual one first; none: no error source describes it
   std::vector<causes::Rival> rivals;
   causes::Remedy told_apart_by;
-  std::string_view shown_by;            ///< what must be recorded to show it
-  std::string_view action;              ///< for the shop floor
-  std::vector<causes::Figure> figures;  ///< of its findings: those of the summary, then its parameters
+  std::string_view shown_by;  ///< what must be recorded to show it
+  std::string_view action;    ///< for the shop floor
+  std::vector<causes::Figure>
+      figures;  ///< of its findings: those of the summary, then its parameters
 
   // Members that only some causes set.
   causes::Part part = causes::Part::kNone;
   causes::Numbers numbers = causes::Numbers::kTogether;
   causes::Summary summary = causes::Summary::kNone;
-  bool takes_numbers = false;        ///< its spelling may end in `@number+number`
-  bool of_turning_joint = false;     ///< of revolute joints only
-  bool gives_way = false;            ///< deforms under load: an error of the payload shows through it
-  bool goes_with_time = false;       ///< looks like other effects that grow with time
+  bool takes_numbers = false;     ///< its spelling may end in `@number+number`
+  bool of_turning_joint = false;  ///< of revolute joints only
+  bool gives_way = false;         ///< deforms under load: an error of the payload shows through it
+  bool goes_with_time = false;    ///< looks like other effects that grow with time
   std::optional<double> order = {};  ///< cycles per joint turn, if always the same
   std::optional<causes::WholeBatch> whole_batch = {};
   std::optional<causes::Example> example = {};
@@ -199,7 +207,8 @@ struct CauseRecord {
   std::optional<causes::AddedByData> added_by_data = {};
 };
 
-/// The rival that a step equals if it began before the first pose; null if the cause does not begin at a pose.
+/// The rival that a step equals if it began before the first pose; null if the cause does not begin
+/// at a pose.
 [[nodiscard]] const causes::Rival* whole_of(const CauseRecord& record);
 
 /// The parameter that a rival of a cause of `joint` (0-based) means: `q3`.

@@ -8,7 +8,8 @@ namespace trammel {
 
 std::string causes_in_words(const std::vector<std::string>& spellings) {
   std::string list;
-  for (const std::string& spelling : spellings) list += (list.empty() ? "" : ", ") + in_words(spelling);
+  for (const std::string& spelling : spellings)
+    list += (list.empty() ? "" : ", ") + in_words(spelling);
   return list;
 }
 

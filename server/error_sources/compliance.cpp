@@ -11,20 +11,24 @@ namespace {
 constexpr int kMaxEquilibriumSteps = 50;
 constexpr double kEquilibriumStep = 1e-13;  // rad
 
-/// Every gearbox deflects in proportion to the gravity torque on it, and takes along what bars couple to it. A weight
-/// acts at its centre of gravity (the physical wrench). There are three forms of eq. (3.6), dx = J C Jᵀ F. They differ
-/// by the square of the deflection: 50 um at a deflection of 6 mrad.
+/// Every gearbox deflects in proportion to the gravity torque on it, and takes along what bars
+/// couple to it. A weight acts at its centre of gravity (the physical wrench). There are three
+/// forms of eq. (3.6), dx = J C Jᵀ F. They differ by the square of the deflection: 50 um at a
+/// deflection of 6 mrad.
 class Compliance : public ErrorSource {
  public:
   explicit Compliance(const Chain& chain) {
     for (int i = 0; i < chain.size(); ++i) {
-      parameters_.push_back(compliance_parameter(fmt::format("C{}", i + 1), chain.joint(i).compliance_prior));
+      parameters_.push_back(
+          compliance_parameter(fmt::format("C{}", i + 1), chain.joint(i).compliance_prior));
     }
   }
 
   const CauseRecord& cause() const override { return causes::compliance(); }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return "the gearboxes give way under the weight of the payload"; }
+  std::string explanation() const override {
+    return "the gearboxes give way under the weight of the payload";
+  }
 
  protected:
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxJoints>;
@@ -38,7 +42,8 @@ class Compliance : public ErrorSource {
   }
 
   /// Records how the joints move with each compliance: a row of `by_C` for each of `rows`.
-  static void add_by_C(const Square& by_C, const std::vector<int>& rows, int first_column, StateJacobian& jacobian) {
+  static void add_by_C(const Square& by_C, const std::vector<int>& rows, int first_column,
+                       StateJacobian& jacobian) {
     for (Eigen::Index j = 0; j < by_C.cols(); ++j) {
       for (Eigen::Index i = 0; i < by_C.rows(); ++i) {
         const auto row = rows[static_cast<std::size_t>(i)];
@@ -65,8 +70,8 @@ class ComplianceFirstOrder final : public Compliance {
   using Compliance::Compliance;
   std::string name() const override { return "compliance_first_order"; }
 
-  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
-             int first_column) const override {
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
     const ArmKinematics kinematics(state);
     const JointArray torque = kinematics.gravity_torque();
     if (jacobian != nullptr) {
@@ -85,8 +90,8 @@ class ComplianceEquilibrium final : public Compliance {
   using Compliance::Compliance;
   std::string name() const override { return "compliance_equilibrium"; }
 
-  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
-             int first_column) const override {
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
     const ArmState unloaded = state;
     JointArray deflection = JointArray::Zero(C.size());
     for (int step = 0; step < kMaxEquilibriumSteps; ++step) {
@@ -98,15 +103,16 @@ class ComplianceEquilibrium final : public Compliance {
       if (moved < kEquilibriumStep) break;
     }
     if (jacobian == nullptr) return;
-    // For the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T the torque's
-    // derivative in the loaded posture, B the bars.
+    // For the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T
+    // the torque's derivative in the loaded posture, B the bars.
     const ArmKinematics loaded(state);
     const JointArray torque = loaded.gravity_torque();
     const JointStateMatrix T = loaded.gravity_torque_jacobian();
     const int n = state.chain->size();
     const std::vector<int> rows = joint_rows(*state.chain);
     Square by_joints(n, n);
-    for (int j = 0; j < n; ++j) by_joints.col(j) = C.cwiseProduct(T.col(rows[static_cast<std::size_t>(j)]));
+    for (int j = 0; j < n; ++j)
+      by_joints.col(j) = C.cwiseProduct(T.col(rows[static_cast<std::size_t>(j)]));
     const Square bars = state.chain->bars();
     const Square balance = Square::Identity(n, n) - by_joints * bars;
     const Square inverse = bars * balance.partialPivLu().inverse();
@@ -121,8 +127,8 @@ class ComplianceLinear final : public Compliance {
   using Compliance::Compliance;
   std::string name() const override { return "compliance_linear"; }
 
-  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
-             int first_column) const override {
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
     const ArmKinematics kinematics(state);
     const JointArray torque = kinematics.gravity_torque();
     const ArmKinematics::JointJacobian J = kinematics.deflection_jacobian();
@@ -131,7 +137,8 @@ class ComplianceLinear final : public Compliance {
       const ArmKinematics::JointJacobian by_torque = J * C.asDiagonal();
       const JointStateMatrix T = kinematics.gravity_torque_jacobian();
       Eigen::MatrixXd by_state = kinematics.deflection_jacobian_derivative(deflection);
-      for (int row = 0; row < T.cols(); ++row) by_state.col(row) += by_torque.lazyProduct(T.col(row));
+      for (int row = 0; row < T.cols(); ++row)
+        by_state.col(row) += by_torque.lazyProduct(T.col(row));
       jacobian->pass_on(jacobian->rows.whole_tip(), std::move(by_state));
       jacobian->add_block(jacobian->rows.tip(0), first_column, J * torque.asDiagonal());
     }
@@ -144,7 +151,9 @@ Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) {
   return std::make_shared<ComplianceForm>(cell.robot);
 }
 
-bool carries_anything(const Cell& cell) { return !cell.payloads.empty() || cell.robot.has_link_masses(); }
+bool carries_anything(const Cell& cell) {
+  return !cell.payloads.empty() || cell.robot.has_link_masses();
+}
 
 }  // namespace
 
@@ -161,7 +170,9 @@ const CauseRecord& causes::compliance() {
       .forms = {{"compliance_first_order", make<ComplianceFirstOrder>},
                 {"compliance_equilibrium", make<ComplianceEquilibrium>},
                 {"compliance_linear", make<ComplianceLinear>}},
-      .rivals = {{.cause = "payload"}, {.cause = "link_bending"}, {.cause = "encoder_eccentricity"}},
+      .rivals = {{.cause = "payload"},
+                 {.cause = "link_bending"},
+                 {.cause = "encoder_eccentricity"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = remedies::kOtherLoad.text,
       .action = "compensate it for this payload",

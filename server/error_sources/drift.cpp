@@ -1,6 +1,7 @@
 #include "server/error_sources/shipped_causes.h"
 
-/// The record of an arm that is no longer the one that the model in force describes. No error source describes it.
+/// The record of an arm that is no longer the one that the model in force describes. No error
+/// source describes it.
 namespace trammel {
 
 const CauseRecord& causes::drift() {

@@ -9,19 +9,23 @@ constexpr double kShare = 1e-4;  // of the last move, prior
 
 std::vector<Parameter> shares(int joints) {
   std::vector<Parameter> all;
-  for (int j = 1; j <= joints; ++j) all.push_back({fmt::format("early{}", j), "ppm", 1e6, 0, kShare, 0.0});
+  for (int j = 1; j <= joints; ++j)
+    all.push_back({fmt::format("early{}", j), "ppm", 1e6, 0, kShare, 0.0});
   return all;
 }
 
-/// Robot or tracker are read before the arm stands still: each joint still lacks a share of its last move, delta q = -e
-/// (q - q_before). A servo that settles leaves the same share of every move after the same time; an instrument that
-/// begins to average too early sees the end of the same way. e is not negative: a joint that goes too far lacks
-/// nothing, and waiting does not bring it back. It belongs to the measuring: nothing that is served has it.
+/// Robot or tracker are read before the arm stands still: each joint still lacks a share of its
+/// last move, delta q = -e (q - q_before). A servo that settles leaves the same share of every move
+/// after the same time; an instrument that begins to average too early sees the end of the same
+/// way. e is not negative: a joint that goes too far lacks nothing, and waiting does not bring it
+/// back. It belongs to the measuring: nothing that is served has it.
 class EarlyReading final : public JointError {
  public:
   EarlyReading(const SourceSpec& spec, int joints) : JointError(spec.text, -1, shares(joints)) {}
   const CauseRecord& cause() const override { return causes::early_reading(); }
-  std::string explanation() const override { return "poses were measured before the arm stood still"; }
+  std::string explanation() const override {
+    return "poses were measured before the arm stood still";
+  }
 
  private:
   std::vector<Term> terms(const PoseContext& context) const override {
@@ -52,7 +56,9 @@ const CauseRecord& causes::early_reading() {
       .forms = {{"early_reading", make}},
       .rivals = {{.cause = "backlash"}, {.cause = "hysteresis"}, {.cause = "time_lag"}},
       .told_apart_by = remedies::kOtherSpeed,
-      .shown_by = "poses in the order in which they were measured, with their times, after long and short moves",
+      .shown_by =
+          "poses in the order in which they were measured, with their times, after long and short "
+          "moves",
       .action = "wait longer at every pose before it is measured",
       .figures = {{"early", "ppm", "how much of its last move a joint still lacks"}},
   };

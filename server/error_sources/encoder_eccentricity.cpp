@@ -8,8 +8,8 @@ namespace trammel {
 
 namespace {
 
-/// The encoder's disc turns about a point beside its centre: the joint is off by a sine and a cosine of its own angle,
-/// one cycle a turn.
+/// The encoder's disc turns about a point beside its centre: the joint is off by a sine and a
+/// cosine of its own angle, one cycle a turn.
 class EncoderEccentricity final : public JointError {
  public:
   explicit EncoderEccentricity(const SourceSpec& spec)
@@ -28,7 +28,9 @@ class EncoderEccentricity final : public JointError {
   }
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<EncoderEccentricity>(spec); }
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) {
+  return std::make_shared<EncoderEccentricity>(spec);
+}
 
 }  // namespace
 

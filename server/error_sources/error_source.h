@@ -14,13 +14,14 @@
 
 namespace trammel {
 
-/// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people read it.
+/// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people
+/// read it.
 struct Parameter {
-  std::string name;                                         ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
-  std::string unit;                                         ///< for people: `mm`, `rad`, `rad/Nmm`
-  double scale = 1;                                         ///< value for people = scale * SI value
-  double prior = 0;                                         ///< mean of the prior, SI
-  double prior_scale = 1;                                   ///< standard deviation of the prior, SI
+  std::string name;        ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
+  std::string unit;        ///< for people: `mm`, `rad`, `rad/Nmm`
+  double scale = 1;        ///< value for people = scale * SI value
+  double prior = 0;        ///< mean of the prior, SI
+  double prior_scale = 1;  ///< standard deviation of the prior, SI
   double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
   bool is_place = false;  ///< says where an effect is (the order of an oscillation), not how large
 };
@@ -37,20 +38,21 @@ class ErrorSource {
   [[nodiscard]] const ContextNeeds& needs() const { return cause().needs; }
   /// 0-based joint it concerns; -1 where it concerns the whole arm.
   [[nodiscard]] virtual int joint() const { return -1; }
-  /// Range and step of a search over its first parameter, for a source that needs one before refinement (the order of a
-  /// gear's ripple).
+  /// Range and step of a search over its first parameter, for a source that needs one before
+  /// refinement (the order of a gear's ripple).
   struct Search {
     double from = 0, to = 0, step = 0;
   };
   [[nodiscard]] virtual std::optional<Search> search() const { return std::nullopt; }
   /// One sentence about it for reports.
   [[nodiscard]] virtual std::string explanation() const = 0;
-  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given,
-  /// its columns first_column... receive the exact derivative, and sources that depend on the state pass the
-  /// derivatives of earlier sources on. The joints of `context` are the angles of their gears (Chain::gear_angles), not
-  /// what a controller with couplings counts.
-  virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-                     StateJacobian* jacobian, int first_column) const = 0;
+  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where
+  /// `jacobian` is given, its columns first_column... receive the exact derivative, and sources
+  /// that depend on the state pass the derivatives of earlier sources on. The joints of `context`
+  /// are the angles of their gears (Chain::gear_angles), not what a controller with couplings
+  /// counts.
+  virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+                     ArmState& state, StateJacobian* jacobian, int first_column) const = 0;
 };
 
 using ErrorSourcePtr = std::shared_ptr<const ErrorSource>;

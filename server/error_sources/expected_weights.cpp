@@ -7,7 +7,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kMassOfReach = 60;   // kg/m^3: a robot's moving mass over the cube of its reach, as makers list them
+constexpr double kMassOfReach =
+    60;  // kg/m^3: a robot's moving mass over the cube of its reach, as makers list them
 constexpr double kSpreadUnknown = 1;  // of the expected moment, where no masses are told
 constexpr double kSpreadTold = 0.3;   // the same where they are
 constexpr double kLeastLever = 0.05;  // m: a link's weight may be that far beside its axis
@@ -42,7 +43,8 @@ ExpectedWeights expected_weights(const Chain& chain) {
     const double own = per_metre * length_of(chain.joint(i));
     const double at_end = own / 2 + beyond;  // half of its own mass, and all that it carries
     const Eigen::Vector2d moment(at_end * link.a, -std::sin(link.alpha) * along);
-    expected.spread(i) = (told ? kSpreadTold : kSpreadUnknown) * (moment.norm() + kLeastLever * (own + beyond));
+    expected.spread(i) =
+        (told ? kSpreadTold : kSpreadUnknown) * (moment.norm() + kLeastLever * (own + beyond));
     if (!told) expected.moment.col(i) = moment;
     along = at_end * link.d + std::cos(link.alpha) * along;
     beyond += own;

@@ -14,8 +14,8 @@ Matrix3 rotation_axes(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return axes;
 }
 
-void move_tool(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, StateJacobian* jacobian,
-               int first_column) {
+void move_tool(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+               StateJacobian* jacobian, int first_column) {
   const Pose motion = motion_of(values);
   state.X_FT = motion * state.X_FT;
   if (jacobian == nullptr) return;
@@ -33,8 +33,8 @@ void move_tool(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
   jacobian->add_block(translation, first_column + 3, skew(t) * axes);
 }
 
-void move_base_in_world(const Eigen::Ref<const Eigen::VectorXd>& values, double rate, ArmState& state,
-                        StateJacobian* jacobian, int first_column) {
+void move_base_in_world(const Eigen::Ref<const Eigen::VectorXd>& values, double rate,
+                        ArmState& state, StateJacobian* jacobian, int first_column) {
   const Eigen::VectorXd moved = rate * values;
   const Pose motion = motion_of(moved);
   state.X_WB.translation() += motion.translation();

@@ -9,19 +9,24 @@ namespace {
 
 constexpr double kAmplitudePrior = 1e-4;  // rad
 constexpr double kLowestOrder = 2;        // below lie eccentricity and geometry
-constexpr double kHighestOrder = 400;     // cycles a joint turn: two waves a motor turn at a ratio of 200
+constexpr double kHighestOrder =
+    400;  // cycles a joint turn: two waves a motor turn at a ratio of 200
 
-/// Teeth that mesh unevenly: the joint oscillates `order` times a turn of its own, delta q = s sin(order q) + c
-/// cos(order q). The order need not be whole. Several orders of one joint are several triples.
+/// Teeth that mesh unevenly: the joint oscillates `order` times a turn of its own, delta q = s
+/// sin(order q) + c cos(order q). The order need not be whole. Several orders of one joint are
+/// several triples.
 class GearTransmission final : public ErrorSource {
  public:
-  GearTransmission(const SourceSpec& spec, double range) : name_(spec.text), joint_(spec.joint), range_(range) {
+  GearTransmission(const SourceSpec& spec, double range)
+      : name_(spec.text), joint_(spec.joint), range_(range) {
     searched_ = spec.at.empty();
     const std::vector<double> orders = searched_ ? std::vector<double>{kLowestOrder} : spec.at;
-    // Over this range of angles, orders can be resolved to 2 pi / range. The prior stays well within that.
+    // Over this range of angles, orders can be resolved to 2 pi / range. The prior stays well
+    // within that.
     const double spread = 0.25 * 2 * kPi / range_;
     for (std::size_t k = 0; k < orders.size(); ++k) {
-      const std::string which = fmt::format("{}{}", joint_ + 1, orders.size() > 1 ? fmt::format("_{}", k + 1) : "");
+      const std::string which =
+          fmt::format("{}{}", joint_ + 1, orders.size() > 1 ? fmt::format("_{}", k + 1) : "");
       parameters_.push_back({"order" + which, "", 1, orders[k], spread, 0.0, true});
       parameters_.push_back(angle_parameter("gear_sin" + which, kAmplitudePrior));
       parameters_.push_back(angle_parameter("gear_cos" + which, kAmplitudePrior));
@@ -40,15 +45,16 @@ class GearTransmission final : public ErrorSource {
     return Search{kLowestOrder, kHighestOrder, 0.2 * 2 * kPi / range_};
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     const double q = context.q(joint_);
     for (int k = 0; k < static_cast<int>(parameters_.size()); k += 3) {
       const double sine = std::sin(values(k) * q);
       const double cosine = std::cos(values(k) * q);
       state.add_to_joint(joint_, values(k + 1) * sine + values(k + 2) * cosine);
       if (jacobian == nullptr) continue;
-      jacobian->add_to_joint(joint_, first_column + k, q * (values(k + 1) * cosine - values(k + 2) * sine));
+      jacobian->add_to_joint(joint_, first_column + k,
+                             q * (values(k + 1) * cosine - values(k + 2) * sine));
       jacobian->add_to_joint(joint_, first_column + k + 1, sine);
       jacobian->add_to_joint(joint_, first_column + k + 2, cosine);
     }
@@ -71,7 +77,9 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
     const auto& [lower, upper] = cell.joint_ranges[static_cast<std::size_t>(spec.joint)];
     range = upper - lower;
   }
-  if (!(range > 0)) return refused("error source '{}': joint {} does not move in this cell", spec.text, spec.joint + 1);
+  if (!(range > 0))
+    return refused("error source '{}': joint {} does not move in this cell", spec.text,
+                   spec.joint + 1);
   return std::make_shared<GearTransmission>(spec, std::min(range, 4 * kPi));
 }
 

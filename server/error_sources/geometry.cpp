@@ -5,8 +5,9 @@ namespace trammel {
 
 namespace {
 
-/// The link parameters differ from the nominal ones: q, d (or beta in a Hayati row), a and alpha of every link, eqs.
-/// (3.3) and (3.4), 24 parameters for a six-axis arm with one pair of parallel axes.
+/// The link parameters differ from the nominal ones: q, d (or beta in a Hayati row), a and alpha of
+/// every link, eqs. (3.3) and (3.4), 24 parameters for a six-axis arm with one pair of parallel
+/// axes.
 class Geometry final : public ErrorSource {
  public:
   explicit Geometry(const Chain& chain) {
@@ -29,7 +30,9 @@ class Geometry final : public ErrorSource {
   const CauseRecord& cause() const override { return causes::geometry(); }
   std::string name() const override { return "geometry"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return "link lengths, twists and joint zeros differ from the drawing"; }
+  std::string explanation() const override {
+    return "link lengths, twists and joint zeros differ from the drawing";
+  }
 
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
@@ -47,8 +50,10 @@ class Geometry final : public ErrorSource {
   }
 
  private:
-  /// A zero belongs to its gear and is counted as the axis turns: joints that bars couple go with it.
-  static void add_to_zero(int joint, double value, ArmState& state, StateJacobian* jacobian, int column) {
+  /// A zero belongs to its gear and is counted as the axis turns: joints that bars couple go with
+  /// it.
+  static void add_to_zero(int joint, double value, ArmState& state, StateJacobian* jacobian,
+                          int column) {
     const double sign = state.chain->joint(joint).sign;
     state.add_to_joint(joint, sign * value);
     if (jacobian != nullptr) jacobian->add_to_joint(joint, column, sign);
@@ -63,7 +68,9 @@ class Geometry final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) { return std::make_shared<Geometry>(cell.robot); }
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) {
+  return std::make_shared<Geometry>(cell.robot);
+}
 
 }  // namespace
 

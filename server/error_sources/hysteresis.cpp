@@ -12,17 +12,19 @@ constexpr double kWay = 0.02;        // rad: of friction before it slips
 constexpr double kWaySpread = 0.01;
 constexpr double kShortestWay = 1e-3;
 
-/// Friction in a gear holds the joint back, by as much as it was moved to get there: delta q = -h m / sqrt(m^2 + w^2),
-/// m = q - q_before. Long moves end in `backlash`, a step by the side alone; moves shorter than w leave less. The pose
-/// before is all that it remembers. h is not negative: friction never takes a joint farther than it was sent. Where
-/// nobody knows that pose there is no hysteresis, which is its mean over both sides.
+/// Friction in a gear holds the joint back, by as much as it was moved to get there: delta q = -h m
+/// / sqrt(m^2 + w^2), m = q - q_before. Long moves end in `backlash`, a step by the side alone;
+/// moves shorter than w leave less. The pose before is all that it remembers. h is not negative:
+/// friction never takes a joint farther than it was sent. Where nobody knows that pose there is no
+/// hysteresis, which is its mean over both sides.
 class Hysteresis final : public ErrorSource {
  public:
   explicit Hysteresis(const SourceSpec& spec)
       : name_(spec.text),
         joint_(spec.joint),
         parameters_({{fmt::format("hyst{}", spec.joint + 1), "rad", 1, 0, kHalfWidth, 0.0},
-                     {fmt::format("way{}", spec.joint + 1), "rad", 1, kWay, kWaySpread, kShortestWay, true}}) {}
+                     {fmt::format("way{}", spec.joint + 1), "rad", 1, kWay, kWaySpread,
+                      kShortestWay, true}}) {}
   const CauseRecord& cause() const override { return causes::hysteresis(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
@@ -31,8 +33,8 @@ class Hysteresis final : public ErrorSource {
     return fmt::format("friction holds joint {} back towards where it came from", joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     if (!context.before) return;
     const double moved = context.q(joint_) - (*context.before)(joint_);
     const double length = std::hypot(moved, values(1));
@@ -41,7 +43,8 @@ class Hysteresis final : public ErrorSource {
     state.add_to_joint(joint_, values(0) * share);
     if (jacobian == nullptr) return;
     jacobian->add_to_joint(joint_, first_column, share);
-    jacobian->add_to_joint(joint_, first_column + 1, -values(0) * share * values(1) / (length * length));
+    jacobian->add_to_joint(joint_, first_column + 1,
+                           -values(0) * share * values(1) / (length * length));
   }
 
  private:
@@ -69,9 +72,12 @@ const CauseRecord& causes::hysteresis() {
       .search = SearchFamily::kColumns,
       .acts = {ActsOn::kJoints, 13},
       .forms = {{"hysteresis", make}},
-      .rivals = {{.cause = "backlash", .likeness = Likeness::kSimplerCase}, {.cause = "early_reading"}},
+      .rivals = {{.cause = "backlash", .likeness = Likeness::kSimplerCase},
+                 {.cause = "early_reading"}},
       .told_apart_by = remedies::kBothSides,
-      .shown_by = "poses in the order in which they were measured, with their times, after long and short moves",
+      .shown_by =
+          "poses in the order in which they were measured, with their times, after long and short "
+          "moves",
       .action = "approach every target by a long move from one side of this joint",
       .figures = {{"hyst", "rad", "half of what lies between both sides after long moves"},
                   {"way", "rad", "how long a move must be to show most of it"}},

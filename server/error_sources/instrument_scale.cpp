@@ -10,33 +10,38 @@ namespace {
 constexpr double kReferenceTemperature = 20;  // degrees Celsius
 constexpr double kPartsPerMillion = 1e6;
 
-/// The instrument tells distances from itself too long: by a share of the distance, by a share that grows with the
-/// distance (its bend), and by one that grows with the temperature of the air: what it sees stands at p + e (p - p_0),
-/// e = scale + bend r + warm (T - 20), r = |p - p_0|. It is no error of the arm: nothing that is served has it. A scale
-/// alone is the same as an arm with all lengths longer that stands elsewhere: it is told by known lengths only, so by
-/// link geometry that is not among the error sources. Its bend and its temperature are its own.
+/// The instrument tells distances from itself too long: by a share of the distance, by a share that
+/// grows with the distance (its bend), and by one that grows with the temperature of the air: what
+/// it sees stands at p + e (p - p_0), e = scale + bend r + warm (T - 20), r = |p - p_0|. It is no
+/// error of the arm: nothing that is served has it. A scale alone is the same as an arm with all
+/// lengths longer that stands elsewhere: it is told by known lengths only, so by link geometry that
+/// is not among the error sources. Its bend and its temperature are its own.
 class InstrumentScale final : public ErrorSource {
  public:
   explicit InstrumentScale(const Vector3& p_W) : p_W_(p_W) {}
   const CauseRecord& cause() const override { return causes::instrument_scale(); }
   std::string name() const override { return "instrument_scale"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return "the instrument tells distances too long, or too short"; }
+  std::string explanation() const override {
+    return "the instrument tells distances too long, or too short";
+  }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     if (context.served) return;
     const ArmKinematics kinematics(state);
     const Vector3 away = kinematics.tool_pose_W().translation() - p_W_;
     const double distance = away.norm();
-    const Vector3 shares(1, distance, context.temperature ? *context.temperature - kReferenceTemperature : 0);
+    const Vector3 shares(1, distance,
+                         context.temperature ? *context.temperature - kReferenceTemperature : 0);
     const double share = shares.dot(values.head<3>());
     state.tip_W.head<3>() += share * away;
     if (jacobian == nullptr) return;
     const StateRows& rows = jacobian->rows;
     Matrix3 by_place = share * Matrix3::Identity();
     if (distance > 0) by_place += values(1) / distance * away * away.transpose();
-    jacobian->pass_on({rows.tip(0), rows.tip(1), rows.tip(2)}, by_place * kinematics.pose_jacobian().topRows<3>());
+    jacobian->pass_on({rows.tip(0), rows.tip(1), rows.tip(2)},
+                      by_place * kinematics.pose_jacobian().topRows<3>());
     jacobian->add_block(rows.tip(0), first_column, away * shares.transpose());
   }
 
@@ -66,8 +71,12 @@ const CauseRecord& causes::instrument_scale() {
       .forms = {{"instrument_scale", make}},
       .rivals = {{.cause = "geometry"}, {.cause = "thermal_growth"}, {.cause = "tracker_drift"}},
       .told_apart_by = remedies::kReflectors,
-      .shown_by = "a known length, measured near and far from the instrument, and where it stands (tracker: xyz_mm)",
-      .action = "let the instrument be checked against a scale bar, and give it the air's temperature and pressure",
+      .shown_by =
+          "a known length, measured near and far from the instrument, and where it stands "
+          "(tracker: xyz_mm)",
+      .action =
+          "let the instrument be checked against a scale bar, and give it the air's temperature "
+          "and pressure",
       .figures = {{"scale", "um/m", "how much too long it tells a distance"},
                   {"bend", "um/m/m", "how much more of that for each metre of distance"},
                   {"warm", "um/m/K", "how much more of that for each degree above 20"}},

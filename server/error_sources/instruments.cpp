@@ -6,7 +6,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kTypical = 2;  // mm, as of a base; where one is unknown its prior is widened as that of a base is
+constexpr double kTypical =
+    2;  // mm, as of a base; where one is unknown its prior is widened as that of a base is
 
 const CauseRecord& record() {
   static const CauseRecord of_instruments = {
@@ -30,7 +31,8 @@ const CauseRecord& record() {
 
 }  // namespace
 
-Instruments::Instruments(std::string name, Anchors anchors) : name_(std::move(name)), anchors_(std::move(anchors)) {
+Instruments::Instruments(std::string name, Anchors anchors)
+    : name_(std::move(name)), anchors_(std::move(anchors)) {
   for (const auto& [id, anchor] : anchors_) {
     if (name_ == kAnchors ? anchor.p_W.has_value() : anchor.zero.has_value()) continue;
     first_[id] = static_cast<Eigen::Index>(parameters_.size());
@@ -55,14 +57,18 @@ Eigen::Index Instruments::place(const std::string& id, Eigen::Index first) const
   return found == first_.end() ? -1 : first + found->second;
 }
 
-bool is_of_instruments(std::string_view spec) { return spec == kAnchors || spec == kInstrumentZero; }
+bool is_of_instruments(std::string_view spec) {
+  return spec == kAnchors || spec == kInstrumentZero;
+}
 
 bool is_of_instruments(const ErrorSource& source) { return &source.cause() == &record(); }
 
 Result<ErrorSourcePtr> make_instrument_source(const std::string& spec, const Cell& cell) {
-  if (!is_of_instruments(spec)) return failure(ErrorCode::kUsage, "'{}' is nothing of instruments", spec);
-  return anchors_of(cell).map(
-      [&](Anchors anchors) -> ErrorSourcePtr { return std::make_shared<Instruments>(spec, std::move(anchors)); });
+  if (!is_of_instruments(spec))
+    return failure(ErrorCode::kUsage, "'{}' is nothing of instruments", spec);
+  return anchors_of(cell).map([&](Anchors anchors) -> ErrorSourcePtr {
+    return std::make_shared<Instruments>(spec, std::move(anchors));
+  });
 }
 
 }  // namespace trammel

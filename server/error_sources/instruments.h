@@ -17,9 +17,11 @@ inline constexpr std::string_view kInstrumentZero = "instrument_zero";
 [[nodiscard]] bool is_of_instruments(std::string_view spec);
 [[nodiscard]] bool is_of_instruments(const ErrorSource& source);
 
-/// `anchors`: `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) of each anchor whose place the cell file does not say, which is 0
-/// until it is found. `instrument_zero`: `zero[ID]` (m) of each whose zero it does not say. Refuses what is neither.
-[[nodiscard]] Result<ErrorSourcePtr> make_instrument_source(const std::string& spec, const Cell& cell);
+/// `anchors`: `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) of each anchor whose place the cell file does
+/// not say, which is 0 until it is found. `instrument_zero`: `zero[ID]` (m) of each whose zero it
+/// does not say. Refuses what is neither.
+[[nodiscard]] Result<ErrorSourcePtr> make_instrument_source(const std::string& spec,
+                                                            const Cell& cell);
 
 /// One of the two lists.
 class Instruments final : public ErrorSource {
@@ -29,8 +31,8 @@ class Instruments final : public ErrorSource {
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override;
-  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>&, ArmState&, StateJacobian*,
-             int) const override {}
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>&, ArmState&,
+             StateJacobian*, int) const override {}
 
   [[nodiscard]] const Anchors& anchors() const { return anchors_; }
   /// Place of its first parameter, from `first` on; -1: it has none.

@@ -11,21 +11,26 @@ namespace {
 
 constexpr double kLessExpected = 8;  // nat, while the arm's geometry is not in the model
 constexpr int kHarmonics = 4;
-constexpr double kRatio = 1e-3;      // rad/rad, prior: teeth and bars are exact, what drags along is not
-constexpr double kAmplitude = 2e-4;  // rad, prior of a first harmonic: a tenth of a mm on a bar of half a metre
+constexpr double kRatio =
+    1e-3;  // rad/rad, prior: teeth and bars are exact, what drags along is not
+constexpr double kAmplitude =
+    2e-4;  // rad, prior of a first harmonic: a tenth of a mm on a bar of half a metre
 
-/// A joint that is driven past another one: delta q = k u + f(u) + g(q + u) + h(q - u), u the other joint's angle, f, g
-/// and h short Fourier series. A belt or a shaft that runs around the other's axis makes k and f. A motor that stands
-/// before the other joint makes g, a parallelogram whose bars are not as drawn h, or the other way round: which of the
-/// two is the angle of motor or bars depends on how the controller counts. What depends on q alone is an angle error
-/// map, the constant is the joint's zero.
+/// A joint that is driven past another one: delta q = k u + f(u) + g(q + u) + h(q - u), u the other
+/// joint's angle, f, g and h short Fourier series. A belt or a shaft that runs around the other's
+/// axis makes k and f. A motor that stands before the other joint makes g, a parallelogram whose
+/// bars are not as drawn h, or the other way round: which of the two is the angle of motor or bars
+/// depends on how the controller counts. What depends on q alone is an angle error map, the
+/// constant is the joint's zero.
 class JointCoupling final : public JointError {
  public:
   JointCoupling(const SourceSpec& spec, int other)
-      : JointError(spec.text, spec.joint, series(fmt::format("{}.{}", spec.joint + 1, other + 1))), other_(other) {}
+      : JointError(spec.text, spec.joint, series(fmt::format("{}.{}", spec.joint + 1, other + 1))),
+        other_(other) {}
   const CauseRecord& cause() const override { return causes::joint_coupling(); }
   std::string explanation() const override {
-    return fmt::format("joint {} is driven past joint {} and follows it a little", joint() + 1, other_ + 1);
+    return fmt::format("joint {} is driven past joint {} and follows it a little", joint() + 1,
+                       other_ + 1);
   }
 
  private:
@@ -34,7 +39,8 @@ class JointCoupling final : public JointError {
     for (const char* argument : {"couple", "sum", "difference"}) {
       for (int h = 1; h <= kHarmonics; ++h) {
         for (const char* wave : {"sin", "cos"})
-          all.push_back(angle_parameter(fmt::format("{}_{}{}_{}", argument, wave, joints, h), kAmplitude / h));
+          all.push_back(angle_parameter(fmt::format("{}_{}{}_{}", argument, wave, joints, h),
+                                        kAmplitude / h));
       }
     }
     return all;
@@ -89,7 +95,8 @@ const CauseRecord& causes::joint_coupling() {
                   {"couple_cos", "rad", "by its cosine"},
                   {"sum_sin", "rad", "by the sine of a multiple of the sum of both angles"},
                   {"sum_cos", "rad", "by its cosine"},
-                  {"difference_sin", "rad", "by the sine of a multiple of the joint's angle less the other's"},
+                  {"difference_sin", "rad",
+                   "by the sine of a multiple of the joint's angle less the other's"},
                   {"difference_cos", "rad", "by its cosine"}},
       .takes_numbers = true,
       .of_turning_joint = true,

@@ -21,11 +21,12 @@ class JointError : public ErrorSource {
   [[nodiscard]] std::string name() const final { return name_; }
   [[nodiscard]] int joint() const final { return joint_; }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const final {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const final {
     for (const Term& term : terms(context)) {
       state.add_to_joint(term.joint, term.rate * values(term.column));
-      if (jacobian != nullptr) jacobian->add_to_joint(term.joint, first_column + term.column, term.rate);
+      if (jacobian != nullptr)
+        jacobian->add_to_joint(term.joint, first_column + term.column, term.rate);
     }
   }
 

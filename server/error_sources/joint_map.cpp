@@ -17,7 +17,8 @@ constexpr int kMaxHarmonics = 500;
 constexpr std::size_t kNumbersOfSpectrum = 4;
 constexpr double kLeast = 1e-6;         // of amplitude and power
 constexpr double kMostAmplitude = 1e6;  // urad
-constexpr double kLeastKnee = 0.01;     // with the most power a standard deviation is still a number above 0
+constexpr double kLeastKnee =
+    0.01;  // with the most power a standard deviation is still a number above 0
 constexpr double kMostKnee = 1e4;
 constexpr double kMostPower = 50;
 
@@ -36,14 +37,17 @@ class Harmonics {
   double sine_of_q_, cosine_of_q_;
 };
 
-/// An error of one joint's angle that depends on that angle alone: a Fourier series with period one turn. The constant
-/// is the joint's zero.
+/// An error of one joint's angle that depends on that angle alone: a Fourier series with period one
+/// turn. The constant is the joint's zero.
 class JointMap final : public ErrorSource {
  public:
-  JointMap(const SourceSpec& spec, const MapSpectrum& spectrum) : name_(spec.text), joint_(spec.joint) {
+  JointMap(const SourceSpec& spec, const MapSpectrum& spectrum)
+      : name_(spec.text), joint_(spec.joint) {
     for (int h = 1; h <= spectrum.harmonics; ++h) {
-      parameters_.push_back(angle_parameter(fmt::format("map{}_sin{}", joint_ + 1, h), spectrum.stddev(h)));
-      parameters_.push_back(angle_parameter(fmt::format("map{}_cos{}", joint_ + 1, h), spectrum.stddev(h)));
+      parameters_.push_back(
+          angle_parameter(fmt::format("map{}_sin{}", joint_ + 1, h), spectrum.stddev(h)));
+      parameters_.push_back(
+          angle_parameter(fmt::format("map{}_cos{}", joint_ + 1, h), spectrum.stddev(h)));
     }
   }
   const CauseRecord& cause() const override { return causes::joint_map(); }
@@ -54,8 +58,8 @@ class JointMap final : public ErrorSource {
     return fmt::format("joint {} is off by a function of its own angle", joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     Harmonics harmonic(context.q(joint_));
     double off = 0;
     for (int k = 0; k < static_cast<int>(parameters_.size()); k += 2) {
@@ -81,8 +85,8 @@ std::optional<MapSpectrum> spectrum_of(const std::vector<double>& numbers) {
   if (numbers[0] != std::floor(numbers[0]) || numbers[0] > kMaxHarmonics) return std::nullopt;
   spectrum.harmonics = static_cast<int>(numbers[0]);
   if (numbers.size() == 1) return spectrum;
-  if (numbers.size() != kNumbersOfSpectrum || numbers[1] > kMostAmplitude || numbers[2] < kLeastKnee ||
-      numbers[2] > kMostKnee || numbers[3] > kMostPower)
+  if (numbers.size() != kNumbersOfSpectrum || numbers[1] > kMostAmplitude ||
+      numbers[2] < kLeastKnee || numbers[2] > kMostKnee || numbers[3] > kMostPower)
     return std::nullopt;
   spectrum.amplitude = kMicro * numbers[1];
   spectrum.knee = numbers[2];
@@ -96,17 +100,20 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   }
   const std::optional<MapSpectrum> spectrum = spectrum_of(spec.at);
   if (!spectrum) {
-    return failure(ErrorCode::kUsage,
-                   "error source '{}': expected @harmonics, a whole number up to {}, or "
-                   "@harmonics+amplitude+knee+power, in urad up to {:g}, {:g} to {:g} and up to {:g}",
-                   spec.text, kMaxHarmonics, kMostAmplitude, kLeastKnee, kMostKnee, kMostPower);
+    return failure(
+        ErrorCode::kUsage,
+        "error source '{}': expected @harmonics, a whole number up to {}, or "
+        "@harmonics+amplitude+knee+power, in urad up to {:g}, {:g} to {:g} and up to {:g}",
+        spec.text, kMaxHarmonics, kMostAmplitude, kLeastKnee, kMostKnee, kMostPower);
   }
   return std::make_shared<JointMap>(spec, *spectrum);
 }
 
-/// The number with four significant digits. It has no exponent, since the sign of one would end the number.
+/// The number with four significant digits. It has no exponent, since the sign of one would end the
+/// number.
 std::string in_digits(double value) {
-  return fmt::format("{:.{}f}", value, std::clamp(3 - static_cast<int>(std::floor(std::log10(value))), 0, 12));
+  return fmt::format("{:.{}f}", value,
+                     std::clamp(3 - static_cast<int>(std::floor(std::log10(value))), 0, 12));
 }
 
 /// True where `spelling` is a map of a joint.
@@ -121,7 +128,8 @@ double MapSpectrum::stddev(int harmonic) const {
 }
 
 std::string spelled_map(int joint, const MapSpectrum& spectrum) {
-  return fmt::format("{}:{}@{}+{}+{}+{}", causes::joint_map().spelling, joint + 1, spectrum.harmonics,
+  return fmt::format("{}:{}@{}+{}+{}+{}", causes::joint_map().spelling, joint + 1,
+                     spectrum.harmonics,
                      in_digits(std::clamp(spectrum.amplitude / kMicro, kLeast, kMostAmplitude)),
                      in_digits(std::clamp(spectrum.knee, kLeastKnee, kMostKnee)),
                      in_digits(std::clamp(spectrum.power, kLeast, kMostPower)));
@@ -137,7 +145,8 @@ std::optional<int> joint_of_open_map(const std::string& spelling) {
 
 std::string without_learned_spectrum(const std::string& spelling) {
   const std::size_t at = spelling.find('@');
-  const bool learned = is_map(spelling) && at != std::string::npos && spelling.find('+', at) != std::string::npos;
+  const bool learned =
+      is_map(spelling) && at != std::string::npos && spelling.find('+', at) != std::string::npos;
   return learned ? spelling.substr(0, at) : spelling;
 }
 
@@ -158,7 +167,8 @@ const CauseRecord& causes::joint_map() {
       .told_apart_by = remedies::kWiderRange,
       .shown_by = "more poses over this joint's range",
       .action = "compensate it; measure again after service of this joint",
-      .figures = {{"peak_to_peak", "urad", "how far apart the joint is off at the two poses that differ most"}},
+      .figures = {{"peak_to_peak", "urad",
+                   "how far apart the joint is off at the two poses that differ most"}},
       .summary = Summary::kPeakToPeak,
       .takes_numbers = true,
       .of_turning_joint = true,

@@ -6,9 +6,9 @@
 /// How large the harmonics of a joint's map are expected to be.
 namespace trammel {
 
-/// The sine and the cosine of harmonic h are normal with standard deviation amplitude / (1 + (h/knee)²)^(power/2): a
-/// random function of the joint's angle, the smoother the larger the power. Amplitudes that fall as 1/h have power 1
-/// and a knee of 1.
+/// The sine and the cosine of harmonic h are normal with standard deviation amplitude / (1 +
+/// (h/knee)²)^(power/2): a random function of the joint's angle, the smoother the larger the power.
+/// Amplitudes that fall as 1/h have power 1 and a knee of 1.
 struct MapSpectrum {
   int harmonics = 48;
   double amplitude = 3e-4;  ///< rad, of slow harmonics
@@ -18,15 +18,16 @@ struct MapSpectrum {
   [[nodiscard]] double stddev(int harmonic) const;
 };
 
-/// The map of `joint` (0-based) with that spectrum, as a source is spelled: `joint_map:2@110+312.5+1.84+1.02`,
-/// harmonics, amplitude in µrad, knee and power.
+/// The map of `joint` (0-based) with that spectrum, as a source is spelled:
+/// `joint_map:2@110+312.5+1.84+1.02`, harmonics, amplitude in µrad, knee and power.
 [[nodiscard]] std::string spelled_map(int joint, const MapSpectrum& spectrum);
 
-/// The joint (0-based) of a map that says nothing of its spectrum, `joint_map:2`; nothing for any other spelling.
+/// The joint (0-based) of a map that says nothing of its spectrum, `joint_map:2`; nothing for any
+/// other spelling.
 [[nodiscard]] std::optional<int> joint_of_open_map(const std::string& spelling);
 
-/// The spelling without a spectrum that was learned: `joint_map:2` of `joint_map:2@110+312.5+1.84+1.02`. Any other
-/// spelling as it is.
+/// The spelling without a spectrum that was learned: `joint_map:2` of
+/// `joint_map:2@110+312.5+1.84+1.02`. Any other spelling as it is.
 [[nodiscard]] std::string without_learned_spectrum(const std::string& spelling);
 
 }  // namespace trammel

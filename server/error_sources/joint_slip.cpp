@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kUsualSlip = 2e-3;  // rad
 
-/// A joint loses its zero at a pose and keeps the new one. A second number, mrad, says how far that usually is.
+/// A joint loses its zero at a pose and keeps the new one. A second number, mrad, says how far that
+/// usually is.
 class JointSlip final : public JointError {
  public:
   explicit JointSlip(const SourceSpec& spec)
@@ -31,7 +32,8 @@ class JointSlip final : public JointError {
 
 Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) {
   if (spec.at.size() > 2)
-    return failure(ErrorCode::kUsage, "error source '{}': a pose, and how far zeros usually slip, mrad", spec.text);
+    return failure(ErrorCode::kUsage,
+                   "error source '{}': a pose, and how far zeros usually slip, mrad", spec.text);
   return std::make_shared<JointSlip>(spec);
 }
 
@@ -53,7 +55,9 @@ const CauseRecord& causes::joint_slip() {
                  {.cause = "tool_changed"}},
       .told_apart_by = {45, remedies::kReflectors.text},
       .shown_by = remedies::kReflectors.text,
-      .action = "check this joint's brake, coupling and calibration marks, and update its revolution counter",
+      .action =
+          "check this joint's brake, coupling and calibration marks, and update its revolution "
+          "counter",
       .figures = {{"slip", "rad", "how far the zero is off"}},
       .takes_numbers = true,
       .whole_batch = WholeBatch{"joint {} lost its zero", false},

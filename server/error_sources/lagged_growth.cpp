@@ -5,17 +5,19 @@ namespace trammel {
 
 namespace {
 
-/// Every length of the arm grows with the temperature of its links, which follow the recorded one with a lag. What
-/// `thermal_growth` is where they follow at once.
+/// Every length of the arm grows with the temperature of its links, which follow the recorded one
+/// with a lag. What `thermal_growth` is where they follow at once.
 class LaggedGrowth final : public ErrorSource {
  public:
   const CauseRecord& cause() const override { return causes::lagged_growth(); }
   std::string name() const override { return "lagged_growth"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return "the links grow as they warm up, later than the thermometer"; }
+  std::string explanation() const override {
+    return "the links grow as they warm up, later than the thermometer";
+  }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     const std::optional<Warming> felt = warming_at(context, values(1));
     if (!felt) return;
     const double factor = 1 + values(0) * felt->kelvin;
@@ -37,10 +39,13 @@ class LaggedGrowth final : public ErrorSource {
   }
 
  private:
-  const std::vector<Parameter> parameters_ = {{"growth", "um/m/K", 1e6, 0, 20e-6}, heat_lag_parameter("heat_lag")};
+  const std::vector<Parameter> parameters_ = {{"growth", "um/m/K", 1e6, 0, 20e-6},
+                                              heat_lag_parameter("heat_lag")};
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_shared<LaggedGrowth>(); }
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) {
+  return std::make_shared<LaggedGrowth>();
+}
 
 }  // namespace
 
@@ -55,12 +60,15 @@ const CauseRecord& causes::lagged_growth() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kLinks, 2},
       .forms = {{"lagged_growth", make}},
-      .rivals = {{.cause = "thermal_growth"}, {.cause = "thermal_zero"}, {.cause = "tracker_drift"}},
+      .rivals = {{.cause = "thermal_growth"},
+                 {.cause = "thermal_zero"},
+                 {.cause = "tracker_drift"}},
       .told_apart_by = remedies::kOtherTemperature,
       .shown_by = "temperature and time of every pose, over a warm-up and a cooling",
       .action = "warm the robot up before work, or record its temperature with every job",
       .figures = {{"growth", "um/m/K", "growth of every link"},
-                  {"heat_lag", "min", "how long the links take to follow the recorded temperature"}},
+                  {"heat_lag", "min",
+                   "how long the links take to follow the recorded temperature"}},
   };
   return record;
 }

@@ -11,9 +11,10 @@ namespace {
 
 constexpr double kShortestLink = 0.1;  // m; shorter ones do not bend
 
-/// A link bends as a cantilever under the weight at its far end and the moment of the weight's lever beyond it, eq.
-/// (4.2) with x = l: deflection F l^3/3EI + M l^2/2EI, slope F l^2/2EI + M l/EI, both only across the link. Everything
-/// beyond moves along. One parameter, 1/EI, small enough that bending adds to the pose linearly.
+/// A link bends as a cantilever under the weight at its far end and the moment of the weight's
+/// lever beyond it, eq. (4.2) with x = l: deflection F l^3/3EI + M l^2/2EI, slope F l^2/2EI + M
+/// l/EI, both only across the link. Everything beyond moves along. One parameter, 1/EI, small
+/// enough that bending adds to the pose linearly.
 class LinkBending final : public ErrorSource {
  public:
   explicit LinkBending(const SourceSpec& spec)
@@ -24,7 +25,9 @@ class LinkBending final : public ErrorSource {
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
-  std::string explanation() const override { return fmt::format("link {} bends under the payload", joint_ + 1); }
+  std::string explanation() const override {
+    return fmt::format("link {} bends under the payload", joint_ + 1);
+  }
 
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
@@ -41,7 +44,8 @@ class LinkBending final : public ErrorSource {
       Eigen::Matrix<double, 6, 15> by_points;
       for (int i = 0; i < 6; ++i) by_points.row(i) = with_derivative(i).derivatives().transpose();
       const int tip = jacobian->rows.tip(0);
-      jacobian->pass_on(jacobian->rows.whole_tip(), values(0) * by_points * kinematics.loaded_link_jacobian(joint_));
+      jacobian->pass_on(jacobian->rows.whole_tip(),
+                        values(0) * by_points * kinematics.loaded_link_jacobian(joint_));
       jacobian->add_block(tip, first_column, unit);
     }
     state.tip_W += values(0) * unit;
@@ -85,8 +89,8 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   const LinkGeometry& link = cell.robot.joint(spec.joint).link;
   const double length = std::hypot(link.a, link.d);
   if (length < kShortestLink || cell.payloads.empty()) {
-    return refused("error source '{}': link {} is {:.3f} m long (limit {}), {} payloads", spec.text, spec.joint + 1,
-                   length, kShortestLink, cell.payloads.size());
+    return refused("error source '{}': link {} is {:.3f} m long (limit {}), {} payloads", spec.text,
+                   spec.joint + 1, length, kShortestLink, cell.payloads.size());
   }
   return std::make_shared<LinkBending>(spec);
 }
@@ -104,9 +108,10 @@ const CauseRecord& causes::link_bending() {
       .search = SearchFamily::kColumns,
       .acts = {ActsOn::kLoadedArm, 1},
       .forms = {{"link_bending", make}},
-      // Joints give way before links do; only beside the joints' compliance is bending a cause of its own. Odds of 50
-      // to 1 (4 nat) while the model has neither.
-      .rivals = {{.cause = "compliance", .likeness = Likeness::kSpecialCase, .surprise = 4}, {.cause = "payload"}},
+      // Joints give way before links do; only beside the joints' compliance is bending a cause of
+      // its own. Odds of 50 to 1 (4 nat) while the model has neither.
+      .rivals = {{.cause = "compliance", .likeness = Likeness::kSpecialCase, .surprise = 4},
+                 {.cause = "payload"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = remedies::kOtherLoad.text,
       .action = "compensate it for this payload; identify again when the payload changes",

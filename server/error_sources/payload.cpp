@@ -11,10 +11,12 @@ constexpr double kMassPrior = 5;  // kg
 
 void add_four(std::vector<Parameter>& parameters, const std::string& suffix) {
   parameters.push_back({"mass" + suffix, "kg", 1, 0, kMassPrior});
-  for (const char* name : {"cx", "cy", "cz"}) parameters.push_back(length_parameter(name + suffix, 20));
+  for (const char* name : {"cx", "cy", "cz"})
+    parameters.push_back(length_parameter(name + suffix, 20));
 }
 
-void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, StateJacobian* jacobian, int first_column) {
+void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, StateJacobian* jacobian,
+          int first_column) {
   state.payload.mass += values(0);
   state.payload.p_FoCog_F += values.segment<3>(1);
   if (jacobian == nullptr) return;
@@ -22,8 +24,9 @@ void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, Stat
   for (int k = 0; k < 3; ++k) jacobian->add(jacobian->rows.cog(k), first_column + 1 + k, 1);
 }
 
-/// The mass or the centre of gravity of a payload differs from the cell file. Four parameters for each payload of the
-/// cell. It shows only through compliance and bending. With a single payload, its mass scales all compliances alike.
+/// The mass or the centre of gravity of a payload differs from the cell file. Four parameters for
+/// each payload of the cell. It shows only through compliance and bending. With a single payload,
+/// its mass scales all compliances alike.
 class PayloadError final : public ErrorSource {
  public:
   explicit PayloadError(const Cell& cell) {
@@ -39,11 +42,12 @@ class PayloadError final : public ErrorSource {
     return "the payload's mass or centre of gravity is not as the cell file says";
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     for (std::size_t k = 0; k < ids_.size(); ++k) {
       const int first = 4 * static_cast<int>(k);
-      if (ids_[k] == context.payload) load(values.segment<4>(first), state, jacobian, first_column + first);
+      if (ids_[k] == context.payload)
+        load(values.segment<4>(first), state, jacobian, first_column + first);
     }
   }
 
@@ -55,16 +59,19 @@ class PayloadError final : public ErrorSource {
 /// From a pose on, something else hangs on the flange.
 class PayloadChanged final : public ErrorSource {
  public:
-  explicit PayloadChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
+  explicit PayloadChanged(const SourceSpec& spec)
+      : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
     add_four(parameters_, fmt::format("@{}", first_ + 1));
   }
   const CauseRecord& cause() const override { return causes::payload_changed(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  std::string explanation() const override { return fmt::format("the payload changed before pose {}", first_ + 1); }
+  std::string explanation() const override {
+    return fmt::format("the payload changed before pose {}", first_ + 1);
+  }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     if (context.from(first_)) load(values, state, jacobian, first_column);
   }
 
@@ -82,11 +89,13 @@ std::vector<causes::Figure> load_figures() {
 }
 
 Result<ErrorSourcePtr> make_payload(const SourceSpec& spec, const Cell& cell) {
-  if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
+  if (cell.payloads.empty())
+    return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
   return std::make_shared<PayloadError>(cell);
 }
 Result<ErrorSourcePtr> make_payload_changed(const SourceSpec& spec, const Cell& cell) {
-  if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
+  if (cell.payloads.empty())
+    return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
   return std::make_shared<PayloadChanged>(spec);
 }
 
@@ -125,10 +134,12 @@ const CauseRecord& causes::payload_changed() {
       .search = SearchFamily::kStep,
       .acts = {ActsOn::kLoad, 1},
       .forms = {{"payload_changed", make_payload_changed}},
-      .rivals = {{.cause = "payload", .likeness = Likeness::kFromTheFirstPose}, {.cause = "tool_changed"}},
+      .rivals = {{.cause = "payload", .likeness = Likeness::kFromTheFirstPose},
+                 {.cause = "tool_changed"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = "a payload_id for every pose, wide poses before and after",
-      .action = "find out what was mounted or lost at that pose, and give the poses their payload_id",
+      .action =
+          "find out what was mounted or lost at that pose, and give the poses their payload_id",
       .figures = load_figures(),
       .whole_batch = WholeBatch{"the payload is another one", true},
   };

@@ -8,8 +8,8 @@ namespace trammel {
 
 namespace {
 
-/// The pose as its causes see it: with the angles of the gears, where the controller counts other angles. Recorded
-/// approach directions are those of the gears already.
+/// The pose as its causes see it: with the angles of the gears, where the controller counts other
+/// angles. Recorded approach directions are those of the gears already.
 class AtTheGears {
  public:
   AtTheGears(const Chain& robot, const PoseContext& context) : context_(&context) {
@@ -33,7 +33,8 @@ class AtTheGears {
 
 int PhysicalModel::parameter_count() const {
   int count = 0;
-  for (const ErrorSourcePtr& source : sources) count += static_cast<int>(source->parameters().size());
+  for (const ErrorSourcePtr& source : sources)
+    count += static_cast<int>(source->parameters().size());
   return count;
 }
 
@@ -85,20 +86,23 @@ ArmState PhysicalModel::state(const PoseContext& context) const {
   return state;
 }
 
-Pose PhysicalModel::pose_W(const PoseContext& context) const { return ArmKinematics(state(context)).tool_pose_W(); }
+Pose PhysicalModel::pose_W(const PoseContext& context) const {
+  return ArmKinematics(state(context)).tool_pose_W();
+}
 
 Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& parameter_values,
                            Eigen::MatrixXd* jacobian) const {
   TRAMMEL_CHECK(parameter_values.size() == parameter_count());
   ArmState state = nominal_state(context);
   std::optional<StateJacobian> by_parameters;
-  if (jacobian != nullptr) by_parameters.emplace(cell->robot, static_cast<int>(parameter_values.size()));
+  if (jacobian != nullptr)
+    by_parameters.emplace(cell->robot, static_cast<int>(parameter_values.size()));
   const AtTheGears seen(cell->robot, context);
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    source->apply(*seen, parameter_values.segment(first, count), state, by_parameters ? &*by_parameters : nullptr,
-                  static_cast<int>(first));
+    source->apply(*seen, parameter_values.segment(first, count), state,
+                  by_parameters ? &*by_parameters : nullptr, static_cast<int>(first));
     first += count;
   }
   const ArmKinematics kinematics(state);
@@ -116,9 +120,11 @@ Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source) {
   const auto count = static_cast<Eigen::Index>(parameters.size());
   const Eigen::VectorXd after = model.values.tail(model.values.size() - first);
   model.values.conservativeResize(first + count + after.size());
-  for (Eigen::Index k = 0; k < count; ++k) model.values(first + k) = parameters[static_cast<std::size_t>(k)].prior;
+  for (Eigen::Index k = 0; k < count; ++k)
+    model.values(first + k) = parameters[static_cast<std::size_t>(k)].prior;
   model.values.tail(after.size()) = after;
-  model.sources.insert(model.sources.begin() + static_cast<std::ptrdiff_t>(place), std::move(source));
+  model.sources.insert(model.sources.begin() + static_cast<std::ptrdiff_t>(place),
+                       std::move(source));
   return first;
 }
 
@@ -136,8 +142,8 @@ Status check_counts(const std::vector<std::string>& specs) {
         .beyond(specs.size(), kMostSources);
   for (const std::string& spec : specs) {
     if (spec.size() <= kMostSpecBytes) continue;
-    return failure(ErrorCode::kTooLarge, "error source '{}...': {} bytes, limit {}", spec.substr(0, 40), spec.size(),
-                   kMostSpecBytes)
+    return failure(ErrorCode::kTooLarge, "error source '{}...': {} bytes, limit {}",
+                   spec.substr(0, 40), spec.size(), kMostSpecBytes)
         .of("error_sources")
         .beyond(spec.size(), kMostSpecBytes);
   }
@@ -146,7 +152,8 @@ Status check_counts(const std::vector<std::string>& specs) {
 
 }  // namespace
 
-Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, const std::vector<std::string>& specs) {
+Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell,
+                                          const std::vector<std::string>& specs) {
   TRY(check_counts(specs));
   PhysicalModel model;
   std::size_t parameters = 0;
@@ -155,16 +162,20 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     for (const ErrorSourcePtr& other : model.sources) {
       const CauseRecord& cause = other->cause();
       if (&cause == &source->cause() && cause.forms.size() > 1) {
-        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(), spec)
+        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause",
+                       other->name(), spec)
             .of("error_sources")
             .with_text(spec);
       }
       if (other->name() == source->name())
-        return failure(ErrorCode::kUsage, "error source '{}' given twice", spec).of("error_sources").with_text(spec);
+        return failure(ErrorCode::kUsage, "error source '{}' given twice", spec)
+            .of("error_sources")
+            .with_text(spec);
     }
     parameters += source->parameters().size();
     if (parameters > kMostParameters) {
-      return failure(ErrorCode::kTooLarge, "error source '{}': {} parameters with those before it, limit {}", spec,
+      return failure(ErrorCode::kTooLarge,
+                     "error source '{}': {} parameters with those before it, limit {}", spec,
                      parameters, kMostParameters)
           .of("error_sources")
           .with_text(spec)
@@ -172,8 +183,9 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     }
     model.sources.push_back(std::move(source));
   }
-  std::stable_sort(model.sources.begin(), model.sources.end(),
-                   [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) { return acts_before(*a, *b); });
+  std::stable_sort(
+      model.sources.begin(), model.sources.end(),
+      [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) { return acts_before(*a, *b); });
   model.X_WB = cell->X_WB.value_or(Pose::Identity());
   for (const auto& [name, X_FT] : cell->tools) model.tools[name] = X_FT.value_or(Pose::Identity());
   model.cell = std::move(cell);

@@ -21,31 +21,39 @@ double travel_of(const Joint& joint) {
   return std::isfinite(travel) ? travel : 1;
 }
 
-/// The carriage travels another distance than rack or scale says: delta q = k q. The constant is the rail's zero.
+/// The carriage travels another distance than rack or scale says: delta q = k q. The constant is
+/// the rail's zero.
 class RailScale final : public JointError {
  public:
   explicit RailScale(const SourceSpec& spec)
-      : JointError(spec.text, spec.joint, {{fmt::format("rail_scale{}", spec.joint + 1), "um/m", 1e6, 0, 1e-4}}) {}
+      : JointError(spec.text, spec.joint,
+                   {{fmt::format("rail_scale{}", spec.joint + 1), "um/m", 1e6, 0, 1e-4}}) {}
   const CauseRecord& cause() const override { return causes::rail_scale(); }
   std::string explanation() const override {
     return fmt::format("joint {} travels farther than it says, or less far", joint() + 1);
   }
 
  private:
-  std::vector<Term> terms(const PoseContext& context) const override { return {{joint(), 0, context.q(joint())}}; }
+  std::vector<Term> terms(const PoseContext& context) const override {
+    return {{joint(), 0, context.q(joint())}};
+  }
 };
 
-/// Teeth of rack and pinion: the carriage runs ahead and behind once a pitch, delta q = s sin(2 pi q / p) + c cos(2 pi
-/// q / p). Several pitches of one rail, as of a tooth and of a turn of the pinion, are several triples.
+/// Teeth of rack and pinion: the carriage runs ahead and behind once a pitch, delta q = s sin(2 pi
+/// q / p) + c cos(2 pi q / p). Several pitches of one rail, as of a tooth and of a turn of the
+/// pinion, are several triples.
 class RackPitch final : public ErrorSource {
  public:
   RackPitch(const SourceSpec& spec, double travel) : name_(spec.text), joint_(spec.joint) {
     for (std::size_t k = 0; k < spec.at.size(); ++k) {
-      const std::string which = fmt::format("{}{}", joint_ + 1, spec.at.size() > 1 ? fmt::format("_{}", k + 1) : "");
+      const std::string which =
+          fmt::format("{}{}", joint_ + 1, spec.at.size() > 1 ? fmt::format("_{}", k + 1) : "");
       const double pitch = from_mm(spec.at[k]);
-      const double spread = 0.25 * pitch * pitch / travel;  // a quarter of what this travel resolves
+      const double spread =
+          0.25 * pitch * pitch / travel;  // a quarter of what this travel resolves
       parameters_.push_back({"pitch" + which, "mm", to_mm(1), pitch, spread, pitch / 2, true});
-      for (const char* wave : {"rack_sin", "rack_cos"}) parameters_.push_back(length_parameter(wave + which, kPriorMm));
+      for (const char* wave : {"rack_sin", "rack_cos"})
+        parameters_.push_back(length_parameter(wave + which, kPriorMm));
     }
   }
   const CauseRecord& cause() const override { return causes::rack_pitch(); }
@@ -53,11 +61,12 @@ class RackPitch final : public ErrorSource {
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
   std::string explanation() const override {
-    return fmt::format("the rack of joint {} moves the carriage unevenly, once a pitch", joint_ + 1);
+    return fmt::format("the rack of joint {} moves the carriage unevenly, once a pitch",
+                       joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     for (int k = 0; k < static_cast<int>(parameters_.size()); k += 3) {
       const double turn = 2 * kPi * context.q(joint_) / values(k);
       const double sine = std::sin(turn);
@@ -78,10 +87,11 @@ class RackPitch final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// A rail that is not straight: the carriage stands beside the line by smooth functions x(s) and y(s) of its place, and
-/// turns as the rail does there: about y by x'(s), about x by -y'(s). It rolls about the rail by w(s). All are sums of
-/// Chebyshev polynomials over the rail's limits. Constant and straight parts of x and y are where the rail lies, and
-/// the constant of the roll is how the arm stands on it: base and geometry.
+/// A rail that is not straight: the carriage stands beside the line by smooth functions x(s) and
+/// y(s) of its place, and turns as the rail does there: about y by x'(s), about x by -y'(s). It
+/// rolls about the rail by w(s). All are sums of Chebyshev polynomials over the rail's limits.
+/// Constant and straight parts of x and y are where the rail lies, and the constant of the roll is
+/// how the arm stands on it: base and geometry.
 class RailStraightness final : public ErrorSource {
  public:
   RailStraightness(const SourceSpec& spec, const Joint& joint)
@@ -89,7 +99,8 @@ class RailStraightness final : public ErrorSource {
     middle_ = std::isfinite(joint.lower) ? joint.lower + half_ : 0;
     for (const char* axis : {"straight_x", "straight_y"}) {
       for (int k = 2; k <= kDegrees; ++k)
-        parameters_.push_back(length_parameter(fmt::format("{}{}_{}", axis, joint_ + 1, k), kStraightMm / (k - 1)));
+        parameters_.push_back(
+            length_parameter(fmt::format("{}{}_{}", axis, joint_ + 1, k), kStraightMm / (k - 1)));
     }
     for (int k = 1; k < kDegrees; ++k)
       parameters_.push_back(angle_parameter(fmt::format("roll{}_{}", joint_ + 1, k), kRoll / k));
@@ -102,8 +113,8 @@ class RailStraightness final : public ErrorSource {
     return fmt::format("the rail of joint {} is not straight, and twisted", joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     const double q = state.chain->drive().row(joint_) * context.q;
     const double place = state.chain->joint(joint_).link.d + q;
     move_axis(joint_, rates_at(q, place), values, state, jacobian, first_column);
@@ -138,7 +149,8 @@ class RailStraightness final : public ErrorSource {
     return {T[at] + (u - inside) * slope[at], slope[at] / half_};
   }
 
-  /// The axis is tilted about the rail's zero, which moves the carriage by its place times the tilt: taken back.
+  /// The axis is tilted about the rail's zero, which moves the carriage by its place times the
+  /// tilt: taken back.
   AxisMotion rates_at(double q, double place) const {
     AxisMotion rates = AxisMotion::Zero(5, static_cast<Eigen::Index>(parameters_.size()));
     for (int k = 2; k <= kDegrees; ++k) {
@@ -167,7 +179,8 @@ Result<ErrorSourcePtr> make_scale(const SourceSpec& spec, const Cell& cell) {
 Result<ErrorSourcePtr> make_pitch(const SourceSpec& spec, const Cell& cell) {
   TRY(check_is_rail(spec, cell));
   if (spec.at.empty())
-    return failure(ErrorCode::kUsage, "error source '{}': expected {}@mm, the pitch of the rack", spec.text, spec.text);
+    return failure(ErrorCode::kUsage, "error source '{}': expected {}@mm, the pitch of the rack",
+                   spec.text, spec.text);
   return std::make_shared<RackPitch>(spec, travel_of(cell.robot.joint(spec.joint)));
 }
 
@@ -236,7 +249,8 @@ const CauseRecord& causes::rail_straightness() {
       .told_apart_by = remedies::kWiderRange,
       .shown_by = "poses along the whole rail, with the arm in different postures",
       .action = "have the rail aligned, or compensate it",
-      .figures = {{"straight_x", "mm", "how far it leaves the line along x, by the degree of the polynomial"},
+      .figures = {{"straight_x", "mm",
+                   "how far it leaves the line along x, by the degree of the polynomial"},
                   {"straight_y", "mm", "along y"},
                   {"roll", "rad", "how far it is twisted"}},
   };

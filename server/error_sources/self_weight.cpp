@@ -11,7 +11,8 @@ namespace {
 constexpr double kLessExpected = 8;     // nat, while the arm's geometry is not in the model
 constexpr double kVertical = 1 - 1e-6;  // cosine: an axis along gravity feels no weight
 
-/// True where the weight beyond joint `i` can turn a joint at all. It cannot where all axes up to it are one vertical.
+/// True where the weight beyond joint `i` can turn a joint at all. It cannot where all axes up to
+/// it are one vertical.
 bool is_felt(const Cell& cell, int i) {
   const Chain& chain = cell.robot;
   if (chain.joint(i).type != JointType::kRevolute) return false;
@@ -26,9 +27,10 @@ bool is_felt(const Cell& cell, int i) {
   return std::abs(axis.dot(cell.gravity_W)) < kVertical;
 }
 
-/// The weight of the links, told by no data sheet. Joint j feels z_j . (sum over i >= j of b_i) x g, b_i the first
-/// moment of all that link i carries as one piece. Of b_i the part along its own axis belongs to the link before, so
-/// two numbers a link are left: they are all that torques show. The poses show torques through compliances alone.
+/// The weight of the links, told by no data sheet. Joint j feels z_j . (sum over i >= j of b_i) x
+/// g, b_i the first moment of all that link i carries as one piece. Of b_i the part along its own
+/// axis belongs to the link before, so two numbers a link are left: they are all that torques show.
+/// The poses show torques through compliances alone.
 class LinkWeights final : public ErrorSource {
  public:
   explicit LinkWeights(const Cell& cell) {
@@ -37,8 +39,8 @@ class LinkWeights final : public ErrorSource {
       if (!is_felt(cell, i)) continue;
       links_.push_back(i);
       for (int k = 0; k < 2; ++k) {
-        parameters_.push_back(
-            {fmt::format("{}{}", k == 0 ? "wx" : "wy", i + 1), "kg m", 1, expected.moment(k, i), expected.spread(i)});
+        parameters_.push_back({fmt::format("{}{}", k == 0 ? "wx" : "wy", i + 1), "kg m", 1,
+                               expected.moment(k, i), expected.spread(i)});
       }
     }
   }
@@ -51,7 +53,8 @@ class LinkWeights final : public ErrorSource {
 
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    if (state.first_moments.cols() == 0) state.first_moments = FirstMoments::Zero(2, state.chain->size());
+    if (state.first_moments.cols() == 0)
+      state.first_moments = FirstMoments::Zero(2, state.chain->size());
     for (std::size_t l = 0; l < links_.size(); ++l) {
       const int column = 2 * static_cast<int>(l);
       state.first_moments.col(links_[l]) += values.segment<2>(column);
@@ -66,7 +69,9 @@ class LinkWeights final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) { return std::make_shared<LinkWeights>(cell); }
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) {
+  return std::make_shared<LinkWeights>(cell);
+}
 
 }  // namespace
 
@@ -94,9 +99,9 @@ const CauseRecord& causes::self_weight() {
           AddedByData{
               .beside = "compliance",
               .is_known = [](const Cell& cell) { return cell.robot.has_link_masses(); },
-              .note = "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance "
-                      "acts on link weights that were found from the poses (self_weight); without them it would act on "
-                      "the payload alone"},
+              .note = "the robot file tells no link masses, and these poses show the links' "
+                      "weight: gearbox compliance acts on link weights that were found from the "
+                      "poses (self_weight); without them it would act on the payload alone"},
   };
   return record;
 }

@@ -46,13 +46,16 @@ Result<SourceSpec> parse_spec(const std::string& text, const CauseRecord& known,
   const std::size_t at = text.find('@');
   const std::size_t colon = text.substr(0, at).find(':');
   if (known.scope != Scope::kJoint) {
-    if (colon != std::string::npos) return failure(ErrorCode::kUsage, "error source '{}' takes no joint", text);
+    if (colon != std::string::npos)
+      return failure(ErrorCode::kUsage, "error source '{}' takes no joint", text);
   } else {
     int joint = 0;
-    const std::string number = colon == std::string::npos ? "" : text.substr(colon + 1, at - colon - 1);
+    const std::string number =
+        colon == std::string::npos ? "" : text.substr(colon + 1, at - colon - 1);
     if (!parse_number(number, joint) || joint < 1 || joint > cell.robot.size()) {
-      return failure(ErrorCode::kUsage, "error source '{}': expected {}:joint with a joint of 1 to {}", text, spec.name,
-                     cell.robot.size());
+      return failure(ErrorCode::kUsage,
+                     "error source '{}': expected {}:joint with a joint of 1 to {}", text,
+                     spec.name, cell.robot.size());
     }
     spec.joint = joint - 1;
   }
@@ -63,15 +66,18 @@ Result<SourceSpec> parse_spec(const std::string& text, const CauseRecord& known,
     for (std::string word; std::getline(numbers, word, '+');) {
       double value = 0;
       if (!parse_number(word, value) || !(value > 0) || !std::isfinite(value)) {
-        return failure(ErrorCode::kUsage, "error source '{}': '{}' after '@' is not a number above 0", text, word);
+        return failure(ErrorCode::kUsage,
+                       "error source '{}': '{}' after '@' is not a number above 0", text, word);
       }
       spec.at.push_back(value);
     }
   }
   const std::size_t most = known.takes_numbers ? 3 : 1;
   if (known.lasting == Lasting::kFromAPose &&
-      (spec.at.empty() || spec.at.size() > most || spec.at[0] != std::floor(spec.at[0]) || spec.at[0] > kMostPoses)) {
-    return failure(ErrorCode::kUsage, "error source '{}': expected {}@pose, the row of the batch at which it begins",
+      (spec.at.empty() || spec.at.size() > most || spec.at[0] != std::floor(spec.at[0]) ||
+       spec.at[0] > kMostPoses)) {
+    return failure(ErrorCode::kUsage,
+                   "error source '{}': expected {}@pose, the row of the batch at which it begins",
                    text, text.substr(0, at));
   }
   return spec;
@@ -93,7 +99,9 @@ std::vector<std::string> known_causes() {
   return names;
 }
 
-bool acts_before(const ErrorSource& one, const ErrorSource& other) { return is_earlier(&one.cause(), &other.cause()); }
+bool acts_before(const ErrorSource& one, const ErrorSource& other) {
+  return is_earlier(&one.cause(), &other.cause());
+}
 
 std::vector<std::string> alternatives(const std::string& spec, const Cell& cell) {
   const CauseRecord* record = find_cause(spec);
@@ -113,12 +121,15 @@ Result<ErrorSourcePtr> make_error_source(const std::string& given, const Cell& c
     for (const CauseRecord* record : all_causes()) {
       if (record->forms.size() > 1) names.emplace(names.begin(), record->spelling);
     }
-    return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec, did_you_mean(cause_in(spec), names))
+    return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec,
+                   did_you_mean(cause_in(spec), names))
         .of("error_sources")
         .with_text(spec)
-        .next(fmt::format("levels are M0 to M3, more sources are joined by commas; known: {}", fmt::join(names, ", ")));
+        .next(fmt::format("levels are M0 to M3, more sources are joined by commas; known: {}",
+                          fmt::join(names, ", ")));
   }
-  if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
+  if (const auto forms = alternatives(spec, cell); forms.front() != spec)
+    return make_error_source(forms.front(), cell);
   const auto form = std::find_if(known->forms.begin(), known->forms.end(),
                                  [&](const Form& one) { return one.spelling == cause_in(spec); });
   if (form == known->forms.end())
@@ -127,7 +138,9 @@ Result<ErrorSourcePtr> make_error_source(const std::string& given, const Cell& c
         .with_text(spec);
   return parse_spec(spec, *known, cell)
       .and_then([&](const SourceSpec& parsed) { return form->make(parsed, cell); })
-      .map_error([&](Error error) { return Failure(std::move(error)).of("error_sources").with_text(spec).value(); });
+      .map_error([&](Error error) {
+        return Failure(std::move(error)).of("error_sources").with_text(spec).value();
+      });
 }
 
 std::vector<std::string> spelled_out(const std::vector<std::string>& specs, const Cell& cell) {
@@ -157,7 +170,8 @@ bool are_forms_of_one(const std::string& source, const std::string& other) {
 std::string as_listed(const std::string& source, const std::vector<std::string>& list) {
   const auto listed = std::find_if(list.begin(), list.end(), [&](const std::string& spec) {
     const CauseRecord* record = find_cause(spec);
-    if (record != nullptr && spec == record->spelling && are_forms_of_one(source, spec)) return true;
+    if (record != nullptr && spec == record->spelling && are_forms_of_one(source, spec))
+      return true;
     return spec == without_learned_spectrum(source);
   });
   return listed == list.end() ? source : *listed;
@@ -172,17 +186,20 @@ bool corrects(const std::vector<std::string>& sources, causes::Part part) {
 
 namespace {
 
-/// The cause with its parts in words: joint, number and place stand behind it as `:3`, `:d6`, `@40`.
+/// The cause with its parts in words: joint, number and place stand behind it as `:3`, `:d6`,
+/// `@40`.
 std::string in_words(const CauseRecord& record, const std::string& spelling) {
   const std::size_t at = spelling.find('@');
   const std::size_t colon = spelling.substr(0, at).find(':');
-  const std::string behind = colon == std::string::npos ? "" : spelling.substr(colon + 1, at - colon - 1);
+  const std::string behind =
+      colon == std::string::npos ? "" : spelling.substr(colon + 1, at - colon - 1);
   int joint = 0;
   const bool of_joint = parse_number(behind, joint);
   std::string words = plain_name(record, of_joint ? joint - 1 : -1);
   if (!behind.empty() && !of_joint) words += fmt::format(" ({})", behind);
   if (at != std::string::npos && record.lasting == Lasting::kFromAPose)
-    words += fmt::format(" from row {} on", spelling.substr(at + 1, spelling.find('+', at) - at - 1));
+    words +=
+        fmt::format(" from row {} on", spelling.substr(at + 1, spelling.find('+', at) - at - 1));
   return words;
 }
 
@@ -199,7 +216,9 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   for (std::string word; std::getline(words, word, ',');) {
     word.erase(std::remove(word.begin(), word.end(), ' '), word.end());
     if (word.empty())
-      return failure(ErrorCode::kUsage, "level '{}': an empty entry", level).of("level").with_text(level);
+      return failure(ErrorCode::kUsage, "level '{}': an empty entry", level)
+          .of("level")
+          .with_text(level);
     if (word == "M0") continue;
     if (word == "M1" || word == "M2" || word == "M3") {
       names.emplace_back("base");
@@ -210,9 +229,13 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
     }
   }
   if (level.empty())
-    return failure(ErrorCode::kUsage, "an empty level").of("level").next("expected M0, M1, M2, M3 or error sources");
+    return failure(ErrorCode::kUsage, "an empty level")
+        .of("level")
+        .next("expected M0, M1, M2, M3 or error sources");
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
-    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level).of("level").with_text(level);
+    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level)
+        .of("level")
+        .with_text(level);
   }
   return names;
 }

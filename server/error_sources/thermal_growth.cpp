@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kReferenceTemperature = 20;  // degrees Celsius, of drawings
 
-/// Every length of the arm grows with temperature, by one coefficient. A temperature that never changes only rescales d
-/// and a.
+/// Every length of the arm grows with temperature, by one coefficient. A temperature that never
+/// changes only rescales d and a.
 class ThermalGrowth final : public ErrorSource {
  public:
   const CauseRecord& cause() const override { return causes::thermal_growth(); }
@@ -18,8 +18,8 @@ class ThermalGrowth final : public ErrorSource {
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "the links grow as they warm up"; }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     if (!context.temperature) return;
     const double warming = *context.temperature - kReferenceTemperature;
     const double factor = 1 + values(0) * warming;
@@ -43,7 +43,9 @@ class ThermalGrowth final : public ErrorSource {
   const std::vector<Parameter> parameters_ = {{"growth", "um/m/K", 1e6, 0, 20e-6}};
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_shared<ThermalGrowth>(); }
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) {
+  return std::make_shared<ThermalGrowth>();
+}
 
 }  // namespace
 
@@ -58,7 +60,8 @@ const CauseRecord& causes::thermal_growth() {
       .search = SearchFamily::kColumns,
       .acts = {ActsOn::kLinks, 1},
       .forms = {{"thermal_growth", make}},
-      .rivals = {{.cause = "geometry", .likeness = Likeness::kWhereConstant}, {.cause = "tracker_drift"}},
+      .rivals = {{.cause = "geometry", .likeness = Likeness::kWhereConstant},
+                 {.cause = "tracker_drift"}},
       .told_apart_by = remedies::kOtherTemperature,
       .shown_by = "temperatures that differ between poses and do not only rise with time",
       .action = "warm the robot up before work, or record its temperature with every job",
@@ -69,10 +72,12 @@ const CauseRecord& causes::thermal_growth() {
                       .is_known =
                           [](const Cell& cell) {
                             const auto& sources = cell.model.error_sources;
-                            return std::find(sources.begin(), sources.end(), "thermal_growth") != sources.end();
+                            return std::find(sources.begin(), sources.end(), "thermal_growth") !=
+                                   sources.end();
                           },
-                      .note = "the arm was longer in warmer sessions: its links grow with the recorded temperature "
-                              "(thermal_growth), which the cell file does not list"},
+                      .note =
+                          "the arm was longer in warmer sessions: its links grow with the recorded "
+                          "temperature (thermal_growth), which the cell file does not list"},
   };
   return record;
 }

@@ -7,8 +7,9 @@ namespace {
 
 constexpr double kRate = 1e-5;  // rad/K, prior
 
-/// The zero of a joint goes with the temperature of its gearbox, which follows the recorded one with a lag: delta q = z
-/// (T_lag - 20). Without the history of the temperature the gearbox has that of the thermometer.
+/// The zero of a joint goes with the temperature of its gearbox, which follows the recorded one
+/// with a lag: delta q = z (T_lag - 20). Without the history of the temperature the gearbox has
+/// that of the thermometer.
 class ThermalZero final : public ErrorSource {
  public:
   explicit ThermalZero(const SourceSpec& spec)
@@ -24,8 +25,8 @@ class ThermalZero final : public ErrorSource {
     return fmt::format("the zero of joint {} goes with the temperature of its gearbox", joint_ + 1);
   }
 
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     const std::optional<Warming> felt = warming_at(context, values(1));
     if (!felt) return;
     state.add_to_joint(joint_, values(0) * felt->kelvin);
@@ -67,7 +68,8 @@ const CauseRecord& causes::thermal_zero() {
       .shown_by = "temperature and time of every pose, over a warm-up and a cooling",
       .action = "warm the robot up before work, or record its temperature with every job",
       .figures = {{"zero_rate", "urad/K", "how far the zero goes with each degree"},
-                  {"heat_lag", "min", "how long the gearbox takes to follow the recorded temperature"}},
+                  {"heat_lag", "min",
+                   "how long the gearbox takes to follow the recorded temperature"}},
       .of_turning_joint = true,
   };
   return record;

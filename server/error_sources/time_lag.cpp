@@ -5,23 +5,30 @@ namespace trammel {
 
 namespace {
 
-/// Measurement and commanded joints belong to different times: every joint stands where it was commanded `lag` earlier.
+/// Measurement and commanded joints belong to different times: every joint stands where it was
+/// commanded `lag` earlier.
 class TimeLag final : public JointError {
  public:
-  explicit TimeLag(const SourceSpec& spec) : JointError(spec.text, -1, {{"lag", "s", 1, 0, 0.05}}) {}
+  explicit TimeLag(const SourceSpec& spec)
+      : JointError(spec.text, -1, {{"lag", "s", 1, 0, 0.05}}) {}
   const CauseRecord& cause() const override { return causes::time_lag(); }
-  std::string explanation() const override { return "joints and measurement are not of the same moment"; }
+  std::string explanation() const override {
+    return "joints and measurement are not of the same moment";
+  }
 
  private:
   std::vector<Term> terms(const PoseContext& context) const override {
     std::vector<Term> all;
     if (!context.velocity) return all;
-    for (int j = 0; j < static_cast<int>(context.q.size()); ++j) all.push_back({j, 0, -(*context.velocity)(j)});
+    for (int j = 0; j < static_cast<int>(context.q.size()); ++j)
+      all.push_back({j, 0, -(*context.velocity)(j)});
     return all;
   }
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<TimeLag>(spec); }
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) {
+  return std::make_shared<TimeLag>(spec);
+}
 
 }  // namespace
 

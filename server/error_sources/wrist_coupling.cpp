@@ -8,13 +8,17 @@ namespace {
 
 Parameter ratio_parameter(std::string name) { return {std::move(name), "rad/rad", 1, 0, 1e-3}; }
 
-/// The shafts of the wrist are concentric: joint 4 drags joints 5 and 6 along in proportion, and joint 5 drags joint 6.
+/// The shafts of the wrist are concentric: joint 4 drags joints 5 and 6 along in proportion, and
+/// joint 5 drags joint 6.
 class WristCoupling final : public JointError {
  public:
   explicit WristCoupling(const SourceSpec& spec)
-      : JointError(spec.text, -1, {ratio_parameter("k54"), ratio_parameter("k64"), ratio_parameter("k65")}) {}
+      : JointError(spec.text, -1,
+                   {ratio_parameter("k54"), ratio_parameter("k64"), ratio_parameter("k65")}) {}
   const CauseRecord& cause() const override { return causes::wrist_coupling(); }
-  std::string explanation() const override { return "the wrist axes drag one another along through their gears"; }
+  std::string explanation() const override {
+    return "the wrist axes drag one another along through their gears";
+  }
 
  private:
   std::vector<Term> terms(const PoseContext& context) const override {
@@ -24,8 +28,8 @@ class WristCoupling final : public JointError {
 
 Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   if (cell.robot.size() != 6) {
-    return refused("error source '{}' is of six-axis robots, {} has {} joints", spec.text, cell.robot.name(),
-                   cell.robot.size());
+    return refused("error source '{}' is of six-axis robots, {} has {} joints", spec.text,
+                   cell.robot.name(), cell.robot.size());
   }
   return std::make_shared<WristCoupling>(spec);
 }

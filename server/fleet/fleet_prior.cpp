@@ -12,12 +12,14 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kTails = 4;        // degrees of freedom of a deviation from the mean
-constexpr double kAsIfRobots = 3;   // of a parameter's kind, that are added to those of the parameter
+constexpr double kTails = 4;  // degrees of freedom of a deviation from the mean
+constexpr double kAsIfRobots =
+    3;  // of a parameter's kind, that are added to those of the parameter
 constexpr double kCorrelated = 10;  // likewise, without any correlation
 constexpr int kRounds = 60;
 
-/// The message of one robot's own poses on the parameters: information, and information times value, in prior scales.
+/// The message of one robot's own poses on the parameters: information, and information times
+/// value, in prior scales.
 struct Said {
   Eigen::MatrixXd information;
   Eigen::VectorXd weighted;
@@ -43,7 +45,8 @@ std::map<std::string, Index> arm_parameters(const PhysicalModel& physics) {
 }
 
 /// The prior of the training, taken out of its posterior.
-Said said_by(const ModelParts& parts, const std::vector<Index>& places, const Eigen::VectorXd& scale) {
+Said said_by(const ModelParts& parts, const std::vector<Index>& places,
+             const Eigen::VectorXd& scale) {
   Eigen::MatrixXd covariance = parts.covariance(places, places);
   covariance = scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
   covariance.diagonal().array() += 1e-12;
@@ -51,7 +54,8 @@ Said said_by(const ModelParts& parts, const std::vector<Index>& places, const Ei
   const Eigen::MatrixXd precision = covariance.llt().solve(Eigen::MatrixXd::Identity(P, P));
   Eigen::VectorXd value(P), prior(P), prior_precision(P);
   for (Index k = 0; k < P; ++k) {
-    const IdentifiedParameter& one = parts.parameters[static_cast<std::size_t>(places[static_cast<std::size_t>(k)])];
+    const IdentifiedParameter& one =
+        parts.parameters[static_cast<std::size_t>(places[static_cast<std::size_t>(k)])];
     value(k) = one.value / scale(k);
     prior(k) = one.parameter.prior / scale(k);
     prior_precision(k) = std::pow(scale(k) / one.parameter.prior_scale, 2);
@@ -59,7 +63,8 @@ Said said_by(const ModelParts& parts, const std::vector<Index>& places, const Ei
   Eigen::MatrixXd information = precision;
   information.diagonal() -= prior_precision;
   // Rounding may leave directions with less than nothing.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (information + information.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      0.5 * (information + information.transpose()));
   const Eigen::MatrixXd& V = eigen.eigenvectors();
   Said said;
   said.information = V * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * V.transpose();
@@ -73,7 +78,8 @@ struct Learned {
   Eigen::MatrixXd deviations;  ///< robots x P, expected
 };
 
-/// Parameters of one kind have similar spreads. For quantities that cannot be below 0 these are shares of their means.
+/// Parameters of one kind have similar spreads. For quantities that cannot be below 0 these are
+/// shares of their means.
 struct Kind {
   std::string unit;
   bool positive = false;
@@ -93,7 +99,8 @@ Eigen::VectorXd shrunk(const Eigen::VectorXd& sums, const Eigen::VectorXd& mean,
   Eigen::VectorXd variance(sums.size());
   for (Index k = 0; k < sums.size(); ++k) {
     const auto& [sum, count] = kinds.at(of[static_cast<std::size_t>(k)].unit);
-    variance(k) = (sums(k) + kAsIfRobots * size(k) * std::exp(sum / count)) / (robots + kAsIfRobots);
+    variance(k) =
+        (sums(k) + kAsIfRobots * size(k) * std::exp(sum / count)) / (robots + kAsIfRobots);
   }
   return variance;
 }
@@ -101,7 +108,8 @@ Eigen::VectorXd shrunk(const Eigen::VectorXd& sums, const Eigen::VectorXd& mean,
 Learned learned_from(const std::vector<Said>& robots, const std::vector<Kind>& kinds) {
   const Index P = robots.front().weighted.size();
   const auto n = static_cast<Index>(robots.size());
-  Learned now{Eigen::VectorXd::Zero(P), Eigen::VectorXd::Constant(P, 1.0), Eigen::MatrixXd::Zero(n, P)};
+  Learned now{Eigen::VectorXd::Zero(P), Eigen::VectorXd::Constant(P, 1.0),
+              Eigen::MatrixXd::Zero(n, P)};
   Eigen::MatrixXd weights = Eigen::MatrixXd::Ones(n, P);
   for (int round = 0; round < kRounds; ++round) {
     Eigen::MatrixXd expected(n, P), uncertain(n, P);
@@ -113,11 +121,12 @@ Learned learned_from(const std::vector<Said>& robots, const std::vector<Kind>& k
       expected.row(r) = factor.solve(said.weighted + precision.cwiseProduct(now.mean)).transpose();
       uncertain.row(r) = factor.solve(Eigen::MatrixXd::Identity(P, P)).diagonal().transpose();
     }
-    now.mean = (weights.array() * expected.array()).colwise().sum() / weights.array().colwise().sum();
+    now.mean =
+        (weights.array() * expected.array()).colwise().sum() / weights.array().colwise().sum();
     const Eigen::MatrixXd off = expected.rowwise() - now.mean.transpose();
     const Eigen::MatrixXd square = off.cwiseAbs2() + uncertain;
-    now.variance =
-        shrunk((weights.array() * square.array()).colwise().sum().transpose(), now.mean, static_cast<double>(n), kinds);
+    now.variance = shrunk((weights.array() * square.array()).colwise().sum().transpose(), now.mean,
+                          static_cast<double>(n), kinds);
     weights = (kTails + 1) / (kTails + square.array().rowwise() / now.variance.transpose().array());
     now.deviations = off;
   }
@@ -129,7 +138,8 @@ Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& deviations) {
   const Eigen::MatrixXd covariance = deviations.transpose() * deviations;
   const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseMax(1e-300);
   Eigen::MatrixXd correlation = covariance.cwiseQuotient(scale * scale.transpose());
-  correlation *= static_cast<double>(deviations.rows()) / (static_cast<double>(deviations.rows()) + kCorrelated);
+  correlation *= static_cast<double>(deviations.rows()) /
+                 (static_cast<double>(deviations.rows()) + kCorrelated);
   correlation.diagonal() = Eigen::VectorXd::Ones(P);
   return correlation;
 }
@@ -137,14 +147,16 @@ Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& deviations) {
 }  // namespace
 
 double FleetParameter::next_stddev() const {
-  constexpr double kNormalOverStudent = 1.45;  // variance of normal values over the square of the scale that is learned
+  constexpr double kNormalOverStudent =
+      1.45;  // variance of normal values over the square of the scale that is learned
   const double n = std::max(robots, 2);
   return spread * std::sqrt(kNormalOverStudent * (n + 1) / (n - 1) * (1 + 1 / n));
 }
 
 namespace {
 
-/// How probable it is that a value of Student's t with `freedom` degrees of freedom is farther from 0 than `t`.
+/// How probable it is that a value of Student's t with `freedom` degrees of freedom is farther from
+/// 0 than `t`.
 double two_sided(double t, double freedom) {
   return Eigen::numext::betainc(0.5 * freedom, 0.5, freedom / (freedom + t * t));
 }
@@ -152,8 +164,8 @@ double two_sided(double t, double freedom) {
 }  // namespace
 
 const FleetParameter* FleetPrior::find(const std::string& name) const {
-  const auto found =
-      std::find_if(parameters.begin(), parameters.end(), [&](const auto& one) { return one.name == name; });
+  const auto found = std::find_if(parameters.begin(), parameters.end(),
+                                  [&](const auto& one) { return one.name == name; });
   return found == parameters.end() ? nullptr : &*found;
 }
 
@@ -162,8 +174,9 @@ bool same_type(const Chain& one, const Chain& other) {
   for (int i = 0; i < one.size(); ++i) {
     const LinkGeometry& a = one.joint(i).link;
     const LinkGeometry& b = other.joint(i).link;
-    const bool same = a.theta == b.theta && a.d == b.d && a.a == b.a && a.alpha == b.alpha && a.beta == b.beta &&
-                      one.joint(i).type == other.joint(i).type && one.joint(i).sign == other.joint(i).sign;
+    const bool same = a.theta == b.theta && a.d == b.d && a.a == b.a && a.alpha == b.alpha &&
+                      a.beta == b.beta && one.joint(i).type == other.joint(i).type &&
+                      one.joint(i).sign == other.joint(i).sign;
     if (!same) return false;
   }
   return true;
@@ -184,8 +197,8 @@ Result<FleetPrior> learn_fleet_prior(const Chain& robot, const std::vector<Fleet
     twins.push_back(&parts);
   }
   if (static_cast<int>(twins.size()) < kFewestTwins) {
-    return refused("{} trained robots of type {} to learn from, at least {} are needed", twins.size(), robot.name(),
-                   kFewestTwins)
+    return refused("{} trained robots of type {} to learn from, at least {} are needed",
+                   twins.size(), robot.name(), kFewestTwins)
         .of("prior")
         .beyond(twins.size(), kFewestTwins);
   }
@@ -212,21 +225,22 @@ Result<FleetPrior> learn_fleet_prior(const Chain& robot, const std::vector<Fleet
   prior.robots = static_cast<int>(twins.size());
   for (std::size_t k = 0; k < names.size(); ++k) {
     const auto at = static_cast<Index>(k);
-    prior.parameters.push_back(
-        {names[k], learned.mean(at) * scale(at), std::sqrt(learned.variance(at)) * scale(at), prior.robots});
+    prior.parameters.push_back({names[k], learned.mean(at) * scale(at),
+                                std::sqrt(learned.variance(at)) * scale(at), prior.robots});
   }
   prior.correlation = correlation_of(learned.deviations);
   return prior;
 }
 
-std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& parameters, const Eigen::MatrixXd& covariance,
-                                 const FleetPrior& fleet) {
+std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& parameters,
+                                 const Eigen::MatrixXd& covariance, const FleetPrior& fleet) {
   std::vector<Unlike> all;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     const IdentifiedParameter& one = parameters[k];
     const FleetParameter* twin = fleet.find(one.parameter.name);
     if (twin == nullptr || one.parameter.is_place) continue;
-    // Its posterior without its own prior, everything else unchanged: the cavity of expectation propagation.
+    // Its posterior without its own prior, everything else unchanged: the cavity of expectation
+    // propagation.
     const double posterior = 1 / covariance(static_cast<Index>(k), static_cast<Index>(k));
     const double prior = 1 / (one.parameter.prior_scale * one.parameter.prior_scale);
     const double said = posterior - prior;
@@ -237,7 +251,8 @@ std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& paramet
     const double asked = static_cast<double>(fleet.parameters.size()) * (fleet.robots + 1);
     if (asked * two_sided(z, std::max(1, fleet.robots - 1)) > kFalseFleets) continue;
     const double scale = one.parameter.scale;
-    all.push_back({one.parameter.name, one.parameter.unit, value * scale, twin->mean * scale, stddev * scale, z});
+    all.push_back({one.parameter.name, one.parameter.unit, value * scale, twin->mean * scale,
+                   stddev * scale, z});
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Unlike& a, const Unlike& b) { return std::abs(a.z) > std::abs(b.z); });
@@ -249,8 +264,10 @@ std::vector<Unlike> unlike_twins(const ModelParts& parts, const FleetPrior& flee
 }
 
 std::string to_string(const Unlike& unlike) {
-  return fmt::format("{} is {:.4g} {}, its twins have {:.4g} +- {:.2g} ({:.1f} standard deviations)", unlike.parameter,
-                     unlike.value, unlike.unit, unlike.fleet_mean, 2 * unlike.fleet_stddev, unlike.z);
+  return fmt::format(
+      "{} is {:.4g} {}, its twins have {:.4g} +- {:.2g} ({:.1f} standard deviations)",
+      unlike.parameter, unlike.value, unlike.unit, unlike.fleet_mean, 2 * unlike.fleet_stddev,
+      unlike.z);
 }
 
 }  // namespace trammel

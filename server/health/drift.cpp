@@ -7,8 +7,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kDay = 86400;                                  // s
-constexpr double kSurprise = 2.71;                              // of twice the log likelihood: 95 % from one side
+constexpr double kDay = 86400;      // s
+constexpr double kSurprise = 2.71;  // of twice the log likelihood: 95 % from one side
 constexpr double kLeastVariance = 1e-14, kMostVariance = 1e-4;  // m^2
 constexpr int kOfADecade = 12;                                  // variances; of rates twice as many
 constexpr int kDecades = 10;
@@ -30,8 +30,8 @@ double independent(const std::vector<DriftSeen>& checks) {
   double sum = 0;
   for (const DriftSeen& a : checks) {
     for (const DriftSeen& b : checks) {
-      const auto overlap =
-          static_cast<double>(std::max<std::int64_t>(0, std::min(a.until, b.until) - std::max(a.from, b.from)));
+      const auto overlap = static_cast<double>(
+          std::max<std::int64_t>(0, std::min(a.until, b.until) - std::max(a.from, b.from)));
       sum += overlap * overlap / (length_of(a) * length_of(b));
     }
   }
@@ -41,7 +41,8 @@ double independent(const std::vector<DriftSeen>& checks) {
 
 bool says_something(const DriftSeen& seen) {
   return length_of(seen) >= kDay && seen.misfit.size() == drift_variances().size() &&
-         std::all_of(seen.misfit.begin(), seen.misfit.end(), [](double misfit) { return std::isfinite(misfit); });
+         std::all_of(seen.misfit.begin(), seen.misfit.end(),
+                     [](double misfit) { return std::isfinite(misfit); });
 }
 
 }  // namespace
@@ -82,7 +83,8 @@ std::optional<DriftRate> drift_rate(const std::vector<DriftSeen>& checks) {
     misfits.push_back(sum * rate.weight / rate.checks);
   }
   const auto least = std::min_element(misfits.begin(), misfits.end());
-  rate.best = least == misfits.begin() ? 0 : rates[static_cast<std::size_t>(least - misfits.begin())];
+  rate.best =
+      least == misfits.begin() ? 0 : rates[static_cast<std::size_t>(least - misfits.begin())];
   for (std::size_t k = 0; k < rates.size(); ++k) {
     if (misfits[k] < *least + kSurprise) rate.most = rates[k];
   }

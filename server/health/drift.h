@@ -7,16 +7,18 @@
 
 /// How fast an arm drifts away from its model, by all checks that were made of it.
 ///
-/// Drift is a random walk of all single causes together: after a time t their effects over the working poses are
-/// normal, of variance r t in all. A check says how likely each variance is; together the checks say how likely each
-/// rate r is. Checks whose times overlap have seen a part of the same walk: two of them have squared effects that
-/// correlate by (overlap)^2 / (length * length), and all together count for as many as are independent.
+/// Drift is a random walk of all single causes together: after a time t their effects over the
+/// working poses are normal, of variance r t in all. A check says how likely each variance is;
+/// together the checks say how likely each rate r is. Checks whose times overlap have seen a part
+/// of the same walk: two of them have squared effects that correlate by (overlap)^2 / (length *
+/// length), and all together count for as many as are independent.
 namespace trammel {
 
 /// What one check says of it.
 struct DriftSeen {
   std::int64_t from = 0, until = 0;  ///< Unix time, s: when the model was measured, and the check
-  std::vector<double> misfit;        ///< minus twice the log likelihood, beside the least, at drift_variances()
+  std::vector<double>
+      misfit;  ///< minus twice the log likelihood, beside the least, at drift_variances()
 };
 /// m^2, rising evenly in their logarithm.
 [[nodiscard]] const std::vector<double>& drift_variances();

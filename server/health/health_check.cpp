@@ -15,7 +15,8 @@ namespace trammel {
 namespace {
 
 /// What cannot even be begun.
-HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options, const std::string& why) {
+HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options,
+                    const std::string& why) {
   HealthCheck check;
   check.poses = static_cast<int>(batch.measurements.size());
   check.tolerance = options.tolerance;
@@ -27,8 +28,9 @@ HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options,
 bool is_all_by_zeros(const HealthCheck& check) {
   const auto leaves_nothing = [](const SeenChange& change) {
     const auto& others = change.could_also_be;
-    return std::none_of(others.begin(), others.end(),
-                        [](const SingleCause& other) { return same_cause(other, health::unknown_cause()); });
+    return std::none_of(others.begin(), others.end(), [](const SingleCause& other) {
+      return same_cause(other, health::unknown_cause());
+    });
   };
   return !check.changed.empty() && !check.changed.front().zeros.empty() &&
          std::all_of(check.changed.begin(), check.changed.end(), leaves_nothing);
@@ -38,18 +40,24 @@ Result<HealthCheck> looked_through(const CompensatedModel& model, const CheckedB
                                    const HealthOptions& options) {
   const MeasurementBatch known = known_rows(model, batch.rows());
   if (known.measurements.empty()) {
-    return refused("no pose has a tool and payload that model {} was trained with", model.provenance().id)
+    return refused("no pose has a tool and payload that model {} was trained with",
+                   model.provenance().id)
         .in("batch " + batch.id());
   }
   const std::vector<PoseContext> contexts = health::contexts_of(model, known);
   const CauseEffects effects(model.parts().physics, contexts, model.parts().temperature_mean);
-  const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed), options.new_tool);
+  const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed),
+                             options.new_tool);
   Result<health::CheckRows> rows = health::check_rows(model, known, effects);
-  if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
+  if (!rows)
+    return too_few(known, options,
+                   "these poses do not say where the base stands: " + rows.error().message);
   const ErrorFigures& shown = model.parts().training.compensated;
-  const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
-  HealthCheck check = health::Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
-                          .result({model.provenance().measured_at, batch.rows().measured_at});
+  const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0,
+                                            model.parts().training.poses);
+  HealthCheck check =
+      health::Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
+          .result({model.provenance().measured_at, batch.rows().measured_at});
   check.model = model.provenance().id;
   return check;
 }
@@ -72,7 +80,8 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
                                  const HealthOptions& options) {
   TRY(require_positions(batch.rows(), "a check"));
   if (has_sessions(batch.rows())) {
-    return refused("a check is one set-up of the instrument, the batch has {}", batch.rows().sessions.size())
+    return refused("a check is one set-up of the instrument, the batch has {}",
+                   batch.rows().sessions.size())
         .in("batch " + batch.id())
         .of("session_id")
         .next("check each session by itself");

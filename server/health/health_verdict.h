@@ -25,9 +25,10 @@ inline constexpr double kUsualTolerance = 1e-4;  // m
 
 struct HealthOptions {
   double tolerance = kUsualTolerance;  ///< m, of an effect over the working poses, rms
-  bool new_tool = false;               ///< the tool sits elsewhere than in the model: it is refitted with the base
-  double false_alarm = 0.003;          ///< chance that a healthy robot is said to have changed
-  double power = 0.95;                 ///< chance with which an effect of the stated smallest size is seen
+  bool new_tool =
+      false;  ///< the tool sits elsewhere than in the model: it is refitted with the base
+  double false_alarm = 0.003;  ///< chance that a healthy robot is said to have changed
+  double power = 0.95;         ///< chance with which an effect of the stated smallest size is seen
   std::uint64_t seed = 1;
   std::vector<DriftSeen> earlier = {};  ///< what checks before this one saw of the arm's drift
 };
@@ -41,12 +42,14 @@ struct LostZero {
 
 /// A change that was seen.
 struct SeenChange {
-  SingleCause cause;              ///< `unknown`: no single cause fits; a lost zero of no joint: those of several
-  double effect_rms = 0;          ///< m, base (and tool) refitted, over the working poses
-  double u95 = 0;                 ///< m, U(k=2) of it
-  bool at_these_poses = false;    ///< `effect_rms` is at the check's: they do not show how large it is elsewhere
+  SingleCause
+      cause;  ///< `unknown`: no single cause fits; a lost zero of no joint: those of several
+  double effect_rms = 0;  ///< m, base (and tool) refitted, over the working poses
+  double u95 = 0;         ///< m, U(k=2) of it
+  bool at_these_poses =
+      false;  ///< `effect_rms` is at the check's: they do not show how large it is elsewhere
   std::vector<LostZero> zeros{};  ///< of lost zeros: which, and by how much
-  double p_value = 1;             ///< chance that the best of all causes explains as much in a healthy robot
+  double p_value = 1;  ///< chance that the best of all causes explains as much in a healthy robot
   std::vector<SingleCause> could_also_be = {};
 };
 
@@ -54,20 +57,21 @@ struct HealthCheck {
   HealthVerdict verdict = HealthVerdict::kCannotTell;
   std::string sentence;  ///< why, for people
   int poses = 0;
-  double tolerance = 0;                   ///< m
-  double rms = 0;                         ///< m, Euclidean, base (and tool) refitted, suspect poses left out
-  double expected_rms = 0;                ///< m, of a healthy robot
-  double p_value = 1;                     ///< chance of at least as much in a healthy robot
-  std::optional<double> would_have_seen;  ///< m: the largest of `smallest`; empty where an effect would not be seen
-  std::vector<SmallestEffect> smallest;   ///< the largest first
+  double tolerance = 0;     ///< m
+  double rms = 0;           ///< m, Euclidean, base (and tool) refitted, suspect poses left out
+  double expected_rms = 0;  ///< m, of a healthy robot
+  double p_value = 1;       ///< chance of at least as much in a healthy robot
+  std::optional<double>
+      would_have_seen;  ///< m: the largest of `smallest`; empty where an effect would not be seen
+  std::vector<SmallestEffect> smallest;  ///< the largest first
   std::vector<SeenChange> changed;
   std::vector<std::string> suspects;  ///< pose ids that fit nothing, left out
   std::vector<CauseNotAsked> not_asked;
   std::string model;                    ///< id of the one that it was held against
   std::optional<DriftSeen> drift;       ///< what this check says of it; empty: nothing
   std::optional<DriftRate> drift_rate;  ///< by this check and the earlier ones
-  std::string due;                      ///< date of the next check (ISO 8601, UTC); empty: cannot be said
-  std::string due_because;              ///< from what that follows, or why it cannot be said
+  std::string due;          ///< date of the next check (ISO 8601, UTC); empty: cannot be said
+  std::string due_because;  ///< from what that follows, or why it cannot be said
 };
 
 }  // namespace trammel

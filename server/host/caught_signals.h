@@ -8,12 +8,13 @@
 
 namespace trammel {
 
-/// Catches the signals that end the service (SIGTERM, SIGINT) or have it read its files again (SIGHUP).
+/// Catches the signals that end the service (SIGTERM, SIGINT) or have it read its files again
+/// (SIGHUP).
 ///
-/// Libraries start threads before main() begins, and the kernel gives a signal to any thread that does not block it. So
-/// these signals have a handler: in whichever thread it runs, it writes the signal's number into a pipe and does
-/// nothing else. Threads that are started while one of these exists block the signals, so that none of their calls is
-/// interrupted. One exists at a time.
+/// Libraries start threads before main() begins, and the kernel gives a signal to any thread that
+/// does not block it. So these signals have a handler: in whichever thread it runs, it writes the
+/// signal's number into a pipe and does nothing else. Threads that are started while one of these
+/// exists block the signals, so that none of their calls is interrupted. One exists at a time.
 class CaughtSignals {
  public:
   /// `hangs` is called where the process still runs 10 s after a signal to end; it does not return.

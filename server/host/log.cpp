@@ -25,7 +25,8 @@ namespace {
 /// The message in one line that controls no terminal, whatever names it holds.
 class PlainMessage final : public spdlog::custom_flag_formatter {
  public:
-  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& line) override {
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& line) override {
     const std::string plain = shown({message.payload.data(), message.payload.size()});
     line.append(plain.data(), plain.data() + plain.size());
   }
@@ -105,11 +106,15 @@ spdlog::level::level_enum level_of(LogLevel level) {
 Status start_log(const LogOptions& options) {
   int descriptor = STDERR_FILENO;
   if (!options.file.empty()) {
-    descriptor = ::open(options.file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0644);
+    descriptor = ::open(options.file.c_str(),
+                        O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0644);
     if (descriptor < 0)
-      return refused("cannot be opened: {}", std::strerror(errno)).in(options.file).under("log: file");
+      return refused("cannot be opened: {}", std::strerror(errno))
+          .in(options.file)
+          .under("log: file");
   }
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("trammeld", std::make_shared<LogSink>(descriptor)));
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("trammeld", std::make_shared<LogSink>(descriptor)));
   spdlog::set_error_handler([](const std::string&) {});  // it would wait for standard error
   spdlog::flush_on(spdlog::level::info);
   change_log(options);
@@ -134,7 +139,8 @@ std::string log_members(const char* kind, const std::string& text, const LogAbou
     if (!value.empty()) members[name] = value;
   }
   members["message"] = text;
-  const std::string object = members.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
+  const std::string object =
+      members.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
   return object.substr(1, object.size() - 2);
 }
 

@@ -20,9 +20,13 @@ long long monotonic_us() {
 
 }  // namespace
 
-void tell_manager_ready(const std::string& status) { notify(fmt::format("READY=1\nSTATUS={}", shown(status))); }
+void tell_manager_ready(const std::string& status) {
+  notify(fmt::format("READY=1\nSTATUS={}", shown(status)));
+}
 
-void tell_manager_reloading() { notify(fmt::format("RELOADING=1\nMONOTONIC_USEC={}", monotonic_us())); }
+void tell_manager_reloading() {
+  notify(fmt::format("RELOADING=1\nMONOTONIC_USEC={}", monotonic_us()));
+}
 
 void tell_manager_stopping() { notify("STOPPING=1\nSTATUS=stops"); }
 

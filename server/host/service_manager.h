@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-/// What the manager of services (systemd) that started this process is told. Without one all of this does nothing.
-/// Thread-safe.
+/// What the manager of services (systemd) that started this process is told. Without one all of
+/// this does nothing. Thread-safe.
 namespace trammel {
 
 /// It serves; also at the end of a reload.

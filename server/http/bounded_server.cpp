@@ -27,7 +27,8 @@ constexpr std::size_t kLongestUri = 2048;  // bytes
 constexpr int kBacklog = 1024;             // connections that wait to be accepted
 
 constexpr const char* kTooMany =
-    "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 9\r\nContent-Type: text/plain\r\nRetry-After: 1\r\n"
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 9\r\nContent-Type: "
+    "text/plain\r\nRetry-After: 1\r\n"
     "Connection: close\r\n\r\ntoo many\n";
 
 void send_away(int socket) {
@@ -47,8 +48,10 @@ class Workers {
  public:
   using Serve = std::function<void(int socket)>;
 
-  Workers(std::size_t count, std::size_t most, Serve serve) : most_(most), serve_(std::move(serve)) {
-    for (std::size_t i = 0; i < count; ++i) workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+  Workers(std::size_t count, std::size_t most, Serve serve)
+      : most_(most), serve_(std::move(serve)) {
+    for (std::size_t i = 0; i < count; ++i)
+      workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
   }
   ~Workers() {
     for (std::jthread& worker : workers_) worker.request_stop();
@@ -92,11 +95,13 @@ class Workers {
   std::vector<std::jthread> workers_;
 };
 
-/// `127.0.0.1:9464` and `localhost` name this host; a name that somebody else's server may have given it does not.
+/// `127.0.0.1:9464` and `localhost` name this host; a name that somebody else's server may have
+/// given it does not.
 bool is_of_this_host(const std::string& host) {
   const std::string name = host.substr(0, host.rfind(':'));
   in_addr parsed{};
-  const bool is_loopback = ::inet_pton(AF_INET, name.c_str(), &parsed) == 1 && ntohl(parsed.s_addr) >> 24 == 127;
+  const bool is_loopback =
+      ::inet_pton(AF_INET, name.c_str(), &parsed) == 1 && ntohl(parsed.s_addr) >> 24 == 127;
   return name == "localhost" || is_loopback;
 }
 
@@ -121,8 +126,12 @@ std::vector<std::string> words_of(const std::string& path) {
 
 HttpReply reply_to(const httplib::Request& request, const HttpHandler& handler) {
   if (request.method != "GET" && request.method != "HEAD")
-    return {405, "text/plain; charset=utf-8", "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
-  if (request.target.size() > kLongestUri) return {414, "text/plain; charset=utf-8", "the address is too long\n"};
+    return {405,
+            "text/plain; charset=utf-8",
+            "nothing can be changed here\n",
+            {{"Allow", "GET, HEAD"}}};
+  if (request.target.size() > kLongestUri)
+    return {414, "text/plain; charset=utf-8", "the address is too long\n"};
   if (!is_of_this_host(request.get_header_value("Host")))
     return {421, "text/plain; charset=utf-8", "ask for 127.0.0.1 or localhost\n"};
   HttpAsk ask{words_of(request.path), {}};
@@ -146,9 +155,11 @@ sockaddr_in socket_address(const std::string& address, std::uint16_t port) {
 
 class BoundedServer::Running final : public httplib::Server {
  public:
-  Running(const HttpLimits& limits, HttpHandler handler) : limits_(limits), handler_(std::move(handler)) {
+  Running(const HttpLimits& limits, HttpHandler handler)
+      : limits_(limits), handler_(std::move(handler)) {
     for (const std::string& word : limits_.apart)
-      apart_[word] = std::make_unique<Workers>(1, limits_.waiting, [this](int socket) { serve(socket); });
+      apart_[word] =
+          std::make_unique<Workers>(1, limits_.waiting, [this](int socket) { serve(socket); });
     new_task_queue = [] { return new AtOnce; };
     // By itself it would share the port with whoever listens there.
     set_socket_options([](int socket) {
@@ -193,7 +204,8 @@ class BoundedServer::Running final : public httplib::Server {
   void serve(int socket) {
     DeadlineStream stream(socket, limits_.reading, limits_.writing);
     bool closed = false;
-    // One request a connection; neither compressed nor in pieces: that is work, and nobody is far away.
+    // One request a connection; neither compressed nor in pieces: that is work, and nobody is far
+    // away.
     process_request(stream, true, closed, [](httplib::Request& request) {
       request.headers.erase("Accept-Encoding");
       request.ranges.clear();
@@ -226,12 +238,16 @@ BoundedServer::~BoundedServer() = default;
 
 std::uint64_t BoundedServer::shed() const { return running_->shed(); }
 
-Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& address, std::uint16_t port,
-                                                            const HttpLimits& limits, HttpHandler handler) {
+Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& address,
+                                                            std::uint16_t port,
+                                                            const HttpLimits& limits,
+                                                            HttpHandler handler) {
   TRY(check_http_address(address, port));
   auto running = std::make_unique<Running>(limits, std::move(handler));
   if (!running->bind_to_port(address, port))
-    return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port).of("port").with_value(port);
+    return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port)
+        .of("port")
+        .with_value(port);
   running->let_many_wait();
   running->listen_in_a_thread();
   while (!running->is_running()) std::this_thread::yield();  // stop() does nothing before
@@ -240,19 +256,21 @@ Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& a
 
 Status check_http_address(const std::string& address, std::uint16_t port) {
   if (!is_of_this_host(address) || address == "localhost")
-    return failure(ErrorCode::kUsage, "'{}' is not 127.x.x.x: pages and metrics stay on this host", address)
+    return failure(ErrorCode::kUsage, "'{}' is not 127.x.x.x: pages and metrics stay on this host",
+                   address)
         .of("address")
         .with_text(address);
   const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int yes = 1;
   ::setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   const sockaddr_in to = socket_address(address, port);
-  const bool free = ::bind(probe, reinterpret_cast<const sockaddr*>(&to), sizeof(to)) == 0 && ::listen(probe, 1) == 0;
+  const bool free = ::bind(probe, reinterpret_cast<const sockaddr*>(&to), sizeof(to)) == 0 &&
+                    ::listen(probe, 1) == 0;
   const int why = errno;
   ::close(probe);
   if (free) return {};
-  return failure(why == EADDRNOTAVAIL ? ErrorCode::kUsage : ErrorCode::kConflict, "{}:{} cannot be listened on: {}",
-                 address, port, std::strerror(why))
+  return failure(why == EADDRNOTAVAIL ? ErrorCode::kUsage : ErrorCode::kConflict,
+                 "{}:{} cannot be listened on: {}", address, port, std::strerror(why))
       .of("port")
       .with_value(port)
       .next("give it another port, or end who has it");

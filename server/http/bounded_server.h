@@ -18,19 +18,23 @@ struct HttpLimits {
   std::size_t waiting = 32;                 ///< requests; one more is answered 503 at once
   std::chrono::milliseconds reading{2000};  ///< for a request from its first byte to its last
   std::chrono::milliseconds writing{5000};  ///< for a reply
-  std::vector<std::string> apart = {};      ///< first words of paths that have a worker of their own each
+  std::vector<std::string> apart =
+      {};  ///< first words of paths that have a worker of their own each
 };
 
-/// A server of HTTP/1.1 for GET and HEAD, one request a connection. A fixed number of threads of low priority, bounded
-/// queues, and a time for each request: whoever is slow to ask holds up nobody, whoever is slow to read others who read
-/// what has no worker of its own, and neither anything else of the process. It answers to names of this host only, so
-/// that no page of somebody else's can ask through a browser (DNS rebinding).
+/// A server of HTTP/1.1 for GET and HEAD, one request a connection. A fixed number of threads of
+/// low priority, bounded queues, and a time for each request: whoever is slow to ask holds up
+/// nobody, whoever is slow to read others who read what has no worker of its own, and neither
+/// anything else of the process. It answers to names of this host only, so that no page of somebody
+/// else's can ask through a browser (DNS rebinding).
 class BoundedServer {
  public:
-  /// Listens until it is destroyed. `handler` is called in its threads. Refuses (kUsage) an address that is not
-  /// 127.x.x.x or that this host does not have, and (kConflict) a port that is taken.
-  [[nodiscard]] static Result<std::unique_ptr<BoundedServer>> start(const std::string& address, std::uint16_t port,
-                                                                    const HttpLimits& limits, HttpHandler handler);
+  /// Listens until it is destroyed. `handler` is called in its threads. Refuses (kUsage) an address
+  /// that is not 127.x.x.x or that this host does not have, and (kConflict) a port that is taken.
+  [[nodiscard]] static Result<std::unique_ptr<BoundedServer>> start(const std::string& address,
+                                                                    std::uint16_t port,
+                                                                    const HttpLimits& limits,
+                                                                    HttpHandler handler);
   ~BoundedServer();
   BoundedServer(const BoundedServer&) = delete;
   BoundedServer& operator=(const BoundedServer&) = delete;

@@ -15,12 +15,14 @@ namespace {
 /// Or the system would tell the other side that what it was sent is lost.
 void read_what_is_left(int socket) {
   std::array<char, 4096> rest{};
-  for (int i = 0; i < 16 && ::recv(socket, rest.data(), rest.size(), MSG_DONTWAIT) > 0; ++i) continue;
+  for (int i = 0; i < 16 && ::recv(socket, rest.data(), rest.size(), MSG_DONTWAIT) > 0; ++i)
+    continue;
 }
 
 }  // namespace
 
-DeadlineStream::DeadlineStream(int socket, std::chrono::milliseconds reading, std::chrono::milliseconds writing)
+DeadlineStream::DeadlineStream(int socket, std::chrono::milliseconds reading,
+                               std::chrono::milliseconds writing)
     : socket_(socket), read_until_(Clock::now() + reading), writing_(writing) {
   ::fcntl(socket_, F_SETFL, ::fcntl(socket_, F_GETFL) | O_NONBLOCK);
 }
@@ -73,7 +75,9 @@ void DeadlineStream::get_remote_ip_and_port(std::string& ip, int& port) const {
   port = 0;
 }
 
-void DeadlineStream::get_local_ip_and_port(std::string& ip, int& port) const { get_remote_ip_and_port(ip, port); }
+void DeadlineStream::get_local_ip_and_port(std::string& ip, int& port) const {
+  get_remote_ip_and_port(ip, port);
+}
 
 void close_with_words(int socket) {
   ::shutdown(socket, SHUT_WR);

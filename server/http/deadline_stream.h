@@ -9,7 +9,8 @@
 
 namespace trammel {
 
-/// A connection that ends when its time is over, however slowly the other side sends or reads. Closes it at the end.
+/// A connection that ends when its time is over, however slowly the other side sends or reads.
+/// Closes it at the end.
 class DeadlineStream final : public httplib::Stream {
  public:
   using Clock = std::chrono::steady_clock;

@@ -16,7 +16,8 @@ constexpr const char* kJson = "application/json";
 constexpr const char* kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
 HttpReply json_reply(int code, const nlohmann::ordered_json& json) {
-  return {code, kJson, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"};
+  return {code, kJson,
+          json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"};
 }
 
 std::string option(const HttpAsk& ask, const std::string& name) {
@@ -29,7 +30,10 @@ std::string option(const HttpAsk& ask, const std::string& name) {
 class HttpServer::Running {
  public:
   Running(HttpOptions options, Watched server)
-      : options_(std::move(options)), server_(std::move(server)), metrics_(server_), pages_(server_) {}
+      : options_(std::move(options)),
+        server_(std::move(server)),
+        metrics_(server_),
+        pages_(server_) {}
 
   Status start() {
     if (options_.port == 0) return {};

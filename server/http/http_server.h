@@ -8,9 +8,10 @@
 
 namespace trammel {
 
-/// Shows what a server does to those who watch it, over HTTP and to this host only: metrics for Prometheus, whether it
-/// is well and ready, and pages for people. Changes nothing, and works in threads of its own, of low priority and of a
-/// fixed number. README.md has the addresses. Thread-safe.
+/// Shows what a server does to those who watch it, over HTTP and to this host only: metrics for
+/// Prometheus, whether it is well and ready, and pages for people. Changes nothing, and works in
+/// threads of its own, of low priority and of a fixed number. README.md has the addresses.
+/// Thread-safe.
 class HttpServer {
  public:
   /// What `server` refers to outlives it.
@@ -19,7 +20,8 @@ class HttpServer {
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Listens, where a port is named. From now until the phase is kServing it says that the server is starting.
+  /// Listens, where a port is named. From now until the phase is kServing it says that the server
+  /// is starting.
   [[nodiscard]] Status start();
   void set_phase(ServerPhase phase);
   /// For counting what becomes of jobs.

@@ -38,7 +38,8 @@ Incoming::Head Incoming::head_of(int socket) {
   const ssize_t size = ::recv(socket, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return {};
   bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-  if (size <= 0 || bytes.find("\r\n\r\n") != std::string::npos) return {Head::kThere, std::move(bytes)};
+  if (size <= 0 || bytes.find("\r\n\r\n") != std::string::npos)
+    return {Head::kThere, std::move(bytes)};
   return {bytes.size() == kLongestHead ? Head::kTooLong : Head::kNotYet, {}};
 }
 
@@ -46,7 +47,8 @@ void Incoming::take(int socket, const Head& head) const {
   head.arrival == Head::kThere ? come_(socket, head.bytes) : close_at_once(socket);
 }
 
-Incoming::Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out)
+Incoming::Incoming(std::size_t most, std::chrono::milliseconds patience, Come come,
+                   PushedOut pushed_out)
     : most_(most),
       patience_(patience),
       come_(std::move(come)),
@@ -106,7 +108,8 @@ void Incoming::watch(const std::stop_token& stop) {
       return slow_.empty();
     }();
     std::array<epoll_event, 32> events{};
-    const int count = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), is_idle ? -1 : kTick);
+    const int count =
+        ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), is_idle ? -1 : kTick);
     for (int i = 0; i < count; ++i) look_at(events[static_cast<std::size_t>(i)].data.fd);
     close_late();
   }
@@ -144,7 +147,8 @@ void Incoming::close_late() {
 void become_http_thread(const char* name) {
   constexpr int kNiceness = 10;
   ::pthread_setname_np(::pthread_self(), name);
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // of this thread alone, as Linux has it
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()),
+                kNiceness);  // of this thread alone, as Linux has it
 }
 
 void Incoming::wake() const {

@@ -12,15 +12,17 @@
 
 namespace trammel {
 
-/// Connections whose request has not come yet. They take no worker: one thread watches all of them, and hands on each
-/// whose request has its head. Whoever is slow can hold up nobody: where there is no room, the one that has been slow
-/// for longest makes it. Thread-safe.
+/// Connections whose request has not come yet. They take no worker: one thread watches all of them,
+/// and hands on each whose request has its head. Whoever is slow can hold up nobody: where there is
+/// no room, the one that has been slow for longest makes it. Thread-safe.
 class Incoming {
  public:
-  using Come = std::function<void(int socket, const std::string& head)>;  ///< closes it, sooner or later
-  using PushedOut = std::function<void(int socket)>;                      ///< closes it
+  using Come =
+      std::function<void(int socket, const std::string& head)>;  ///< closes it, sooner or later
+  using PushedOut = std::function<void(int socket)>;             ///< closes it
 
-  /// `come`: takes what can be read at once. `pushed_out`: takes what made room, and what waits at the end.
+  /// `come`: takes what can be read at once. `pushed_out`: takes what made room, and what waits at
+  /// the end.
   Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out);
   ~Incoming();
   Incoming(const Incoming&) = delete;

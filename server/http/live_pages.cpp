@@ -23,10 +23,14 @@ constexpr std::size_t kHistoryVersions = 10;  // whose parameters are read
 constexpr std::size_t kEvents = 30;
 constexpr int kJobs = 20;  // of those done, and of those failed
 
-std::string html_time(std::optional<std::int64_t> unix_s) { return "<time>" + shown_time(unix_s) + "</time>"; }
+std::string html_time(std::optional<std::int64_t> unix_s) {
+  return "<time>" + shown_time(unix_s) + "</time>";
+}
 
 /// Text that may be broken anywhere, as hashes are.
-std::string breakable(const std::string& text) { return "<span class=\"breaks\">" + html_text(text) + "</span>"; }
+std::string breakable(const std::string& text) {
+  return "<span class=\"breaks\">" + html_text(text) + "</span>";
+}
 
 std::string table(const std::vector<std::string>& head, std::vector<HtmlRow> rows) {
   return "<div class=\"wide\">" + html_table({"stacks", head, std::move(rows)}) + "</div>";
@@ -38,7 +42,9 @@ std::string apart_words(std::string word) {
   return word;
 }
 
-std::string millimetres(const std::optional<double>& m) { return m && *m > 0 ? fmt::format("{:.4f}", to_mm(*m)) : "–"; }
+std::string millimetres(const std::optional<double>& m) {
+  return m && *m > 0 ? fmt::format("{:.4f}", to_mm(*m)) : "–";
+}
 
 std::string model_address(const std::string& cell, int version) {
   return fmt::format("{}/models/{}", cell_address(cell), version);
@@ -84,11 +90,13 @@ InMemory in_memory(const Watched& server) {
 }
 
 HtmlRow fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now) {
-  HtmlRow row{{html_link(cell_address(one.cell), one.cell), state_of(one)}, one.is_dark() ? "dark" : "served"};
+  HtmlRow row{{html_link(cell_address(one.cell), one.cell), state_of(one)},
+              one.is_dark() ? "dark" : "served"};
   const auto found = models.find(one.cell);
   const ServedModel* model = found == models.end() ? nullptr : found->second.get();
   const int version = model == nullptr ? one.version : model->version;
-  row.cells.push_back(version == 0 ? "–" : html_link(model_address(one.cell, version), std::to_string(version)));
+  row.cells.push_back(
+      version == 0 ? "–" : html_link(model_address(one.cell, version), std::to_string(version)));
   if (model == nullptr) {
     row.cells.insert(row.cells.end(), 3, "–");
     return row;
@@ -96,13 +104,16 @@ HtmlRow fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t
   const ModelProvenance& made = model->model.provenance();
   const auto& judged = model->model.parts().validation;
   row.cells.push_back(html_time(made.trained_at));
-  row.cells.push_back(made.measured_at ? shown_age(static_cast<double>(now - *made.measured_at)) : "–");
-  row.cells.push_back(millimetres(judged && judged->poses > 0 ? std::optional(judged->compensated.rms) : std::nullopt));
+  row.cells.push_back(made.measured_at ? shown_age(static_cast<double>(now - *made.measured_at))
+                                       : "–");
+  row.cells.push_back(millimetres(
+      judged && judged->poses > 0 ? std::optional(judged->compensated.rms) : std::nullopt));
   return row;
 }
 
 std::string outcome_of(const StoredJob& job, const std::optional<JobProgress>& now) {
-  if (now && now->stage == JobStage::kQueued) return now->what.empty() ? "waits" : "waits: " + html_text(now->what);
+  if (now && now->stage == JobStage::kQueued)
+    return now->what.empty() ? "waits" : "waits: " + html_text(now->what);
   if (now) return fmt::format("{}, {:.0f} %", html_text(now->what), 100 * now->share);
   const std::string verdict = apart_words(to_text(job.outcome.verdict));
   const std::string why = with_micro(job.outcome.why.empty() ? job.message : job.outcome.why);
@@ -124,18 +135,23 @@ std::optional<JobProgress> progress_in(const Unfinished& jobs, std::int64_t job)
 }
 
 std::string batches_of(const StoredJob& job) {
-  return job.batch_ids.empty() ? "sent with it" : html_text(fmt::format("{}", fmt::join(job.batch_ids, ", ")));
+  return job.batch_ids.empty() ? "sent with it"
+                               : html_text(fmt::format("{}", fmt::join(job.batch_ids, ", ")));
 }
 
-bool has_findings(const StoredJob& job) { return job.kind != JobKind::kTrain && job.state == JobState::kDone; }
+bool has_findings(const StoredJob& job) {
+  return job.kind != JobKind::kTrain && job.state == JobState::kDone;
+}
 
-/// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made lately.
+/// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made
+/// lately.
 std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
   const StoredJob* last = nullptr;  // the jobs come oldest first
   for (const StoredJob& job : jobs)
     if (job.kind == kind && has_findings(job)) last = &job;
   if (last == nullptr) return "";
-  const std::string name = fmt::format("Last {}, {} UTC", kind_of(kind), shown_time(last->finished_at));
+  const std::string name =
+      fmt::format("Last {}, {} UTC", kind_of(kind), shown_time(last->finished_at));
   return fmt::format("<p>{}: {}</p>", html_link(job_address(last->id) + "/findings", name),
                      outcome_of(*last, std::nullopt));
 }
@@ -149,14 +165,18 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
   for (auto job = jobs.rbegin(); job != jobs.rend(); ++job) {
     const auto now = progress_in(running, job->id);
     rows.push_back(
-        {{html_link(job_address(job->id), std::to_string(job->id)), html_link(cell_address(job->cell), job->cell),
-          kind_of(job->kind), batches_of(*job), html_time(job->created_at), html_time(job->finished_at),
+        {{html_link(job_address(job->id), std::to_string(job->id)),
+          html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
+          html_time(job->created_at), html_time(job->finished_at),
           job->server.empty() ? "–" : html_text(job->server),
           outcome_of(*job, now) +
-              (has_findings(*job) ? "<br>" + html_link(job_address(job->id) + "/findings", "what it found") : "")},
+              (has_findings(*job)
+                   ? "<br>" + html_link(job_address(job->id) + "/findings", "what it found")
+                   : "")},
          now ? "now" : ""});
   }
-  return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "server", "outcome"}, rows);
+  return table(
+      {"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "server", "outcome"}, rows);
 }
 
 Result<std::string> version_table(const Watched& server, const std::string& cell) {
@@ -166,13 +186,15 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
   std::vector<HtmlRow> rows;
   for (auto one = versions.rbegin(); one != versions.rend() && rows.size() < kMostVersions; ++one) {
     const bool now = one->version == in_force;
-    rows.push_back(
-        {{html_link(model_address(cell, one->version), std::to_string(one->version)) + (now ? " in force" : ""),
-          html_time(one->trained_at), html_time(one->measured_at), html_text(one->batch_id),
-          html_text(level_in_words(one->level)), std::to_string(one->training_poses), millimetres(one->validation_rms)},
-         now ? "now" : ""});
+    rows.push_back({{html_link(model_address(cell, one->version), std::to_string(one->version)) +
+                         (now ? " in force" : ""),
+                     html_time(one->trained_at), html_time(one->measured_at),
+                     html_text(one->batch_id), html_text(level_in_words(one->level)),
+                     std::to_string(one->training_poses), millimetres(one->validation_rms)},
+                    now ? "now" : ""});
   }
-  return table({"version", "trained (UTC)", "measured (UTC)", "batches", "error sources", "poses", "held-out rms, mm"},
+  return table({"version", "trained (UTC)", "measured (UTC)", "batches", "error sources", "poses",
+                "held-out rms, mm"},
                rows);
 }
 
@@ -182,25 +204,29 @@ Result<std::string> quarantine_table(const Watched& server, const std::string& c
   for (const StoredBatch& batch : batches)
     rows.push_back({{html_text(batch.id), std::to_string(batch.poses), html_time(batch.accepted_at),
                      html_text(batch.quarantine)}});
-  return rows.empty() ? std::string() : table({"batch", "poses", "came (UTC)", "why it is kept out"}, rows);
+  return rows.empty() ? std::string()
+                      : table({"batch", "poses", "came (UTC)", "why it is kept out"}, rows);
 }
 
 std::string event_table(const AuditTrail& trail) {
   std::vector<HtmlRow> rows;
   for (auto row = trail.rows.rbegin(); row != trail.rows.rend(); ++row)
     rows.push_back({{html_time(row->at), html_text(row->what), html_text(row->subject),
-                     breakable(row->before + (row->after.empty() ? "" : " → " + row->after)), html_text(row->why),
-                     breakable(row->who)}});
+                     breakable(row->before + (row->after.empty() ? "" : " → " + row->after)),
+                     html_text(row->why), breakable(row->who)}});
   std::string html =
-      rows.empty() ? "<p>None.</p>" : table({"when (UTC)", "what", "of what", "before → after", "why", "who"}, rows);
-  if (trail.broken) html = "<p>The trail is broken: " + html_text(sentence(*trail.broken)) + "</p>" + html;
+      rows.empty() ? "<p>None.</p>"
+                   : table({"when (UTC)", "what", "of what", "before → after", "why", "who"}, rows);
+  if (trail.broken)
+    html = "<p>The trail is broken: " + html_text(sentence(*trail.broken)) + "</p>" + html;
   return html;
 }
 
 /// A section, or why there is none.
 void add_section(std::string* body, const std::string& title, const Result<std::string>& html) {
   if (html && html->empty()) return;
-  *body += html_section(title, html ? *html : "<p>Cannot be read: " + html_text(sentence(html.error())) + "</p>");
+  *body += html_section(
+      title, html ? *html : "<p>Cannot be read: " + html_text(sentence(html.error())) + "</p>");
 }
 
 CellReadiness readiness_of(const Watched& server, const std::string& cell) {
@@ -226,46 +252,51 @@ Result<CompensatedModel> model_of(const Watched& server, const std::string& cell
 ServicePage fleet_page(const Watched& server) {
   const std::vector<CellReadiness> cells = cells_readiness(server);
   const InMemory models = in_memory(server);
-  const auto dark = std::count_if(cells.begin(), cells.end(), [](const auto& one) { return one.is_dark(); });
+  const auto dark =
+      std::count_if(cells.begin(), cells.end(), [](const auto& one) { return one.is_dark(); });
   std::vector<HtmlRow> rows;
   for (const CellReadiness& one : cells) rows.push_back(fleet_row(one, models, unix_now()));
-  const std::string verdict = dark == 0
-                                  ? cells.size() == 1 ? "Its cell is answered for."
-                                                      : fmt::format("All {} cells are answered for.", cells.size())
-                                  : fmt::format("{} of {} cells {} dark: nobody gets an answer for {}.", dark,
-                                                cells.size(), dark == 1 ? "is" : "are", dark == 1 ? "it" : "them");
+  const std::string verdict =
+      dark == 0 ? cells.size() == 1 ? "Its cell is answered for."
+                                    : fmt::format("All {} cells are answered for.", cells.size())
+                : fmt::format("{} of {} cells {} dark: nobody gets an answer for {}.", dark,
+                              cells.size(), dark == 1 ? "is" : "are", dark == 1 ? "it" : "them");
   const Movement movement = server.movement();
   const std::string still =
       movement.still.empty()
           ? ""
-          : fmt::format("<p>No progress in: {}</p>", html_text(fmt::format("{}", fmt::join(movement.still, ", "))));
+          : fmt::format("<p>No progress in: {}</p>",
+                        html_text(fmt::format("{}", fmt::join(movement.still, ", "))));
   const auto running = server.trainer.unfinished_jobs().size();
   const std::string body =
       html_section("Now",
-                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run. {}: who serves and trains.</p><p "
-                               "class=\"note\">{} {}, read "
-                               "again every {} s.</p>",
-                               verdict, still, html_link("/jobs", "Jobs"), running, html_link("/fleet", "Servers"),
-                               html_text(server.server_id), html_text(server.program_version), kLiveAgain)) +
+                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run. {}: who serves "
+                               "and trains.</p><p class=\"note\">{} {}, read again every {} s.</p>",
+                               verdict, still, html_link("/jobs", "Jobs"), running,
+                               html_link("/fleet", "Servers"), html_text(server.server_id),
+                               html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
-      html_section("Cells",
-                   table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));
+      html_section("Cells", table({"cell", "state", "version", "trained (UTC)", "age of its data",
+                                   "held-out rms, mm"},
+                                  rows));
   return {"Cells of " + server.server_id, body, kLiveAgain};
 }
 
 Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
   TRY(check_served(server, cell));
   const CellReadiness now = readiness_of(server, cell);
-  const std::string report =
-      now.version == 0
-          ? ""
-          : html_link(model_address(cell, now.version), fmt::format("Report of version {}", now.version)) + " · ";
-  const std::vector<StoredJob> lately = server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>());
-  std::string body =
-      html_section("Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>",
-                                      now.is_dark() ? "Dark" : "Answered for", state_of(now), report,
-                                      html_link(cell_address(cell) + "/history", "History of its parameters")) +
-                              last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
+  const std::string report = now.version == 0
+                                 ? ""
+                                 : html_link(model_address(cell, now.version),
+                                             fmt::format("Report of version {}", now.version)) +
+                                       " · ";
+  const std::vector<StoredJob> lately =
+      server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>());
+  std::string body = html_section(
+      "Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>",
+                         now.is_dark() ? "Dark" : "Answered for", state_of(now), report,
+                         html_link(cell_address(cell) + "/history", "History of its parameters")) +
+                 last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
   add_section(&body, "Versions", version_table(server, cell));
   add_section(&body, "Batches that are kept out", quarantine_table(server, cell));
   add_section(&body, "Jobs", job_table(server, cell));
@@ -291,15 +322,17 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
                                {{"outcome", outcome_of(job, now)}}};
   const JobOutcome& outcome = job.outcome;
   if (outcome.before || outcome.after)
-    rows.push_back({{"held-out rms, mm", fmt::format("before {}, after {}, limit {}", millimetres(outcome.before),
-                                                     millimetres(outcome.after), millimetres(outcome.limit))}});
+    rows.push_back({{"held-out rms, mm",
+                     fmt::format("before {}, after {}, limit {}", millimetres(outcome.before),
+                                 millimetres(outcome.after), millimetres(outcome.limit))}});
   if (!outcome.next.empty()) rows.push_back({{"next", html_text(outcome.next)}});
   if (job.model_version > 0)
     rows.push_back({{"model", html_link(model_address(job.cell, job.model_version),
                                         fmt::format("version {}", job.model_version))}});
   if (job.kind != JobKind::kTrain && !now)
     rows.push_back({{"found", html_link(job_address(id) + "/findings", "what it found")}});
-  return ServicePage{fmt::format("Job {}", id), html_section("What became of it", html_table({"", {}, rows})),
+  return ServicePage{fmt::format("Job {}", id),
+                     html_section("What became of it", html_table({"", {}, rows})),
                      now ? kLiveAgain : 0};
 }
 
@@ -318,23 +351,27 @@ Result<std::string> history_report(const Watched& server, const std::string& cel
   const std::size_t skipped = versions.size() - std::min(versions.size(), kHistoryVersions);
   for (std::size_t i = skipped; i < versions.size(); ++i) {
     const StoredModel& stored = versions[i];
-    VersionOnRecord one{stored.version,
-                        stored.id,
-                        stored.batch_id,
-                        stored.trained_at,
-                        stored.training_poses,
-                        stored.validation_rms > 0 ? std::optional(stored.validation_rms) : std::nullopt,
-                        stored.version == in_force};
+    VersionOnRecord one{
+        stored.version,
+        stored.id,
+        stored.batch_id,
+        stored.trained_at,
+        stored.training_poses,
+        stored.validation_rms > 0 ? std::optional(stored.validation_rms) : std::nullopt,
+        stored.version == in_force};
     if (const auto model = model_of(server, cell, stored.version)) put_on_record(*model, one);
     history.versions.push_back(std::move(one));
   }
-  for (const StoredJob& job : server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>())) {
+  for (const StoredJob& job :
+       server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>())) {
     if (job.kind != JobKind::kTrain || !job.finished_at) continue;
     history.trainings.push_back({*job.finished_at, fmt::format("{}", fmt::join(job.batch_ids, "+")),
-                                 to_text(job.outcome.verdict), job.outcome.why, job.outcome.before, job.outcome.after});
+                                 to_text(job.outcome.verdict), job.outcome.why, job.outcome.before,
+                                 job.outcome.after});
   }
   if (const auto trail = server.store.audit({cell, 0, 10 * kEvents})) {
-    for (const AuditRow& row : trail->rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+    for (const AuditRow& row : trail->rows)
+      history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
   }
   return history_page(history);
 }

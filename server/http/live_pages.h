@@ -18,7 +18,8 @@ namespace trammel {
 [[nodiscard]] Result<ServicePage> job_page(const Watched& server, std::int64_t job);
 
 /// The report of a model; `version` need not be in memory.
-[[nodiscard]] Result<std::string> model_report(const Watched& server, const std::string& cell, int version);
+[[nodiscard]] Result<std::string> model_report(const Watched& server, const std::string& cell,
+                                               int version);
 /// What the cell has been through, over its last versions.
 [[nodiscard]] Result<std::string> history_report(const Watched& server, const std::string& cell);
 

@@ -18,9 +18,11 @@ class MetricFamilies {
  public:
   void gauge(const char* name, const char* help, double value, const MetricLabels& labels = {});
   void counter(const char* name, const char* help, double value, const MetricLabels& labels = {});
-  /// `in_class`: how many are in each class, `bounds` their upper bounds; one more class holds what is above the last.
+  /// `in_class`: how many are in each class, `bounds` their upper bounds; one more class holds what
+  /// is above the last.
   void histogram(const char* name, const char* help, std::span<const double> bounds,
-                 std::span<const std::uint64_t> in_class, double sum, const MetricLabels& labels = {});
+                 std::span<const std::uint64_t> in_class, double sum,
+                 const MetricLabels& labels = {});
 
   /// In Prometheus' text format.
   [[nodiscard]] std::string text() const;

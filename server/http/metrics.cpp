@@ -25,29 +25,37 @@ void add_process(MetricFamilies& out) {
 
 void add_requests(MetricFamilies& out, const ServiceFigures& service) {
   for (const OperationFigures& one : service.operations) {
-    out.histogram("trammel_request_seconds", "From the arrival of a request that was worked on to its reply.",
-                  LatencyHistogram::kBounds, one.latency.in_class, one.latency.sum, {{"operation", one.operation}});
+    out.histogram("trammel_request_seconds",
+                  "From the arrival of a request that was worked on to its reply.",
+                  LatencyHistogram::kBounds, one.latency.in_class, one.latency.sum,
+                  {{"operation", one.operation}});
   }
   for (const OperationFigures& one : service.operations) {
     for (const auto& [result, count] : one.by_result) {
-      out.counter("trammel_requests_total", "Answers by their result; busy and deadline_missed were shed.",
-                  number(count), {{"operation", one.operation}, {"result", result}});
+      out.counter("trammel_requests_total",
+                  "Answers by their result; busy and deadline_missed were shed.", number(count),
+                  {{"operation", one.operation}, {"result", result}});
     }
   }
   for (const QueueFigures& one : service.queues) {
-    out.gauge("trammel_requests_waiting", "Requests that wait or are worked on.", number(one.requests),
-              {{"queue", one.queue}});
+    out.gauge("trammel_requests_waiting", "Requests that wait or are worked on.",
+              number(one.requests), {{"queue", one.queue}});
   }
-  out.gauge("trammel_requests_waiting_bytes", "Memory that these take.", number(service.waiting_bytes));
+  out.gauge("trammel_requests_waiting_bytes", "Memory that these take.",
+            number(service.waiting_bytes));
   out.gauge("trammel_clients", "Clients with a reply channel.", number(service.clients));
-  out.counter("trammel_replies_unheard_total", "Replies that nobody listened to any more.", number(service.unheard));
+  out.counter("trammel_replies_unheard_total", "Replies that nobody listened to any more.",
+              number(service.unheard));
   out.counter("trammel_participants_refused_total",
-              "Participants without the right certificate or permissions, each try.", number(service.strangers));
-  out.counter("trammel_requests_misdirected_total", "Requests whose reply would have gone to another client.",
+              "Participants without the right certificate or permissions, each try.",
+              number(service.strangers));
+  out.counter("trammel_requests_misdirected_total",
+              "Requests whose reply would have gone to another client.",
               number(service.misdirected));
-  out.counter("trammel_requests_unreadable_total", "Requests of which not even the header could be read.",
-              number(service.unreadable));
-  out.counter("trammel_samples_lost_total", "Requests that DDS lost before anybody saw them.", number(service.lost));
+  out.counter("trammel_requests_unreadable_total",
+              "Requests of which not even the header could be read.", number(service.unreadable));
+  out.counter("trammel_samples_lost_total", "Requests that DDS lost before anybody saw them.",
+              number(service.lost));
   for (const auto& [reason, count] : service.dropped_packets) {
     out.counter("trammel_packets_dropped_total", "Packets that were dropped unread.", number(count),
                 {{"reason", reason}});
@@ -55,17 +63,21 @@ void add_requests(MetricFamilies& out, const ServiceFigures& service) {
 }
 
 void add_work(MetricFamilies& out, const std::map<std::string, WorkFigures>& work) {
-  constexpr const char* kHelp = "Poses that were asked for, by whether the model knows the arm there.";
+  constexpr const char* kHelp =
+      "Poses that were asked for, by whether the model knows the arm there.";
   for (const auto& [cell, of] : work) {
-    out.counter("trammel_poses_asked_total", kHelp, number(of.inside), {{"cell", cell}, {"domain", "inside"}});
-    out.counter("trammel_poses_asked_total", kHelp, number(of.outside), {{"cell", cell}, {"domain", "outside"}});
+    out.counter("trammel_poses_asked_total", kHelp, number(of.inside),
+                {{"cell", cell}, {"domain", "inside"}});
+    out.counter("trammel_poses_asked_total", kHelp, number(of.outside),
+                {{"cell", cell}, {"domain", "outside"}});
   }
   for (const auto& [cell, of] : work) {
-    out.counter("trammel_targets_left_total", "Targets that were left as they were.", number(of.left),
-                {{"cell", cell}});
+    out.counter("trammel_targets_left_total", "Targets that were left as they were.",
+                number(of.left), {{"cell", cell}});
   }
   for (const auto& [cell, of] : work) {
-    out.histogram("trammel_promised_stddev_mm", "Standard deviation of the true error that the answers promised.",
+    out.histogram("trammel_promised_stddev_mm",
+                  "Standard deviation of the true error that the answers promised.",
                   WorkFigures::kBounds, of.in_class, of.sum_mm, {{"cell", cell}});
   }
 }
@@ -79,10 +91,12 @@ std::string phase_of(const JobProgress& job) {
 
 void add_jobs(MetricFamilies& out, const std::vector<JobProgress>& unfinished,
               const std::map<std::string, std::uint64_t>& ended) {
-  std::map<JobStage, int> in_stage = {{JobStage::kQueued, 0}, {JobStage::kTraining, 0}, {JobStage::kStoring, 0}};
+  std::map<JobStage, int> in_stage = {
+      {JobStage::kQueued, 0}, {JobStage::kTraining, 0}, {JobStage::kStoring, 0}};
   for (const JobProgress& job : unfinished) ++in_stage[job.stage];
   const auto state = [&](const char* name, JobStage stage) {
-    out.gauge("trammel_jobs", "Trainings, diagnoses and checks that are not over.", in_stage[stage], {{"state", name}});
+    out.gauge("trammel_jobs", "Trainings, diagnoses and checks that are not over.", in_stage[stage],
+              {{"state", name}});
   };
   state("queued", JobStage::kQueued);
   state("computing", JobStage::kTraining);
@@ -93,8 +107,8 @@ void add_jobs(MetricFamilies& out, const std::vector<JobProgress>& unfinished,
               {{"cell", job.cell}, {"phase", phase_of(job)}});
   }
   for (const auto& [verdict, count] : ended) {
-    out.counter("trammel_jobs_ended_total", "Jobs that ended since the start, by their outcome.", number(count),
-                {{"verdict", verdict}});
+    out.counter("trammel_jobs_ended_total", "Jobs that ended since the start, by their outcome.",
+                number(count), {{"verdict", verdict}});
   }
 }
 
@@ -107,8 +121,10 @@ void add_store(MetricFamilies& out, const Watched& server) {
     out.gauge("trammel_store_free_bytes", "Room on its disk.", file.free_bytes);
   }
   out.gauge("trammel_store_writable", "1: changes can be stored.", state.why_not_written ? 0 : 1);
-  out.counter("trammel_store_failed_writes_total", "Changes that the disk did not take.", number(state.failed_writes));
-  out.gauge("trammel_troubles", "What is wrong now, as the status says it.", number(server.trainer.troubles().size()));
+  out.counter("trammel_store_failed_writes_total", "Changes that the disk did not take.",
+              number(state.failed_writes));
+  out.gauge("trammel_troubles", "What is wrong now, as the status says it.",
+            number(server.trainer.troubles().size()));
 }
 
 /// As the servers were heard of last. While the record is away nobody knows who is there.
@@ -133,8 +149,10 @@ void add_record(MetricFamilies& out, const Watched& server) {
 }
 
 void add_models_in_memory(MetricFamilies& out, const ModelRegistry& registry) {
-  out.gauge("trammel_models_in_memory_bytes", "Memory of the models that are loaded.", number(registry.bytes()));
-  out.gauge("trammel_cells_with_a_model", "Cells with a model in force.", number(registry.cells_served()));
+  out.gauge("trammel_models_in_memory_bytes", "Memory of the models that are loaded.",
+            number(registry.bytes()));
+  out.gauge("trammel_cells_with_a_model", "Cells with a model in force.",
+            number(registry.cells_served()));
 }
 
 }  // namespace
@@ -156,8 +174,10 @@ std::map<std::string, Metrics::Stamp> Metrics::stamps() {
   int asked = 0;
   for (const auto& [cell, place] : places) {
     if (stamps_[cell].version == place.version || ++asked > kMostAsked) continue;
-    for (const StoredModel& model : server_.store.models(cell).value_or(std::vector<StoredModel>())) {
-      if (model.version == place.version) stamps_[cell] = {model.version, model.trained_at, model.measured_at};
+    for (const StoredModel& model :
+         server_.store.models(cell).value_or(std::vector<StoredModel>())) {
+      if (model.version == place.version)
+        stamps_[cell] = {model.version, model.trained_at, model.measured_at};
     }
   }
   std::erase_if(stamps_, [&](const auto& one) { return !places.contains(one.first); });
@@ -170,14 +190,17 @@ std::string Metrics::text(ServerPhase phase, std::uint64_t shed) {
             {{"version", server_.program_version}, {"server", server_.server_id}});
   add_process(out);
   out.counter("trammel_http_shed_total", "Requests for pages that were sent away.", number(shed));
-  out.gauge("trammel_serving", "1: it is neither starting nor stopping.", phase == ServerPhase::kServing ? 1 : 0);
+  out.gauge("trammel_serving", "1: it is neither starting nor stopping.",
+            phase == ServerPhase::kServing ? 1 : 0);
   if (phase != ServerPhase::kServing) return out.text();
-  out.gauge("trammel_healthy", "1: every part of it moves.", server_.movement().still.empty() ? 1 : 0);
+  out.gauge("trammel_healthy", "1: every part of it moves.",
+            server_.movement().still.empty() ? 1 : 0);
   const ServiceFigures service = server_.figures();
   add_requests(out, service);
   add_work(out, service.work);
   if (service.not_recorded)
-    out.counter("trammel_requests_not_recorded_total", "Requests that are in no record: the disk was too slow or full.",
+    out.counter("trammel_requests_not_recorded_total",
+                "Requests that are in no record: the disk was too slow or full.",
                 number(*service.not_recorded));
   std::map<std::string, std::uint64_t> ended;
   {
@@ -199,7 +222,8 @@ std::string Metrics::text(ServerPhase phase, std::uint64_t shed) {
     out.gauge("trammel_model_training_age_seconds", "Since the model in force was trained.",
               now - static_cast<double>(stamp.trained_at), {{"cell", cell}});
     if (!stamp.measured_at) continue;
-    out.gauge("trammel_model_data_age_seconds", "Since the newest measurement that it was made from.",
+    out.gauge("trammel_model_data_age_seconds",
+              "Since the newest measurement that it was made from.",
               now - static_cast<double>(*stamp.measured_at), {{"cell", cell}});
   }
   return out.text();

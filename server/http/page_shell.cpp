@@ -35,14 +35,18 @@ constexpr std::string_view kWayBackStyle = R"(
 )";
 
 std::string way_back(const std::string& cell) {
-  std::string links = html_link("/", "Cells") + html_link("/jobs", "Jobs") + html_link("/fleet", "Servers");
+  std::string links =
+      html_link("/", "Cells") + html_link("/jobs", "Jobs") + html_link("/fleet", "Servers");
   if (!cell.empty())
-    links += html_link(cell_address(cell), cell) + html_link(cell_address(cell) + "/history", "History");
+    links +=
+        html_link(cell_address(cell), cell) + html_link(cell_address(cell) + "/history", "History");
   return "<nav class=\"service\">" + links + "</nav>";
 }
 
-/// Puts `what` before or behind the first `mark`; the page's own head and body come before all that is foreign.
-std::string inserted(std::string page, std::string_view mark, const std::string& what, bool behind) {
+/// Puts `what` before or behind the first `mark`; the page's own head and body come before all that
+/// is foreign.
+std::string inserted(std::string page, std::string_view mark, const std::string& what,
+                     bool behind) {
   const std::size_t at = page.find(mark);
   if (at == std::string::npos) return page;
   return page.insert(behind ? at + mark.size() : at, what);
@@ -70,20 +74,24 @@ HttpReply html_reply(int code, std::string html, std::string policy) {
 }  // namespace
 
 HttpReply page_reply(const ServicePage& page, int code) {
-  static const std::string kPolicy =
-      content_policy({{}, {std::string(page_style()), std::string(kStyle), std::string(kWayBackStyle)}});
+  static const std::string kPolicy = content_policy(
+      {{}, {std::string(page_style()), std::string(kStyle), std::string(kWayBackStyle)}});
   const std::string again =
-      page.again_after > 0 ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">\n", page.again_after) : "";
+      page.again_after > 0
+          ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">\n", page.again_after)
+          : "";
   const std::string title = html_text(page.title);
   return html_reply(
       code,
       fmt::format(
           "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-          "<link rel=\"icon\" href=\"data:,\">\n{}"
-          "<title>{}</title>\n<style>{}</style>\n<style>{}</style>\n<style>{}</style>\n</head>\n<body>\n{}\n<main>\n"
+          "<link rel=\"icon\" "
+          "href=\"data:,\">\n{}<title>{}</title>\n<style>{}</style>\n<style>{}</style>\n<style>{}</"
+          "style>\n</head>\n<body>\n{}\n<main>\n"
           "<h1>{}</h1>\n{}\n<p class=\"note\">Read at {} UTC.</p>\n</main>\n</body>\n</html>\n",
-          again, title, page_style(), kStyle, kWayBackStyle, way_back(""), title, page.body, shown_time(unix_now())),
+          again, title, page_style(), kStyle, kWayBackStyle, way_back(""), title, page.body,
+          shown_time(unix_now())),
       kPolicy);
 }
 
@@ -95,14 +103,15 @@ HttpReply report_reply(const std::string& page, const std::string& cell) {
 HttpReply stored_page_reply(const std::string& page, const std::string& cell) {
   PageInserts own = inserts_of(page);
   own.styles.emplace_back(kWayBackStyle);
-  return html_reply(200, with_way_back(page, cell), content_policy(own) + "; sandbox allow-scripts");
+  return html_reply(200, with_way_back(page, cell),
+                    content_policy(own) + "; sandbox allow-scripts");
 }
 
 std::string cell_address(const std::string& cell) {
   std::string address = "/cells/";
   for (const char c : cell) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-                       c == '_' || c == '.' || c == '~';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_' || c == '.' || c == '~';
     address += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
   return address;

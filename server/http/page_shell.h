@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// A page of the service: its title, its body as HTML, and after how many seconds it is read again (0: never).
+/// A page of the service: its title, its body as HTML, and after how many seconds it is read again
+/// (0: never).
 struct ServicePage {
   std::string title;
   std::string body;
@@ -18,8 +19,8 @@ struct ServicePage {
 
 /// A page that stands for itself (a model, a history), with the way back to the others above it.
 [[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell);
-/// The same of a page that an earlier version of the program may have written: its scripts run, shut off from
-/// everything else.
+/// The same of a page that an earlier version of the program may have written: its scripts run,
+/// shut off from everything else.
 [[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);
 
 /// The page of a cell, whatever its name is.

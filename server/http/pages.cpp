@@ -24,10 +24,15 @@ HttpReply not_there() { return told(404, "Not there", "There is no such page.");
 HttpReply refused_reply(const Error& error) {
   const bool missing = error.code == ErrorCode::kNotFound;
   const bool later = error.code == ErrorCode::kBusy;
-  return told(missing ? 404 : later ? 503 : 500, missing ? "Not there" : "Cannot be shown", sentence(error));
+  return told(missing ? 404
+              : later ? 503
+                      : 500,
+              missing ? "Not there" : "Cannot be shown", sentence(error));
 }
 
-HttpReply reply_of(const Result<ServicePage>& page) { return page ? page_reply(*page) : refused_reply(page.error()); }
+HttpReply reply_of(const Result<ServicePage>& page) {
+  return page ? page_reply(*page) : refused_reply(page.error());
+}
 
 template <typename Number>
 std::optional<Number> number_in(const std::string& word) {
@@ -39,11 +44,13 @@ std::optional<Number> number_in(const std::string& word) {
 
 /// What a check found, with the way to its cell and its job.
 HttpReply health_reply(const std::string& findings, const StoredJob& job) {
-  const std::string links = fmt::format(
-      "<p>{} · {} · {} · {} · checked {} UTC</p>", html_link(cell_address(job.cell), "Cell " + job.cell),
-      html_link(cell_address(job.cell) + "/history", "History"),
-      html_link(fmt::format("/jobs/{}", job.id), fmt::format("Job {}", job.id)),
-      html_link(fmt::format("/jobs/{}/findings.json", job.id), "all of it as JSON"), shown_time(job.finished_at));
+  const std::string links =
+      fmt::format("<p>{} · {} · {} · {} · checked {} UTC</p>",
+                  html_link(cell_address(job.cell), "Cell " + job.cell),
+                  html_link(cell_address(job.cell) + "/history", "History"),
+                  html_link(fmt::format("/jobs/{}", job.id), fmt::format("Job {}", job.id)),
+                  html_link(fmt::format("/jobs/{}/findings.json", job.id), "all of it as JSON"),
+                  shown_time(job.finished_at));
   return page_reply({"Health of cell " + job.cell, health_sections(findings, links)});
 }
 
@@ -62,9 +69,12 @@ HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_progr
 
 HttpReply Pages::answer(const HttpAsk& ask, ServerPhase phase) {
   if (phase != ServerPhase::kServing)
-    return told(503, "Not up", phase == ServerPhase::kStarting ? "The service is starting." : "The service stops.");
+    return told(
+        503, "Not up",
+        phase == ServerPhase::kStarting ? "The service is starting." : "The service stops.");
   const auto& path = ask.path;
-  if (path.empty()) return kept("/", kForAMoment, [this] { return page_reply(fleet_page(server_)); });
+  if (path.empty())
+    return kept("/", kForAMoment, [this] { return page_reply(fleet_page(server_)); });
   if (path[0] == "cells" && path.size() >= 2) return of_cell(ask);
   if (path[0] == "jobs") return of_job(ask);
   if (path[0] == "fleet" && path.size() == 1)
@@ -76,12 +86,14 @@ HttpReply Pages::of_cell(const HttpAsk& ask) {
   const auto& path = ask.path;
   const std::string& cell = path[1];
   if (path.size() == 2)
-    return kept(cell_address(cell), kForAMoment, [&] { return reply_of(cell_page(server_, cell)); });
+    return kept(cell_address(cell), kForAMoment,
+                [&] { return reply_of(cell_page(server_, cell)); });
   const auto report = [&](const Result<std::string>& page) {
     return page ? report_reply(*page, cell) : refused_reply(page.error());
   };
   if (path.size() == 3 && path[2] == "history")
-    return kept(cell_address(cell) + "/history", kForAWhile, [&] { return report(history_report(server_, cell)); });
+    return kept(cell_address(cell) + "/history", kForAWhile,
+                [&] { return report(history_report(server_, cell)); });
   if (path.size() != 4 || path[2] != "models") return not_there();
   const auto version = number_in<int>(path[3]);
   if (!version) return not_there();
@@ -91,7 +103,8 @@ HttpReply Pages::of_cell(const HttpAsk& ask) {
 
 HttpReply Pages::of_job(const HttpAsk& ask) {
   const auto& path = ask.path;
-  if (path.size() == 1) return kept("/jobs", kForAMoment, [this] { return reply_of(jobs_page(server_)); });
+  if (path.size() == 1)
+    return kept("/jobs", kForAMoment, [this] { return reply_of(jobs_page(server_)); });
   const auto job = number_in<std::int64_t>(path[1]);
   if (!job || path.size() > 3) return not_there();
   if (path.size() == 2) return reply_of(job_page(server_, *job));
@@ -102,11 +115,13 @@ HttpReply Pages::of_job(const HttpAsk& ask) {
 std::optional<HttpReply> Pages::find_kept(const std::string& address) {
   const MutexLock lock(mutex_);
   std::erase_if(kept_, [now = Clock::now()](const Kept& one) { return one.until <= now; });
-  const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& one) { return one.address == address; });
+  const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                  [&](const Kept& one) { return one.address == address; });
   return found == kept_.end() ? std::nullopt : std::optional(found->reply);
 }
 
-HttpReply Pages::kept(const std::string& address, std::chrono::seconds keep, const std::function<HttpReply()>& make) {
+HttpReply Pages::kept(const std::string& address, std::chrono::seconds keep,
+                      const std::function<HttpReply()>& make) {
   if (auto reply = find_kept(address)) return *reply;
   const MutexLock one_at_a_time(making_);
   if (auto reply = find_kept(address)) return *reply;

@@ -13,8 +13,8 @@
 
 namespace trammel {
 
-/// The pages for people: the fleet, a cell, its models, jobs, what they found. Costly ones are made one at a time, and
-/// the last ones made are kept for a moment. Thread-safe.
+/// The pages for people: the fleet, a cell, its models, jobs, what they found. Costly ones are made
+/// one at a time, and the last ones made are kept for a moment. Thread-safe.
 class Pages {
  public:
   explicit Pages(const Watched& server) : server_(server) {}

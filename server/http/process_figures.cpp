@@ -17,13 +17,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Unix time, s, when this program file was loaded.
-const double kStarted = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+const double kStarted =
+    std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 
 /// The fields of /proc/self/stat behind the name of the process, which may hold anything.
 std::vector<double> fields_of_stat() {
   std::ifstream in("/proc/self/stat");
   const std::string line{std::istreambuf_iterator<char>(in), {}};
-  std::istringstream rest(line.substr(std::min(line.size(), line.rfind(')') + 4)));  // and its state
+  std::istringstream rest(
+      line.substr(std::min(line.size(), line.rfind(')') + 4)));  // and its state
   return {std::istream_iterator<double>(rest), {}};
 }
 
@@ -51,7 +53,8 @@ ProcessFigures process_figures() {
   now.processor_s = seconds(used.ru_utime) + seconds(used.ru_stime);
   now.started = kStarted;
   std::error_code error;
-  for (fs::directory_iterator file("/proc/self/fd", error), end; !error && file != end; file.increment(error))
+  for (fs::directory_iterator file("/proc/self/fd", error), end; !error && file != end;
+       file.increment(error))
     ++now.open_files;
   return now;
 }

@@ -9,7 +9,8 @@ namespace {
 using State = CellReadiness::State;
 using Where = ModelRegistry::Place::Where;
 
-constexpr int kMostAsked = 20;  // dark cells whose last training the store is asked for, in one answer
+constexpr int kMostAsked =
+    20;  // dark cells whose last training the store is asked for, in one answer
 
 /// What all cells are looked up in, read once.
 struct Known {
@@ -56,15 +57,16 @@ CellReadiness untrained(const std::string& cell, const Watched& server, int* ask
   if (++*asked > kMostAsked) return one;
   const auto jobs = server.store.recent_jobs(cell, 1);
   if (!jobs) return {cell, State::kUnreadable, 0, sentence(jobs.error())};
-  const auto last =
-      std::find_if(jobs->rbegin(), jobs->rend(), [](const StoredJob& job) { return job.kind == JobKind::kTrain; });
+  const auto last = std::find_if(jobs->rbegin(), jobs->rend(),
+                                 [](const StoredJob& job) { return job.kind == JobKind::kTrain; });
   if (last == jobs->rend()) return one;
   one.state = State::kTrainingEnded;
   one.why = fmt::format("job {} ended without a model in force: {}", last->id, last->message);
   return one;
 }
 
-CellReadiness readiness_of(const std::string& cell, const Known& known, const Watched& server, int* asked) {
+CellReadiness readiness_of(const std::string& cell, const Known& known, const Watched& server,
+                           int* asked) {
   const auto place = known.places.find(cell);
   const auto trouble = known.troubles.find(cell);
   if (place != known.places.end()) {
@@ -76,12 +78,16 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
     }
     return one;
   }
-  const bool has_other_files = trouble != known.troubles.end() && state_of(trouble->second) == State::kFormerServed;
+  const bool has_other_files =
+      trouble != known.troubles.end() && state_of(trouble->second) == State::kFormerServed;
   if (has_other_files)
-    return {cell, State::kDescribedOtherwise, 0, trouble->second.what};  // and no model to go on with
-  if (trouble != known.troubles.end()) return {cell, state_of(trouble->second), 0, trouble->second.what};
+    return {cell, State::kDescribedOtherwise, 0,
+            trouble->second.what};  // and no model to go on with
+  if (trouble != known.troubles.end())
+    return {cell, state_of(trouble->second), 0, trouble->second.what};
   if (const auto job = known.unfinished.find(cell); job != known.unfinished.end())
-    return {cell, State::kInTraining, 0, fmt::format("job {} is making its first model", job->second.job)};
+    return {cell, State::kInTraining, 0,
+            fmt::format("job {} is making its first model", job->second.job)};
   return untrained(cell, server, asked);
 }
 
@@ -90,15 +96,16 @@ std::vector<std::string> notes_of(const Watched& server) {
   std::vector<std::string> notes;
   const StoreState state = server.store.state();
   if (state.why_not_written)
-    notes.push_back(fmt::format("the store cannot be {}: {}",
-                                state.readable ? "written" : "read, copies of its models are served",
-                                sentence(*state.why_not_written)));
+    notes.push_back(
+        fmt::format("the store cannot be {}: {}",
+                    state.readable ? "written" : "read, copies of its models are served",
+                    sentence(*state.why_not_written)));
   if (!state.clock.empty()) notes.push_back(state.clock);
   notes.insert(notes.end(), state.damages.begin(), state.damages.end());
   for (const ServerInRecord& one : server.trainer.servers_seen()) {
     if (one.is_gone)
-      notes.push_back(
-          fmt::format("server {} on {} is gone: not heard of for {} s", one.self.server, one.self.host, one.silent_s));
+      notes.push_back(fmt::format("server {} on {} is gone: not heard of for {} s", one.self.server,
+                                  one.self.host, one.silent_s));
   }
   return notes;
 }
@@ -114,14 +121,16 @@ nlohmann::ordered_json record_seen(const Watched& server) {
                        {"serves", one.self.serves},
                        {"trains", one.self.trains},
                        {"changes_behind", one.behind}});
-  nlohmann::ordered_json record = {
-      {"reachable", !state.why_not_written}, {"away_since_unix_s", nullptr}, {"servers", std::move(servers)}};
+  nlohmann::ordered_json record = {{"reachable", !state.why_not_written},
+                                   {"away_since_unix_s", nullptr},
+                                   {"servers", std::move(servers)}};
   if (state.why_not_written) record["away_since_unix_s"] = state.since;
   return record;
 }
 
 nlohmann::ordered_json json_of(const CellReadiness& one) {
-  nlohmann::ordered_json json = {{"cell", one.cell}, {"state", to_text(one.state)}, {"version", one.version}};
+  nlohmann::ordered_json json = {
+      {"cell", one.cell}, {"state", to_text(one.state)}, {"version", one.version}};
   if (!one.why.empty()) json["why"] = one.why;
   return json;
 }
@@ -131,7 +140,8 @@ Readiness not_ready(const char* state, const std::string& why) {
 }
 
 Readiness of_cells(const std::vector<CellReadiness>& cells) {
-  nlohmann::ordered_json dark = nlohmann::ordered_json::array(), noted = nlohmann::ordered_json::array();
+  nlohmann::ordered_json dark = nlohmann::ordered_json::array(),
+                         noted = nlohmann::ordered_json::array();
   for (const CellReadiness& one : cells) {
     if (one.is_dark()) dark.push_back(json_of(one));
     if (!one.is_dark() && !one.why.empty()) noted.push_back(json_of(one));
@@ -181,7 +191,8 @@ std::vector<CellReadiness> cells_readiness(const Watched& server) {
   const Known known = known_of(server);
   std::vector<CellReadiness> all;
   int asked = 0;
-  for (const auto& [name, cell] : server.trainer.cells()) all.push_back(readiness_of(name, known, server, &asked));
+  for (const auto& [name, cell] : server.trainer.cells())
+    all.push_back(readiness_of(name, known, server, &asked));
   return all;
 }
 
@@ -192,7 +203,8 @@ Readiness readiness(const Watched& server, ServerPhase phase, const std::string&
   if (!movement.still.empty())
     return not_ready("hung", fmt::format("no progress in: {}", fmt::join(movement.still, ", ")));
   std::vector<CellReadiness> cells = cells_readiness(server);
-  if (!cell.empty()) std::erase_if(cells, [&](const CellReadiness& one) { return one.cell != cell; });
+  if (!cell.empty())
+    std::erase_if(cells, [&](const CellReadiness& one) { return one.cell != cell; });
   if (cells.empty()) return not_ready("unknown", fmt::format("cell {} is not served here", cell));
   Readiness told = of_cells(cells);
   told.told["notes"] = notes_of(server);

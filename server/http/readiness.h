@@ -43,6 +43,7 @@ struct Readiness {
   nlohmann::ordered_json told;
 };
 /// `cell`: of this one alone; empty: of all.
-[[nodiscard]] Readiness readiness(const Watched& server, ServerPhase phase, const std::string& cell);
+[[nodiscard]] Readiness readiness(const Watched& server, ServerPhase phase,
+                                  const std::string& cell);
 
 }  // namespace trammel

@@ -24,7 +24,9 @@ namespace trammel {
 
 namespace {
 
-std::string name_of(const MeasurementBatch& batch) { return batch.where.empty() ? "batch " + batch.id : batch.where; }
+std::string name_of(const MeasurementBatch& batch) {
+  return batch.where.empty() ? "batch " + batch.id : batch.where;
+}
 
 /// Shifts the times so that the first recorded one of each session is 0.
 void rebase_times(std::vector<Measurement>& measurements) {
@@ -38,7 +40,8 @@ Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string&
   const Anchors anchors = TRY(anchors_of(cell));
   for (Measurement& measurement : batch.measurements) {
     if (measurement.context.q.size() != cell.robot.size()) {
-      return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
+      return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(),
+                     cell.robot.size())
           .in(where)
           .at_row(measurement.row)
           .beyond(measurement.context.q.size(), cell.robot.size());
@@ -60,7 +63,8 @@ Status check_spreads(const MeasurementBatch& recorded, const Cell& cell, const s
   const MeasurementBatch batch = positions_of(recorded);
   if (!has_sessions(batch)) return check_spread(batch, cell, where);
   for (const MeasurementBatch& session : by_session(batch)) {
-    const Status fine = check_spread(session, cell, fmt::format("{}, session {}", where, session.id));
+    const Status fine =
+        check_spread(session, cell, fmt::format("{}, session {}", where, session.id));
     if (!fine) return fine;
   }
   return {};
@@ -81,9 +85,10 @@ std::vector<std::string> session_names(const MeasurementBatch& next) {
   return names;
 }
 
-/// What two rows have in common only if they are one measurement: all digits of joints and position, and what was on
-/// the arm.
-using Fingerprint = std::tuple<std::vector<double>, std::array<double, 3>, std::string, std::string>;
+/// What two rows have in common only if they are one measurement: all digits of joints and
+/// position, and what was on the arm.
+using Fingerprint =
+    std::tuple<std::vector<double>, std::array<double, 3>, std::string, std::string>;
 
 Fingerprint fingerprint_of(const Measurement& m) {
   return {std::vector<double>(m.context.q.begin(), m.context.q.end()),
@@ -152,8 +157,9 @@ CheckedBatch::CheckedBatch(MeasurementBatch rows, std::vector<bool> is_held_out,
   BatchSplit split = split_rows(rows, is_held_out);
   mark(split.train, MeasurementSet::kTrain);
   mark(split.validation, MeasurementSet::kValidation);
-  content_ = std::make_shared<const Content>(Content{
-      std::move(rows), std::move(split.train), std::move(split.validation), std::move(is_held_out), std::move(hash)});
+  content_ = std::make_shared<const Content>(Content{std::move(rows), std::move(split.train),
+                                                     std::move(split.validation),
+                                                     std::move(is_held_out), std::move(hash)});
 }
 
 CheckedBatch CheckedBatch::holding_out(const std::vector<bool>& flags) const {
@@ -165,7 +171,8 @@ CheckedBatch CheckedBatch::holding_out(const std::vector<bool>& flags) const {
 
 bool CheckedBatch::is_in_order_of_time() const {
   const auto& poses = rows().measurements;
-  if (!std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.time.has_value(); })) {
+  if (!std::all_of(poses.begin(), poses.end(),
+                   [](const Measurement& m) { return m.context.time.has_value(); })) {
     return true;
   }
   return std::is_sorted(poses.begin(), poses.end(), earlier);
@@ -190,9 +197,11 @@ CheckedBatch CheckedBatch::in_order_of_time(const Chain& robot) const {
   return {std::move(sorted), std::move(is_held_out), hash()};
 }
 
-Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) {
+Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell,
+                                        const HoldOut& hold_out) {
   const std::string where = name_of(batch);
-  if (batch.measurements.empty()) return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
+  if (batch.measurements.empty())
+    return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
   // Of a batch that was never a file, too, parts are known by the text of the whole.
   if (batch.source_text.empty()) batch.source_text = to_csv(batch);
   std::string hash = batch_hash(batch);
@@ -203,8 +212,10 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   const auto with_reading = [&](const Error& why) {
     return tl::make_unexpected(has_gauges(batch) ? why : with_likely_reading(why, batch, cell));
   };
-  if (const Status poses = check_poses(batch, cell, where); !poses) return with_reading(poses.error());
-  if (const Status spread = check_spreads(batch, cell, where); !spread) return with_reading(spread.error());
+  if (const Status poses = check_poses(batch, cell, where); !poses)
+    return with_reading(poses.error());
+  if (const Status spread = check_spreads(batch, cell, where); !spread)
+    return with_reading(spread.error());
   fill_velocity(batch);
   fill_history(batch, cell.robot);
   std::vector<bool> is_held_out = hold_out(batch);
@@ -216,9 +227,11 @@ CheckedBatch joined(std::vector<CheckedBatch> batches) {
   if (batches.size() == 1) return batches.front();
   const auto clock = [](const CheckedBatch& batch) { return batch.rows().clock; };
   MeasurementBatch all;
-  if (std::all_of(batches.begin(), batches.end(), [&](const CheckedBatch& one) { return clock(one).has_value(); })) {
-    std::stable_sort(batches.begin(), batches.end(),
-                     [&](const CheckedBatch& a, const CheckedBatch& b) { return *clock(a) < *clock(b); });
+  if (std::all_of(batches.begin(), batches.end(),
+                  [&](const CheckedBatch& one) { return clock(one).has_value(); })) {
+    std::stable_sort(
+        batches.begin(), batches.end(),
+        [&](const CheckedBatch& a, const CheckedBatch& b) { return *clock(a) < *clock(b); });
     all.clock = clock(batches.back());
   }
   std::vector<bool> is_held_out;

@@ -11,17 +11,20 @@
 
 namespace trammel {
 
-/// Chooses the rows that are held out: one flag per row. The batch still has `set` as it was recorded.
+/// Chooses the rows that are held out: one flag per row. The batch still has `set` as it was
+/// recorded.
 using HoldOut = std::function<std::vector<bool>(const MeasurementBatch& batch)>;
-/// Chooses by the `set` column if the batch has one, else draws `share` of the poses at random with `seed`.
+/// Chooses by the `set` column if the batch has one, else draws `share` of the poses at random with
+/// `seed`.
 [[nodiscard]] HoldOut drawn(double share, std::uint64_t seed);
 
-/// A batch that was checked against a cell and split into training and held-out rows. All training and validation code
-/// takes this type, so each batch is checked and split once. Only check_against_cell() makes one.
+/// A batch that was checked against a cell and split into training and held-out rows. All training
+/// and validation code takes this type, so each batch is checked and split once. Only
+/// check_against_cell() makes one.
 ///
-/// Tools and payloads are resolved, rows of a session stand together (divide_into_sessions()), times count from the
-/// first one that was recorded in it, and poses of a continuous path have velocities (fill_velocity()). Immutable;
-/// copies share their content.
+/// Tools and payloads are resolved, rows of a session stand together (divide_into_sessions()),
+/// times count from the first one that was recorded in it, and poses of a continuous path have
+/// velocities (fill_velocity()). Immutable; copies share their content.
 class CheckedBatch {
  public:
   [[nodiscard]] const std::string& id() const { return rows().id; }
@@ -39,8 +42,8 @@ class CheckedBatch {
   [[nodiscard]] CheckedBatch holding_out(const std::vector<bool>& flags) const;
   /// False if the recorded times contradict the order of the rows.
   [[nodiscard]] bool is_in_order_of_time() const;
-  /// A copy with the poses in the order of their times, and with velocities computed from that order, as `robot` went
-  /// through them. A batch that is in order is returned unchanged.
+  /// A copy with the poses in the order of their times, and with velocities computed from that
+  /// order, as `robot` went through them. A batch that is in order is returned unchanged.
   [[nodiscard]] CheckedBatch in_order_of_time(const Chain& robot) const;
 
  private:
@@ -50,23 +53,26 @@ class CheckedBatch {
     std::string hash;
   };
   CheckedBatch(MeasurementBatch rows, std::vector<bool> is_held_out, std::string hash);
-  friend Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out);
+  friend Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell,
+                                                 const HoldOut& hold_out);
   friend CheckedBatch joined(std::vector<CheckedBatch> batches);
 
   std::shared_ptr<const Content> content_;
 };
 
-/// The batch made ready for `cell`. Refuses a wrong number or kind of joints, a joint beyond its limit, an unknown tool
-/// or payload, and a missing name where the cell has several. Refuses joints that look like radians, and positions that
-/// spread far more or far less than the robot's own motion (metres for millimetres).
+/// The batch made ready for `cell`. Refuses a wrong number or kind of joints, a joint beyond its
+/// limit, an unknown tool or payload, and a missing name where the cell has several. Refuses joints
+/// that look like radians, and positions that spread far more or far less than the robot's own
+/// motion (metres for millimetres).
 [[nodiscard]] Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell,
                                                       const HoldOut& hold_out = drawn(0, 0));
 
-/// Joins batches of one cell into one, in the order of time where the instruments' clocks say it, else in their order.
-/// Each batch is a session, or as many as it has, because the tracker may have been set up anew. The ids are joined by
-/// plus signs, pose ids become `batch/pose`, extra columns are dropped. Held-out rows stay held out. A row that an
-/// earlier batch has to the last digit is the same measurement under another name: it counts once, and `copies` counts
-/// it. A single batch is returned unchanged.
+/// Joins batches of one cell into one, in the order of time where the instruments' clocks say it,
+/// else in their order. Each batch is a session, or as many as it has, because the tracker may have
+/// been set up anew. The ids are joined by plus signs, pose ids become `batch/pose`, extra columns
+/// are dropped. Held-out rows stay held out. A row that an earlier batch has to the last digit is
+/// the same measurement under another name: it counts once, and `copies` counts it. A single batch
+/// is returned unchanged.
 [[nodiscard]] CheckedBatch joined(std::vector<CheckedBatch> batches);
 
 }  // namespace trammel

@@ -14,8 +14,8 @@ std::optional<std::string> computed_not_measured(double rms, double sigma, int p
   const double left = rms / std::sqrt(3.0);
   if (poses < kEnoughPoses || !(left < kTooGood * sigma)) return std::nullopt;
   return fmt::format(
-      "the positions are the model's to {:.4f} mm, and the instrument is said to measure to {:.3f} mm: these positions "
-      "were computed, not measured",
+      "the positions are the model's to {:.4f} mm, and the instrument is said to measure to {:.3f} "
+      "mm: these positions were computed, not measured",
       to_mm(rms), to_mm(sigma));
 }
 

@@ -15,13 +15,15 @@ Result<std::string> resolved(const std::string& name, const Cell& cell, const An
   for (const auto& [id, anchor] : anchors) ids.push_back(id);
   const std::string known = ids.empty() ? "none" : fmt::format("{}", fmt::join(ids, ", "));
   if (name.empty() && ids.size() == 1) return ids.front();
-  Failure why = name.empty() ? refused("cell {}: no anchor named, and the cell has {}", cell.name, ids.size())
-                             : refused("cell {}: unknown anchor '{}'", cell.name, name);
+  Failure why =
+      name.empty() ? refused("cell {}: no anchor named, and the cell has {}", cell.name, ids.size())
+                   : refused("cell {}: unknown anchor '{}'", cell.name, name);
   if (!name.empty() && anchors.contains(name)) return name;
   return std::move(why)
       .of("anchor_id")
       .with_text(name)
-      .next(fmt::format("known: {}; anchors stand in the cell file, anchors: {{a1: {{xyz_mm: null}}}}", known));
+      .next(fmt::format(
+          "known: {}; anchors stand in the cell file, anchors: {{a1: {{xyz_mm: null}}}}", known));
 }
 
 /// The pose that it is told against, as the cell has it.
@@ -55,7 +57,8 @@ Status require_positions(const MeasurementBatch& batch, const std::string& who) 
   const auto gauged = std::find_if(batch.measurements.begin(), batch.measurements.end(),
                                    [](const Measurement& m) { return m.gauge.has_value(); });
   if (gauged == batch.measurements.end()) return {};
-  const std::string column = gauged->gauge->kind == Gauge::Kind::kDistance ? "distance_mm" : "touch_mm";
+  const std::string column =
+      gauged->gauge->kind == Gauge::Kind::kDistance ? "distance_mm" : "touch_mm";
   return refused("a row has {} and no position, {} works with positions alone", column, who)
       .in(batch.where.empty() ? "batch " + batch.id : batch.where)
       .at_row(gauged->row)
@@ -73,7 +76,9 @@ Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& an
     return refused("touch_mm of anchor '{}', which is a point", gauge.anchor)
         .of("touch_mm")
         .with_text(gauge.anchor)
-        .next("say in the cell file what is touched: sphere_radius_mm, plane_normal, or ring_axis and ring_radius_mm");
+        .next(
+            "say in the cell file what is touched: sphere_radius_mm, plane_normal, or ring_axis "
+            "and ring_radius_mm");
   }
   if (!measurement.sigma) measurement.sigma = anchor.sigma;
   return check_minus(gauge, cell);

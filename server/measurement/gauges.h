@@ -15,9 +15,11 @@ namespace trammel {
 /// Refuses gauges where `who` (`diagnose`, `a check`) works with positions alone.
 [[nodiscard]] Status require_positions(const MeasurementBatch& batch, const std::string& who);
 
-/// Resolves anchors, tools and payloads of the gauges, and gives a value without a sigma that of its instrument.
-/// Refuses an anchor that the cell file does not have, a touch of a point, a pose against which is told that is none of
-/// the robot's, and a missing name where the cell has several anchors. The caller adds file and row to errors.
-[[nodiscard]] Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& anchors);
+/// Resolves anchors, tools and payloads of the gauges, and gives a value without a sigma that of
+/// its instrument. Refuses an anchor that the cell file does not have, a touch of a point, a pose
+/// against which is told that is none of the robot's, and a missing name where the cell has several
+/// anchors. The caller adds file and row to errors.
+[[nodiscard]] Status check_gauge(Measurement& measurement, const Cell& cell,
+                                 const Anchors& anchors);
 
 }  // namespace trammel

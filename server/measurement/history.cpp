@@ -14,11 +14,13 @@ using Rows = std::span<Measurement>;
 bool is_in_order(const Rows& rows) {
   const auto timed = [](const Measurement& m) { return m.context.time.has_value(); };
   return std::all_of(rows.begin(), rows.end(), timed) &&
-         std::is_sorted(rows.begin(), rows.end(),
-                        [](const Measurement& a, const Measurement& b) { return *a.context.time < *b.context.time; });
+         std::is_sorted(rows.begin(), rows.end(), [](const Measurement& a, const Measurement& b) {
+           return *a.context.time < *b.context.time;
+         });
 }
 
-/// Whether the robot can have come to `now` from `before` by the sides of the gears that were recorded.
+/// Whether the robot can have come to `now` from `before` by the sides of the gears that were
+/// recorded.
 bool may_come_from(const JointVector& before, const PoseContext& now, const Chain& robot) {
   if (before.size() != now.q.size()) return false;
   if (now.direction.empty()) return true;
@@ -37,7 +39,8 @@ void fill_before(const Rows& rows, const Chain& robot) {
   }
 }
 
-/// Of a body that follows by `lag`, `time` later, while the temperature went evenly from `from` to `to`.
+/// Of a body that follows by `lag`, `time` later, while the temperature went evenly from `from` to
+/// `to`.
 double followed(double body, double from, double to, double time, double lag) {
   if (!(time > 0)) return body;
   const double behind = (to - from) / time * lag;  // how far it stays behind in the end
@@ -52,8 +55,8 @@ void fill_lagged(const Rows& rows) {
     const PoseContext& then = rows[i - 1].context;
     PoseContext& now = rows[i].context;
     for (std::size_t k = 0; k < kHeatLags.size(); ++k)
-      now.lagged.push_back(
-          followed(then.lagged[k], *then.temperature, *now.temperature, *now.time - *then.time, kHeatLags[k]));
+      now.lagged.push_back(followed(then.lagged[k], *then.temperature, *now.temperature,
+                                    *now.time - *then.time, kHeatLags[k]));
   }
 }
 

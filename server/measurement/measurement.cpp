@@ -9,8 +9,9 @@ namespace trammel {
 
 namespace {
 
-constexpr double kOldestUnixTime = 1e9;  // s: September 2001; smaller times count from another start
-constexpr double kClockAhead = 86400;    // s by which the instrument's clock may be ahead of ours
+constexpr double kOldestUnixTime =
+    1e9;                               // s: September 2001; smaller times count from another start
+constexpr double kClockAhead = 86400;  // s by which the instrument's clock may be ahead of ours
 
 }  // namespace
 

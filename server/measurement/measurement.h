@@ -18,15 +18,16 @@ enum class MeasurementSet { kUnassigned, kTrain, kValidation };
 struct Measurement {
   std::string pose_id;
   PoseContext context;
-  Vector3 p_W = Vector3::Zero();         ///< tool point as measured, m; of a gauge it is not a number
-  std::optional<Matrix3> R_WT;           ///< tool orientation as measured, active W <- T
-  std::optional<Gauge> gauge;            ///< one number instead of a position (gauges.h)
-  std::optional<double> sigma;           ///< m, of one axis of this point, or of the gauge
-  std::optional<double> sigma_rotation;  ///< rad, of one axis of this orientation, where it is not the tracker's
+  Vector3 p_W = Vector3::Zero();  ///< tool point as measured, m; of a gauge it is not a number
+  std::optional<Matrix3> R_WT;    ///< tool orientation as measured, active W <- T
+  std::optional<Gauge> gauge;     ///< one number instead of a position (gauges.h)
+  std::optional<double> sigma;    ///< m, of one axis of this point, or of the gauge
+  std::optional<double>
+      sigma_rotation;  ///< rad, of one axis of this orientation, where it is not the tracker's
   MeasurementSet set = MeasurementSet::kUnassigned;
-  std::string session_id;          ///< as recorded: one set-up of the instrument; empty: the batch is one
-  int session = 0;                 ///< its place in MeasurementBatch::sessions
-  int row = 0;                     ///< line in its file, for messages
+  std::string session_id;  ///< as recorded: one set-up of the instrument; empty: the batch is one
+  int session = 0;         ///< its place in MeasurementBatch::sessions
+  int row = 0;             ///< line in its file, for messages
   std::vector<std::string> extra;  ///< values of the batch's extra columns
 };
 
@@ -35,30 +36,37 @@ struct MeasurementBatch {
   std::string id;     ///< name given at submission, else the file's name without its extension
   std::string where;  ///< the file as messages name it; empty = not from a file
   std::vector<Measurement> measurements;
-  std::vector<JointType> joint_types;      ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
-  std::vector<std::string> extra_columns;  ///< header names of columns that Trammel does not know, kept
-  std::string source_text;                 ///< the CSV as it came
-  std::optional<std::int64_t> measured_at = {};  ///< Unix time, s, of the newest measurement; empty = unknown
-  std::optional<std::int64_t> clock = {};        ///< the same where the instrument's clock says it, else empty
-  /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch is one. A session
-  /// has a frame W of its own, because the tracker was set up anew.
+  std::vector<JointType>
+      joint_types;  ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
+  std::vector<std::string>
+      extra_columns;        ///< header names of columns that Trammel does not know, kept
+  std::string source_text;  ///< the CSV as it came
+  std::optional<std::int64_t> measured_at =
+      {};  ///< Unix time, s, of the newest measurement; empty = unknown
+  std::optional<std::int64_t> clock =
+      {};  ///< the same where the instrument's clock says it, else empty
+  /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch
+  /// is one. A session has a frame W of its own, because the tracker was set up anew.
   std::vector<std::string> sessions = {};
   int copies = 0;        ///< rows that were left out: an earlier batch has them, see joined()
-  bool as_then = false;  ///< its poses are placed by their index among those of a model: what began later had not begun
+  bool as_then = false;  ///< its poses are placed by their index among those of a model: what began
+                         ///< later had not begun
 };
 
-/// The batch with measured_at set: the latest `time_s` if that column is Unix time, else `taken_in`. `taken_in` is when
-/// the batch was received or its file was written (Unix time, s). A time before September 2001, or more than a day
-/// after `taken_in`, is no Unix time.
+/// The batch with measured_at set: the latest `time_s` if that column is Unix time, else
+/// `taken_in`. `taken_in` is when the batch was received or its file was written (Unix time, s). A
+/// time before September 2001, or more than a day after `taken_in`, is no Unix time.
 [[nodiscard]] MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in);
 
-/// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit: an empty file, a
-/// missing or doubled column, a row of another length, a number that is not finite, a quaternion that is not a unit one
-/// (limit 1e-3), a sigma that is not positive, a direction outside -1, 0, +1, two rows with one pose_id. In an optional
-/// column an empty field means that nothing was recorded. Joints are counted, not checked against a robot. A row tells
-/// a position, or one of `distance_mm` and `touch_mm` with `anchor_id`, perhaps against the pose `minus_pose_id`; a row
-/// that others name so may tell nothing, and is then no measurement.
-[[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where);
+/// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit:
+/// an empty file, a missing or doubled column, a row of another length, a number that is not
+/// finite, a quaternion that is not a unit one (limit 1e-3), a sigma that is not positive, a
+/// direction outside -1, 0, +1, two rows with one pose_id. In an optional column an empty field
+/// means that nothing was recorded. Joints are counted, not checked against a robot. A row tells a
+/// position, or one of `distance_mm` and `touch_mm` with `anchor_id`, perhaps against the pose
+/// `minus_pose_id`; a row that others name so may tell nothing, and is then no measurement.
+[[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text,
+                                                       const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);
 /// The batch as parse_batch_csv() reads it; optional columns only where a row has them.
 [[nodiscard]] std::string to_csv(const MeasurementBatch& batch);

@@ -9,7 +9,8 @@
 namespace trammel {
 
 double spread_of(const Eigen::Matrix3Xd& points) {
-  return (points.colwise() - points.rowwise().mean()).norm() / std::sqrt(static_cast<double>(points.cols()));
+  return (points.colwise() - points.rowwise().mean()).norm() /
+         std::sqrt(static_cast<double>(points.cols()));
 }
 
 bool are_at_one_place(const Eigen::Matrix3Xd& points) {
@@ -24,7 +25,8 @@ bool is_each_tool_at_one_place(const MeasurementBatch& batch) {
   }
   return !points.empty() && std::all_of(points.begin(), points.end(), [](const auto& tool) {
     const auto count = static_cast<Eigen::Index>(tool.second.size());
-    return are_at_one_place(Eigen::Map<const Eigen::Matrix3Xd>(tool.second.front().data(), 3, count));
+    return are_at_one_place(
+        Eigen::Map<const Eigen::Matrix3Xd>(tool.second.front().data(), 3, count));
   });
 }
 

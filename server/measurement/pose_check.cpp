@@ -10,7 +10,8 @@ constexpr double kLimitTolerance = 1e-6;  // rad, m: what a file rounds away
 
 }  // namespace
 
-Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot, const std::string& where) {
+Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
+                           const std::string& where) {
   if (static_cast<int>(columns.size()) != robot.size()) {
     return refused("{} joint columns, robot {} has {}", columns.size(), robot.name(), robot.size())
         .in(where)
@@ -19,7 +20,8 @@ Status check_joint_columns(const std::vector<JointType>& columns, const Chain& r
   for (int j = 0; j < robot.size(); ++j) {
     const JointType type = columns[static_cast<std::size_t>(j)];
     if (type == robot.joint(j).type) continue;
-    return refused("column {}, but joint {} of robot {} is {}: expected {}", joint_column(j, type), j + 1, robot.name(),
+    return refused("column {}, but joint {} of robot {} is {}: expected {}", joint_column(j, type),
+                   j + 1, robot.name(),
                    robot.joint(j).type == JointType::kPrismatic ? "prismatic" : "revolute",
                    joint_column(j, robot.joint(j).type))
         .in(where)

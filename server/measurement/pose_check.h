@@ -13,7 +13,8 @@ namespace trammel {
 [[nodiscard]] Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
                                          const std::string& where);
 
-/// Checks the joint limits and resolves tool and payload. The caller adds file and row to the error.
+/// Checks the joint limits and resolves tool and payload. The caller adds file and row to the
+/// error.
 [[nodiscard]] Status check_pose(PoseContext& context, const Cell& cell);
 
 }  // namespace trammel

@@ -25,16 +25,19 @@ std::optional<JointColumn> as_joint_column(std::string_view column_name) {
   const std::string name = lower(column_name);
   if (!name.starts_with('q')) return std::nullopt;
   JointColumn column;
-  const auto [end, error] = std::from_chars(name.data() + 1, name.data() + name.size(), column.number);
+  const auto [end, error] =
+      std::from_chars(name.data() + 1, name.data() + name.size(), column.number);
   const std::string_view unit(end, static_cast<std::size_t>(name.data() + name.size() - end));
-  if (error != std::errc() || column.number < 1 || (unit != "_deg" && unit != "_mm")) return std::nullopt;
+  if (error != std::errc() || column.number < 1 || (unit != "_deg" && unit != "_mm"))
+    return std::nullopt;
   column.type = unit == "_deg" ? JointType::kRevolute : JointType::kPrismatic;
   return column;
 }
 
 /// An optional column's number in this row; empty field = nothing recorded.
 Result<std::optional<double>> optional_number(const CsvTable& table, std::size_t row,
-                                              const std::optional<std::size_t>& column, double limit) {
+                                              const std::optional<std::size_t>& column,
+                                              double limit) {
   if (!column || table.field(row, *column).empty()) return std::optional<double>();
   return table.number(row, *column, limit).map([](double value) { return std::optional(value); });
 }
@@ -47,8 +50,8 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   for (std::size_t i = 0; i < table.columns().size(); ++i) {
     const auto joint = as_joint_column(table.columns()[i]);
     if (joint && !joints.emplace(joint->number, std::pair(i, joint->type)).second) {
-      return refused("two columns for joint {}: {} and {}", joint->number, table.columns()[joints[joint->number].first],
-                     table.columns()[i])
+      return refused("two columns for joint {}: {} and {}", joint->number,
+                     table.columns()[joints[joint->number].first], table.columns()[i])
           .in(table.where())
           .of(table.columns()[i]);
     }
@@ -56,7 +59,8 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   std::vector<std::string> direction_names;
   for (const auto& [number, column] : joints) {
     if (number != static_cast<int>(found.joints_.size()) + 1) {
-      return tl::make_unexpected(table.require(fmt::format("q{}_deg", found.joints_.size() + 1)).error());
+      return tl::make_unexpected(
+          table.require(fmt::format("q{}_deg", found.joints_.size() + 1)).error());
     }
     found.joints_.push_back(column.first);
     found.joint_types_.push_back(column.second);
@@ -84,7 +88,8 @@ Result<JointVector> PoseColumns::joints(const CsvTable& table, std::size_t row) 
   JointVector q(static_cast<Eigen::Index>(joints_.size()));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const double value = TRY(table.number(row, joints_[j]));
-    q(static_cast<Eigen::Index>(j)) = joint_types_[j] == JointType::kRevolute ? from_deg(value) : from_mm(value);
+    q(static_cast<Eigen::Index>(j)) =
+        joint_types_[j] == JointType::kRevolute ? from_deg(value) : from_mm(value);
   }
   return q;
 }
@@ -101,11 +106,13 @@ Result<PoseContext> PoseColumns::circumstances(const CsvTable& table, std::size_
   context.time = time;
   context.temperature = temperature;
   for (const std::size_t column : directions_) {
-    const int direction = TRY(table.field(row, column).empty() ? 0 : table.integer(row, column, -1, 1));
+    const int direction =
+        TRY(table.field(row, column).empty() ? 0 : table.integer(row, column, -1, 1));
     context.direction.push_back(direction);
   }
   context.index = static_cast<int>(row);
-  for (const auto& [column, text] : {std::pair(tool_, &context.tool), std::pair(payload_, &context.payload)}) {
+  for (const auto& [column, text] :
+       {std::pair(tool_, &context.tool), std::pair(payload_, &context.payload)}) {
     if (!column) continue;
     std::string name = TRY(table.name(row, *column));
     *text = std::move(name);
@@ -150,7 +157,8 @@ double joint_to_column(double value, JointType type) {
 }
 
 std::string joint_text(double value, JointType type) {
-  return fmt::format("{:.6g} {}", joint_to_column(value, type), type == JointType::kRevolute ? "deg" : "mm");
+  return fmt::format("{:.6g} {}", joint_to_column(value, type),
+                     type == JointType::kRevolute ? "deg" : "mm");
 }
 
 }  // namespace trammel

@@ -11,12 +11,13 @@
 
 namespace trammel {
 
-/// The columns of a table that describe commanded poses: `q1_deg` (of a rail `q1_mm`) and on, `dir1` and on, `time_s`,
-/// `temperature_c`, `tool_id`, `payload_id`, `pose_id`. Shared by batches, joint lists and targets.
+/// The columns of a table that describe commanded poses: `q1_deg` (of a rail `q1_mm`) and on,
+/// `dir1` and on, `time_s`, `temperature_c`, `tool_id`, `payload_id`, `pose_id`. Shared by batches,
+/// joint lists and targets.
 class PoseColumns {
  public:
-  /// Refuses a gap in the joint columns or directions that do not match them. No joint column at all is refused by
-  /// require_joints() only.
+  /// Refuses a gap in the joint columns or directions that do not match them. No joint column at
+  /// all is refused by require_joints() only.
   [[nodiscard]] static Result<PoseColumns> find(const CsvTable& table);
   [[nodiscard]] Status require_joints(const CsvTable& table) const;
 

@@ -40,18 +40,21 @@ std::vector<PoseGroup> pose_groups(const MeasurementBatch& batch) {
 }
 
 bool are_seen_together(const Measurement& a, const Measurement& b) {
-  return !a.gauge && !b.gauge && a.session == b.session && a.context.direction == b.context.direction;
+  return !a.gauge && !b.gauge && a.session == b.session &&
+         a.context.direction == b.context.direction;
 }
 
 std::vector<PoseGroup> groups_seen_together(const MeasurementBatch& batch) {
-  const auto at = [&](Index row) -> const Measurement& { return batch.measurements[static_cast<std::size_t>(row)]; };
+  const auto at = [&](Index row) -> const Measurement& {
+    return batch.measurements[static_cast<std::size_t>(row)];
+  };
   std::vector<PoseGroup> groups;
   for (const PoseGroup& rows : pose_groups(batch)) {
     const auto first = std::ssize(groups);
     for (const Index row : rows) {
-      const auto same = std::find_if(groups.begin() + first, groups.end(), [&](const PoseGroup& group) {
-        return are_seen_together(at(group.front()), at(row));
-      });
+      const auto same = std::find_if(
+          groups.begin() + first, groups.end(),
+          [&](const PoseGroup& group) { return are_seen_together(at(group.front()), at(row)); });
       if (same == groups.end()) {
         groups.push_back({row});
       } else {
@@ -67,7 +70,8 @@ std::vector<int> counted_together(const MeasurementBatch& batch) {
   if (groups.size() == batch.measurements.size()) return {};
   std::vector<int> counts(batch.measurements.size(), 1);
   for (const PoseGroup& rows : groups) {
-    for (const Index row : rows) counts[static_cast<std::size_t>(row)] = static_cast<int>(rows.size());
+    for (const Index row : rows)
+      counts[static_cast<std::size_t>(row)] = static_cast<int>(rows.size());
   }
   return counts;
 }

@@ -22,14 +22,18 @@ using reading::Reading;
 
 constexpr std::size_t kFewestPoses = 6;
 constexpr std::size_t kRowsLocated = 80, kRowsFitted = 200;  // evenly drawn beyond
-constexpr std::size_t kMostFitted = 16;  // readings that are tried with all of the arm, the nearest first
+constexpr std::size_t kMostFitted =
+    16;  // readings that are tried with all of the arm, the nearest first
 // Distances, m.
-constexpr double kWorthAsking = 1e-3;  // below it no reading is tried: what a model of a robot leaves
-constexpr double kOfRows = 5e-3;       // the same for rows: on a path, a late clock looks like the next row
-constexpr double kMuchBetter = 0.25;   // of the distance as given: a reading that was surely meant
-constexpr double kAsGood = 1.5;        // times the best: a reading that cannot be told from it
-constexpr double kFollow = 20e-3;      // what fits within it can be asked for single rows, zeros and tools
-constexpr double kBadRow = 10e-3;      // and 8 times the median: a row of other joints
+constexpr double kWorthAsking =
+    1e-3;  // below it no reading is tried: what a model of a robot leaves
+constexpr double kOfRows =
+    5e-3;  // the same for rows: on a path, a late clock looks like the next row
+constexpr double kMuchBetter = 0.25;  // of the distance as given: a reading that was surely meant
+constexpr double kAsGood = 1.5;       // times the best: a reading that cannot be told from it
+constexpr double kFollow =
+    20e-3;  // what fits within it can be asked for single rows, zeros and tools
+constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joints
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
 // What no robot is off by.
@@ -41,8 +45,9 @@ constexpr double kToolSigmas = 4;
 constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell is that near
 // Stated uncertainties.
 constexpr std::size_t kFewestForSigma = 20;  // poses: below that an arm follows noise
-constexpr double kNotThatGood = 0.25;        // of the stated deviation: honest noise leaves at least 0.8 of it
-constexpr double kHarmless = 3e-4;           // m: who states less may be careful, and does no harm
+constexpr double kNotThatGood =
+    0.25;  // of the stated deviation: honest noise leaves at least 0.8 of it
+constexpr double kHarmless = 3e-4;  // m: who states less may be careful, and does no harm
 // Angles.
 constexpr double kOtherTurn = from_deg(0.5);  // by which orientations decide between readings
 constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
@@ -59,13 +64,14 @@ struct Tried {
   ArmFit fit;
 };
 
-/// rad, median turn of the orientations from what the arm and its tool say; empty where there are none.
+/// rad, median turn of the orientations from what the arm and its tool say; empty where there are
+/// none.
 std::optional<double> turned(const NumberTable& table, const Cell& cell, const ArmFit& fit) {
   std::map<std::string, std::vector<Matrix3>> by_tool;
   for (std::size_t i = 0; i < table.size(); ++i) {
     if (table.R_WT[i])
-      by_tool[table.from[i]->context.tool].push_back(flange_pose_W(table, i, cell, fit).linear().transpose() *
-                                                     *table.R_WT[i]);
+      by_tool[table.from[i]->context.tool].push_back(
+          flange_pose_W(table, i, cell, fit).linear().transpose() * *table.R_WT[i]);
   }
   std::vector<double> off;
   for (const auto& [tool, all] : by_tool) {
@@ -81,7 +87,8 @@ std::optional<double> turned(const NumberTable& table, const Cell& cell, const A
 
 class Look {
  public:
-  Look(const MeasurementBatch& batch, const Cell& cell) : cell_(cell), table_(reading::table_of(batch)) {
+  Look(const MeasurementBatch& batch, const Cell& cell)
+      : cell_(cell), table_(reading::table_of(batch)) {
     if (table_.size() < kFewestPoses) return;
     const NumberTable some = thinned(table_, kRowsFitted);
     given_ = fitted(some, cell_, located(thinned(table_, kRowsLocated), cell_));
@@ -146,7 +153,8 @@ void Look::search() {
     const double quality = tried.fit.quality;
     near.emplace_back(quality, std::move(tried));
   }
-  std::stable_sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::stable_sort(near.begin(), near.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   if (near.size() > kMostFitted) near.resize(kMostFitted);
   std::vector<Tried> tried;
   for (auto& [quality, one] : near) {
@@ -157,14 +165,17 @@ void Look::search() {
   if (!tried.empty()) keep_best(std::move(tried));
 }
 
-/// A reading that shrinks the positions shrinks what is left of them, too: it must fit better beside their spread.
+/// A reading that shrinks the positions shrinks what is left of them, too: it must fit better
+/// beside their spread.
 bool Look::is_much_better(const Tried& tried) const {
   const double as_given = spread_of(table_.p_W);
   return tried.fit.quality < kFollow &&
-         tried.fit.quality * as_given < kMuchBetter * given_->quality * std::min(as_given, spread_of(tried.table.p_W));
+         tried.fit.quality * as_given <
+             kMuchBetter * given_->quality * std::min(as_given, spread_of(tried.table.p_W));
 }
 
-/// Of readings that fit the positions as well, orientations decide, then where the base stands, then the catalogue.
+/// Of readings that fit the positions as well, orientations decide, then where the base stands,
+/// then the catalogue.
 void Look::keep_best(std::vector<Tried> tried) {
   const auto keep = [&tried](const auto& figure, double ratio, double slack, double limit) {
     std::vector<double> all;
@@ -179,16 +190,20 @@ void Look::keep_best(std::vector<Tried> tried) {
   };
   const auto quality = [](const Tried& one) { return one.fit.quality; };
   keep(quality, kAsGood, 0.2 * kWorthAsking, std::numeric_limits<double>::infinity());
-  keep([this](const Tried& one) { return turned(one.table, cell_, one.fit).value_or(0); }, kAsGood, kOtherTurn, kPi);
-  std::stable_sort(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) { return a.reading < b.reading; });
+  keep([this](const Tried& one) { return turned(one.table, cell_, one.fit).value_or(0); }, kAsGood,
+       kOtherTurn, kPi);
+  std::stable_sort(tried.begin(), tried.end(),
+                   [](const Tried& a, const Tried& b) { return a.reading < b.reading; });
   if (cell_.X_WB) {
     const auto from_drawn = [this](const Tried& one) {
-      return Eigen::Quaterniond(one.fit.X_WB.linear()).angularDistance(Eigen::Quaterniond(cell_.X_WB->linear()));
+      return Eigen::Quaterniond(one.fit.X_WB.linear())
+          .angularDistance(Eigen::Quaterniond(cell_.X_WB->linear()));
     };
     std::vector<Tried> all = tried;
     keep(from_drawn, 1, from_deg(5), kNearBase);
     const Reading* first = tried.front().reading;
-    std::stable_partition(all.begin(), all.end(), [first](const Tried& one) { return one.reading == first; });
+    std::stable_partition(all.begin(), all.end(),
+                          [first](const Tried& one) { return one.reading == first; });
     tried = std::move(all);
   }
   found_ = std::move(tried);
@@ -197,8 +212,9 @@ void Look::keep_best(std::vector<Tried> tried) {
 Error Look::of_reading() const {
   const Tried& best = found_.front();
   const double given = std::max(given_->off, given_->quality);
-  std::string text = fmt::format("the positions do not follow the joints: {} off; read {} they would fit to {}",
-                                 mm(given), best.reading->name, mm(std::max(best.fit.off, best.fit.quality)));
+  std::string text =
+      fmt::format("the positions do not follow the joints: {} off; read {} they would fit to {}",
+                  mm(given), best.reading->name, mm(std::max(best.fit.off, best.fit.quality)));
   std::vector<std::string> others;
   for (std::size_t k = 1; k < found_.size(); ++k) {
     // Of rows, the others are the same with a few rows more.
@@ -233,9 +249,11 @@ std::optional<Error> Look::of_units() const {
     }
     if (rows.empty()) continue;
     const bool one = rows.size() == 1;
-    return refused("{} of {} positions {} not follow the joints, by up to {}: {} {}; read in {} {} would fit to {}",
-                   rows.size(), off.size(), one ? "does" : "do", mm(worst), one ? "row" : "rows",
-                   fmt::format("{}", fmt::join(rows, ", ")), unit.name, one ? "it" : "they", mm(left))
+    return refused(
+               "{} of {} positions {} not follow the joints, by up to {}: {} {}; read in {} {} "
+               "would fit to {}",
+               rows.size(), off.size(), one ? "does" : "do", mm(worst), one ? "row" : "rows",
+               fmt::format("{}", fmt::join(rows, ", ")), unit.name, one ? "it" : "they", mm(left))
         .of("x_mm,y_mm,z_mm")
         .at_row(rows.front())
         .beyond(to_mm(worst), to_mm(limit))
@@ -250,19 +268,22 @@ std::optional<Error> Look::of_units() const {
 std::optional<Error> Look::of_some_rows() {
   const std::vector<double> off = distances(table_, cell_, *given_);
   const double limit = std::max(kBadRow, kBadRowRatio * median(off));
-  const auto bad = static_cast<std::size_t>(std::count_if(off.begin(), off.end(), [&](double d) { return d > limit; }));
+  const auto bad = static_cast<std::size_t>(
+      std::count_if(off.begin(), off.end(), [&](double d) { return d > limit; }));
   if (bad < kFewestBadRows) return std::nullopt;
   for (const Reading& one : row_readings(table_, cell_)) {
     const NumberTable table = one.apply(table_);
     if (2 * (table_.size() - table.size()) > bad) continue;
     const std::vector<double> then = distances(table, cell_, *given_);
-    const auto left =
-        static_cast<std::size_t>(std::count_if(then.begin(), then.end(), [&](double d) { return d > limit; }));
+    const auto left = static_cast<std::size_t>(
+        std::count_if(then.begin(), then.end(), [&](double d) { return d > limit; }));
     if (4 * left > bad) continue;
     const auto first = std::find_if(off.begin(), off.end(), [&](double d) { return d > limit; });
     const double worst = *std::max_element(off.begin(), off.end());
-    return refused("{} of {} positions do not follow the joints, by up to {}; read {} all but {} would fit to {}", bad,
-                   off.size(), mm(worst), one.name, left, mm(median(then)))
+    return refused(
+               "{} of {} positions do not follow the joints, by up to {}; read {} all but {} would "
+               "fit to {}",
+               bad, off.size(), mm(worst), one.name, left, mm(median(then)))
         .of(one.columns)
         .at_row(table_.from[static_cast<std::size_t>(first - off.begin())]->row)
         .beyond(to_mm(worst), to_mm(limit))
@@ -282,13 +303,14 @@ std::optional<Error> Look::of_zero() const {
     if (given_->stddev_of_zeros(j) > kCertainZero) continue;
     const double turns = kQuarter * std::round(to_deg(zero) / kQuarter);
     const bool is_turn = turns != 0 && std::abs(to_deg(zero) - turns) < to_deg(kMostZero);
-    if (j + 1 == cell_.robot.size() && !is_turn) continue;  // the tool turned about the last axis, or another one
+    if (j + 1 == cell_.robot.size() && !is_turn)
+      continue;  // the tool turned about the last axis, or another one
     const std::string column = joint_column(j, JointType::kRevolute);
     const double added = is_turn ? turns : to_deg(zero);
     const std::string name = fmt::format("with {:.3g} deg added to {}", added, column);
     return refused(
-               "the positions follow the joints only {}: the zero of joint {} would be {:.1f} deg from the robot "
-               "file's",
+               "the positions follow the joints only {}: the zero of joint {} would be {:.1f} deg "
+               "from the robot file's",
                name, j + 1, to_deg(zero))
         .of(column)
         .beyond(std::abs(to_deg(zero)), to_deg(kMostZero))
@@ -306,8 +328,8 @@ std::optional<Error> Look::of_sigma() const {
   for (const Measurement* m : table_.from) stated.push_back(m->sigma.value_or(cell_.tracker.sigma));
   const double sigma = median(stated);
   if (sigma < kHarmless || given_->off > kNotThatGood * sigma) return std::nullopt;
-  return refused("the positions follow the joints to {}, and are said to be uncertain by {}", mm(given_->off),
-                 mm(sigma))
+  return refused("the positions follow the joints to {}, and are said to be uncertain by {}",
+                 mm(given_->off), mm(sigma))
       .of("sigma_mm")
       .beyond(to_mm(sigma), to_mm(given_->off / kNotThatGood))
       .next("is sigma_mm in another unit?")
@@ -324,8 +346,10 @@ std::optional<Error> Look::of_tool() const {
     if (!anywhere) anywhere = fitted(some, cell_, *given_, reading::ToolPoints::kAnywhere);
     const Vector3 p_FT = anywhere->tools.at(tool).translation();
     const Vector3 moved = p_FT - drawn->translation();
-    const Matrix3 spread = anywhere->tool_covariance.at(tool) + kToolStddev * kToolStddev * Matrix3::Identity();
-    if (moved.dot(spread.ldlt().solve(moved)) > kToolSigmas * kToolSigmas) return of_tool_at(tool, p_FT);
+    const Matrix3 spread =
+        anywhere->tool_covariance.at(tool) + kToolStddev * kToolStddev * Matrix3::Identity();
+    if (moved.dot(spread.ldlt().solve(moved)) > kToolSigmas * kToolSigmas)
+      return of_tool_at(tool, p_FT);
   }
   return std::nullopt;
 }
@@ -337,16 +361,18 @@ Error Look::of_tool_at(const std::string& tool, const Vector3& p_FT) const {
     if (other != tool && X_FT && (p_FT - X_FT->translation()).norm() < kSameTool * moved)
       is = fmt::format("those of tool '{}'", other);
   }
-  return refused("the positions are {} from the point of tool '{}': they would be {}", mm(moved), tool, is)
+  return refused("the positions are {} from the point of tool '{}': they would be {}", mm(moved),
+                 tool, is)
       .of("tool_id")
       .beyond(to_mm(moved), to_mm(kToolSigmas * kToolStddev))
       .with_text(is)
-      .next(fmt::format("another tool frame? Its xyz_mm would be [{:.1f}, {:.1f}, {:.1f}]", to_mm(p_FT.x()),
-                        to_mm(p_FT.y()), to_mm(p_FT.z())))
+      .next(fmt::format("another tool frame? Its xyz_mm would be [{:.1f}, {:.1f}, {:.1f}]",
+                        to_mm(p_FT.x()), to_mm(p_FT.y()), to_mm(p_FT.z())))
       .value();
 }
 
-/// The batch with its tools named, if the cell knows them and the joints are as many as the robot's.
+/// The batch with its tools named, if the cell knows them and the joints are as many as the
+/// robot's.
 std::optional<MeasurementBatch> with_tools(MeasurementBatch batch, const Cell& cell) {
   for (Measurement& m : batch.measurements) {
     const auto tool = resolve_tool(cell, m.context.tool);
@@ -359,7 +385,9 @@ std::optional<MeasurementBatch> with_tools(MeasurementBatch batch, const Cell& c
 
 }  // namespace
 
-ReadingLook look_at_readings(const MeasurementBatch& batch, const Cell& cell) { return Look(batch, cell).look(); }
+ReadingLook look_at_readings(const MeasurementBatch& batch, const Cell& cell) {
+  return Look(batch, cell).look();
+}
 
 Error with_likely_reading(Error failed, const MeasurementBatch& batch, const Cell& cell) {
   const auto named = with_tools(batch, cell);

@@ -5,8 +5,8 @@
 /// Units that numbers are told in by mistake.
 namespace trammel {
 
-/// The largest angle, told in radians, that a robot's joint has: two half turns and a little. A column of degrees that
-/// nowhere is beyond it may be one of radians.
+/// The largest angle, told in radians, that a robot's joint has: two half turns and a little. A
+/// column of degrees that nowhere is beyond it may be one of radians.
 inline constexpr double kMostRadians = 6.4;
 
 /// A unit of lengths that should have been mm.

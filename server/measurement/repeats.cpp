@@ -19,14 +19,16 @@ using Group = std::vector<const Measurement*>;
 
 bool are_repeats(const Measurement& a, const Measurement& b) {
   if (a.gauge || b.gauge) return false;  // at one pose, several instruments tell different numbers
-  if (a.context.velocity || b.context.velocity || a.set != b.set || a.session != b.session) return false;
+  if (a.context.velocity || b.context.velocity || a.set != b.set || a.session != b.session)
+    return false;
   if (a.context.tool != b.context.tool || a.context.payload != b.context.payload) return false;
-  if (a.context.direction != b.context.direction || a.context.q.size() != b.context.q.size()) return false;
+  if (a.context.direction != b.context.direction || a.context.q.size() != b.context.q.size())
+    return false;
   return ((a.context.q - b.context.q).array().abs() <= kSameJoint).all();
 }
 
-/// A number that is nearly equal for nearly equal joints and rarely for others. It finds candidates without comparing
-/// every pair.
+/// A number that is nearly equal for nearly equal joints and rarely for others. It finds candidates
+/// without comparing every pair.
 double joint_key(const JointVector& q) {
   double key = 0;
   for (Eigen::Index j = 0; j < q.size(); ++j) key += std::sqrt(static_cast<double>(j) + 2) * q(j);
@@ -47,8 +49,9 @@ std::vector<Group> group_repeats(const MeasurementBatch& batch) {
     const double key = joint_key(m.context.q);
     const double tolerance = key_tolerance(m.context.q);
     const auto end = group_of_key.upper_bound(key + tolerance);
-    const auto found = std::find_if(group_of_key.lower_bound(key - tolerance), end,
-                                    [&](const auto& entry) { return are_repeats(*groups[entry.second].front(), m); });
+    const auto found = std::find_if(
+        group_of_key.lower_bound(key - tolerance), end,
+        [&](const auto& entry) { return are_repeats(*groups[entry.second].front(), m); });
     if (found != end) {
       groups[found->second].push_back(&m);
     } else {
@@ -114,7 +117,8 @@ std::vector<double> mean_lagged(const Group& group) {
   std::vector<double> mean(kHeatLags.size());
   for (const Measurement* m : group) {
     if (m->context.lagged.size() != mean.size()) return {};
-    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += m->context.lagged[k] / static_cast<double>(group.size());
+    for (std::size_t k = 0; k < mean.size(); ++k)
+      mean[k] += m->context.lagged[k] / static_cast<double>(group.size());
   }
   return mean;
 }
@@ -133,7 +137,8 @@ Measurement average(const Group& group, double default_sigma) {
     mean.R_WT = mean_rotation(rotations);
   }
   mean.context.time = mean_of(group, [](const Measurement& m) { return m.context.time; });
-  mean.context.temperature = mean_of(group, [](const Measurement& m) { return m.context.temperature; });
+  mean.context.temperature =
+      mean_of(group, [](const Measurement& m) { return m.context.temperature; });
   mean.context.before = mean_before(group);
   mean.context.lagged = mean_lagged(group);
   return mean;
@@ -151,13 +156,14 @@ struct Scatter {
     for (const Measurement* m : group) {
       squares += (m->p_W - centre).squaredNorm();
       chi_square += weight(*m, default_sigma) * (m->p_W - weighted_mean.p_W).squaredNorm();
-      if (m->R_WT) rotation += rotation_log(*m->R_WT * weighted_mean.R_WT->transpose()).squaredNorm();
+      if (m->R_WT)
+        rotation += rotation_log(*m->R_WT * weighted_mean.R_WT->transpose()).squaredNorm();
     }
   }
 };
 
-RepeatStatistics statistics_of(const std::vector<Group>& groups, const std::vector<Measurement>& means,
-                               double default_sigma) {
+RepeatStatistics statistics_of(const std::vector<Group>& groups,
+                               const std::vector<Measurement>& means, double default_sigma) {
   RepeatStatistics statistics;
   Scatter scatter;
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -170,12 +176,15 @@ RepeatStatistics statistics_of(const std::vector<Group>& groups, const std::vect
     statistics.rotation_degrees_of_freedom += 3 * std::max(0, rotations - 1);
     scatter.add(groups[g], means[g], default_sigma);
   }
-  if (statistics.degrees_of_freedom > 0) statistics.sigma = std::sqrt(scatter.squares / statistics.degrees_of_freedom);
+  if (statistics.degrees_of_freedom > 0)
+    statistics.sigma = std::sqrt(scatter.squares / statistics.degrees_of_freedom);
   if (statistics.rotation_degrees_of_freedom > 0) {
-    statistics.sigma_rotation = std::sqrt(scatter.rotation / statistics.rotation_degrees_of_freedom);
+    statistics.sigma_rotation =
+        std::sqrt(scatter.rotation / statistics.rotation_degrees_of_freedom);
   }
   if (statistics.degrees_of_freedom >= kLeastDegreesOfFreedom) {
-    statistics.sigma_factor = std::max(1.0, std::sqrt(scatter.chi_square / statistics.degrees_of_freedom));
+    statistics.sigma_factor =
+        std::max(1.0, std::sqrt(scatter.chi_square / statistics.degrees_of_freedom));
   }
   return statistics;
 }

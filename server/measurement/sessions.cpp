@@ -8,7 +8,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kOldestUnixTime = 1e9;  // s: September 2001; smaller times count from another start
+constexpr double kOldestUnixTime =
+    1e9;  // s: September 2001; smaller times count from another start
 
 /// A session as it comes in the file.
 struct Found {
@@ -37,8 +38,10 @@ bool has_sessions(const MeasurementBatch& batch) { return batch.sessions.size() 
 void divide_into_sessions(MeasurementBatch& batch) {
   std::vector<Found> found = sessions_in(batch);
   if (found.size() < 2) return;
-  if (std::all_of(found.begin(), found.end(), [](const Found& one) { return one.began.has_value(); })) {
-    std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return *a.began < *b.began; });
+  if (std::all_of(found.begin(), found.end(),
+                  [](const Found& one) { return one.began.has_value(); })) {
+    std::stable_sort(found.begin(), found.end(),
+                     [](const Found& a, const Found& b) { return *a.began < *b.began; });
   } else {
     batch.clock.reset();
   }
@@ -49,8 +52,9 @@ void divide_into_sessions(MeasurementBatch& batch) {
     batch.sessions.push_back(session.id.empty() ? batch.id : session.id);
   }
   for (Measurement& m : batch.measurements) m.session = place.at(m.session_id);
-  std::stable_sort(batch.measurements.begin(), batch.measurements.end(),
-                   [](const Measurement& a, const Measurement& b) { return a.session < b.session; });
+  std::stable_sort(
+      batch.measurements.begin(), batch.measurements.end(),
+      [](const Measurement& a, const Measurement& b) { return a.session < b.session; });
   int index = 0;
   for (Measurement& m : batch.measurements) m.context.index = index++;
 }
@@ -63,13 +67,15 @@ std::vector<MeasurementBatch> by_session(const MeasurementBatch& batch) {
   none.source_text.clear();
   std::vector<MeasurementBatch> parts(batch.sessions.size(), none);
   for (std::size_t s = 0; s < parts.size(); ++s) parts[s].id = batch.sessions[s];
-  for (const Measurement& m : batch.measurements) parts[static_cast<std::size_t>(m.session)].measurements.push_back(m);
+  for (const Measurement& m : batch.measurements)
+    parts[static_cast<std::size_t>(m.session)].measurements.push_back(m);
   return parts;
 }
 
 MeasurementBatch only_sessions(const MeasurementBatch& batch, const std::vector<bool>& kept) {
   MeasurementBatch some = batch;
-  std::erase_if(some.measurements, [&](const Measurement& m) { return !kept[static_cast<std::size_t>(m.session)]; });
+  std::erase_if(some.measurements,
+                [&](const Measurement& m) { return !kept[static_cast<std::size_t>(m.session)]; });
   std::vector<int> place;
   some.sessions.clear();
   for (std::size_t s = 0; s < kept.size(); ++s) {

@@ -12,7 +12,8 @@ namespace trammel {
 
 namespace {
 
-/// Draws `count` of `size` without replacement. Own Fisher-Yates: the result of std::shuffle differs between libraries.
+/// Draws `count` of `size` without replacement. Own Fisher-Yates: the result of std::shuffle
+/// differs between libraries.
 std::vector<bool> draw(std::size_t size, std::size_t count, std::uint64_t seed) {
   std::vector<std::size_t> order(size);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -35,8 +36,9 @@ std::vector<bool> drawn_of(std::size_t count, double share, std::uint64_t seed) 
 
 std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share, std::uint64_t seed) {
   const auto& rows = batch.measurements;
-  const bool assigned =
-      std::any_of(rows.begin(), rows.end(), [](const Measurement& m) { return m.set != MeasurementSet::kUnassigned; });
+  const bool assigned = std::any_of(rows.begin(), rows.end(), [](const Measurement& m) {
+    return m.set != MeasurementSet::kUnassigned;
+  });
   if (assigned) {
     std::vector<bool> validation;
     for (const Measurement& m : rows) validation.push_back(m.set == MeasurementSet::kValidation);

@@ -13,18 +13,23 @@ struct BatchSplit {
   MeasurementBatch validation;
 };
 
-/// Draws `share` of `count` things with `seed`, one flag for each; at least one is not drawn. Reproducible.
+/// Draws `share` of `count` things with `seed`, one flag for each; at least one is not drawn.
+/// Reproducible.
 [[nodiscard]] std::vector<bool> drawn_of(std::size_t count, double share, std::uint64_t seed);
 
-/// One flag per row, true if it is held out. Uses the `set` column if the batch has one, else draws `share` of the
-/// poses with `seed` (at least one stays for training), each with all rows that stand at its joint vector: a row that
-/// is learned from would vouch for its siblings. Reproducible: same rows, seed and share, same flags.
-[[nodiscard]] std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share, std::uint64_t seed);
+/// One flag per row, true if it is held out. Uses the `set` column if the batch has one, else draws
+/// `share` of the poses with `seed` (at least one stays for training), each with all rows that
+/// stand at its joint vector: a row that is learned from would vouch for its siblings.
+/// Reproducible: same rows, seed and share, same flags.
+[[nodiscard]] std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share,
+                                              std::uint64_t seed);
 
 /// Splits the batch by `held_out`, one flag per row.
-[[nodiscard]] BatchSplit split_rows(const MeasurementBatch& batch, const std::vector<bool>& held_out);
+[[nodiscard]] BatchSplit split_rows(const MeasurementBatch& batch,
+                                    const std::vector<bool>& held_out);
 
 /// split_rows() by rows_held_out().
-[[nodiscard]] BatchSplit split_batch(const MeasurementBatch& batch, double share, std::uint64_t seed);
+[[nodiscard]] BatchSplit split_batch(const MeasurementBatch& batch, double share,
+                                     std::uint64_t seed);
 
 }  // namespace trammel

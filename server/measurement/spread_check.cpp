@@ -12,10 +12,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kRatio = 3;                  // nominal and real robot differ by millimetres, not by this
-constexpr double kSlack = 0.05;               // m: what a wrong tool or a moved tracker may add in a small batch
-constexpr double kSlackOfSmallAngles = 0.01;  // m: with |q| within 2 pi degrees the tool's share is a tenth
-constexpr double kUnknownToolLength = 0.5;    // m
+constexpr double kRatio = 3;     // nominal and real robot differ by millimetres, not by this
+constexpr double kSlack = 0.05;  // m: what a wrong tool or a moved tracker may add in a small batch
+constexpr double kSlackOfSmallAngles =
+    0.01;  // m: with |q| within 2 pi degrees the tool's share is a tenth
+constexpr double kUnknownToolLength = 0.5;  // m
 
 /// The smallest and largest possible spread of the nominal tool points, m.
 struct NominalSpread {
@@ -31,8 +32,9 @@ double spread_of(const std::vector<Vector3>& points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-/// With the tool point t in F unknown, the squared spread is c + 2 bᵀt + tᵀAt; its least and greatest value for
-/// |t| <= kUnknownToolLength, the least found along the way to the unbounded minimum.
+/// With the tool point t in F unknown, the squared spread is c + 2 bᵀt + tᵀAt; its least and
+/// greatest value for |t| <= kUnknownToolLength, the least found along the way to the unbounded
+/// minimum.
 NominalSpread spread_with_unknown_tool(const std::vector<Pose>& flanges) {
   const auto n = static_cast<double>(flanges.size());
   Vector3 p_mean = Vector3::Zero();
@@ -102,8 +104,8 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
     const double upper = kRatio * nominal.largest + (small_angles ? kSlackOfSmallAngles : kSlack);
     if (measured > upper && small_angles) {
       return refused(
-                 "measured positions spread over {:.1f} mm (rms from their centroid), but the commanded joints, all "
-                 "within {:.2f} deg, move the tool over {:.1f} mm at most",
+                 "measured positions spread over {:.1f} mm (rms from their centroid), but the "
+                 "commanded joints, all within {:.2f} deg, move the tool over {:.1f} mm at most",
                  to_mm(measured), group.largest_angle_deg, to_mm(nominal.largest))
           .in(where)
           .of("q1_deg")
@@ -112,13 +114,16 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
     }
     if (measured > upper || kRatio * measured + kSlack < nominal.smallest) {
       return refused(
-                 "measured positions spread over {:.1f} mm (rms from their centroid), the commanded joints move tool "
-                 "'{}' over {:.1f} mm, limit: a factor of {:g} and {:g} mm",
-                 to_mm(measured), tool, to_mm(measured > upper ? nominal.largest : nominal.smallest), kRatio,
+                 "measured positions spread over {:.1f} mm (rms from their centroid), the "
+                 "commanded joints move tool '{}' over {:.1f} mm, limit: a factor of {:g} and {:g} "
+                 "mm",
+                 to_mm(measured), tool,
+                 to_mm(measured > upper ? nominal.largest : nominal.smallest), kRatio,
                  to_mm(kSlack))
           .in(where)
           .of("x_mm")
-          .beyond(to_mm(measured), to_mm(measured > upper ? upper : (nominal.smallest - kSlack) / kRatio))
+          .beyond(to_mm(measured),
+                  to_mm(measured > upper ? upper : (nominal.smallest - kSlack) / kRatio))
           .next("Are positions mm, joints degrees, and is this the robot?");
     }
   }

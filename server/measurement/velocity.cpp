@@ -14,7 +14,8 @@ constexpr double kLargestMove = 0.2;    // rad, m
 
 bool is_continuous_path(const std::vector<Measurement>& path) {
   if (path.size() < kLeastPoses) return false;
-  if (!std::all_of(path.begin(), path.end(), [](const Measurement& m) { return m.context.time.has_value(); })) {
+  if (!std::all_of(path.begin(), path.end(),
+                   [](const Measurement& m) { return m.context.time.has_value(); })) {
     return false;
   }
   std::vector<double> steps;
@@ -44,13 +45,16 @@ JointVector slope(const PoseContext& a, const PoseContext& b, const PoseContext&
 
 /// Of the rows [first, end), which are of one session.
 bool fill_velocity_of(MeasurementBatch& batch, std::size_t first, std::size_t end) {
-  const auto at = [&](std::size_t i) { return batch.measurements.begin() + static_cast<std::ptrdiff_t>(i); };
+  const auto at = [&](std::size_t i) {
+    return batch.measurements.begin() + static_cast<std::ptrdiff_t>(i);
+  };
   const std::vector<Measurement> path(at(first), at(end));
   if (!is_continuous_path(path)) return false;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const std::size_t middle = std::clamp<std::size_t>(i, 1, path.size() - 2);
     batch.measurements[first + i].context.velocity =
-        slope(path[middle - 1].context, path[middle].context, path[middle + 1].context, *path[i].context.time);
+        slope(path[middle - 1].context, path[middle].context, path[middle + 1].context,
+              *path[i].context.time);
   }
   return true;
 }
@@ -62,7 +66,8 @@ bool fill_velocity(MeasurementBatch& batch) {
   for (Measurement& m : batch.measurements) m.context.velocity.reset();
   for (std::size_t first = 0; first < batch.measurements.size();) {
     std::size_t end = first;
-    while (end < batch.measurements.size() && batch.measurements[end].session == batch.measurements[first].session)
+    while (end < batch.measurements.size() &&
+           batch.measurements[end].session == batch.measurements[first].session)
       ++end;
     any = fill_velocity_of(batch, first, end) || any;
     first = end;

@@ -14,7 +14,8 @@ namespace trammel {
 /// What is counted of the requests of one operation. Thread-safe, without a lock.
 class OperationCounts {
  public:
-  static constexpr std::size_t kResults = 32;  ///< result codes that are told apart; what is beyond counts as the last
+  static constexpr std::size_t kResults =
+      32;  ///< result codes that are told apart; what is beyond counts as the last
 
   /// A request was answered with this code, `times` times (with its repeats).
   void answered(std::size_t result, std::uint64_t times) {

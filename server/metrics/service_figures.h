@@ -15,8 +15,9 @@ namespace trammel {
 
 struct OperationFigures {
   std::string operation;
-  LatencyHistogram::Counts latency;                ///< of what was worked on
-  std::map<std::string, std::uint64_t> by_result;  ///< answers, by the word of their result code: `ok`, `busy`
+  LatencyHistogram::Counts latency;  ///< of what was worked on
+  std::map<std::string, std::uint64_t>
+      by_result;  ///< answers, by the word of their result code: `ok`, `busy`
 };
 
 struct QueueFigures {
@@ -28,16 +29,16 @@ struct QueueFigures {
 struct ServiceFigures {
   std::vector<OperationFigures> operations;
   std::vector<QueueFigures> queues;
-  std::size_t waiting_bytes = 0;                         ///< memory of the requests that wait or are worked on
-  std::size_t clients = 0;                               ///< with a reply channel
-  std::uint64_t unheard = 0;                             ///< replies that were dropped because nobody listened
-  std::uint64_t strangers = 0;                           ///< handshakes of participants without the right certificate
-  std::uint64_t misdirected = 0;                         ///< requests whose reply would have gone to another client
-  std::uint64_t unreadable = 0;                          ///< requests of which not even the header could be read
-  std::uint64_t lost = 0;                                ///< requests that DDS lost before the service saw them
+  std::size_t waiting_bytes = 0;  ///< memory of the requests that wait or are worked on
+  std::size_t clients = 0;        ///< with a reply channel
+  std::uint64_t unheard = 0;      ///< replies that were dropped because nobody listened
+  std::uint64_t strangers = 0;    ///< handshakes of participants without the right certificate
+  std::uint64_t misdirected = 0;  ///< requests whose reply would have gone to another client
+  std::uint64_t unreadable = 0;   ///< requests of which not even the header could be read
+  std::uint64_t lost = 0;         ///< requests that DDS lost before the service saw them
   std::map<std::string, std::uint64_t> dropped_packets;  ///< by reason
   std::map<std::string, WorkFigures> work;               ///< by cell
-  std::optional<std::uint64_t> not_recorded = {};        ///< requests that were to be; empty: none are
+  std::optional<std::uint64_t> not_recorded = {};  ///< requests that were to be; empty: none are
 };
 
 /// Whether the threads of a service do their work.

@@ -11,9 +11,11 @@
 
 namespace trammel {
 
-/// What a cell was asked for, and how sure the answers were: whether the work is where the model knows the arm.
+/// What a cell was asked for, and how sure the answers were: whether the work is where the model
+/// knows the arm.
 struct WorkFigures {
-  /// Upper bounds of the classes of promised deviations, mm. One more class holds what is above the last.
+  /// Upper bounds of the classes of promised deviations, mm. One more class holds what is above the
+  /// last.
   static constexpr std::array<double, 9> kBounds = {0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1};
 
   std::uint64_t inside = 0;   ///< poses in the model's domain
@@ -22,7 +24,8 @@ struct WorkFigures {
   std::array<std::uint64_t, kBounds.size() + 1> in_class{};
   double sum_mm = 0;  ///< of the promised deviations
 
-  /// An answer with this standard deviation of the true error (root mean square of the three axes), m.
+  /// An answer with this standard deviation of the true error (root mean square of the three axes),
+  /// m.
   void answered(bool in_domain, double stddev) {
     ++(in_domain ? inside : outside);
     const double mm = 1e3 * stddev;

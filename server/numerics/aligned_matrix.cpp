@@ -54,7 +54,8 @@ AlignedMatrix AlignedMatrix::copy() const {
 
 AlignedMatrix factor_storage(Eigen::Index rows) {
   const Eigen::Index padded = padded_rows(rows);
-  // Columns that are a multiple of 512 bytes apart would put whole rows into the same few cache sets.
+  // Columns that are a multiple of 512 bytes apart would put whole rows into the same few cache
+  // sets.
   return {padded % 64 == 0 ? padded + kTargetBlock : padded, padded};
 }
 

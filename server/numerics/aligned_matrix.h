@@ -5,9 +5,9 @@
 
 namespace trammel {
 
-/// A column-major matrix of doubles, zero at first, that starts on a cache line. A large one asks for huge pages: a
-/// factorisation touches a page for each column, and with small pages most of its time would go into looking up their
-/// addresses. Movable, not copyable.
+/// A column-major matrix of doubles, zero at first, that starts on a cache line. A large one asks
+/// for huge pages: a factorisation touches a page for each column, and with small pages most of its
+/// time would go into looking up their addresses. Movable, not copyable.
 class AlignedMatrix {
  public:
   AlignedMatrix() = default;
@@ -20,8 +20,12 @@ class AlignedMatrix {
   [[nodiscard]] Eigen::Index cols() const { return cols_; }
   [[nodiscard]] double* data() { return data_.get(); }
   [[nodiscard]] const double* data() const { return data_.get(); }
-  [[nodiscard]] double& operator()(Eigen::Index row, Eigen::Index col) { return data_[index(row, col)]; }
-  [[nodiscard]] double operator()(Eigen::Index row, Eigen::Index col) const { return data_[index(row, col)]; }
+  [[nodiscard]] double& operator()(Eigen::Index row, Eigen::Index col) {
+    return data_[index(row, col)];
+  }
+  [[nodiscard]] double operator()(Eigen::Index row, Eigen::Index col) const {
+    return data_[index(row, col)];
+  }
   [[nodiscard]] Eigen::Map<Eigen::MatrixXd> map() { return {data(), rows_, cols_}; }
   [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> map() const { return {data(), rows_, cols_}; }
 
@@ -42,8 +46,8 @@ class AlignedMatrix {
   std::unique_ptr<double[], Release> data_;
 };
 
-/// Room for `rows` rows and columns as the factorisations of numerics_table.h want it: padded, and with a leading
-/// dimension that spreads a row over all cache sets.
+/// Room for `rows` rows and columns as the factorisations of numerics_table.h want it: padded, and
+/// with a leading dimension that spreads a row over all cache sets.
 [[nodiscard]] AlignedMatrix factor_storage(Eigen::Index rows);
 
 }  // namespace trammel

@@ -6,20 +6,27 @@
 namespace trammel {
 namespace {
 
-constexpr double kSufficientDecrease = 1e-4;  // of what the slope promises: Nocedal & Wright, section 3.1
-constexpr double kLeastCurvature = 1e-10;     // cosine of step and change of gradient: below it is rounding
-constexpr double kLeastDecrease = 1e-3;       // of the tolerance: a shorter step is not worth an evaluation
+constexpr double kSufficientDecrease =
+    1e-4;  // of what the slope promises: Nocedal & Wright, section 3.1
+constexpr double kLeastCurvature =
+    1e-10;  // cosine of step and change of gradient: below it is rounding
+constexpr double kLeastDecrease =
+    1e-3;  // of the tolerance: a shorter step is not worth an evaluation
 
-// Eq. 6.17. A step along which the curvature is not positive is left out: the matrix stays positive definite.
-void update_inverse_hessian(const Eigen::VectorXd& step, const Eigen::VectorXd& change, Eigen::MatrixXd* inverse) {
+// Eq. 6.17. A step along which the curvature is not positive is left out: the matrix stays positive
+// definite.
+void update_inverse_hessian(const Eigen::VectorXd& step, const Eigen::VectorXd& change,
+                            Eigen::MatrixXd* inverse) {
   const double curvature = step.dot(change);
   if (!(curvature > kLeastCurvature * step.norm() * change.norm())) return;
   const Eigen::VectorXd mapped = *inverse * change;
   const double scale = (1.0 + change.dot(mapped) / curvature) / curvature;
-  *inverse += scale * step * step.transpose() - (mapped * step.transpose() + step * mapped.transpose()) / curvature;
+  *inverse += scale * step * step.transpose() -
+              (mapped * step.transpose() + step * mapped.transpose()) / curvature;
 }
 
-// The minimum of the parabola through the value and slope at 0 and the value at `length`, kept off both ends.
+// The minimum of the parabola through the value and slope at 0 and the value at `length`, kept off
+// both ends.
 double shorter(double length, double value, double slope, double new_value) {
   if (!std::isfinite(new_value)) return 0.25 * length;
   const double parabola = -slope * length * length / (2.0 * (new_value - value - slope * length));
@@ -28,8 +35,8 @@ double shorter(double length, double value, double slope, double new_value) {
 
 }  // namespace
 
-BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, const Eigen::MatrixXd& inverse_hessian,
-                    const BfgsOptions& options) {
+BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start,
+                    const Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options) {
   BfgsResult result;
   ObjectiveValue here;
   result.evaluations = 1;
@@ -62,7 +69,8 @@ BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, co
       }
     }
     if (!accepted) break;
-    update_inverse_hessian(length * direction, there.gradient - here.gradient, &result.inverse_hessian);
+    update_inverse_hessian(length * direction, there.gradient - here.gradient,
+                           &result.inverse_hessian);
     result.x += length * direction;
     std::swap(here, there);
   }

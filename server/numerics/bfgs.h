@@ -10,7 +10,8 @@ struct ObjectiveValue {
   Eigen::VectorXd gradient;
 };
 
-/// A function and its gradient. Returns false where it is not defined; the search then takes a shorter step.
+/// A function and its gradient. Returns false where it is not defined; the search then takes a
+/// shorter step.
 using Objective = std::function<bool(const Eigen::VectorXd& x, ObjectiveValue* out)>;
 
 struct BfgsOptions {
@@ -25,12 +26,15 @@ struct BfgsResult {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd inverse_hessian;  ///< the approximation at x
   int evaluations = 0;
-  bool defined = false;    ///< false: the function is not defined at the start, and nothing else is set
+  bool defined =
+      false;  ///< false: the function is not defined at the start, and nothing else is set
   bool converged = false;  ///< the tolerance was met within the evaluations allowed
 };
 
-/// Minimises by BFGS with a backtracking line search (Nocedal & Wright, Numerical Optimization, ch. 3 and 6).
+/// Minimises by BFGS with a backtracking line search (Nocedal & Wright, Numerical Optimization, ch.
+/// 3 and 6).
 [[nodiscard]] BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start,
-                                  const Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options);
+                                  const Eigen::MatrixXd& inverse_hessian,
+                                  const BfgsOptions& options);
 
 }  // namespace trammel

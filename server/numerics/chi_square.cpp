@@ -13,7 +13,9 @@ constexpr int kMostTerms = 20000;
 
 /// Two more degrees of freedom add this to the tail: (x/2)^(k/2) e^(-x/2) / Gamma(k/2 + 1).
 double added_by_two(double x, double freedom) {
-  return x <= 0 ? 0 : std::exp(0.5 * freedom * std::log(0.5 * x) - 0.5 * x - std::lgamma(0.5 * freedom + 1));
+  return x <= 0 ? 0
+                : std::exp(0.5 * freedom * std::log(0.5 * x) - 0.5 * x -
+                           std::lgamma(0.5 * freedom + 1));
 }
 
 }  // namespace

@@ -12,8 +12,12 @@ Index start_of(Index row) { return row * (row + 1) / 2; }
 
 }  // namespace
 
-Eigen::Map<const VectorXd> InverseRoot::row(Index i) const { return {rows_.data() + start_of(i), i + 1}; }
-Eigen::Map<VectorXd> InverseRoot::mutable_row(Index i) { return {rows_.data() + start_of(i), i + 1}; }
+Eigen::Map<const VectorXd> InverseRoot::row(Index i) const {
+  return {rows_.data() + start_of(i), i + 1};
+}
+Eigen::Map<VectorXd> InverseRoot::mutable_row(Index i) {
+  return {rows_.data() + start_of(i), i + 1};
+}
 
 // [L 0; lᵀ d]⁻¹ = [L⁻¹ 0; -lᵀL⁻¹/d 1/d], l = L⁻¹ k, d² = variance - |l|².
 std::optional<VectorXd> InverseRoot::append(const VectorXd& covariance, double variance) {
@@ -33,8 +37,8 @@ std::optional<VectorXd> InverseRoot::append(const VectorXd& covariance, double v
   return fresh;
 }
 
-// Each later row is rotated with the row of `point` until the column of the point is empty below it. The row of the
-// point gathers r.
+// Each later row is rotated with the row of `point` until the column of the point is empty below
+// it. The row of the point gathers r.
 VectorXd InverseRoot::remove(Index point) {
   VectorXd gathered = VectorXd::Zero(size_);
   gathered.head(point + 1) = row(point);

@@ -7,7 +7,8 @@
 
 namespace trammel {
 
-/// L⁻¹ of a covariance M = L Lᵀ, stored row after row. A point is added or removed in N² operations.
+/// L⁻¹ of a covariance M = L Lᵀ, stored row after row. A point is added or removed in N²
+/// operations.
 class InverseRoot {
  public:
   /// `rows`: row i has i + 1 entries.
@@ -17,12 +18,13 @@ class InverseRoot {
   /// Row i: i + 1 entries.
   [[nodiscard]] Eigen::Map<const Eigen::VectorXd> row(Eigen::Index i) const;
 
-  /// Adds a point with this covariance with the others and this variance; returns the new last row. Empty, and nothing
-  /// changed, where M would no longer be positive definite.
-  [[nodiscard]] std::optional<Eigen::VectorXd> append(const Eigen::VectorXd& covariance, double variance);
+  /// Adds a point with this covariance with the others and this variance; returns the new last row.
+  /// Empty, and nothing changed, where M would no longer be positive definite.
+  [[nodiscard]] std::optional<Eigen::VectorXd> append(const Eigen::VectorXd& covariance,
+                                                      double variance);
 
-  /// Takes row and column `point` out of M. Returns r with (M⁻¹ before) = (M⁻¹ after) + r rᵀ; r has the length that
-  /// rows had before.
+  /// Takes row and column `point` out of M. Returns r with (M⁻¹ before) = (M⁻¹ after) + r rᵀ; r has
+  /// the length that rows had before.
   Eigen::VectorXd remove(Eigen::Index point);
 
   [[nodiscard]] const std::vector<double>& rows() const { return rows_; }

@@ -9,8 +9,8 @@ namespace trammel {
 
 namespace {
 
-/// True where TRAMMEL_NUMERICS asks for an older processor than `build` is for. This gives the results of an older
-/// machine.
+/// True where TRAMMEL_NUMERICS asks for an older processor than `build` is for. This gives the
+/// results of an older machine.
 bool is_too_new(std::string_view build) {
   const char* said = std::getenv("TRAMMEL_NUMERICS");
   if (said == nullptr) return false;
@@ -22,9 +22,11 @@ bool is_too_new(std::string_view build) {
 
 const Numerics& numerics() {
   static const Numerics& fastest = []() -> const Numerics& {
-    if (!is_too_new("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+    if (!is_too_new("avx512") && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512dq"))
       return numerics_avx512();
-    if (!is_too_new("avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return numerics_avx2();
+    if (!is_too_new("avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+      return numerics_avx2();
     return numerics_baseline();
   }();
   return fastest;

@@ -13,15 +13,16 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr Index kPanel = 32;  // columns of a triangle that are computed together, what lies beyond it included
+constexpr Index kPanel =
+    32;  // columns of a triangle that are computed together, what lies beyond it included
 
 }  // namespace
 
 MatrixXd transposed_product(const MatrixXd& a, const MatrixXd& b) {
   TRAMMEL_CHECK(a.rows() == b.rows());
   MatrixXd c(a.cols(), b.cols());
-  numerics().transposed_product(a.rows(), a.cols(), a.data(), a.rows(), b.cols(), b.data(), b.rows(), c.data(),
-                                c.rows());
+  numerics().transposed_product(a.rows(), a.cols(), a.data(), a.rows(), b.cols(), b.data(),
+                                b.rows(), c.data(), c.rows());
   return c;
 }
 
@@ -30,8 +31,8 @@ MatrixXd gram(const MatrixXd& a) {
   MatrixXd c(n, n);
   for (Index j = 0; j < n; j += kPanel) {
     const double* from = a.data() + j * a.rows();
-    numerics().transposed_product(a.rows(), n - j, from, a.rows(), std::min(kPanel, n - j), from, a.rows(),
-                                  c.data() + j + j * n, n);
+    numerics().transposed_product(a.rows(), n - j, from, a.rows(), std::min(kPanel, n - j), from,
+                                  a.rows(), c.data() + j + j * n, n);
   }
   c.triangularView<Eigen::StrictlyUpper>() = c.transpose();
   return c;
@@ -45,8 +46,8 @@ MatrixXd times_lower_transposed(const MatrixXd& a, const MatrixXd& l) {
   MatrixXd c(a.rows(), n);
   for (Index j = 0; j < n; j += kPanel) {
     const Index width = std::min(kPanel, n - j);
-    numerics().transposed_product(j + width, a.rows(), left.data(), n, width, right.data() + j * n, n,
-                                  c.data() + j * c.rows(), c.rows());
+    numerics().transposed_product(j + width, a.rows(), left.data(), n, width, right.data() + j * n,
+                                  n, c.data() + j * c.rows(), c.rows());
   }
   return c;
 }
@@ -60,7 +61,8 @@ std::optional<MatrixXd> inverse_factor(const MatrixXd& m) {
   matrix.topLeftCorner(n, n).triangularView<Eigen::Lower>() = m;
   AlignedMatrix work(numerics().work_size(n), 1);
   double log_det = 0;
-  if (!numerics().inverse_root(n, 0, storage.data(), storage.rows(), work.data(), &log_det)) return std::nullopt;
+  if (!numerics().inverse_root(n, 0, storage.data(), storage.rows(), work.data(), &log_det))
+    return std::nullopt;
   MatrixXd inverse = MatrixXd::Zero(n, n);
   inverse.triangularView<Eigen::Lower>() = matrix.topLeftCorner(n, n);
   return inverse;

@@ -8,8 +8,9 @@
 
 namespace trammel {
 
-/// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014). The distributions and
-/// shuffles of the standard library differ between implementations; these give the same numbers everywhere.
+/// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014).
+/// The distributions and shuffles of the standard library differ between implementations; these
+/// give the same numbers everywhere.
 class SeededRandom {
  public:
   explicit SeededRandom(std::uint64_t seed) : state_(seed) {}
@@ -19,7 +20,9 @@ class SeededRandom {
     z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
     return z ^ (z >> 31U);
   }
-  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53; }
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53;
+  }
 
  private:
   std::uint64_t state_;

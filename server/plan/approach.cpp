@@ -16,9 +16,12 @@ constexpr double kBumpLength = from_mm(50);  // of a rail
 constexpr double kLeastBump = 0.2;           // of the bump: 1 deg takes up any play
 constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of programs
 
-double longest_way(const Joint& joint) { return joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength; }
+double longest_way(const Joint& joint) {
+  return joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
+}
 
-/// Where the arm starts to come to `q` with its gears turning as `sides` say, kept within the limits.
+/// Where the arm starts to come to `q` with its gears turning as `sides` say, kept within the
+/// limits.
 JointVector start_of(const Chain& robot, const JointVector& q, const Sides& sides) {
   JointVector way(robot.size());
   for (int j = 0; j < robot.size(); ++j) {
@@ -27,12 +30,15 @@ JointVector start_of(const Chain& robot, const JointVector& q, const Sides& side
     way(j) = side * longest_way(robot.joint(j));
   }
   JointVector start = q - robot.commanded(way);
-  for (int j = 0; j < robot.size(); ++j) start(j) = std::clamp(start(j), robot.joint(j).lower, robot.joint(j).upper);
+  for (int j = 0; j < robot.size(); ++j)
+    start(j) = std::clamp(start(j), robot.joint(j).lower, robot.joint(j).upper);
   return start;
 }
 
-/// True where the gear of the joint turns far enough from `start` to `q` to take up its play on this side.
-bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint, int side) {
+/// True where the gear of the joint turns far enough from `start` to `q` to take up its play on
+/// this side.
+bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint,
+             int side) {
   return side * robot.gear_angles(q - start)(joint) >= kLeastBump * longest_way(robot.joint(joint));
 }
 
@@ -40,9 +46,13 @@ bool has_way(const Chain& robot, const JointVector& q, const JointVector& start,
 
 Sides planned_sides(const Chain& robot, int number) {
   Sides sides;
-  // Columns of a Hadamard matrix: joint j has the binary digits of j + 1, and the last digit turns all of them.
+  // Columns of a Hadamard matrix: joint j has the binary digits of j + 1, and the last digit turns
+  // all of them.
   for (int j = 0; j < robot.size(); ++j)
-    sides.push_back(std::popcount(static_cast<unsigned>(number) & static_cast<unsigned>(2 * j + 3)) % 2 == 0 ? -1 : 1);
+    sides.push_back(
+        std::popcount(static_cast<unsigned>(number) & static_cast<unsigned>(2 * j + 3)) % 2 == 0
+            ? -1
+            : 1);
   return sides;
 }
 

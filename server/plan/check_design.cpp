@@ -9,8 +9,10 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kWorstCounts = 4;   // power of the mean over the signals: towards the largest of them
-constexpr double kWeakPrior = 1e-6;  // of base and tool, per squared sigma: so that few poses have an inverse
+constexpr double kWorstCounts =
+    4;  // power of the mean over the signals: towards the largest of them
+constexpr double kWeakPrior =
+    1e-6;  // of base and tool, per squared sigma: so that few poses have an inverse
 constexpr int kRounds = 3;           // of exchanges
 constexpr double kLeastGain = 1e-3;  // of the criterion
 
@@ -20,8 +22,8 @@ struct Whitened {
   Eigen::MatrixXd signals;  // R x s
 };
 
-Whitened whitened(const CauseEffects& effects, const std::vector<CauseSignal>& signals, const PoseContext& pose,
-                  const CheckTest& test) {
+Whitened whitened(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
+                  const PoseContext& pose, const CheckTest& test) {
   const PoseEffects at = effects.at(pose);
   const Index rows = test.orientation ? 6 : 3;
   Vector6 weight;
@@ -34,7 +36,8 @@ Whitened whitened(const CauseEffects& effects, const std::vector<CauseSignal>& s
   Eigen::MatrixXd moved(6, static_cast<Index>(signals.size()));
   for (Index s = 0; s < moved.cols(); ++s)
     moved.col(s) = signal_at(signals[static_cast<std::size_t>(s)], effects, at, pose.q);
-  return {(weight.asDiagonal() * frames).topRows(rows), (weight.asDiagonal() * moved).topRows(rows)};
+  return {(weight.asDiagonal() * frames).topRows(rows),
+          (weight.asDiagonal() * moved).topRows(rows)};
 }
 
 /// Sums over poses from which every signal's lambda follows: s² - b' A⁻¹ b.
@@ -78,8 +81,9 @@ class Criterion {
   Eigen::VectorXd needed_;
 };
 
-std::size_t best_of(const Criterion& criterion, const Sums& sums, const std::vector<Whitened>& poses,
-                    const std::vector<bool>& taken, double* value) {
+std::size_t best_of(const Criterion& criterion, const Sums& sums,
+                    const std::vector<Whitened>& poses, const std::vector<bool>& taken,
+                    double* value) {
   std::size_t best = 0;
   *value = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -91,8 +95,8 @@ std::size_t best_of(const Criterion& criterion, const Sums& sums, const std::vec
 }
 
 /// Takes one pose out after the other and puts the best one in.
-void exchange(const Criterion& criterion, const std::vector<Whitened>& poses, Sums& sums, std::vector<bool>& taken,
-              std::vector<std::size_t>& chosen) {
+void exchange(const Criterion& criterion, const std::vector<Whitened>& poses, Sums& sums,
+              std::vector<bool>& taken, std::vector<std::size_t>& chosen) {
   double value = criterion.of(sums);
   for (int round = 0; round < kRounds; ++round) {
     const double before = value;
@@ -113,8 +117,10 @@ double needed_strength(int freedom, const CheckTest& test) {
   return size * size * 1e12;
 }
 
-std::vector<SmallestEffect> smallest_of(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
-                                        const Eigen::VectorXd& strengths, int poses, const CheckTest& test) {
+std::vector<SmallestEffect> smallest_of(const CauseEffects& effects,
+                                        const std::vector<CauseSignal>& signals,
+                                        const Eigen::VectorXd& strengths, int poses,
+                                        const CheckTest& test) {
   std::vector<SmallestEffect> smallest;
   for (std::size_t cause = 0; cause < effects.causes().size(); ++cause) {
     std::vector<double> own;
@@ -122,12 +128,14 @@ std::vector<SmallestEffect> smallest_of(const CauseEffects& effects, const std::
       if (signals[s].cause == cause) own.push_back(strengths(static_cast<Index>(s)));
     if (own.empty()) continue;
     const CauseEffects::Entry& entry = effects.causes()[cause];
-    smallest.push_back({entry.cause, smallest_seen(own, freedom_of(entry, poses), test.false_alarm, test.power)});
+    smallest.push_back(
+        {entry.cause, smallest_seen(own, freedom_of(entry, poses), test.false_alarm, test.power)});
   }
   return smallest;
 }
 
-Sums sums_for(const CauseEffects& effects, const std::vector<CauseSignal>& signals, const CheckTest& test) {
+Sums sums_for(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
+              const CheckTest& test) {
   const auto tool = static_cast<Index>(test.new_tool ? effects.tool_columns().size() : 0);
   return {6 + tool, static_cast<Index>(signals.size())};
 }
@@ -138,15 +146,18 @@ int freedom_of(const CauseEffects::Entry& entry, int poses) {
   return entry.cause.any_function ? poses : static_cast<int>(entry.columns.size());
 }
 
-Result<CheckDesign> check_design(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
-                                 const std::vector<PoseContext>& candidates, int count, const CheckTest& test) {
+Result<CheckDesign> check_design(const CauseEffects& effects,
+                                 const std::vector<CauseSignal>& signals,
+                                 const std::vector<PoseContext>& candidates, int count,
+                                 const CheckTest& test) {
   if (static_cast<int>(candidates.size()) < count) {
     return refused("a check of {} poses, {} can be measured", count, candidates.size())
         .of("--check")
         .beyond(count, candidates.size());
   }
   std::vector<Whitened> poses;
-  for (const PoseContext& candidate : candidates) poses.push_back(whitened(effects, signals, candidate, test));
+  for (const PoseContext& candidate : candidates)
+    poses.push_back(whitened(effects, signals, candidate, test));
   Eigen::VectorXd needed(static_cast<Index>(signals.size()));
   for (Index s = 0; s < needed.size(); ++s) {
     const auto& entry = effects.causes()[signals[static_cast<std::size_t>(s)].cause];
@@ -168,8 +179,10 @@ Result<CheckDesign> check_design(const CauseEffects& effects, const std::vector<
   return design;
 }
 
-std::vector<SmallestEffect> smallest_effects(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
-                                             const std::vector<PoseContext>& poses, const CheckTest& test) {
+std::vector<SmallestEffect> smallest_effects(const CauseEffects& effects,
+                                             const std::vector<CauseSignal>& signals,
+                                             const std::vector<PoseContext>& poses,
+                                             const CheckTest& test) {
   Sums sums = sums_for(effects, signals, test);
   for (const PoseContext& pose : poses) sums.add(whitened(effects, signals, pose, test));
   return smallest_of(effects, signals, sums.strengths(), static_cast<int>(poses.size()), test);

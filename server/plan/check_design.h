@@ -22,7 +22,8 @@ struct CheckTest {
 /// Numbers that the test of a cause looks at, of `poses` poses.
 [[nodiscard]] int freedom_of(const CauseEffects::Entry& entry, int poses);
 
-/// How small an effect of a cause is seen at some poses; m, rms over the working poses. Empty: none is.
+/// How small an effect of a cause is seen at some poses; m, rms over the working poses. Empty: none
+/// is.
 struct SmallestEffect {
   SingleCause cause;
   std::optional<double> rms;
@@ -33,11 +34,12 @@ struct CheckDesign {
   std::vector<SmallestEffect> smallest;  ///< of every cause that can be asked for
 };
 
-/// Chooses `count` of `candidates` so that the largest of the smallest effects seen is small: greedily, then by
-/// exchange. Refuses fewer candidates than `count`.
-[[nodiscard]] Result<CheckDesign> check_design(const CauseEffects& effects, const std::vector<CauseSignal>& signals,
-                                               const std::vector<PoseContext>& candidates, int count,
-                                               const CheckTest& test);
+/// Chooses `count` of `candidates` so that the largest of the smallest effects seen is small:
+/// greedily, then by exchange. Refuses fewer candidates than `count`.
+[[nodiscard]] Result<CheckDesign> check_design(const CauseEffects& effects,
+                                               const std::vector<CauseSignal>& signals,
+                                               const std::vector<PoseContext>& candidates,
+                                               int count, const CheckTest& test);
 /// The same for poses that are given.
 [[nodiscard]] std::vector<SmallestEffect> smallest_effects(const CauseEffects& effects,
                                                            const std::vector<CauseSignal>& signals,

@@ -13,9 +13,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kDirections = 24;                          // of a cause of several numbers
-constexpr double kLeastEffect = 1e-7;                    // m, of one prior scale: below it is rounding
-constexpr double kLeastShare = 0.01;                     // of an effect: less is a motion of base and tool
+constexpr int kDirections = 24;        // of a cause of several numbers
+constexpr double kLeastEffect = 1e-7;  // m, of one prior scale: below it is rounding
+constexpr double kLeastShare = 0.01;   // of an effect: less is a motion of base and tool
 constexpr double kLowestOrder = 1, kHighestOrder = 120;  // cycles a turn, of a function of an angle
 
 /// A number of the normal distribution, by Box and Muller.
@@ -35,13 +35,16 @@ Eigen::MatrixXd span_of(const Eigen::MatrixXd& columns) {
 
 }  // namespace
 
-Vector6 signal_at(const CauseSignal& signal, const CauseEffects& effects, const PoseEffects& at, const JointVector& q) {
+Vector6 signal_at(const CauseSignal& signal, const CauseEffects& effects, const PoseEffects& at,
+                  const JointVector& q) {
   const SingleCause& cause = effects.causes()[signal.cause].cause;
-  const double shape = cause.any_function ? std::sin(signal.order * q(cause.joint) + signal.phase) : 1.0;
+  const double shape =
+      cause.any_function ? std::sin(signal.order * q(cause.joint) + signal.phase) : 1.0;
   return shape * (at.by_cause * signal.weights);
 }
 
-WorkingPoses::WorkingPoses(const CauseEffects& effects, const std::vector<PoseContext>& poses, bool new_tool)
+WorkingPoses::WorkingPoses(const CauseEffects& effects, const std::vector<PoseContext>& poses,
+                           bool new_tool)
     : poses_(poses) {
   const auto rows = 3 * static_cast<Index>(poses.size());
   by_cause_.resize(rows, effects.size());
@@ -74,7 +77,8 @@ double WorkingPoses::any_function_rms(Index column) const {
 Eigen::VectorXd WorkingPoses::effect(const CauseSignal& signal, Index joint) const {
   Eigen::VectorXd moved = by_cause_ * signal.weights;
   for (Index i = 0; joint >= 0 && 3 * i < moved.size(); ++i)
-    moved.segment<3>(3 * i) *= std::sin(signal.order * poses_[static_cast<std::size_t>(i)].q(joint) + signal.phase);
+    moved.segment<3>(3 * i) *=
+        std::sin(signal.order * poses_[static_cast<std::size_t>(i)].q(joint) + signal.phase);
   return moved;
 }
 
@@ -98,24 +102,28 @@ void WorkingPoses::add_signals(const CauseEffects& effects, std::size_t cause, s
       signal.order = std::exp(random.uniform(std::log(kLowestOrder), std::log(kHighestOrder)));
       signal.phase = random.uniform(0, 2 * kPi);
     }
-    for (const Index column : entry.columns) signal.weights(column) = entry.columns.size() == 1 ? 1 : normal(random);
+    for (const Index column : entry.columns)
+      signal.weights(column) = entry.columns.size() == 1 ? 1 : normal(random);
     if (scaled_to_one(signal, any ? entry.cause.joint : -1)) all.push_back(std::move(signal));
   }
 }
 
-std::vector<CauseSignal> WorkingPoses::signals(const CauseEffects& effects, std::uint64_t seed) const {
+std::vector<CauseSignal> WorkingPoses::signals(const CauseEffects& effects,
+                                               std::uint64_t seed) const {
   std::vector<CauseSignal> all;
-  for (std::size_t cause = 0; cause < effects.causes().size(); ++cause) add_signals(effects, cause, seed, all);
+  for (std::size_t cause = 0; cause < effects.causes().size(); ++cause)
+    add_signals(effects, cause, seed, all);
   return all;
 }
 
-std::optional<double> smallest_seen(const std::vector<double>& strengths, int freedom, double false_alarm,
-                                    double power) {
+std::optional<double> smallest_seen(const std::vector<double>& strengths, int freedom,
+                                    double false_alarm, double power) {
   if (strengths.empty() || freedom < 1) return std::nullopt;
   const double limit = chi_square_limit(false_alarm, freedom);
   const auto seen = [&](double size) {
     double sum = 0;
-    for (const double strength : strengths) sum += chi_square_tail(limit, freedom, size * size * strength);
+    for (const double strength : strengths)
+      sum += chi_square_tail(limit, freedom, size * size * strength);
     return sum / static_cast<double>(strengths.size()) >= power;
   };
   constexpr double kLargest = 1;  // m

@@ -14,7 +14,8 @@ Sides sides_of(const Chain& robot, const PoseContext& context, int number) {
   return known ? recorded : possible_sides(robot, context.q, planned_sides(robot, number));
 }
 
-Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given, int number, const std::string& where) {
+Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given, int number,
+                                 const std::string& where) {
   PlannedPose pose{given.pose_id, given.context, {}};
   pose.context.index = number;
   pose.context.q = on_program_grid(robot, given.context.q);

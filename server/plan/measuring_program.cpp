@@ -24,7 +24,8 @@ constexpr int kFanucTools = 29;
 
 bool is_name(const std::string& text, std::size_t longest) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
-  return !text.empty() && text.size() <= longest && std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
+  return !text.empty() && text.size() <= longest &&
+         std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
          std::all_of(text.begin(), text.end(), allowed);
 }
 
@@ -37,7 +38,8 @@ std::string module_name(const std::string& name) {
   return text.substr(0, kRapidName);
 }
 
-/// Text that may stand in a comment: one line of plain letters, of the length that controllers take.
+/// Text that may stand in a comment: one line of plain letters, of the length that controllers
+/// take.
 std::string comment(const std::string& sign, std::string text) {
   for (char& c : text) {
     if (c < ' ' || c > '~') c = '_';
@@ -65,7 +67,8 @@ Result<Axes> axes_of(const Chain& robot, const ProgramOptions& options) {
     }
   }
   if (axes.turning.size() != 6) {
-    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size())
+    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(),
+                   axes.turning.size())
         .of("joints")
         .beyond(axes.turning.size(), 6);
   }
@@ -93,7 +96,8 @@ std::string change_before(const Plan& plan, std::size_t i) {
   if (i == 0) return "";
   const PoseContext& before = plan.poses[i - 1].context;
   if (before.tool == now.tool && before.payload == now.payload) return "";
-  return fmt::format("now tool {}, payload {}", now.tool, now.payload.empty() ? "none" : now.payload);
+  return fmt::format("now tool {}, payload {}", now.tool,
+                     now.payload.empty() ? "none" : now.payload);
 }
 
 std::string rapid_target(const std::string& name, const Axes& axes, const JointVector& q) {
@@ -118,7 +122,9 @@ class FanucText {
  public:
   FanucText(const Axes& axes, int tool) : axes_(axes), tool_(tool) {}
 
-  void line(const std::string& instruction) { lines_ += fmt::format("{:4}:  {} ;\n", ++count_, instruction); }
+  void line(const std::string& instruction) {
+    lines_ += fmt::format("{:4}:  {} ;\n", ++count_, instruction);
+  }
   void remark(const std::string& text) { line(comment("!", text).substr(0, kFanucRemark)); }
   void move(const JointVector& q, int percent) {
     // The motion type stands where other instructions have a blank.
@@ -126,13 +132,16 @@ class FanucText {
     positions_ += fmt::format("P[{}]{{\n   GP1:\n\tUF : 0, UT : {},\t\n", position_, tool_);
     std::vector<std::string> values;
     for (std::size_t k = 0; k < axes_.turning.size(); ++k)
-      values.push_back(fmt::format("\tJ{}= {:10.4f} deg", k + 1, to_deg(q(axes_.turning[k])) + 0.0));
-    if (axes_.rail) values.push_back(fmt::format("\tE1= {:10.4f}  mm", to_mm(q(*axes_.rail)) + 0.0));
+      values.push_back(
+          fmt::format("\tJ{}= {:10.4f} deg", k + 1, to_deg(q(axes_.turning[k])) + 0.0));
+    if (axes_.rail)
+      values.push_back(fmt::format("\tE1= {:10.4f}  mm", to_mm(q(*axes_.rail)) + 0.0));
     positions_ += fmt::format("{}\n}};\n", fmt::join(values, ",\n"));
   }
   [[nodiscard]] std::string text(const std::string& name) const {
     return fmt::format(
-        "/PROG  {}\n/ATTR\nOWNER\t\t= MNEDITOR;\nCOMMENT\t\t= \"measuring poses\";\nLINE_COUNT\t= {};\n"
+        "/PROG  {}\n/ATTR\nOWNER\t\t= MNEDITOR;\nCOMMENT\t\t= \"measuring poses\";\nLINE_COUNT\t= "
+        "{};\n"
         "PROTECT\t\t= READ_WRITE;\nDEFAULT_GROUP\t= 1,*,*,*,*;\n/MN\n{}/POS\n{}/END\n",
         name, count_, lines_, positions_);
   }
@@ -155,13 +164,14 @@ std::string script_motion(const Axes& axes, const JointVector& q, double speed) 
 Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
   const Axes axes = TRY(axes_of(robot, options));
   if (!is_name(options.rapid_tool, kRapidName)) {
-    return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most", options.rapid_tool,
-                   kRapidName)
+    return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most",
+                   options.rapid_tool, kRapidName)
         .of("rapid_tool")
         .with_text(options.rapid_tool);
   }
   std::string text = fmt::format("MODULE {}\n", module_name(options.name));
-  text += "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text +=
+      "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
   text += fmt::format("  CONST num trammel_wait:={:g};\n", options.wait_s);
   text += "  CONST speeddata trammel_fast:=[200,20,200,20];\n";
   text += "  CONST speeddata trammel_slow:=[20,2,20,2];\n";
@@ -175,8 +185,10 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
       text += "    " + comment("!", change) + "\n    Stop;\n";
     }
     text += "    " + comment("!", "pose " + plan.poses[i].id) + "\n";
-    text += fmt::format("    MoveAbsJ trammel_b{}\\NoEOffs,trammel_fast,fine,{};\n", i + 1, options.rapid_tool);
-    text += fmt::format("    MoveAbsJ trammel_p{}\\NoEOffs,trammel_slow,fine,{};\n", i + 1, options.rapid_tool);
+    text += fmt::format("    MoveAbsJ trammel_b{}\\NoEOffs,trammel_fast,fine,{};\n", i + 1,
+                        options.rapid_tool);
+    text += fmt::format("    MoveAbsJ trammel_p{}\\NoEOffs,trammel_slow,fine,{};\n", i + 1,
+                        options.rapid_tool);
     text += "    WaitTime \\InPos,trammel_wait;\n";
   }
   return text + "  ENDPROC\nENDMODULE\n";
@@ -190,13 +202,16 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
         .beyond(options.krl_tool, options.krl_tool < 0 ? 0 : kKrlTools);
   }
   if (!is_name(options.name, kKrlName)) {
-    return refused("KRL program '{}': expected a letter, then letters, digits or '_', {} at most, as its file is named",
-                   options.name, kKrlName)
+    return refused(
+               "KRL program '{}': expected a letter, then letters, digits or '_', {} at most, as "
+               "its file is named",
+               options.name, kKrlName)
         .of("program")
         .with_text(options.name);
   }
   std::string text = fmt::format("&ACCESS RVP\n&REL 1\nDEF {} ( )\n", options.name);
-  text += "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text +=
+      "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
   text += "  EXT BAS (BAS_COMMAND :IN,REAL :IN)\n";
   text += "  DECL REAL TRAMMEL_WAIT\n";
   text += "  BAS (#INITMOV,0)\n";
@@ -224,8 +239,8 @@ Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const Program
         .beyond(options.fanuc_tool, options.fanuc_tool < 1 ? 1 : kFanucTools);
   }
   if (!is_name(options.name, kFanucName)) {
-    return refused("TP program '{}': expected a letter, then letters, digits or '_', {} at most", options.name,
-                   kFanucName)
+    return refused("TP program '{}': expected a letter, then letters, digits or '_', {} at most",
+                   options.name, kFanucName)
         .of("program")
         .with_text(options.name);
   }
@@ -246,15 +261,18 @@ Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const Program
   return text.text(upper(options.name));
 }
 
-Result<std::string> to_urscript(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
+Result<std::string> to_urscript(const Chain& robot, const Plan& plan,
+                                const ProgramOptions& options) {
   const Axes axes = TRY(axes_of(robot, options));
   if (axes.rail)
-    return refused("robot {}: joint {} is prismatic, a script moves six turning joints", robot.name(), *axes.rail + 1)
+    return refused("robot {}: joint {} is prismatic, a script moves six turning joints",
+                   robot.name(), *axes.rail + 1)
         .of(fmt::format("joint {}", *axes.rail + 1));
   constexpr double kFast = 0.35, kSlow = 0.035;  // rad/s
   const std::string name = module_name(options.name);
-  std::string text = fmt::format("def {}():\n  {}\n", name,
-                                 comment("#", fmt::format("{} poses for {}", plan.poses.size(), robot.name())));
+  std::string text =
+      fmt::format("def {}():\n  {}\n", name,
+                  comment("#", fmt::format("{} poses for {}", plan.poses.size(), robot.name())));
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
     if (const std::string change = change_before(plan, i); !change.empty()) {
       text += fmt::format("  popup(\"{}\", blocking=True)\n", comment("", change).substr(1));

@@ -37,7 +37,8 @@ Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint6
     std::shuffle(slice.begin(), slice.end(), random);
     for (int i = 0; i < count; ++i) {
       const double share = (slice[static_cast<std::size_t>(i)] + unit(random)) / count;
-      q(i, static_cast<Eigen::Index>(j)) = ranges[j].first + share * (ranges[j].second - ranges[j].first);
+      q(i, static_cast<Eigen::Index>(j)) =
+          ranges[j].first + share * (ranges[j].second - ranges[j].first);
     }
   }
   return q;
@@ -50,8 +51,9 @@ constexpr int kCheckCandidates = 800;      // likewise, of a check: each is held
 constexpr int kWorkingPoses = 200;         // at which an effect is measured
 constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is hardly one
 // How many times larger than wanted a hypercube is drawn at most.
-constexpr int kLargestFactor = 512;       // of poses: fewer than 1 in 1000 fits then
-constexpr int kLargestDesignFactor = 64;  // of candidates: they are more already, and each is linearised
+constexpr int kLargestFactor = 512;  // of poses: fewer than 1 in 1000 fits then
+constexpr int kLargestDesignFactor =
+    64;  // of candidates: they are more already, and each is linearised
 
 /// The poses that the cell allows, for every tool that will be used.
 class Filter {
@@ -66,7 +68,8 @@ class Filter {
     return filter;
   }
 
-  /// True where the candidate may be planned and approached in each of these ways. Counts the candidate.
+  /// True where the candidate may be planned and approached in each of these ways. Counts the
+  /// candidate.
   bool keeps(const JointVector& q, const std::vector<Sides>& ways, DrawCount& count) const {
     ++count.drawn;
     std::vector<JointVector> visited = {q};
@@ -91,7 +94,8 @@ class Filter {
     const Pose X_BF = cell_.robot.flange_pose(q);
     return std::all_of(X_FT_.begin(), X_FT_.end(), [&](const Pose& X_FT) {
       const Vector3 p = X_BF * X_FT.translation();
-      return (p.array() >= cell_.workspace->lower.array()).all() && (p.array() <= cell_.workspace->upper.array()).all();
+      return (p.array() >= cell_.workspace->lower.array()).all() &&
+             (p.array() <= cell_.workspace->upper.array()).all();
     });
   }
 
@@ -105,15 +109,18 @@ struct Drawn {
   DrawCount count;
 };
 
-/// `wanted` joint vectors that the filter keeps, from a Latin hypercube that doubles until it is large enough, up to
-/// `largest_factor` times as many as wanted. Refuses where even that one has fewer than `needed`. `ways_of` tells how
-/// the next one that is kept, with this number, would be approached.
+/// `wanted` joint vectors that the filter keeps, from a Latin hypercube that doubles until it is
+/// large enough, up to `largest_factor` times as many as wanted. Refuses where even that one has
+/// fewer than `needed`. `ways_of` tells how the next one that is kept, with this number, would be
+/// approached.
 template <typename Prepare, typename WaysOf>
-Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed, int largest_factor,
-                   std::uint64_t seed, const Prepare& prepare, const WaysOf& ways_of) {
+Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed,
+                   int largest_factor, std::uint64_t seed, const Prepare& prepare,
+                   const WaysOf& ways_of) {
   const JointRanges ranges = TRY(planning_ranges(cell));
   Drawn drawn;
-  for (int factor = 1; factor <= largest_factor && static_cast<int>(drawn.q.size()) < wanted; factor *= 2) {
+  for (int factor = 1; factor <= largest_factor && static_cast<int>(drawn.q.size()) < wanted;
+       factor *= 2) {
     drawn = {};
     const Eigen::MatrixXd candidates = latin_hypercube(ranges, wanted * factor, seed);
     for (Eigen::Index i = 0; i < candidates.rows(); ++i) {
@@ -130,10 +137,11 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
   const DrawCount& count = drawn.count;
   if (count.kept < needed) {
     return refused(
-               "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the "
-               "workspace, {} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be "
-               "approached",
-               cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way)
+               "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are "
+               "needed; {} leave the workspace, {} are out of the tracker's sight, {} are beyond a "
+               "joint limit or too near to it to be approached",
+               cell.name, count.drawn, count.kept, needed, count.outside, count.unseen,
+               count.no_way)
         .of("count")
         .beyond(count.kept, needed);
   }
@@ -165,7 +173,8 @@ struct Planning {
 };
 
 Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<std::string>& asked,
-                                          Result<std::string> (*resolve)(const Cell&, const std::string&)) {
+                                          Result<std::string> (*resolve)(const Cell&,
+                                                                         const std::string&)) {
   std::vector<std::string> names;
   for (const std::string& name : asked.empty() ? std::vector<std::string>{""} : asked) {
     const std::string known = TRY(resolve(cell, name));
@@ -190,8 +199,8 @@ std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector
   return contexts;
 }
 
-/// Poses that were chosen come from the sides of their place in the plan, as far as the arm stays in the workspace on
-/// the way: the choice alone would leave some joint more often on one side.
+/// Poses that were chosen come from the sides of their place in the plan, as far as the arm stays
+/// in the workspace on the way: the choice alone would leave some joint more often on one side.
 void come_in_turn(const Planning& planning, const Filter& filter, std::vector<PoseContext>& poses) {
   if (planning.twice) return;
   DrawCount count;
@@ -215,10 +224,14 @@ std::vector<PlannedPose> planned(const Planning& planning, std::vector<PoseConte
     for (std::size_t way = 0; way < ways; ++way) {
       PlannedPose pose;
       pose.context = std::move(contexts[order[i] * ways + way]);
-      pose.id = fmt::format("{}{}", i + 1, ways == 1 ? "" : pose.context.direction.front() > 0 ? "+" : "-");
+      pose.id = fmt::format("{}{}", i + 1,
+                            ways == 1                            ? ""
+                            : pose.context.direction.front() > 0 ? "+"
+                                                                 : "-");
       pose.context.index = static_cast<int>(poses.size());
       const Chain& robot = planning.cell->robot;
-      pose.bump = on_program_grid(robot, bump_pose(robot, pose.context.q, pose.context.direction).value());
+      pose.bump =
+          on_program_grid(robot, bump_pose(robot, pose.context.q, pose.context.direction).value());
       poses.push_back(std::move(pose));
     }
   }
@@ -231,16 +244,19 @@ Result<CausePair> pair_of(const Planning& planning, const PlanOptions& options) 
   }
   PhysicalModel model = TRY(make_physical_model(planning.cell, planning.cell->model.error_sources));
   if (model.parameter_count() == 0)
-    return refused("cell {}: its model has no error sources", planning.cell->name).of("error_sources");
+    return refused("cell {}: its model has no error sources", planning.cell->name)
+        .of("error_sources");
   model.values = planning_values(model);
   return CausePair{std::move(model), "", "", {}, {}};
 }
 
-Plan::Separation separation_of(const CausePair& pair, const Separability& plan, const Separability& latin_hypercube,
+Plan::Separation separation_of(const CausePair& pair, const Separability& plan,
+                               const Separability& latin_hypercube,
                                const Separability& candidates) {
   Plan::Separation separation{plan, latin_hypercube, candidates, {}, ""};
   const auto shows = [](const ParameterSeparation& parameter) { return parameter.effect > 0; };
-  const bool any_shows = std::any_of(candidates.parameters.begin(), candidates.parameters.end(), shows);
+  const bool any_shows =
+      std::any_of(candidates.parameters.begin(), candidates.parameters.end(), shows);
   for (const ParameterSeparation& parameter : candidates.parameters) {
     // The order of a gear's error shows only once its amplitude is known, so it is not asked for.
     if (any_shows && !shows(parameter)) continue;
@@ -283,20 +299,22 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
   plan.criterion_of_latin_hypercube = criterion(evenly);
   if (options.criterion == PlanCriterion::kSeparation) {
     const auto told = [&](const Eigen::MatrixXd& known) { return separability(pair, known); };
-    plan.separation = separation_of(pair, told(of_plan), told(evenly), told(rows.rows.transpose() * rows.rows));
+    plan.separation =
+        separation_of(pair, told(of_plan), told(evenly), told(rows.rows.transpose() * rows.rows));
   }
   plan.poses = planned(planning, std::move(chosen));
   return plan;
 }
 
 /// Chooses among `candidates`, which also stand for the poses that the cell works at.
-Result<Plan> planned_check(const Planning& planning, const PlanOptions& options, const Filter& filter,
-                           const Drawn& candidates) {
+Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
+                           const Filter& filter, const Drawn& candidates) {
   const CausePair pair = TRY(pair_of(planning, options));
   const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
   const CauseEffects effects(pair.model, contexts);
   const auto working = std::min(contexts.size(), static_cast<std::size_t>(kWorkingPoses));
-  const WorkingPoses work(effects, {contexts.begin(), contexts.begin() + static_cast<std::ptrdiff_t>(working)}, false);
+  const WorkingPoses work(
+      effects, {contexts.begin(), contexts.begin() + static_cast<std::ptrdiff_t>(working)}, false);
   CheckTest test;
   test.sigma = planning.cell->tracker.sigma;
   test.sigma_rotation = planning.cell->tracker.sigma_rotation;
@@ -319,10 +337,12 @@ Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options)
   TRY(check_count(options));
   const Filter filter = TRY(Filter::of(cell, {cell.tools.begin()->first}));
   const Drawn drawn = TRY(draw(
-      cell, filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; },
+      cell, filter, options.count, options.count, kLargestFactor, options.seed,
+      [](JointVector q) { return q; },
       [](const JointVector&, std::size_t) { return std::vector<Sides>(); }));
   Eigen::MatrixXd q(options.count, cell.robot.size());
-  for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = drawn.q[static_cast<std::size_t>(i)].transpose();
+  for (Eigen::Index i = 0; i < q.rows(); ++i)
+    q.row(i) = drawn.q[static_cast<std::size_t>(i)].transpose();
   return q;
 }
 
@@ -339,7 +359,8 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
       inside = inside && at >= ranges[j].first && at <= ranges[j].second;
     }
     const auto comes = [&](int side) {
-      const Sides sides = possible_sides(cell.robot, one, Sides(static_cast<std::size_t>(one.size()), side));
+      const Sides sides =
+          possible_sides(cell.robot, one, Sides(static_cast<std::size_t>(one.size()), side));
       return filter.keeps(one, {sides}, count);
     };
     may[static_cast<std::size_t>(i)] = inside && (comes(-1) || comes(1));
@@ -366,11 +387,17 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
   };
   const Drawn latin_hypercube = TRY(drawn(options.count, kLargestFactor));
   if (options.criterion == PlanCriterion::kLatinHypercube) {
-    return Plan{planned(planning, contexts_of(planning, latin_hypercube.q)), latin_hypercube.count, 0, 0, {}, {}};
+    return Plan{planned(planning, contexts_of(planning, latin_hypercube.q)),
+                latin_hypercube.count,
+                0,
+                0,
+                {},
+                {}};
   }
   const bool check = options.criterion == PlanCriterion::kCheck;
   const Drawn candidates = TRY(drawn(
-      std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor));
+      std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count),
+      kLargestDesignFactor));
   if (check) return planned_check(planning, options, filter, candidates);
   return designed(planning, options, filter, candidates, latin_hypercube);
 }

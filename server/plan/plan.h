@@ -17,14 +17,18 @@
 /// Which poses to measure.
 namespace trammel {
 
-using JointRanges = std::vector<std::pair<double, double>>;  // rad, lower and upper end of each joint
+using JointRanges =
+    std::vector<std::pair<double, double>>;  // rad, lower and upper end of each joint
 
-/// The cell's joint ranges, or the robot's limits where it gives none. Refuses a joint without any finite range.
+/// The cell's joint ranges, or the robot's limits where it gives none. Refuses a joint without any
+/// finite range.
 [[nodiscard]] Result<JointRanges> planning_ranges(const Cell& cell);
 
-/// `count` joint vectors (rows, rad) by Latin hypercube sampling: each joint's range is cut into `count` equal slices
-/// and every slice is used once (source section 5.1.3). The same seed gives the same rows.
-[[nodiscard]] Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint64_t seed);
+/// `count` joint vectors (rows, rad) by Latin hypercube sampling: each joint's range is cut into
+/// `count` equal slices and every slice is used once (source section 5.1.3). The same seed gives
+/// the same rows.
+[[nodiscard]] Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count,
+                                              std::uint64_t seed);
 
 /// How poses are chosen among those that the cell allows.
 enum class PlanCriterion {
@@ -38,22 +42,23 @@ struct PlanOptions {
   int count = 0;
   std::uint64_t seed = 1;
   PlanCriterion criterion = PlanCriterion::kLatinHypercube;
-  std::string cause = {}, other = {};   ///< for kSeparation: sources as written in the cell file
-  bool bidirectional = false;           ///< every pose twice, all joints from above and all from below
-  bool orientation = true;              ///< false: positions only will be measured
+  std::string cause = {}, other = {};  ///< for kSeparation: sources as written in the cell file
+  bool bidirectional = false;  ///< every pose twice, all joints from above and all from below
+  bool orientation = true;     ///< false: positions only will be measured
   std::vector<std::string> tools = {};  ///< to measure with in turn; empty: the cell's only one
   std::vector<std::string> payloads = {};
-  bool one_way = false;  ///< all joints come to each pose from below: play in the gears does not show, and costs no way
+  bool one_way = false;  ///< all joints come to each pose from below: play in the gears does not
+                         ///< show, and costs no way
 };
 
-/// `count` poses of the cell (rows, rad): a Latin hypercube, of which the poses inside the workspace and in sight of
-/// the tracker, with the first tool, are kept (source section 6.1.2). The hypercube is drawn larger until they are
-/// enough. Refuses a cell where fewer than 1 in 1000 candidates fits, and what Visibility::of() refuses. Of the options
-/// only count and seed matter.
+/// `count` poses of the cell (rows, rad): a Latin hypercube, of which the poses inside the
+/// workspace and in sight of the tracker, with the first tool, are kept (source section 6.1.2). The
+/// hypercube is drawn larger until they are enough. Refuses a cell where fewer than 1 in 1000
+/// candidates fits, and what Visibility::of() refuses. Of the options only count and seed matter.
 [[nodiscard]] Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options);
 
-/// For each row of `q` (rad) whether plan_poses() could have given it and it can be approached from one side at least.
-/// Refuses what plan_poses() refuses of the cell.
+/// For each row of `q` (rad) whether plan_poses() could have given it and it can be approached from
+/// one side at least. Refuses what plan_poses() refuses of the cell.
 [[nodiscard]] Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q);
 
 /// What became of the candidates drawn; each counts for the first reason against it.
@@ -74,28 +79,33 @@ struct PlannedPose {
 struct Plan {
   std::vector<PlannedPose> poses;
   DrawCount draw;
-  /// For kObservability and kSeparation: the criterion (nat) of this plan, and of a Latin hypercube of as many poses.
+  /// For kObservability and kSeparation: the criterion (nat) of this plan, and of a Latin hypercube
+  /// of as many poses.
   double criterion = 0, criterion_of_latin_hypercube = 0;
-  /// For kSeparation: how well the causes are told apart by this plan, by a Latin hypercube, and by all candidates
-  /// together.
+  /// For kSeparation: how well the causes are told apart by this plan, by a Latin hypercube, and by
+  /// all candidates together.
   struct Separation {
     Separability plan, latin_hypercube, candidates;
-    std::vector<std::string> hopeless;  ///< parameters that not even all candidates together separate
-    std::string needs;                  ///< what would separate them; empty where nothing is hopeless
+    std::vector<std::string>
+        hopeless;       ///< parameters that not even all candidates together separate
+    std::string needs;  ///< what would separate them; empty where nothing is hopeless
   };
   std::optional<Separation> separation;
-  /// For kCheck: how small a change of each cause this plan shows with 95 % chance, beside the tracker's noise.
+  /// For kCheck: how small a change of each cause this plan shows with 95 % chance, beside the
+  /// tracker's noise.
   std::vector<SmallestEffect> smallest;
 };
 
-/// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach: from the recorded
-/// sides where every joint has one, else from planned_sides() as far as the limits allow. Refuses a pose that is too
-/// near to a limit to be approached.
+/// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach:
+/// from the recorded sides where every joint has one, else from planned_sides() as far as the
+/// limits allow. Refuses a pose that is too near to a limit to be approached.
 [[nodiscard]] Result<Plan> plan_of(const Cell& cell, const JointList& list);
 
-/// A plan as the options say, each pose with the pose of its approach (source section 3.2.4.2): each joint comes from
-/// above as often as from below, see planned_sides(). Poses of one tool and payload come together, the most telling
-/// first. Refuses what plan_poses() refuses, unknown causes, tools and payloads, and a check with every pose twice.
-[[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options);
+/// A plan as the options say, each pose with the pose of its approach (source section 3.2.4.2):
+/// each joint comes from above as often as from below, see planned_sides(). Poses of one tool and
+/// payload come together, the most telling first. Refuses what plan_poses() refuses, unknown
+/// causes, tools and payloads, and a check with every pose twice.
+[[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell,
+                                     const PlanOptions& options);
 
 }  // namespace trammel

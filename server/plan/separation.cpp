@@ -46,14 +46,17 @@ Separability separability(const CausePair& pair, const Eigen::MatrixXd& informat
   left.diagonal().array() += 1;
 
   Separability result;
-  // The strength of one parameter while the others are free: 1 / (its posterior variance), less the prior's 1.
-  const Eigen::VectorXd variance = left.llt().solve(Eigen::MatrixXd::Identity(left.rows(), left.rows())).diagonal();
+  // The strength of one parameter while the others are free: 1 / (its posterior variance), less the
+  // prior's 1.
+  const Eigen::VectorXd variance =
+      left.llt().solve(Eigen::MatrixXd::Identity(left.rows(), left.rows())).diagonal();
   const std::vector<Parameter> parameters = pair.model.parameters();
   for (Eigen::Index k = 0; k < left.rows(); ++k) {
     const double strength = std::max(1 / variance(k) - 1, 0.0);
     const double share = effect(k, k) > 0 ? std::sqrt(strength / effect(k, k)) : 0.0;
     const auto column = static_cast<std::size_t>(pair.columns[static_cast<std::size_t>(k)]);
-    result.parameters.push_back({parameters[column].name, effect(k, k), strength, std::min(share, 1.0)});
+    result.parameters.push_back(
+        {parameters[column].name, effect(k, k), strength, std::min(share, 1.0)});
   }
   result.strength = std::expm1(log_det(left) / static_cast<double>(left.rows()));
   return result;

@@ -17,25 +17,29 @@ struct CausePair {
   std::vector<Eigen::Index> rest;     ///< all others: what could imitate it
 };
 
-/// The cell's own sources, `cause` and `other` (specs as in the cell file). Refuses two that are the same source and
-/// what make_error_source() refuses.
-[[nodiscard]] Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell, const std::string& cause,
-                                                const std::string& other);
+/// The cell's own sources, `cause` and `other` (specs as in the cell file). Refuses two that are
+/// the same source and what make_error_source() refuses.
+[[nodiscard]] Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell,
+                                                const std::string& cause, const std::string& other);
 
-/// What a least-squares fit of all other parameters (with their priors) leaves of the effect of one.
+/// What a least-squares fit of all other parameters (with their priors) leaves of the effect of
+/// one.
 struct ParameterSeparation {
   std::string parameter;
   double effect = 0;    ///< |effect|^2 / sigma^2 of one prior scale of it
   double strength = 0;  ///< |what is left|^2 / sigma^2 of it
-  double share = 0;     ///< |what is left| / |the effect|, 0 to 1; 0 where these poses do not show the effect
+  double share =
+      0;  ///< |what is left| / |the effect|, 0 to 1; 0 where these poses do not show the effect
 };
 
 struct Separability {
-  double strength = 0;  ///< of the whole cause: geometric mean of 1 + strength over its directions, less 1
+  double strength =
+      0;  ///< of the whole cause: geometric mean of 1 + strength over its directions, less 1
   std::vector<ParameterSeparation> parameters;  ///< of the cause
 };
 
-/// `information` is that of the pair's model from the poses in question, without any prior (information_of()).
+/// `information` is that of the pair's model from the poses in question, without any prior
+/// (information_of()).
 [[nodiscard]] Separability separability(const CausePair& pair, const Eigen::MatrixXd& information);
 
 /// Below this strength (a squared signal-to-noise ratio) nothing should be claimed.

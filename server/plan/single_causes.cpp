@@ -18,20 +18,24 @@ using causes::SearchFamily;
 using Eigen::Index;
 
 /// The rival that a cause is from the first pose on, of every cause that begins at a pose.
-const causes::Rival* begun_before(const CauseRecord& whole, const std::string& parameter, int joint) {
+const causes::Rival* begun_before(const CauseRecord& whole, const std::string& parameter,
+                                  int joint) {
   for (const CauseRecord* step : all_causes()) {
     const causes::Rival* rival = whole_of(*step);
-    if (rival != nullptr && rival->cause == whole.spelling && parameter_of(*rival, joint) == parameter) return rival;
+    if (rival != nullptr && rival->cause == whole.spelling &&
+        parameter_of(*rival, joint) == parameter)
+      return rival;
   }
   return nullptr;
 }
 
 /// True for causes that may have changed while the instrument is as it should be.
 bool may_have_changed(const CauseRecord& record) {
-  if (record.scope == Scope::kPose || record.scope == Scope::kSession || record.part == Part::kBase) return false;
+  if (record.scope == Scope::kPose || record.scope == Scope::kSession || record.part == Part::kBase)
+    return false;
   if (record.search == SearchFamily::kNone || record.search == SearchFamily::kPose) return false;
-  // A cause that always acts and the one that begins at a pose are asked for as one. Maps of an angle are asked for as
-  // "any function".
+  // A cause that always acts and the one that begins at a pose are asked for as one. Maps of an
+  // angle are asked for as "any function".
   return record.search != SearchFamily::kMap && begun_before(record, "", -1) == nullptr;
 }
 
@@ -50,8 +54,8 @@ bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
 
 constexpr std::size_t kMostNumbers = 6;  // of one cause: what needs more is not seen by few poses
 constexpr double kWarmer = 2;            // K between poses, from which on temperature shows
-constexpr double kUnrecorded = 10;       // K: so much warmer may an arm be where no temperature says it
-constexpr double kOfDrawings = 20;       // degrees Celsius
+constexpr double kUnrecorded = 10;  // K: so much warmer may an arm be where no temperature says it
+constexpr double kOfDrawings = 20;  // degrees Celsius
 
 bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
   std::optional<double> low = learned_at, high = learned_at;
@@ -69,11 +73,12 @@ bool shows_alike_at_all(const CauseRecord& record) {
 }
 
 /// The columns that these poses would have to record; empty where the cause shows.
-std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses,
-                    std::optional<double> learned_at) {
+std::string lacking(const CauseRecord& record, int joint, const Cell& cell,
+                    const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
   const ContextNeeds& needs = record.needs;
   if (needs.payload && !carries(cell, poses)) return "a payload";
-  if (needs.direction && joint >= 0 && !(approached(poses, joint, 1) && approached(poses, joint, -1)))
+  if (needs.direction && joint >= 0 &&
+      !(approached(poses, joint, 1) && approached(poses, joint, -1)))
     return "approaching the poses from both sides of this joint";
   if (needs.temperature && !warms(poses, learned_at))
     return "temperatures that differ between the poses, or from those of the training";
@@ -113,8 +118,11 @@ bool same_cause(const SingleCause& one, const SingleCause& other) {
   return one.record == other.record && one.joint == other.joint && one.parameter == other.parameter;
 }
 
-CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at)
-    : model_(std::move(model)), learned_at_(learned_at), is_warmth_recorded_(warms(poses, learned_at)) {
+CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses,
+                           std::optional<double> learned_at)
+    : model_(std::move(model)),
+      learned_at_(learned_at),
+      is_warmth_recorded_(warms(poses, learned_at)) {
   const Chain& robot = model_.cell->robot;
   for (const CauseRecord* record : all_causes()) {
     if (!may_have_changed(*record)) continue;
@@ -130,7 +138,8 @@ CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& 
     }
   }
   for (const CauseRecord* record : all_causes()) {
-    if (!is_warmth_recorded_ && may_have_changed(*record) && shows_alike_at_all(*record)) add(*record, -1);
+    if (!is_warmth_recorded_ && may_have_changed(*record) && shows_alike_at_all(*record))
+      add(*record, -1);
   }
   find_places();
 }
@@ -141,7 +150,8 @@ void CauseEffects::add(const CauseRecord& record, int joint) {
     return;
   }
   const CauseRecord& zero = first_searched_by(SearchFamily::kZeroStep);
-  if (const ErrorSourcePtr source = source_of(zero, joint)) ask({&record, joint, "", true}, source->name(), {0});
+  if (const ErrorSourcePtr source = source_of(zero, joint))
+    ask({&record, joint, "", true}, source->name(), {0});
 }
 
 void CauseEffects::add_numbers(const CauseRecord& record, int joint, const ErrorSource& source) {
@@ -159,14 +169,16 @@ void CauseEffects::add_numbers(const CauseRecord& record, int joint, const Error
   for (const Index k : all) {
     const std::string& name = parameters[static_cast<std::size_t>(k)].name;
     bool begins = false;  // asked for by itself, as what it is when it begins at a pose
-    for (int j = 0; j < model_.cell->robot.size(); ++j) begins = begins || begun_before(record, name, j) != nullptr;
+    for (int j = 0; j < model_.cell->robot.size(); ++j)
+      begins = begins || begun_before(record, name, j) != nullptr;
     if (begins) continue;
     const bool one_a_joint = record.numbers == Numbers::kOneAJoint;
     ask({&record, one_a_joint ? static_cast<int>(k) : joint, name, false}, source.name(), {k});
   }
 }
 
-void CauseEffects::ask(SingleCause cause, const std::string& source, const std::vector<Index>& numbers) {
+void CauseEffects::ask(SingleCause cause, const std::string& source,
+                       const std::vector<Index>& numbers) {
   Entry entry{std::move(cause), {}};
   for (const Index k : numbers) {
     entry.columns.push_back(size());
@@ -201,18 +213,22 @@ void CauseEffects::find_places() {
       first += static_cast<Index>(source->parameters().size());
     }
     const Index place = first + number.number;
-    scale_(static_cast<Index>(place_.size())) = parameters[static_cast<std::size_t>(place)].prior_scale;
+    scale_(static_cast<Index>(place_.size())) =
+        parameters[static_cast<std::size_t>(place)].prior_scale;
     place_.push_back(place);
   }
 }
 
-Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, const Eigen::VectorXd& values, Pose* X_WT) const {
+Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, const Eigen::VectorXd& values,
+                                          Pose* X_WT) const {
   Eigen::MatrixXd jacobian;
   *X_WT = model_.pose_W(context, values, &jacobian);
   return jacobian(Eigen::all, place_);
 }
 
-PoseEffects CauseEffects::at(const PoseContext& context) const { return at(context, Eigen::VectorXd::Zero(size())); }
+PoseEffects CauseEffects::at(const PoseContext& context) const {
+  return at(context, Eigen::VectorXd::Zero(size()));
+}
 
 Eigen::VectorXd CauseEffects::values_at(const Eigen::VectorXd& numbers) const {
   Eigen::VectorXd values = model_.values;
@@ -223,7 +239,8 @@ Eigen::VectorXd CauseEffects::values_at(const Eigen::VectorXd& numbers) const {
   return values;
 }
 
-Eigen::MatrixXd CauseEffects::by_warmth(const PoseContext& context, const Eigen::VectorXd& values) const {
+Eigen::MatrixXd CauseEffects::by_warmth(const PoseContext& context,
+                                        const Eigen::VectorXd& values) const {
   PoseContext learned = context;
   learned.temperature = learned_at_.value_or(kOfDrawings);
   PoseContext now = is_warmth_recorded_ ? context : learned;
@@ -237,11 +254,13 @@ PoseEffects CauseEffects::at(const PoseContext& context, const Eigen::VectorXd& 
   const Eigen::VectorXd values = values_at(numbers);
   Pose X_WT = Pose::Identity();
   Eigen::MatrixXd jacobian = jacobian_at(context, values, &X_WT);
-  if (!warm_.empty() && (learned_at_ || !is_warmth_recorded_)) jacobian(Eigen::all, warm_) = by_warmth(context, values);
+  if (!warm_.empty() && (learned_at_ || !is_warmth_recorded_))
+    jacobian(Eigen::all, warm_) = by_warmth(context, values);
   return in_base(X_WT, jacobian);
 }
 
-PoseEffects CauseEffects::without_warmth(const PoseContext& context, const Eigen::VectorXd& numbers) const {
+PoseEffects CauseEffects::without_warmth(const PoseContext& context,
+                                         const Eigen::VectorXd& numbers) const {
   Pose X_WT = Pose::Identity();
   Eigen::MatrixXd jacobian = jacobian_at(context, values_at(numbers), &X_WT);
   jacobian(Eigen::all, warm_).setZero();
@@ -256,7 +275,8 @@ PoseEffects CauseEffects::in_base(const Pose& X_WT, const Eigen::MatrixXd& jacob
   effects.by_cause.topRows<3>() = R_BW * jacobian_W.topRows<3>();
   effects.by_cause.bottomRows<3>() = R_BW * jacobian_W.bottomRows<3>();
   effects.by_cause *= scale_.asDiagonal();
-  effects.by_base << Matrix3::Identity(), -skew(effects.X_BT.translation()), Matrix3::Zero(), Matrix3::Identity();
+  effects.by_base << Matrix3::Identity(), -skew(effects.X_BT.translation()), Matrix3::Zero(),
+      Matrix3::Identity();
   return effects;
 }
 

@@ -15,7 +15,7 @@ struct SingleCause {
   const CauseRecord* record = nullptr;  ///< of the catalogue
   int joint = -1;                       ///< 0-based; -1 where it concerns the whole arm
   std::string parameter = {};           ///< `d6`: where one number of it is meant; else empty
-  bool any_function = false;            ///< an error of the joint's angle by any function of that angle
+  bool any_function = false;  ///< an error of the joint's angle by any function of that angle
 };
 /// `joint_slip:2`, `geometry:d6`.
 [[nodiscard]] std::string to_string(const SingleCause& cause);
@@ -31,8 +31,8 @@ struct CauseNotAsked {
 
 /// At one pose, all in B: m and rad of the tool.
 struct PoseEffects {
-  Pose X_BT = Pose::Identity();         ///< by the model's physics
-  Eigen::MatrixXd by_cause;             ///< 6 x K, by each number of the causes, in units of its prior scale
+  Pose X_BT = Pose::Identity();  ///< by the model's physics
+  Eigen::MatrixXd by_cause;  ///< 6 x K, by each number of the causes, in units of its prior scale
   Eigen::Matrix<double, 6, 6> by_base;  ///< by a motion of the base
 };
 
@@ -41,13 +41,15 @@ class CauseEffects {
  public:
   struct Entry {
     SingleCause cause;
-    std::vector<Eigen::Index> columns;  ///< of PoseEffects::by_cause; one for any function: that of the joint's zero
+    std::vector<Eigen::Index>
+        columns;  ///< of PoseEffects::by_cause; one for any function: that of the joint's zero
   };
-  /// The causes that `poses` could show by what was recorded with them: others are listed as not asked. `learned_at`,
-  /// degrees Celsius: where the model knows the arm's lengths; heat shows by the difference. Empty: by differences
-  /// between the poses alone. Where these are none, an arm that grew as a whole is asked for all the same: nobody may
-  /// have recorded how warm it is.
-  CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at = {});
+  /// The causes that `poses` could show by what was recorded with them: others are listed as not
+  /// asked. `learned_at`, degrees Celsius: where the model knows the arm's lengths; heat shows by
+  /// the difference. Empty: by differences between the poses alone. Where these are none, an arm
+  /// that grew as a whole is asked for all the same: nobody may have recorded how warm it is.
+  CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses,
+               std::optional<double> learned_at = {});
 
   [[nodiscard]] const std::vector<Entry>& causes() const { return causes_; }
   [[nodiscard]] const std::vector<CauseNotAsked>& not_asked() const { return not_asked_; }
@@ -62,7 +64,8 @@ class CauseEffects {
   /// Where the causes have these numbers (K, in units of their prior scales).
   [[nodiscard]] PoseEffects at(const PoseContext& context, const Eigen::VectorXd& numbers) const;
   /// The same with the columns of warmth 0: a third of the work where no temperature is recorded.
-  [[nodiscard]] PoseEffects without_warmth(const PoseContext& context, const Eigen::VectorXd& numbers) const;
+  [[nodiscard]] PoseEffects without_warmth(const PoseContext& context,
+                                           const Eigen::VectorXd& numbers) const;
 
  private:
   /// One number of a source, which gets a column.
@@ -73,15 +76,17 @@ class CauseEffects {
   void add(const CauseRecord& record, int joint);
   void add_numbers(const CauseRecord& record, int joint, const ErrorSource& source);
   void ask(SingleCause cause, const std::string& source, const std::vector<Eigen::Index>& numbers);
-  /// The source of that cause in the model, which gets it where it has none; null where the cell cannot have it.
+  /// The source of that cause in the model, which gets it where it has none; null where the cell
+  /// cannot have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
   /// Of the model with these numbers of the causes.
   [[nodiscard]] Eigen::VectorXd values_at(const Eigen::VectorXd& numbers) const;
-  [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context, const Eigen::VectorXd& values,
-                                            Pose* X_WT) const;
+  [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context,
+                                            const Eigen::VectorXd& values, Pose* X_WT) const;
   /// 6 x W: the columns of warmth.
-  [[nodiscard]] Eigen::MatrixXd by_warmth(const PoseContext& context, const Eigen::VectorXd& values) const;
+  [[nodiscard]] Eigen::MatrixXd by_warmth(const PoseContext& context,
+                                          const Eigen::VectorXd& values) const;
   [[nodiscard]] PoseEffects in_base(const Pose& X_WT, const Eigen::MatrixXd& jacobian_W) const;
 
   PhysicalModel model_;

@@ -32,9 +32,11 @@ class Tour {
   /// Orders stops[from, to) after the one before them, if any.
   void order(std::vector<Stop>& stops, std::size_t from, std::size_t to) const {
     for (std::size_t at = std::max<std::size_t>(from, 1); at < to; ++at) {
-      const auto nearest = std::min_element(
-          stops.begin() + static_cast<std::ptrdiff_t>(at), stops.begin() + static_cast<std::ptrdiff_t>(to),
-          [&](const Stop& a, const Stop& b) { return way(stops[at - 1], a) < way(stops[at - 1], b); });
+      const auto nearest = std::min_element(stops.begin() + static_cast<std::ptrdiff_t>(at),
+                                            stops.begin() + static_cast<std::ptrdiff_t>(to),
+                                            [&](const Stop& a, const Stop& b) {
+                                              return way(stops[at - 1], a) < way(stops[at - 1], b);
+                                            });
       std::iter_swap(stops.begin() + static_cast<std::ptrdiff_t>(at), nearest);
     }
     if (to - from > kMostImproved) return;
@@ -77,7 +79,9 @@ class Tour {
   const std::vector<PlannedPose>& poses_;
 };
 
-bool same_mounted(const PoseContext& a, const PoseContext& b) { return a.tool == b.tool && a.payload == b.payload; }
+bool same_mounted(const PoseContext& a, const PoseContext& b) {
+  return a.tool == b.tool && a.payload == b.payload;
+}
 
 }  // namespace
 

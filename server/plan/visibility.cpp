@@ -18,12 +18,14 @@ Result<Visibility> Visibility::of(const Cell& cell, const std::string& tool) {
   if (!cell.tracker.p_W || !cell.tracker.aperture) return visibility;
   const std::optional<Pose>& X_FT = cell.tools.at(tool);
   if (!cell.X_WB || !X_FT) {
-    return refused("cell {}: tracker: aperture_deg limits what is seen, but the pose of {} is unknown", cell.name,
-                   cell.X_WB ? "tool " + tool : "the base")
+    return refused(
+               "cell {}: tracker: aperture_deg limits what is seen, but the pose of {} is unknown",
+               cell.name, cell.X_WB ? "tool " + tool : "the base")
         .of(cell.X_WB ? "tools" : "base")
         .next("give it in the cell file, or leave aperture_deg out");
   }
-  visibility.view_ = View{*cell.X_WB, *X_FT, cell.tracker.target_normal_T, *cell.tracker.p_W, *cell.tracker.aperture};
+  visibility.view_ = View{*cell.X_WB, *X_FT, cell.tracker.target_normal_T, *cell.tracker.p_W,
+                          *cell.tracker.aperture};
   return visibility;
 }
 

@@ -8,15 +8,18 @@
 /// Whether the tracker sees the target that the tool carries (source section 6.1.2).
 namespace trammel {
 
-/// Angle (rad, 0 to pi) between the target's normal and the line of sight from the target to a tracker at `tracker_W`
-/// (m). `X_WT` is the tool's pose, `normal_T` a unit vector. pi where the target stands in the tracker itself.
-[[nodiscard]] double visibility_angle(const Pose& X_WT, const Vector3& normal_T, const Vector3& tracker_W);
+/// Angle (rad, 0 to pi) between the target's normal and the line of sight from the target to a
+/// tracker at `tracker_W` (m). `X_WT` is the tool's pose, `normal_T` a unit vector. pi where the
+/// target stands in the tracker itself.
+[[nodiscard]] double visibility_angle(const Pose& X_WT, const Vector3& normal_T,
+                                      const Vector3& tracker_W);
 
-/// Which poses the tracker sees. Only the target's aperture limits the view: obstacles are not known.
+/// Which poses the tracker sees. Only the target's aperture limits the view: obstacles are not
+/// known.
 class Visibility {
  public:
-  /// Where the cell has no tracker position or no aperture, everything is visible. Where it has both, refuses an
-  /// unknown base or tool: there is no line of sight to tell.
+  /// Where the cell has no tracker position or no aperture, everything is visible. Where it has
+  /// both, refuses an unknown base or tool: there is no line of sight to tell.
   [[nodiscard]] static Result<Visibility> of(const Cell& cell, const std::string& tool);
 
   /// Whether the nominal robot at `q` (rad, m) shows its target within the aperture, edge included.

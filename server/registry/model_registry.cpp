@@ -27,7 +27,8 @@ std::size_t bytes_of(const CompensatedModel& model) {
   if (!model.bias()) return kRest;
   const auto poses = static_cast<std::size_t>(model.bias()->state().q.rows());
   if (model.bias()->needs_features() && !model.bias()->has_blocks())
-    return kRest + poses * kOfAPose + bytes_at_flange(poses) + 3 * poses * std::min(poses, kMostOfAnExpert) * 4;
+    return kRest + poses * kOfAPose + bytes_at_flange(poses) +
+           3 * poses * std::min(poses, kMostOfAnExpert) * 4;
   const std::size_t outputs = model.parts().rotation_bias ? 6 : 3;
   const std::size_t triangle = poses * std::min(poses, kMostOfAnExpert) / 2 * sizeof(double);
   const std::size_t triangles = outputs * (model.bias()->needs_features() ? 2 : 1);
@@ -55,10 +56,11 @@ void ModelRegistry::hold(ServedModelPtr model, std::vector<ServedModelPtr>* left
   place.bytes = bytes_of(place.model->model);
   bytes_ += place.bytes;
   while (bytes_ > budget_ && held_.size() > 1) {
-    const auto oldest = std::min_element(held_.begin(), held_.end(), [&key](const auto& a, const auto& b) {
-      if ((a.first == key) != (b.first == key)) return b.first == key;
-      return a.second.used < b.second.used;
-    });
+    const auto oldest =
+        std::min_element(held_.begin(), held_.end(), [&key](const auto& a, const auto& b) {
+          if ((a.first == key) != (b.first == key)) return b.first == key;
+          return a.second.used < b.second.used;
+        });
     bytes_ -= oldest->second.bytes;
     left->push_back(std::move(oldest->second.model));
     held_.erase(oldest);
@@ -97,7 +99,8 @@ Result<ServedModelPtr> ModelRegistry::version(const std::string& cell, int versi
     if (!loaded) return loaded;
     if (*loaded && (*loaded)->version == version) return loaded;
     if (*loaded)
-      return failure(ErrorCode::kInternal, "cell {}: version {} cannot be loaded, version {} is served", cell, version,
+      return failure(ErrorCode::kInternal,
+                     "cell {}: version {} cannot be loaded, version {} is served", cell, version,
                      (*loaded)->version);
   }
 }
@@ -213,19 +216,22 @@ Result<ServedModelPtr> ModelRegistry::from_source(const Key& key, bool in_force)
     source = source_;
   }
   if (!source.in_force || !source.version)
-    return failure(ErrorCode::kNotFound, "cell {}: version {} is not in memory", key.first, key.second);
+    return failure(ErrorCode::kNotFound, "cell {}: version {} is not in memory", key.first,
+                   key.second);
   try {
     auto model = TRY(in_force ? source.in_force(key.first) : source.version(key.first, key.second));
     return reclaimed(std::move(model));
   } catch (const std::exception& error) {  // out of memory, for one
-    return failure(ErrorCode::kInternal, "cell {}: version {} cannot be loaded: {}", key.first, key.second,
-                   error.what());
+    return failure(ErrorCode::kInternal, "cell {}: version {} cannot be loaded: {}", key.first,
+                   key.second, error.what());
   }
 }
 
-void ModelRegistry::settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const {
+void ModelRegistry::settle(const Key& key, bool in_force,
+                           const Result<ServedModelPtr>& loaded) const {
   const int* now = place_of(key.first);
-  if (!in_force || now == nullptr || *now != key.second) return;  // something else went in force meanwhile
+  if (!in_force || now == nullptr || *now != key.second)
+    return;  // something else went in force meanwhile
   never_loaded_.erase(key.first);
   if (loaded) {
     in_force_[key.first] = (*loaded)->version;
@@ -247,7 +253,9 @@ std::optional<ModelRegistry::Key> ModelRegistry::next_to_load() const {
 
 void ModelRegistry::load_for(const std::stop_token& stop, std::chrono::milliseconds tick) {
   const auto until = std::chrono::steady_clock::now() + tick;
-  const auto go_on = [&] { return !stop.stop_requested() && std::chrono::steady_clock::now() < until; };
+  const auto go_on = [&] {
+    return !stop.stop_requested() && std::chrono::steady_clock::now() < until;
+  };
   while (go_on()) {
     std::optional<Key> key;
     {

@@ -21,7 +21,8 @@ namespace trammel {
 /// Memory of what predicts, bytes, as far as it grows with the training poses.
 [[nodiscard]] std::size_t bytes_of(const CompensatedModel& model);
 
-/// Where the models are that are not in memory. Called without a lock, for one version by one thread at a time.
+/// Where the models are that are not in memory. Called without a lock, for one version by one
+/// thread at a time.
 struct ModelSource {
   /// The model to serve the cell with: where the one in force cannot be loaded, another version.
   std::function<Result<ServedModel>(const std::string& cell)> in_force;
@@ -30,11 +31,13 @@ struct ModelSource {
   std::function<void(const ServedModelPtr&)> loaded;
 };
 
-/// The model in force for each cell, and the models in memory. Thread-safe. A reader gets the new model or the previous
-/// one, never a mixture, and keeps it while it holds the pointer. Readers never wait for training.
+/// The model in force for each cell, and the models in memory. Thread-safe. A reader gets the new
+/// model or the previous one, never a mixture, and keeps it while it holds the pointer. Readers
+/// never wait for training.
 ///
-/// Models are loaded when they are first asked for, each by one thread however many ask, and leave the memory when it
-/// is over `budget` and they were not used for longest. Whoever may not wait asks ready().
+/// Models are loaded when they are first asked for, each by one thread however many ask, and leave
+/// the memory when it is over `budget` and they were not used for longest. Whoever may not wait
+/// asks ready().
 class ModelRegistry {
  public:
   static constexpr std::size_t kNoLimit = SIZE_MAX;
@@ -58,7 +61,9 @@ class ModelRegistry {
   /// The same, of a model that is loaded when it is asked for.
   void announce(const std::string& cell, int version);
   /// A model that whoever holds it last does not free itself.
-  [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const { return reclaimer_->watch(std::move(model)); }
+  [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const {
+    return reclaimer_->watch(std::move(model));
+  }
   /// The models in force that are in memory, ordered by cell name.
   [[nodiscard]] std::vector<ServedModelPtr> all() const;
   /// Where the model in force of a cell is.
@@ -78,9 +83,9 @@ class ModelRegistry {
 
   /// Set before it is used by others; the last one set is emptied before what it calls goes.
   void set_source(ModelSource source);
-  /// Loads what ready() was asked for; where nothing is, models in force that were never loaded, as long as there is
-  /// room. Returns after `tick` at the latest, or when `stop` is requested. While one thread calls this again and
-  /// again, ready() does not wait.
+  /// Loads what ready() was asked for; where nothing is, models in force that were never loaded, as
+  /// long as there is room. Returns after `tick` at the latest, or when `stop` is requested. While
+  /// one thread calls this again and again, ready() does not wait.
   void load_for(const std::stop_token& stop, std::chrono::milliseconds tick);
   /// No thread calls load_for() any longer.
   void stop_loading();
@@ -103,13 +108,17 @@ class ModelRegistry {
   /// Loads one, once it is sure that nobody else does; empty: somebody did meanwhile.
   [[nodiscard]] Result<ServedModelPtr> load(const Key& key) const TRAMMEL_EXCLUDES(mutex_);
   [[nodiscard]] Result<ServedModelPtr> from_source(const Key& key, bool in_force) const;
-  void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const TRAMMEL_REQUIRES(mutex_);
+  void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const
+      TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
   /// Whether models are loaded that nobody has asked for.
-  [[nodiscard]] bool has_room() const TRAMMEL_REQUIRES(mutex_) { return bytes_ < budget_ - budget_ / 8; }
+  [[nodiscard]] bool has_room() const TRAMMEL_REQUIRES(mutex_) {
+    return bytes_ < budget_ - budget_ / 8;
+  }
 
   const std::size_t budget_;
-  const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ = std::make_shared<Reclaimer<ServedModel>>();
+  const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ =
+      std::make_shared<Reclaimer<ServedModel>>();
   // Everything is a memory of what the source has: asking changes it.
   mutable Mutex mutex_;
   mutable Condition changed_;
@@ -117,8 +126,9 @@ class ModelRegistry {
   mutable std::map<std::string, int> in_force_ TRAMMEL_GUARDED_BY(mutex_);
   mutable std::map<Key, Held> held_ TRAMMEL_GUARDED_BY(mutex_);
   mutable std::set<Key> loading_ TRAMMEL_GUARDED_BY(mutex_);
-  mutable std::deque<Key> wanted_ TRAMMEL_GUARDED_BY(mutex_);              // asked for by those who do not wait
-  mutable std::set<std::string> never_loaded_ TRAMMEL_GUARDED_BY(mutex_);  // cells whose model was only announced
+  mutable std::deque<Key> wanted_ TRAMMEL_GUARDED_BY(mutex_);  // asked for by those who do not wait
+  mutable std::set<std::string> never_loaded_
+      TRAMMEL_GUARDED_BY(mutex_);  // cells whose model was only announced
   mutable std::size_t bytes_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   mutable std::uint64_t uses_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   bool is_loading_ TRAMMEL_GUARDED_BY(mutex_) = false;  // a thread calls load_for()

@@ -9,15 +9,16 @@
 
 namespace trammel {
 
-/// Frees values in a thread of its own: whoever drops the last pointer to a large value must not pay for it. Without
-/// that thread the last one frees it. Thread-safe.
+/// Frees values in a thread of its own: whoever drops the last pointer to a large value must not
+/// pay for it. Without that thread the last one frees it. Thread-safe.
 template <typename Value>
 class Reclaimer : public std::enable_shared_from_this<Reclaimer<Value>> {
  public:
   [[nodiscard]] std::shared_ptr<const Value> watch(Value value) {
     auto owned = std::make_unique<const Value>(std::move(value));
-    return {owned.release(),
-            [self = this->shared_from_this()](const Value* last) { self->bury(std::unique_ptr<const Value>(last)); }};
+    return {owned.release(), [self = this->shared_from_this()](const Value* last) {
+              self->bury(std::unique_ptr<const Value>(last));
+            }};
   }
   /// Frees what is left until `stop` is requested.
   void run(const std::stop_token& stop) {
@@ -28,7 +29,8 @@ class Reclaimer : public std::enable_shared_from_this<Reclaimer<Value>> {
     for (;;) {
       std::vector<std::unique_ptr<const Value>> dead;
       MutexLock lock(mutex_);
-      const bool some = came_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !dead_.empty(); });
+      const bool some =
+          came_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !dead_.empty(); });
       dead.swap(dead_);
       if (!some) runs_ = false;
       lock.unlock();

@@ -36,8 +36,10 @@ ordered_json json_of(const BudgetLine& line) {
   if (line.times_usual) json["times_usual"] = *line.times_usual;
   if (!line.numbers.empty()) json["numbers"] = ordered_json::array();
   for (const BudgetNumber& number : line.numbers)
-    json["numbers"].push_back(
-        {{"name", number.name}, {"value", number.value}, {"u95", number.u95}, {"unit", number.unit}});
+    json["numbers"].push_back({{"name", number.name},
+                               {"value", number.value},
+                               {"u95", number.u95},
+                               {"unit", number.unit}});
   return json;
 }
 
@@ -45,7 +47,9 @@ ordered_json json_of(const BudgetView& view) {
   ordered_json lines = ordered_json::array();
   std::vector<BudgetLine> largest_first = view.lines;
   std::stable_sort(largest_first.begin(), largest_first.end(),
-                   [](const BudgetLine& one, const BudgetLine& other) { return one.alone_rms > other.alone_rms; });
+                   [](const BudgetLine& one, const BudgetLine& other) {
+                     return one.alone_rms > other.alone_rms;
+                   });
   for (const BudgetLine& line : largest_first) lines.push_back(json_of(line));
   return {{"nominal_rms_mm", to_mm(view.error_rms)}, {"lines", std::move(lines)}};
 }
@@ -66,7 +70,8 @@ ordered_json remedy_steps_json(const ErrorBudget& budget) {
     if (step.step == "nothing") continue;
     ordered_json values = ordered_json::array();
     for (const RemedyValue& value : remedy_values(budget, step.step))
-      values.push_back({{"name", value.name}, {"add", value.add}, {"u95", value.u95}, {"unit", value.unit}});
+      values.push_back(
+          {{"name", value.name}, {"add", value.add}, {"u95", value.u95}, {"unit", value.unit}});
     steps.push_back({{"step", step.step},
                      {"name", step.name},
                      {"left_rms_mm", to_mm(step.left_rms)},

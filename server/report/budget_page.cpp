@@ -18,7 +18,8 @@ constexpr double kWorthARow = 1e-3;  // of the error: shorter bars are not seen
 
 /// A bar as long as its part of the longest one, and its length in words.
 std::string bar(double length, double longest) {
-  return bar_of(longest > 0 ? length / longest : 0, "budget_bar") + fmt::format("{:.4f}", to_mm(length));
+  return bar_of(longest > 0 ? length / longest : 0, "budget_bar") +
+         fmt::format("{:.4f}", to_mm(length));
 }
 
 std::string named(const BudgetLine& line) {
@@ -36,13 +37,16 @@ std::map<std::string, double> shares_of(const BudgetView& view) {
   return shares;
 }
 
-HtmlRow row_of(const BudgetLine& line, double longest, const std::map<std::string, double>& beyond_frames) {
+HtmlRow row_of(const BudgetLine& line, double longest,
+               const std::map<std::string, double>& beyond_frames) {
   const auto beyond = beyond_frames.find(line.line);
-  return {{named(line), value_html(line), bar(line.alone_rms, longest), fmt::format("{:.1f} %", 100 * line.share),
-           beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
-           fmt::format("{:.4f}", to_mm(line.left_if_right)),
-           line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : "", html_text(line.action)},
-          line.action.empty() ? "" : "stands_out"};
+  return {
+      {named(line), value_html(line), bar(line.alone_rms, longest),
+       fmt::format("{:.1f} %", 100 * line.share),
+       beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
+       fmt::format("{:.4f}", to_mm(line.left_if_right)),
+       line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : "", html_text(line.action)},
+      line.action.empty() ? "" : "stands_out"};
 }
 
 }  // namespace
@@ -54,15 +58,17 @@ std::string value_html(const BudgetLine& line) {
 }
 
 std::string bar_of(double share, const char* kind) {
-  return fmt::format(R"(<svg class="{}" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">)"
-                     R"(<rect width="{:.1f}" height="10"/></svg>)",
-                     kind, 100 * share);
+  return fmt::format(
+      R"(<svg class="{}" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">)"
+      R"(<rect width="{:.1f}" height="10"/></svg>)",
+      kind, 100 * share);
 }
 
 std::string budget_section(const std::optional<ErrorBudget>& budget) {
   if (!budget || budget->as_it_stands.lines.empty())
-    return html_section("Where the millimetres come from",
-                        "<p class=\"note\">Not known: no pose has a measured position, or the model is older.</p>");
+    return html_section(
+        "Where the millimetres come from",
+        "<p class=\"note\">Not known: no pose has a measured position, or the model is older.</p>");
   const BudgetView& view = budget->as_it_stands;
   double longest = 0;
   for (const BudgetLine& line : view.lines) longest = std::max(longest, line.alone_rms);
@@ -79,17 +85,17 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
     small += worth || line.kind == LineKind::kUntold ? 0 : 1;
   }
   std::string text = fmt::format(
-      "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool frames would leave "
-      "{:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. Left: what would be left if only this "
-      "line "
-      "were put right.{}</p>",
+      "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool "
+      "frames would leave {:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. "
+      "Left: what would be left if only this line were put right.{}</p>",
       to_mm(view.error_rms), budget->poses, to_mm(budget->beyond_frames.error_rms),
       small > 0 ? fmt::format(" {} more lines have less than 0.1 %.", small) : "");
   text += html_table({"budget stacks",
-                      {"line", "value ± U (k = 2)", "alone, mm rms", "share", "share beyond frames", "left, mm rms",
-                       "times usual", "what to do"},
+                      {"line", "value ± U (k = 2)", "alone, mm rms", "share", "share beyond frames",
+                       "left, mm rms", "times usual", "what to do"},
                       rows});
-  if (!untold.empty()) text += "<p class=\"note\">What these poses cannot tell: " + html_text(untold) + ".</p>";
+  if (!untold.empty())
+    text += "<p class=\"note\">What these poses cannot tell: " + html_text(untold) + ".</p>";
   return html_section("Where the millimetres come from", text);
 }
 

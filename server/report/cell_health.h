@@ -37,11 +37,11 @@ struct CellHealth {
   std::vector<CheckOnRecord> checks = {};     ///< oldest first
 };
 
-/// For programs. `verdict` and `due` are those of the last check of the model in force; null and empty where none was
-/// made.
+/// For programs. `verdict` and `due` are those of the last check of the model in force; null and
+/// empty where none was made.
 [[nodiscard]] nlohmann::ordered_json cell_health_json(const CellHealth& health);
-/// For people, of what cell_health_json() made: the verdict, when the next check is due, what was found when.
-/// `json` may come from outside: what it lacks is left out.
+/// For people, of what cell_health_json() made: the verdict, when the next check is due, what was
+/// found when. `json` may come from outside: what it lacks is left out.
 [[nodiscard]] std::string cell_health_text(const nlohmann::ordered_json& json);
 /// The first line of it.
 [[nodiscard]] std::string cell_health_line(const nlohmann::ordered_json& json);

@@ -38,18 +38,21 @@ std::string lines_table(const BudgetView& view) {
                      fmt::format("{:.1f} %", 100 * line.share)}});
   }
   if (rows.empty()) return "<p>Nothing changed by more than its uncertainty.</p>";
-  return html_table({"budget stacks", {"line", "change ± U (k = 2)", "alone, mm rms", "share"}, rows});
+  return html_table(
+      {"budget stacks", {"line", "change ± U (k = 2)", "alone, mm rms", "share"}, rows});
 }
 
 std::string parameters_table(const ModelDifference& difference) {
   std::vector<HtmlRow> rows;
   for (const ParameterDifference& one : difference.parameters) {
     if (std::abs(one.difference()) <= one.u95) continue;
-    rows.push_back({{html_text(one.name), fmt::format("{:.6g}", one.before), fmt::format("{:.6g}", one.now),
-                     fmt::format("{:+.4g} ± {:.2g}", one.difference(), one.u95), html_text(one.unit)}});
+    rows.push_back(
+        {{html_text(one.name), fmt::format("{:.6g}", one.before), fmt::format("{:.6g}", one.now),
+          fmt::format("{:+.4g} ± {:.2g}", one.difference(), one.u95), html_text(one.unit)}});
   }
   if (rows.empty()) return "<p>No parameter differs by more than its uncertainty.</p>";
-  return html_table({"parameters flows", {"parameter", "A", "B", "B - A ± U (k = 2)", "unit"}, rows});
+  return html_table(
+      {"parameters flows", {"parameter", "A", "B", "B - A ± U (k = 2)", "unit"}, rows});
 }
 
 }  // namespace
@@ -65,7 +68,8 @@ std::string comparison_page(const Comparison& asked) {
                html_section("Beyond what touching base and tool frames would take away",
                             lines_table(found.budget.beyond_frames)) +
                html_section("As it stands", lines_table(found.budget.as_it_stands)) +
-               html_section("Parameters that differ by more than their uncertainty", parameters_table(found))});
+               html_section("Parameters that differ by more than their uncertainty",
+                            parameters_table(found))});
 }
 
 }  // namespace trammel

@@ -12,10 +12,11 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr Eigen::Index kMostPoints = 500;  // of one periodogram: more than a screen has pixels for it
-constexpr double kLeastLever = 0.2;        // of a joint's longest: shorter ones turn noise into angles
-constexpr double kScaleQuantile = 0.98;    // of the errors before: the colour scale's end, so that one outlier does
-                                           // not make all the others look alike
+constexpr Eigen::Index kMostPoints =
+    500;                             // of one periodogram: more than a screen has pixels for it
+constexpr double kLeastLever = 0.2;  // of a joint's longest: shorter ones turn noise into angles
+constexpr double kScaleQuantile = 0.98;  // of the errors before: the colour scale's end, so that
+                                         // one outlier does not make all the others look alike
 
 constexpr int kPhaseStep = 5;  // degrees
 
@@ -30,14 +31,17 @@ class Arm {
   Arm(const Diagnosis& diagnosis, const Cell& cell) : diagnosis_(diagnosis), cell_(cell) {}
 
   [[nodiscard]] Eigen::Index poses() const {
-    return std::min<Eigen::Index>(static_cast<Eigen::Index>(diagnosis_.batch.measurements.size()),
-                                  std::min(diagnosis_.residual_before_B.cols(), diagnosis_.residual_after_B.cols()));
+    return std::min<Eigen::Index>(
+        static_cast<Eigen::Index>(diagnosis_.batch.measurements.size()),
+        std::min(diagnosis_.residual_before_B.cols(), diagnosis_.residual_after_B.cols()));
   }
   [[nodiscard]] const PoseContext& context(Eigen::Index pose) const {
     return diagnosis_.batch.measurements[static_cast<std::size_t>(pose)].context;
   }
   /// Nominal tool position, m, in B.
-  [[nodiscard]] Vector3 p_B(Eigen::Index pose) const { return cell_.robot.flange_pose(context(pose).q) * p_FT(pose); }
+  [[nodiscard]] Vector3 p_B(Eigen::Index pose) const {
+    return cell_.robot.flange_pose(context(pose).q) * p_FT(pose);
+  }
   [[nodiscard]] double gear_angle(Eigen::Index pose, int joint) const {
     return cell_.robot.gear_angles(context(pose).q)(joint);
   }
@@ -89,7 +93,8 @@ ordered_json waterfall(const Diagnosis& diagnosis) {
   return {{"names", names}, {"rms_um", rms}};
 }
 
-/// What was found of a joint and shows in its periodogram. A line that stands out may be another joint's.
+/// What was found of a joint and shows in its periodogram. A line that stands out may be another
+/// joint's.
 std::string found_in(const Periodogram& lines, const std::vector<Finding>& findings) {
   std::vector<std::string> orders;
   std::string map;
@@ -127,7 +132,9 @@ ordered_json periodogram(const Periodogram& all, const std::vector<Finding>& fin
 struct Wave {
   double order = 0, sine = 0, cosine = 0;  ///< cycles a turn; rad
   /// rad, at `angle` of the oscillation itself
-  [[nodiscard]] double at(double angle) const { return sine * std::sin(angle) + cosine * std::cos(angle); }
+  [[nodiscard]] double at(double angle) const {
+    return sine * std::sin(angle) + cosine * std::cos(angle);
+  }
 };
 
 std::optional<Wave> wave_of(const Finding& finding) {
@@ -151,10 +158,11 @@ ordered_json cycle_of(const Wave& wave) {
   return {{"phase_deg", phase}, {"urad", urad}};
 }
 
-/// The joint's error against the phase of its gear's oscillation: with that alone, all that is left besides with it,
-/// and without it.
+/// The joint's error against the phase of its gear's oscillation: with that alone, all that is left
+/// besides with it, and without it.
 ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, const Wave& wave) {
-  ordered_json phase = ordered_json::array(), alone = ordered_json::array(), after = ordered_json::array();
+  ordered_json phase = ordered_json::array(), alone = ordered_json::array(),
+               after = ordered_json::array();
   const Arm::Levers levers = arm.levers(joint);
   for (std::size_t k = 0; k < levers.poses.size(); ++k) {
     const Eigen::Index i = levers.poses[k];
@@ -171,7 +179,8 @@ ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, const W
 ordered_json folds(const Diagnosis& diagnosis, const Arm& arm) {
   ordered_json list = ordered_json::array();
   for (const Finding& finding : diagnosis.findings) {
-    if (const auto wave = wave_of(finding)) list.push_back(fold(diagnosis, arm, finding.cause.joint, *wave));
+    if (const auto wave = wave_of(finding))
+      list.push_back(fold(diagnosis, arm, finding.cause.joint, *wave));
   }
   return list;
 }
@@ -201,7 +210,8 @@ ordered_json over_time(const Diagnosis& diagnosis, const Arm& arm) {
           {"after_um", axes_um(diagnosis.residual_after_B, arm.poses())}};
 }
 
-/// Mean residual along one joint's motion by the side it was approached from; empty where there is only one side.
+/// Mean residual along one joint's motion by the side it was approached from; empty where there is
+/// only one side.
 ordered_json approached(const Diagnosis& diagnosis, const Arm& arm, int joint) {
   const Arm::Levers levers = arm.levers(joint);
   double before[2] = {0, 0}, after[2] = {0, 0};
@@ -217,7 +227,9 @@ ordered_json approached(const Diagnosis& diagnosis, const Arm& arm, int joint) {
     ++count[side];
   }
   if (count[0] == 0 || count[1] == 0) return nullptr;
-  const auto mean = [&](const double* sum, int side) { return tenth_of_um(sum[side] / count[side]); };
+  const auto mean = [&](const double* sum, int side) {
+    return tenth_of_um(sum[side] / count[side]);
+  };
   return {{"joint", joint + 1},
           {"before_um", {mean(before, 0), mean(before, 1)}},
           {"after_um", {mean(after, 0), mean(after, 1)}}};
@@ -234,7 +246,8 @@ ordered_json by_direction(const Diagnosis& diagnosis, const Arm& arm, const Cell
 
 /// Residual away from the robot's base against temperature: what growing links do.
 ordered_json by_temperature(const Diagnosis& diagnosis, const Arm& arm) {
-  ordered_json at = ordered_json::array(), before = ordered_json::array(), after = ordered_json::array();
+  ordered_json at = ordered_json::array(), before = ordered_json::array(),
+               after = ordered_json::array();
   for (Eigen::Index i = 0; i < arm.poses(); ++i) {
     if (!arm.context(i).temperature) continue;
     const Vector3 outward_B = arm.p_B(i).normalized();
@@ -260,10 +273,12 @@ double scale_end(const Eigen::Matrix3Xd& e_B) {
 }
 
 ordered_json maps(const Diagnosis& diagnosis, const Arm& arm) {
-  ordered_json place = {{"x", ordered_json::array()}, {"y", ordered_json::array()}, {"z", ordered_json::array()}};
+  ordered_json place = {
+      {"x", ordered_json::array()}, {"y", ordered_json::array()}, {"z", ordered_json::array()}};
   for (Eigen::Index i = 0; i < arm.poses(); ++i) {
     const Vector3 p_B = arm.p_B(i);
-    for (int k = 0; k < 3; ++k) place[std::string(1, "xyz"[k])].push_back(rounded(to_mm(p_B(k)), 0.1));
+    for (int k = 0; k < 3; ++k)
+      place[std::string(1, "xyz"[k])].push_back(rounded(to_mm(p_B(k)), 0.1));
   }
   return {{"place_mm", place},
           {"before_um", sizes_um(diagnosis.residual_before_B, arm.poses())},
@@ -296,8 +311,9 @@ ordered_json diagnosis_charts(const Diagnosis& diagnosis, const Cell& cell) {
     if (!chart.is_null() && !chart.empty()) charts[name] = std::move(chart);
   };
   if (!diagnosis.waterfall.empty()) put("waterfall", waterfall(diagnosis));
-  put("periodograms",
-      each(diagnosis.periodograms, [&](const Periodogram& one) { return periodogram(one, diagnosis.findings); }));
+  put("periodograms", each(diagnosis.periodograms, [&](const Periodogram& one) {
+        return periodogram(one, diagnosis.findings);
+      }));
   put("recovery", each(diagnosis.recovery, recovery));
   if (arm.poses() == 0) return charts;
   put("folds", folds(diagnosis, arm));

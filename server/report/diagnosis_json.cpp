@@ -47,7 +47,9 @@ ordered_json beginning_json(const std::vector<PossibleBeginning>& places) {
   };
   ordered_json ids = ordered_json::array();
   for (const PossibleBeginning& place : places) ids.push_back(place.pose_id);
-  return {{"earliest", place_json(places.front())}, {"latest", place_json(places.back())}, {"pose_ids", ids}};
+  return {{"earliest", place_json(places.front())},
+          {"latest", place_json(places.back())},
+          {"pose_ids", ids}};
 }
 
 ordered_json finding_json(const Finding& finding) {
@@ -55,7 +57,8 @@ ordered_json finding_json(const Finding& finding) {
   json["source"] = finding.source;
   json["parameters"] = ordered_json::object();
   for (const Estimate& estimate : finding.parameters) {
-    json["parameters"][estimate.name] = {{"value", estimate.value}, {"u95", estimate.u95}, {"unit", estimate.unit}};
+    json["parameters"][estimate.name] = {
+        {"value", estimate.value}, {"u95", estimate.u95}, {"unit", estimate.unit}};
   }
   if (!finding.may_begin_at.empty()) json["may_begin_at"] = beginning_json(finding.may_begin_at);
   if (!finding.since_session.empty())
@@ -132,7 +135,8 @@ ordered_json next_poses_json(const Diagnosis& diagnosis) {
   ordered_json list = ordered_json::array();
   for (const JointVector& q : diagnosis.next_poses.q) {
     ordered_json pose = ordered_json::array();
-    for (Eigen::Index j = 0; j < q.size(); ++j) pose.push_back(joint_to_column(q(j), type_of(diagnosis, j)));
+    for (Eigen::Index j = 0; j < q.size(); ++j)
+      pose.push_back(joint_to_column(q(j), type_of(diagnosis, j)));
     list.push_back(pose);
   }
   return list;
@@ -157,22 +161,24 @@ ordered_json next_poses_worth_json(const Diagnosis& diagnosis) {
 ordered_json leftover_json(const std::vector<Dependence>& leftover) {
   ordered_json list = ordered_json::array();
   for (const Dependence& one : leftover) {
-    list.push_back({{"on", one.on}, {"of", one.of_size ? "size" : "residual"}, {"p_value", one.p_value}});
+    list.push_back(
+        {{"on", one.on}, {"of", one.of_size ? "size" : "residual"}, {"p_value", one.p_value}});
   }
   return list;
 }
 
 ordered_json waterfall_json(const std::vector<WaterfallStep>& steps) {
   ordered_json list = ordered_json::array();
-  for (const WaterfallStep& step : steps) list.push_back({{"step", step.name}, {"rms_mm", to_mm(step.rms)}});
+  for (const WaterfallStep& step : steps)
+    list.push_back({{"step", step.name}, {"rms_mm", to_mm(step.rms)}});
   return list;
 }
 
 /// The notes of both, each once.
 std::vector<Note> together(std::vector<Note> notes, const std::vector<Note>& more) {
   for (const Note& note : more) {
-    const bool is_there =
-        std::any_of(notes.begin(), notes.end(), [&](const Note& known) { return known.text == note.text; });
+    const bool is_there = std::any_of(notes.begin(), notes.end(),
+                                      [&](const Note& known) { return known.text == note.text; });
     if (!is_there) notes.push_back(note);
   }
   return gravest_first(std::move(notes));

@@ -21,19 +21,24 @@ namespace trammel {
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
-constexpr double kDepends = 0.01;  // p-value below which the table says yes: 1 of 100 batches by chance
+constexpr double kDepends =
+    0.01;  // p-value below which the table says yes: 1 of 100 batches by chance
 
 std::string micrometres(double m) { return fmt::format("{:.3g}\u00a0µm", m * 1e6); }
 std::string millimetres(double m) { return fmt::format("{:.4f}", to_mm(m)); }
 
 /// A table that scrolls by itself where the page is narrow.
-std::string table(const HtmlTable& table) { return "<div class=\"wide\">" + html_table(table) + "</div>\n"; }
+std::string table(const HtmlTable& table) {
+  return "<div class=\"wide\">" + html_table(table) + "</div>\n";
+}
 
 std::string paragraph(const std::string& text) { return "<p>" + html_text(text) + "</p>\n"; }
 
 std::string where_of(const Cause& cause) {
   if (!cause.pose_id.empty()) {
-    return fmt::format("{}pose {}", cause.joint >= 0 ? fmt::format("{}, from ", cause.joint + 1) : "", cause.pose_id);
+    return fmt::format("{}pose {}",
+                       cause.joint >= 0 ? fmt::format("{}, from ", cause.joint + 1) : "",
+                       cause.pose_id);
   }
   return cause.joint >= 0 ? fmt::format("{}", cause.joint + 1) : "–";
 }
@@ -49,7 +54,9 @@ std::string unit_shown(const std::string& unit) {
   return unit == "um" ? "µm" : unit;
 }
 
-std::string p_value_shown(double p) { return p <= kLeastPValue ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p); }
+std::string p_value_shown(double p) {
+  return p <= kLeastPValue ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
+}
 
 /// What stands behind the letter p: " = 0.02" or " < 10⁻⁶".
 std::string p_value_after_p(double p) {
@@ -61,9 +68,10 @@ std::string estimates_of(const Finding& finding) {
   std::string html;
   for (const Estimate& estimate : finding.parameters) {
     const ShownValue shown = show_with_uncertainty(estimate.value, estimate.u95);
-    html += fmt::format("{}<span class=\"estimate\">{}\u00a0=\u00a0{}\u00a0±\u00a0{}\u00a0{}</span>",
-                        html.empty() ? "" : "<br>", html_text(estimate.name), shown.value, shown.expanded,
-                        html_text(unit_shown(estimate.unit)));
+    html +=
+        fmt::format("{}<span class=\"estimate\">{}\u00a0=\u00a0{}\u00a0±\u00a0{}\u00a0{}</span>",
+                    html.empty() ? "" : "<br>", html_text(estimate.name), shown.value,
+                    shown.expanded, html_text(unit_shown(estimate.unit)));
   }
   return html.empty() ? "–" : html;
 }
@@ -74,25 +82,28 @@ std::string beginning_of(const Finding& finding) {
   const auto place = [](const PossibleBeginning& one) {
     return one.pose_id + (one.time ? fmt::format(" ({:.0f} s)", *one.time) : "");
   };
-  return fmt::format(" It may have begun at any of {} poses from {} to {} (95\u00a0%).", places.size(),
-                     place(places.front()), place(places.back()));
+  return fmt::format(" It may have begun at any of {} poses from {} to {} (95\u00a0%).",
+                     places.size(), place(places.front()), place(places.back()));
 }
 
 /// What else it could be, for people.
 std::string others_of(const Finding& finding) {
-  return finding.whole ? all_in_words(finding.could_also_be) : "part of it only: more than noise is left";
+  return finding.whole ? all_in_words(finding.could_also_be)
+                       : "part of it only: more than noise is left";
 }
 
 HtmlRow finding_row(const Finding& finding) {
   const std::string others = others_of(finding);
-  return {
-      .cells = {"<b>" + html_text(kind_called(finding.cause, !finding.could_also_be.empty())) + "</b>",
-                html_text(where_of(finding.cause)), estimates_of(finding),
-                fmt::format("{:.3g}", finding.effect_rms * 1e6),
-                millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
-                fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
-                others.empty() ? "no other known cause" : "<span class=\"doubt\">" + html_text(others) + "</span>"},
-      .kind = "found"};
+  return {.cells = {"<b>" + html_text(kind_called(finding.cause, !finding.could_also_be.empty())) +
+                        "</b>",
+                    html_text(where_of(finding.cause)), estimates_of(finding),
+                    fmt::format("{:.3g}", finding.effect_rms * 1e6),
+                    millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" +
+                        millimetres(finding.held_out_after.rms),
+                    fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
+                    others.empty() ? "no other known cause"
+                                   : "<span class=\"doubt\">" + html_text(others) + "</span>"},
+          .kind = "found"};
 }
 
 /// What to do about it, below its figures.
@@ -110,8 +121,8 @@ std::string findings_text(const Diagnosis& diagnosis) {
     rows.push_back(action_row(finding));
   }
   return table({"findings",
-                {"cause", "joint", "parameter ± U (k = 2)", "effect, µm rms", "held-out rms, mm", "strength λ", "p",
-                 "could also be"},
+                {"cause", "joint", "parameter ± U (k = 2)", "effect, µm rms", "held-out rms, mm",
+                 "strength λ", "p", "could also be"},
                 rows});
 }
 
@@ -127,14 +138,15 @@ std::string tiles(const Diagnosis& diagnosis) {
   return tile("before", fmt::format("{:.4f} mm", to_mm(before.rms)), before_name) +
          tile("after", fmt::format("{:.4f} mm", to_mm(after.rms)), "with what was found") +
          tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)),
-              html_text("noise, rms: what is left of a position when all that was found is corrected (" +
-                        with_micro(diagnosis.noise_from) + ")")
+              html_text(
+                  "noise, rms: what is left of a position when all that was found is corrected (" +
+                  with_micro(diagnosis.noise_from) + ")")
                   .c_str());
 }
 
 HtmlRow figures_row(const char* name, const ErrorFigures& figures) {
-  return {
-      {name, millimetres(figures.rms), millimetres(figures.mean), millimetres(figures.p997), millimetres(figures.max)}};
+  return {{name, millimetres(figures.rms), millimetres(figures.mean), millimetres(figures.p997),
+           millimetres(figures.max)}};
 }
 
 std::string figures_table(const Diagnosis& diagnosis) {
@@ -148,7 +160,8 @@ std::string figures_table(const Diagnosis& diagnosis) {
   add("held out but for those that fit neither, before", diagnosis.held_out_before_without);
   add("held out but for those that fit neither, after", diagnosis.held_out_after_without);
   return table({"figures", {"mm", "rms", "mean", "99.7 %", "max"}, rows}) +
-         (diagnosis.held_out_how.empty() ? "" : paragraph("Held out: " + diagnosis.held_out_how + "."));
+         (diagnosis.held_out_how.empty() ? ""
+                                         : paragraph("Held out: " + diagnosis.held_out_how + "."));
 }
 
 std::string unexplained_text(const Diagnosis& diagnosis) {
@@ -158,8 +171,9 @@ std::string unexplained_text(const Diagnosis& diagnosis) {
   const std::string p = fmt::format(" (p{})", p_value_after_p(left.p_value));
   const bool depends = !left.depends_on.empty();
   const std::string changes = html_text(what_it_changes_with(left.depends_on)) + (depends ? p : "");
-  return fmt::format("<p class=\"left\">Unexplained: {} rms{}. {} No known cause fits.</p>\n", micrometres(left.rms),
-                     depends ? "" : ", more than the stated noise" + p, as_sentence(changes));
+  return fmt::format("<p class=\"left\">Unexplained: {} rms{}. {} No known cause fits.</p>\n",
+                     micrometres(left.rms), depends ? "" : ", more than the stated noise" + p,
+                     as_sentence(changes));
 }
 
 std::string leftover_text(const Diagnosis& diagnosis) {
@@ -167,9 +181,9 @@ std::string leftover_text(const Diagnosis& diagnosis) {
   std::vector<HtmlRow> rows;
   for (const Dependence& one : diagnosis.leftover) {
     const char* depends = one.p_value < kDepends ? "yes" : "no";
-    rows.push_back(
-        {.cells = {depends, one.of_size ? "its size" : "the residual", html_text(one.on), p_value_shown(one.p_value)},
-         .kind = depends});
+    rows.push_back({.cells = {depends, one.of_size ? "its size" : "the residual", html_text(one.on),
+                              p_value_shown(one.p_value)},
+                    .kind = depends});
   }
   return table({"leftover", {"depends", "what of it", "on", "p (Holm)"}, rows});
 }
@@ -178,18 +192,23 @@ std::string not_separable_text(const Diagnosis& diagnosis) {
   std::vector<HtmlRow> rows;
   for (const Inseparable& group : diagnosis.not_separable) {
     if (is_never_shown(diagnosis, group.causes.front())) continue;
-    rows.push_back({{html_text(all_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
+    rows.push_back(
+        {{html_text(all_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
   }
   if (rows.empty()) return "<p>These poses tell all causes apart that they show.</p>\n";
-  return table({"confusion stacks", {"look the same at these poses", "canonical correlation"}, rows});
+  return table(
+      {"confusion stacks", {"look the same at these poses", "canonical correlation"}, rows});
 }
 
-JointType type_of(const Cell& cell, Eigen::Index joint) { return cell.robot.joint(static_cast<int>(joint)).type; }
+JointType type_of(const Cell& cell, Eigen::Index joint) {
+  return cell.robot.joint(static_cast<int>(joint)).type;
+}
 
 std::string next_poses_table(const std::vector<JointVector>& poses, const Cell& cell) {
   std::vector<std::string> head = {""};
   for (Eigen::Index j = 0; j < poses.front().size(); ++j) {
-    head.push_back(fmt::format("q{}, {}", j + 1, type_of(cell, j) == JointType::kRevolute ? "°" : "mm"));
+    head.push_back(
+        fmt::format("q{}, {}", j + 1, type_of(cell, j) == JointType::kRevolute ? "°" : "mm"));
   }
   std::vector<HtmlRow> rows;
   for (const JointVector& q : poses) {
@@ -206,17 +225,18 @@ std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   const NextPoses& next = diagnosis.next_poses;
   if (next.q.empty()) return paragraph(as_sentence("None suggested: " + next.none_because));
   return fmt::format(
-             "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with these "
-             "poses</b>, by {} with as many random ones.</p>\n",
-             html_text(all_in_words(next.separates)), uncertain_by(next.stddev_now), uncertain_by(next.stddev_expected),
-             uncertain_by(next.stddev_random)) +
+             "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with "
+             "these poses</b>, by {} with as many random ones.</p>\n",
+             html_text(all_in_words(next.separates)), uncertain_by(next.stddev_now),
+             uncertain_by(next.stddev_expected), uncertain_by(next.stddev_random)) +
          next_poses_table(next.q, cell);
 }
 
 std::string limits_list(const std::vector<std::string>& limits) {
   if (limits.empty()) return "";
   std::string html = "<ul>\n";
-  for (const std::string& limit : limits) html += "<li>" + html_text(as_sentence(limit)) + "</li>\n";
+  for (const std::string& limit : limits)
+    html += "<li>" + html_text(as_sentence(limit)) + "</li>\n";
   return html + "</ul>\n";
 }
 
@@ -245,9 +265,11 @@ std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) 
   if (unseen.empty()) return "";
   std::vector<HtmlRow> rows;
   for (const Need& need : needs_of(unseen)) {
-    rows.push_back({{html_text(kind_in_words(need.one->cause)), html_text(need.joints), html_text(need.one->needs)}});
+    rows.push_back({{html_text(kind_in_words(need.one->cause)), html_text(need.joints),
+                     html_text(need.one->needs)}});
   }
-  return fmt::format("<h3>{}</h3>\n", heading) + table({"never stacks", {"cause", "joint", "it needs"}, rows});
+  return fmt::format("<h3>{}</h3>\n", heading) +
+         table({"never stacks", {"cause", "joint", "it needs"}, rows});
 }
 
 std::string never_tables(const Diagnosis& diagnosis) {
@@ -257,7 +279,8 @@ std::string never_tables(const Diagnosis& diagnosis) {
     (is_looked_for_by_order(one, diagnosis.batch) ? never_for_certain : never).push_back(one);
   }
   return needs_table("Would not have shown", never) +
-         needs_table("Would not have been named for certain: looked for by the order of the poses", never_for_certain);
+         needs_table("Would not have been named for certain: looked for by the order of the poses",
+                     never_for_certain);
 }
 
 HtmlRow smallest_row(const Unseen& one) {
@@ -282,8 +305,8 @@ std::string smallest_table(std::vector<Unseen> unseen) {
 }
 
 std::string unseen_text(const Diagnosis& diagnosis) {
-  const std::string html =
-      limits_list(diagnosis.limits) + never_tables(diagnosis) + smallest_table(diagnosis.could_not_have_seen);
+  const std::string html = limits_list(diagnosis.limits) + never_tables(diagnosis) +
+                           smallest_table(diagnosis.could_not_have_seen);
   return html.empty() ? "<p>Every cause that was looked for would have shown.</p>\n" : html;
 }
 
@@ -291,8 +314,8 @@ std::string suspects_text(const Diagnosis& diagnosis) {
   if (diagnosis.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
   std::vector<HtmlRow> rows;
   for (const SuspectedPose& pose : diagnosis.suspects) {
-    rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row), fmt::format("{:.3g}", pose.distance * 1e6),
-                     html_text(pose.reason)}});
+    rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row),
+                     fmt::format("{:.3g}", pose.distance * 1e6), html_text(pose.reason)}});
   }
   return table({"suspects stacks", {"pose", "row", "off by, µm", "why"}, rows});
 }
@@ -306,8 +329,8 @@ std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
   add("robot", cell.robot.name());
   const CellPapers papers = papers_of(cell).value_or(CellPapers());
   for (const auto& [name, text] :
-       {std::pair("serial number", papers.serial_number), std::pair("instrument", papers.instrument),
-        std::pair("operator", papers.operator_name)})
+       {std::pair("serial number", papers.serial_number),
+        std::pair("instrument", papers.instrument), std::pair("operator", papers.operator_name)})
     if (!text.empty()) add(name, text);
   add("cell hash (SHA-256)", diagnosis.cell_hash);
   add("batch", diagnosis.batch.id);
@@ -331,9 +354,10 @@ std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
   return fill_in(embedded::diagnosis_page_html,
                  {{"page_css", std::string(page_style())},
                   {"mark", page_mark({"diagnosis", cell.name})},
-                  {"title", html_text(fmt::format("Cell {}: what batch {} says", cell.name, diagnosis.batch.id))},
-                  {"subtitle", html_text(fmt::format("{} · {} poses{}", cell.robot.name(), diagnosis.poses,
-                                                     measured_on(diagnosis)))},
+                  {"title", html_text(fmt::format("Cell {}: what batch {} says", cell.name,
+                                                  diagnosis.batch.id))},
+                  {"subtitle", html_text(fmt::format("{} · {} poses{}", cell.robot.name(),
+                                                     diagnosis.poses, measured_on(diagnosis)))},
                   {"verdict", std::string(to_string(diagnosis.verdict))},
                   {"sentence", html_text(with_micro(diagnosis.sentence))},
                   {"tiles", tiles(diagnosis)},

@@ -19,9 +19,13 @@ std::vector<FleetMember> members_but(const std::vector<FleetEntry>& cells, std::
 }
 
 ordered_json unlike_json(const Unlike& one) {
-  return {
-      {"parameter", one.parameter},        {"unit", one.unit}, {"value", one.value},        {"twins", one.fleet_mean},
-      {"twins_u95", 2 * one.fleet_stddev}, {"z", one.z},       {"sentence", to_string(one)}};
+  return {{"parameter", one.parameter},
+          {"unit", one.unit},
+          {"value", one.value},
+          {"twins", one.fleet_mean},
+          {"twins_u95", 2 * one.fleet_stddev},
+          {"z", one.z},
+          {"sentence", to_string(one)}};
 }
 
 /// What its twins say of it; null where they are too few.
@@ -44,10 +48,12 @@ ordered_json health_of(const std::string& check) {
 }
 
 ordered_json type_json(const FleetPrior& prior, const PhysicalModel& physics) {
-  ordered_json type = {{"robot", prior.robot}, {"robots", prior.robots}, {"parameters", ordered_json::array()}};
+  ordered_json type = {
+      {"robot", prior.robot}, {"robots", prior.robots}, {"parameters", ordered_json::array()}};
   const std::vector<Parameter> known = physics.parameters();
   for (const FleetParameter& one : prior.parameters) {
-    const auto parameter = std::find_if(known.begin(), known.end(), [&](const auto& k) { return k.name == one.name; });
+    const auto parameter =
+        std::find_if(known.begin(), known.end(), [&](const auto& k) { return k.name == one.name; });
     if (parameter == known.end()) continue;
     type["parameters"].push_back({{"parameter", one.name},
                                   {"unit", parameter->unit},
@@ -106,8 +112,8 @@ std::string fleet_text(const ordered_json& fleet) {
     }
   }
   for (const ordered_json& type : fleet.at("types"))
-    text +=
-        fmt::format("{}: learned from {} robots\n", type.at("robot").get<std::string>(), type.at("robots").get<int>());
+    text += fmt::format("{}: learned from {} robots\n", type.at("robot").get<std::string>(),
+                        type.at("robots").get<int>());
   return text;
 }
 

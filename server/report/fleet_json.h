@@ -17,8 +17,8 @@ struct FleetEntry {
   std::string last_check = {};            ///< as health_json() has it; empty: none
 };
 
-/// Cells, what was last said of their health, and what is unusual about each among robots of its type; what was learned
-/// of each type.
+/// Cells, what was last said of their health, and what is unusual about each among robots of its
+/// type; what was learned of each type.
 [[nodiscard]] nlohmann::ordered_json fleet_json(const std::vector<FleetEntry>& cells);
 /// For people, of what fleet_json() made.
 [[nodiscard]] std::string fleet_text(const nlohmann::ordered_json& fleet);

@@ -37,7 +37,8 @@ std::string twins_of(const ordered_json& cell) {
   if (!unlike.is_array()) return "too few robots of its type to compare it with";
   if (unlike.empty()) return "like its twins";
   std::string list;
-  for (const ordered_json& one : unlike) list += "<li>" + html_text(text_in(one, "sentence")) + "</li>";
+  for (const ordered_json& one : unlike)
+    list += "<li>" + html_text(text_in(one, "sentence")) + "</li>";
   return "unlike its twins:<ul>" + list + "</ul>";
 }
 
@@ -46,8 +47,8 @@ HtmlRow cell_row(const ordered_json& cell) {
   const ordered_json& version = member(cell, "version");
   std::string model = or_dash(text_in(cell, "model"));
   if (version.is_number_integer()) model += fmt::format(" (version {})", version.get<int>());
-  return {{or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model, html_text(verdict),
-           or_dash(text_in(member(cell, "health"), "due")), twins_of(cell)},
+  return {{or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model,
+           html_text(verdict), or_dash(text_in(member(cell, "health"), "due")), twins_of(cell)},
           verdict == "changed" ? "changed" : ""};
 }
 
@@ -56,9 +57,12 @@ std::string types_text(const ordered_json& types) {
   for (const ordered_json& type : types) {
     const ordered_json& robots = member(type, "robots");
     if (!robots.is_number_integer()) continue;
-    list += fmt::format("<li>{}: {} robots</li>", html_text(text_in(type, "robot")), robots.get<int>());
+    list +=
+        fmt::format("<li>{}: {} robots</li>", html_text(text_in(type, "robot")), robots.get<int>());
   }
-  return list.empty() ? "" : html_section("Types that were learned from several robots", "<ul>" + list + "</ul>");
+  return list.empty()
+             ? ""
+             : html_section("Types that were learned from several robots", "<ul>" + list + "</ul>");
 }
 
 }  // namespace
@@ -73,10 +77,10 @@ std::string fleet_page(const ordered_json& fleet, std::int64_t at) {
     unchecked += verdict_of(cell) == "not checked yet" ? 1 : 0;
   }
   const std::string count = fmt::format("{} robot{}", rows.size(), rows.size() == 1 ? "" : "s");
-  const std::string verdict =
-      fmt::format("<p class=\"verdict\">{}: {} changed, {} not checked yet.</p>", count, changed, unchecked);
-  const std::string table =
-      html_table({"stacks", {"cell", "robot", "model", "health", "next check", "among its twins"}, rows});
+  const std::string verdict = fmt::format(
+      "<p class=\"verdict\">{}: {} changed, {} not checked yet.</p>", count, changed, unchecked);
+  const std::string table = html_table(
+      {"stacks", {"cell", "robot", "model", "health", "next check", "among its twins"}, rows});
   return plain_page({.mark = {"fleet", ""},
                      .title = "Fleet",
                      .subtitle = fmt::format("{} · {}", count, shown_day(at)),

@@ -36,12 +36,14 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   if (!change.zeros.empty()) {
     json["zeros"] = ordered_json::array();
     for (const LostZero& zero : change.zeros)
-      json["zeros"].push_back({{"joint", zero.joint + 1}, {"deg", to_deg(zero.by)}, {"u95_deg", to_deg(zero.u95)}});
+      json["zeros"].push_back(
+          {{"joint", zero.joint + 1}, {"deg", to_deg(zero.by)}, {"u95_deg", to_deg(zero.u95)}});
   }
   json["p_value"] = change.p_value;
   json["since"] = {{"session_id", since.session_id}, {"pose_id", since.pose_id}};
   json["could_also_be"] = ordered_json::array();
-  for (const SingleCause& other : change.could_also_be) json["could_also_be"].push_back(cause_json(other));
+  for (const SingleCause& other : change.could_also_be)
+    json["could_also_be"].push_back(cause_json(other));
   return json;
 }
 
@@ -56,7 +58,8 @@ LineName line_of(const SingleCause& cause) {
   const CauseRecord& record = *cause.record;
   const std::size_t digits = cause.parameter.find_first_of("0123456789");
   if (record.part == causes::Part::kLinks && digits != std::string::npos) {
-    const std::string letters = cause.parameter.substr(0, digits), number = cause.parameter.substr(digits);
+    const std::string letters = cause.parameter.substr(0, digits),
+                      number = cause.parameter.substr(digits);
     const int joint = std::stoi(number) - 1;
     if (letters == "q") return {"zero:" + number, "joint_zero", joint};
     const std::string word = letters == "d" || letters == "a" ? "length" : "twist";
@@ -96,13 +99,15 @@ using SizedLines = std::vector<std::pair<double, ordered_json>>;
 void add_zero_lines(const SeenChange& change, SizedLines& lines) {
   for (const LostZero& zero : change.zeros) {
     const std::string n = std::to_string(zero.joint + 1);
-    ordered_json line = change_line({"zero:" + n, "joint_zero", zero.joint}, "the zero of joint " + n);
+    ordered_json line =
+        change_line({"zero:" + n, "joint_zero", zero.joint}, "the zero of joint " + n);
     line["value"] = to_deg(zero.by);
     line["u95"] = to_deg(zero.u95);
     line["unit"] = "deg";
     if (change.zeros.size() == 1) line["alone_rms_mm"] = to_mm(change.effect_rms);
     for (const LostZero& other : change.zeros)
-      if (other.joint != zero.joint) line["with"].push_back("zero:" + std::to_string(other.joint + 1));
+      if (other.joint != zero.joint)
+        line["with"].push_back("zero:" + std::to_string(other.joint + 1));
     line["action"] = "re-master joint " + n;
     lines.emplace_back(change.effect_rms, std::move(line));
   }
@@ -116,8 +121,8 @@ void add_line(const SeenChange& change, SizedLines& lines) {
   lines.emplace_back(change.effect_rms, std::move(line));
 }
 
-/// What changed since the model was made, in the shape of a budget: from what is off now to what a healthy robot
-/// leaves. A check finds the base anew, so that all of it is beyond the base's frame.
+/// What changed since the model was made, in the shape of a budget: from what is off now to what a
+/// healthy robot leaves. A check finds the base anew, so that all of it is beyond the base's frame.
 ordered_json change_budget_json(const HealthCheck& check) {
   SizedLines sized;
   for (const SeenChange& change : check.changed) {
@@ -130,7 +135,8 @@ ordered_json change_budget_json(const HealthCheck& check) {
   ordered_json rest = change_line({"rest", "rest"}, "what a healthy robot leaves");
   rest["alone_rms_mm"] = to_mm(check.expected_rms);
   sized.emplace_back(check.expected_rms, std::move(rest));
-  std::stable_sort(sized.begin(), sized.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(sized.begin(), sized.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
   ordered_json lines = ordered_json::array();
   for (auto& [size, line] : sized) lines.push_back(std::move(line));
   ordered_json beyond_frames = {{"nominal_rms_mm", to_mm(check.rms)}, {"lines", lines}};
@@ -145,7 +151,8 @@ constexpr double kMonth = 30 * 86400.0;  // s
 ordered_json drift_json(const DriftSeen& drift) {
   ordered_json misfits = ordered_json::array();
   for (const double misfit : drift.misfit) misfits.push_back(std::round(misfit * 1e3) / 1e3);
-  return {{"from_unix_s", drift.from}, {"until_unix_s", drift.until}, {"misfit", std::move(misfits)}};
+  return {
+      {"from_unix_s", drift.from}, {"until_unix_s", drift.until}, {"misfit", std::move(misfits)}};
 }
 
 ordered_json rate_json(const DriftRate& rate) {
@@ -161,7 +168,8 @@ ordered_json rate_json(const DriftRate& rate) {
 
 std::optional<DriftSeen> drift_of(const std::string& check) {
   const ordered_json json = ordered_json::parse(check, nullptr, false);
-  if (!json.is_object() || !json.contains("drift_seen") || !json["drift_seen"].is_object()) return std::nullopt;
+  if (!json.is_object() || !json.contains("drift_seen") || !json["drift_seen"].is_object())
+    return std::nullopt;
   const ordered_json& drift = json["drift_seen"];
   for (const char* key : {"from_unix_s", "until_unix_s"})
     if (!drift.contains(key) || !drift[key].is_number_integer()) return std::nullopt;
@@ -174,7 +182,9 @@ std::optional<DriftSeen> drift_of(const std::string& check) {
   return seen;
 }
 
-std::string drift_text(const DriftSeen& drift) { return ordered_json{{"drift_seen", drift_json(drift)}}.dump(); }
+std::string drift_text(const DriftSeen& drift) {
+  return ordered_json{{"drift_seen", drift_json(drift)}}.dump();
+}
 
 ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   ordered_json json = {{"verdict", to_string(check.verdict)},
@@ -194,7 +204,8 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   json["model"] = check.model;
   json["drift_rate"] = check.drift_rate ? rate_json(*check.drift_rate) : ordered_json(nullptr);
   json["drift_seen"] = check.drift ? drift_json(*check.drift) : ordered_json(nullptr);
-  for (const SeenChange& change : check.changed) json["changed"].push_back(change_json(change, since));
+  for (const SeenChange& change : check.changed)
+    json["changed"].push_back(change_json(change, since));
   json["budget"] = change_budget_json(check);
   for (const SmallestEffect& smallest : check.smallest) {
     ordered_json one = cause_json(smallest.cause);
@@ -209,7 +220,8 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   return json;
 }
 
-ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch, const CompensatedModel& model) {
+ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch,
+                        const CompensatedModel& model) {
   const auto& rows = batch.rows().measurements;
   ordered_json json = health_json(check, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
   json["notes"] = notes_json(notes_of(model));
@@ -217,17 +229,19 @@ ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch, con
 }
 
 std::string health_text(const HealthCheck& check) {
-  std::string text =
-      fmt::format("{}: {}\n{} poses: {:.4f} mm rms, a healthy robot has {:.4f}\n", to_string(check.verdict),
-                  check.sentence, check.poses, to_mm(check.rms), to_mm(check.expected_rms));
-  if (!check.smallest.empty()) text += "hardest to see (mm rms over the working poses, seen with 95 %):\n";
+  std::string text = fmt::format("{}: {}\n{} poses: {:.4f} mm rms, a healthy robot has {:.4f}\n",
+                                 to_string(check.verdict), check.sentence, check.poses,
+                                 to_mm(check.rms), to_mm(check.expected_rms));
+  if (!check.smallest.empty())
+    text += "hardest to see (mm rms over the working poses, seen with 95 %):\n";
   for (std::size_t i = 0; i < std::min(kShownSizes, check.smallest.size()); ++i) {
     const SmallestEffect& one = check.smallest[i];
-    text +=
-        fmt::format("  {:34} {}\n", in_words(one.cause), one.rms ? fmt::format("{:.3f}", to_mm(*one.rms)) : "never");
+    text += fmt::format("  {:34} {}\n", in_words(one.cause),
+                        one.rms ? fmt::format("{:.3f}", to_mm(*one.rms)) : "never");
   }
   if (!check.due.empty() || !check.due_because.empty())
-    text += fmt::format("next check: {}{}{}\n", check.due, check.due.empty() ? "" : "; ", check.due_because);
+    text += fmt::format("next check: {}{}{}\n", check.due, check.due.empty() ? "" : "; ",
+                        check.due_because);
   return text;
 }
 

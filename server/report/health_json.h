@@ -14,8 +14,10 @@ struct CheckedSince {
 };
 
 /// A health check for programs, as the contract spells it; lengths in mm, joints from 1.
-[[nodiscard]] nlohmann::ordered_json health_json(const HealthCheck& check, const CheckedSince& since);
-/// health_json() of a check of `batch`, with the `notes` of the model that it rests on: what every door tells.
+[[nodiscard]] nlohmann::ordered_json health_json(const HealthCheck& check,
+                                                 const CheckedSince& since);
+/// health_json() of a check of `batch`, with the `notes` of the model that it rests on: what every
+/// door tells.
 [[nodiscard]] nlohmann::ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch,
                                                 const CompensatedModel& model);
 /// What the check that health_json() wrote says of the arm's drift; empty: nothing.

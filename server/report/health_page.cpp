@@ -16,7 +16,9 @@ using nlohmann::json;
 constexpr std::size_t kShownSizes = 8;  // those that are hardest to see
 
 std::string text_in(const json& object, const char* key) {
-  return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+  return object.is_object() && object.contains(key) && object[key].is_string()
+             ? object[key].get<std::string>()
+             : "";
 }
 
 std::string mm_in(const json& object, const char* key) {
@@ -42,19 +44,23 @@ std::string cause_of(const json& one) {
 std::string change_of(const json& one) {
   std::vector<std::string> zeros;
   for (const json& zero : list_in(one, "zeros")) {
-    if (zero.is_object() && zero.contains("joint") && zero.contains("deg") && zero.contains("u95_deg") &&
-        zero["joint"].is_number_integer() && zero["deg"].is_number() && zero["u95_deg"].is_number())
+    if (zero.is_object() && zero.contains("joint") && zero.contains("deg") &&
+        zero.contains("u95_deg") && zero["joint"].is_number_integer() && zero["deg"].is_number() &&
+        zero["u95_deg"].is_number())
       zeros.push_back(fmt::format("joint {} by {:.3f} ± {:.3f} deg", zero["joint"].get<int>(),
                                   zero["deg"].get<double>(), zero["u95_deg"].get<double>()));
   }
   if (zeros.empty()) return cause_of(one);
-  return fmt::format("{} ({})", zeros.size() > 1 ? "zeros of several joints: was it remastered?" : cause_of(one),
-                     fmt::join(zeros, ", "));
+  return fmt::format(
+      "{} ({})", zeros.size() > 1 ? "zeros of several joints: was it remastered?" : cause_of(one),
+      fmt::join(zeros, ", "));
 }
 
 std::string figures(const json& found) {
   std::vector<HtmlRow> rows;
-  const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
+  const auto add = [&](const char* name, const std::string& value) {
+    rows.push_back({{name, html_text(value)}});
+  };
   add("tolerance", mm_in(found, "tolerance_mm"));
   add("what the poses are off by, rms", mm_in(found, "rms_mm"));
   add("what a healthy robot is off by, rms", mm_in(found, "expected_rms_mm"));
@@ -62,7 +68,8 @@ std::string figures(const json& found) {
   const std::string due = text_in(found, "due"), because = text_in(found, "due_because");
   const std::string model = text_in(found, "model");
   if (!model.empty()) add("held against model", model);
-  add("check again by", (due.empty() ? "cannot be said" : due) + (because.empty() ? "" : ": " + because));
+  add("check again by",
+      (due.empty() ? "cannot be said" : due) + (because.empty() ? "" : ": " + because));
   return html_table({"", {}, rows});
 }
 
@@ -72,11 +79,14 @@ std::string changes(const json& found) {
     std::vector<std::string> others;
     for (const json& other : list_in(one, "could_also_be")) others.push_back(cause_of(other));
     const bool here = text_in(one, "effect_over") == "these_poses";
-    rows.push_back({{html_text(change_of(one)), mm_in(one, "effect_rms_mm") + (here ? " at these poses" : ""),
-                     mm_in(one, "u95"), html_text(fmt::format("{}", fmt::join(others, ", ")))}});
+    rows.push_back(
+        {{html_text(change_of(one)), mm_in(one, "effect_rms_mm") + (here ? " at these poses" : ""),
+          mm_in(one, "u95"), html_text(fmt::format("{}", fmt::join(others, ", ")))}});
   }
-  return rows.empty() ? "<p>Nothing that these poses show.</p>"
-                      : html_table({"stacks", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});
+  return rows.empty()
+             ? "<p>Nothing that these poses show.</p>"
+             : html_table(
+                   {"stacks", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});
 }
 
 std::string hardest_to_see(const json& found) {
@@ -95,17 +105,20 @@ std::string health_sections(const std::string& findings, const std::string& link
   const json found = json::parse(findings, nullptr, false);
   std::string verdict = text_in(found, "verdict");
   std::replace(verdict.begin(), verdict.end(), '_', ' ');
-  return html_section("Verdict", fmt::format("<p class=\"verdict\">{}: {}</p>\n{}\n", html_text(verdict),
-                                             html_text(text_in(found, "why")), links) +
-                                     figures(found)) +
-         html_section("What changed", changes(found)) + html_section("Hardest to see", hardest_to_see(found));
+  return html_section("Verdict",
+                      fmt::format("<p class=\"verdict\">{}: {}</p>\n{}\n", html_text(verdict),
+                                  html_text(text_in(found, "why")), links) +
+                          figures(found)) +
+         html_section("What changed", changes(found)) +
+         html_section("Hardest to see", hardest_to_see(found));
 }
 
 std::string health_page(const std::string& findings, const HealthPageOf& of) {
   const json found = json::parse(findings, nullptr, false);
   std::string subtitle = fmt::format("batch {} · checked {}", of.batch, shown_day(of.at));
   if (of.papers != nullptr)
-    subtitle = of.papers->robot.name() + " · " + subtitle + papers_text(papers_of(*of.papers).value_or(CellPapers()));
+    subtitle = of.papers->robot.name() + " · " + subtitle +
+               papers_text(papers_of(*of.papers).value_or(CellPapers()));
   return plain_page({.mark = {"health", of.cell, text_in(found, "model")},
                      .title = fmt::format("Health of cell {}", of.cell),
                      .subtitle = subtitle,

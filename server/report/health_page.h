@@ -7,16 +7,17 @@
 
 namespace trammel {
 
-/// What a health check found (report/README.md), for people, as sections of a page. `findings`: its JSON as it is
-/// stored, perhaps by an earlier version of the program: what it does not have is left out. `links`: HTML below the
-/// verdict.
+/// What a health check found (report/README.md), for people, as sections of a page. `findings`: its
+/// JSON as it is stored, perhaps by an earlier version of the program: what it does not have is
+/// left out. `links`: HTML below the verdict.
 [[nodiscard]] std::string health_sections(const std::string& findings, const std::string& links);
 
 /// The same as a page that stands for itself.
 struct HealthPageOf {
   std::string cell, batch;
-  std::int64_t at = 0;           ///< when it was checked, Unix time, s
-  const Cell* papers = nullptr;  ///< its file says which robot, instrument and operator; null: not known
+  std::int64_t at = 0;  ///< when it was checked, Unix time, s
+  const Cell* papers =
+      nullptr;  ///< its file says which robot, instrument and operator; null: not known
 };
 [[nodiscard]] std::string health_page(const std::string& findings, const HealthPageOf& of);
 

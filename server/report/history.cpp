@@ -18,16 +18,21 @@ bool is_same(const ParameterOnRecord& one, const ParameterOnRecord& other) {
   return one.cause == other.cause && one.name == other.name && one.unit == other.unit;
 }
 
-ordered_json optional_mm(const std::optional<double>& m) { return m ? ordered_json(to_mm(*m)) : ordered_json(nullptr); }
+ordered_json optional_mm(const std::optional<double>& m) {
+  return m ? ordered_json(to_mm(*m)) : ordered_json(nullptr);
+}
 
 ordered_json parameter_json(const ParameterOnRecord& one) {
-  return {{"cause", one.cause}, {"parameter", one.name},        {"value", one.value},        {"u95", one.u95},
-          {"unit", one.unit},   {"identified", one.identified}, {"of_set_up", one.of_set_up}};
+  return {{"cause", one.cause},        {"parameter", one.name},
+          {"value", one.value},        {"u95", one.u95},
+          {"unit", one.unit},          {"identified", one.identified},
+          {"of_set_up", one.of_set_up}};
 }
 
 ordered_json version_json(const VersionOnRecord& one) {
   ordered_json parameters = ordered_json::array();
-  for (const ParameterOnRecord& parameter : one.parameters) parameters.push_back(parameter_json(parameter));
+  for (const ParameterOnRecord& parameter : one.parameters)
+    parameters.push_back(parameter_json(parameter));
   return {{"version", one.version},
           {"model", one.id},
           {"batches", one.batches},
@@ -70,9 +75,10 @@ void put_on_record(const CompensatedModel& model, VersionOnRecord& version) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     for (std::size_t k = 0; k < source->parameters().size(); ++k) {
       const IdentifiedParameter& one = parts.parameters[next++];
-      version.parameters.push_back({cause_in_words(source->name()), one.parameter.name, one.parameter.unit,
-                                    one.parameter.scale * one.value, kExpanded * one.parameter.scale * one.stddev,
-                                    one.identified, source->cause().part == causes::Part::kBase});
+      version.parameters.push_back({cause_in_words(source->name()), one.parameter.name,
+                                    one.parameter.unit, one.parameter.scale * one.value,
+                                    kExpanded * one.parameter.scale * one.stddev, one.identified,
+                                    source->cause().part == causes::Part::kBase});
     }
   }
 }
@@ -88,7 +94,8 @@ std::vector<Moved> moved_parameters(const CellHistory& history) {
         if (!was.identified || !is_same(one, was)) continue;
         const double u95 = std::hypot(one.u95, was.u95);
         if (std::abs(one.value - was.value) > u95)
-          moved.push_back({one.cause, one.name, one.unit, before->version, now.version, was.value, one.value, u95});
+          moved.push_back({one.cause, one.name, one.unit, before->version, now.version, was.value,
+                           one.value, u95});
       }
     }
     before = &now;
@@ -103,11 +110,15 @@ ordered_json history_json(const CellHistory& history) {
                        {"moved", ordered_json::array()},
                        {"events", ordered_json::array()}};
   for (const VersionOnRecord& one : history.versions) json["versions"].push_back(version_json(one));
-  for (const TrainingOnRecord& one : history.trainings) json["trainings"].push_back(training_json(one));
+  for (const TrainingOnRecord& one : history.trainings)
+    json["trainings"].push_back(training_json(one));
   for (const Moved& one : moved_parameters(history)) json["moved"].push_back(moved_json(one));
   for (const EventOnRecord& one : history.events) {
-    json["events"].push_back(
-        {{"at", one.at}, {"what", one.what}, {"subject", one.subject}, {"why", one.why}, {"who", one.who}});
+    json["events"].push_back({{"at", one.at},
+                              {"what", one.what},
+                              {"subject", one.subject},
+                              {"why", one.why},
+                              {"who", one.who}});
   }
   return json;
 }

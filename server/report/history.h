@@ -30,8 +30,8 @@ struct VersionOnRecord {
   std::optional<double> validation_rms = {};  ///< m
   bool in_force = false;
   std::vector<ParameterOnRecord> parameters = {};  ///< none where its file is not there any more
-  std::vector<Note> notes = {};                    ///< what it knows to have changed, and what its user should know
-  CellPapers papers = {};                          ///< of its cell file
+  std::vector<Note> notes = {};  ///< what it knows to have changed, and what its user should know
+  CellPapers papers = {};        ///< of its cell file
 };
 /// Its parameters, notes and papers, from the model itself.
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
@@ -58,9 +58,9 @@ struct CellHistory {
   bool of_files = false;  ///< model files, which do not say what is in force
 };
 
-/// A parameter of the arm that moved by more than both uncertainties between two versions of which the later one was
-/// put on record next. Versions share measurements, so that the difference is better known than this: what is told has
-/// moved.
+/// A parameter of the arm that moved by more than both uncertainties between two versions of which
+/// the later one was put on record next. Versions share measurements, so that the difference is
+/// better known than this: what is told has moved.
 struct Moved {
   std::string cause, parameter, unit;
   int from_version = 0, to_version = 0;
@@ -70,8 +70,9 @@ struct Moved {
 
 [[nodiscard]] nlohmann::ordered_json history_json(const CellHistory& history);
 
-/// The history as a page that people look at: every parameter over the versions with its U, the error before and after
-/// each training, events. HTML with everything inside; opens without a network.
+/// The history as a page that people look at: every parameter over the versions with its U, the
+/// error before and after each training, events. HTML with everything inside; opens without a
+/// network.
 [[nodiscard]] std::string history_page(const CellHistory& history);
 
 }  // namespace trammel

@@ -23,7 +23,8 @@ struct Frame {
   double low = 0, high = 0;  // of what is drawn
   std::size_t places = 1;    // from left to right
   [[nodiscard]] double x(std::size_t place) const {
-    const double step = places < 2 ? 0 : static_cast<double>(place) / static_cast<double>(places - 1);
+    const double step =
+        places < 2 ? 0 : static_cast<double>(place) / static_cast<double>(places - 1);
     return margin + step * (width - 2 * margin);
   }
   [[nodiscard]] double y(double value) const {
@@ -42,13 +43,16 @@ std::string day_of(std::int64_t unix_time) {
   return text.data();
 }
 
-std::string millimetres(const std::optional<double>& m) { return m ? fmt::format("{:.4f}", to_mm(*m)) : "–"; }
+std::string millimetres(const std::optional<double>& m) {
+  return m ? fmt::format("{:.4f}", to_mm(*m)) : "–";
+}
 
 using Track = std::map<int, const ParameterOnRecord*>;  // by version
 
 /// A whisker of ± U at each version that has the parameter, and a line through the values.
 std::string track_svg(const Track& track, const std::vector<int>& versions) {
-  Frame frame{240, 40, 6, track.begin()->second->value, track.begin()->second->value, versions.size()};
+  Frame frame{
+      240, 40, 6, track.begin()->second->value, track.begin()->second->value, versions.size()};
   for (const auto& [version, one] : track) {
     frame.low = std::min(frame.low, one->value - one->u95);
     frame.high = std::max(frame.high, one->value + one->u95);
@@ -59,12 +63,14 @@ std::string track_svg(const Track& track, const std::vector<int>& versions) {
     if (found == track.end()) continue;
     const ParameterOnRecord& one = *found->second;
     const double x = frame.x(place);
-    marks += fmt::format(R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}"/><circle cx="{0:.1f}" cy="{3:.1f}" r="2.5"/>)", x,
-                         frame.y(one.value - one.u95), frame.y(one.value + one.u95), frame.y(one.value));
+    marks += fmt::format(
+        R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}"/><circle cx="{0:.1f}" cy="{3:.1f}" r="2.5"/>)", x,
+        frame.y(one.value - one.u95), frame.y(one.value + one.u95), frame.y(one.value));
     line += fmt::format("{}{:.1f} {:.1f}", line.empty() ? "M" : "L", x, frame.y(one.value));
   }
-  return fmt::format(R"(<svg class="track" viewBox="0 0 240 40" role="img"><path class="line" d="{}"/>{}</svg>)", line,
-                     marks);
+  return fmt::format(
+      R"(<svg class="track" viewBox="0 0 240 40" role="img"><path class="line" d="{}"/>{}</svg>)",
+      line, marks);
 }
 
 struct Tracked {
@@ -90,8 +96,9 @@ std::vector<Tracked> tracked(const CellHistory& history) {
 }
 
 bool has_moved(const std::vector<Moved>& moved, const ParameterOnRecord& one) {
-  return std::any_of(moved.begin(), moved.end(),
-                     [&](const Moved& m) { return m.cause == one.cause && m.parameter == one.name; });
+  return std::any_of(moved.begin(), moved.end(), [&](const Moved& m) {
+    return m.cause == one.cause && m.parameter == one.name;
+  });
 }
 
 std::string value_in(const Track& track, int version, const Reading& reading) {
@@ -101,7 +108,8 @@ std::string value_in(const Track& track, int version, const Reading& reading) {
   return fmt::format("{} ± {}", value.value, value.expanded);
 }
 
-/// What is in force; of files, or where that has no parameters on record, the newest that has; nullptr: none has.
+/// What is in force; of files, or where that has no parameters on record, the newest that has;
+/// nullptr: none has.
 const VersionOnRecord* shown_version(const CellHistory& history) {
   const VersionOnRecord* newest = nullptr;
   for (const VersionOnRecord& one : history.versions) {
@@ -127,25 +135,31 @@ std::string parameter_table(const CellHistory& history, const std::vector<Moved>
     const Reading reading = reading_of(last.unit);
     const ShownValue first = show_read(one.first->value, one.first->u95, reading);
     const bool marked = has_moved(moved, last);
-    rows.push_back(
-        {{html_text(last.name), fmt::format("{} ± {}", first.value, first.expanded),
-          value_in(one.track, shown->version, reading), html_text(reading.unit), track_svg(one.track, versions)},
-         marked            ? "moved"
-         : last.identified ? ""
-                           : "unknown"});
+    rows.push_back({{html_text(last.name), fmt::format("{} ± {}", first.value, first.expanded),
+                     value_in(one.track, shown->version, reading), html_text(reading.unit),
+                     track_svg(one.track, versions)},
+                    marked            ? "moved"
+                    : last.identified ? ""
+                                      : "unknown"});
   }
-  const std::string now = fmt::format("version {}{}", shown->version, shown->in_force ? " (in force)" : "");
-  return html_table({"parameters flows", {"parameter", "first", now, "unit", "over the versions, ± U (k = 2)"}, rows});
+  const std::string now =
+      fmt::format("version {}{}", shown->version, shown->in_force ? " (in force)" : "");
+  return html_table({"parameters flows",
+                     {"parameter", "first", now, "unit", "over the versions, ± U (k = 2)"},
+                     rows});
 }
 
 std::string version_table(const CellHistory& history) {
   std::vector<HtmlRow> rows;
   for (const VersionOnRecord& one : history.versions) {
-    rows.push_back({{fmt::format("{}{}", one.version, one.in_force ? " (in force)" : ""), day_of(one.trained_at),
-                     html_text(one.batches), std::to_string(one.poses), millimetres(one.validation_rms)},
+    rows.push_back({{fmt::format("{}{}", one.version, one.in_force ? " (in force)" : ""),
+                     day_of(one.trained_at), html_text(one.batches), std::to_string(one.poses),
+                     millimetres(one.validation_rms)},
                     one.in_force ? "now" : ""});
   }
-  return html_table({"versions stacks", {"version", "trained (UTC)", "batches", "poses", "held-out rms, mm"}, rows});
+  return html_table({"versions stacks",
+                     {"version", "trained (UTC)", "batches", "poses", "held-out rms, mm"},
+                     rows});
 }
 
 std::string outcome_of(const TrainingOnRecord& one) {
@@ -158,26 +172,30 @@ std::string training_table(const CellHistory& history) {
   if (history.trainings.empty()) return "<p>None on record.</p>";
   std::vector<HtmlRow> rows;
   for (const TrainingOnRecord& one : history.trainings) {
-    rows.push_back({{day_of(one.at), html_text(one.batches), millimetres(one.before), millimetres(one.after),
-                     html_text(outcome_of(one))}});
+    rows.push_back({{day_of(one.at), html_text(one.batches), millimetres(one.before),
+                     millimetres(one.after), html_text(outcome_of(one))}});
   }
-  return html_table({"trainings stacks", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
+  return html_table(
+      {"trainings stacks", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
 }
 
 std::string event_table(const CellHistory& history) {
   if (history.events.empty()) return "<p>None.</p>";
   std::vector<HtmlRow> rows;
   for (const EventOnRecord& one : history.events) {
-    rows.push_back(
-        {{day_of(one.at), html_text(one.what), html_text(one.subject), html_text(one.why), html_text(one.who)}});
+    rows.push_back({{day_of(one.at), html_text(one.what), html_text(one.subject),
+                     html_text(one.why), html_text(one.who)}});
   }
   return html_table({"events stacks", {"when (UTC)", "what", "of what", "why", "who"}, rows});
 }
 
 std::string in_force_sentence(const CellHistory& history) {
   for (const VersionOnRecord& one : history.versions)
-    if (one.in_force) return fmt::format("Version {} is in force, trained on {}.", one.version, day_of(one.trained_at));
-  return history.of_files ? "Model files do not say which version is in force." : "No version in force is on record.";
+    if (one.in_force)
+      return fmt::format("Version {} is in force, trained on {}.", one.version,
+                         day_of(one.trained_at));
+  return history.of_files ? "Model files do not say which version is in force."
+                          : "No version in force is on record.";
 }
 
 std::string verdict(const CellHistory& history, const std::vector<Moved>& moved) {
@@ -189,13 +207,14 @@ std::string verdict(const CellHistory& history, const std::vector<Moved>& moved)
   for (const Moved& one : moved) {
     const Reading reading = reading_of(one.unit);
     const ShownValue step = show_read(one.to - one.from, one.u95, reading);
-    list +=
-        fmt::format("<li>{}, {}: {} ± {} {} from version {} to {}</li>", html_text(one.cause), html_text(one.parameter),
-                    step.value, step.expanded, html_text(reading.unit), one.from_version, one.to_version);
+    list += fmt::format("<li>{}, {}: {} ± {} {} from version {} to {}</li>", html_text(one.cause),
+                        html_text(one.parameter), step.value, step.expanded,
+                        html_text(reading.unit), one.from_version, one.to_version);
   }
   if (moved.empty()) {
-    text += fmt::format(" No {}parameter of the arm moved by more than its uncertainty between versions.",
-                        list.empty() ? "" : "other ");
+    text += fmt::format(
+        " No {}parameter of the arm moved by more than its uncertainty between versions.",
+        list.empty() ? "" : "other ");
   }
   return "<p>" + text + "</p>" + (list.empty() ? "" : "<ul>" + list + "</ul>");
 }

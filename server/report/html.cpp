@@ -26,7 +26,9 @@ std::string escaped(char c) {
   }
 }
 
-std::string class_of(const std::string& kind) { return kind.empty() ? "" : fmt::format(" class=\"{}\"", kind); }
+std::string class_of(const std::string& kind) {
+  return kind.empty() ? "" : fmt::format(" class=\"{}\"", kind);
+}
 
 /// The names of columns that cells are shown behind on narrow pages; empty: none.
 std::vector<std::string> names_shown(const HtmlTable& table) {
@@ -48,8 +50,9 @@ std::string rows_of(const std::vector<HtmlRow>& rows, const std::vector<std::str
     html += fmt::format("<tr{}>", class_of(row.kind));
     for (std::size_t k = 0; k < row.cells.size(); ++k) {
       const bool spans = row.last_spans > 1 && k + 1 == row.cells.size();
-      html += fmt::format("<td{}{}>{}</td>", name_of(names, k, spans),
-                          spans ? fmt::format(" colspan=\"{}\"", row.last_spans) : "", row.cells[k]);
+      html +=
+          fmt::format("<td{}{}>{}</td>", name_of(names, k, spans),
+                      spans ? fmt::format(" colspan=\"{}\"", row.last_spans) : "", row.cells[k]);
     }
     html += "</tr>\n";
   }
@@ -67,9 +70,11 @@ std::string html_text(std::string_view text) {
 std::string html_rows(const std::vector<HtmlRow>& rows) { return rows_of(rows, {}); }
 
 std::string html_table(const HtmlTable& table) {
-  if (table.head.empty()) return fmt::format("<table{}>\n{}</table>", class_of(table.kind), html_rows(table.rows));
+  if (table.head.empty())
+    return fmt::format("<table{}>\n{}</table>", class_of(table.kind), html_rows(table.rows));
   return fmt::format("<table{}>\n<thead><tr><th>{}</th></tr></thead>\n<tbody>\n{}</tbody></table>",
-                     class_of(table.kind), fmt::join(table.head, "</th><th>"), rows_of(table.rows, names_shown(table)));
+                     class_of(table.kind), fmt::join(table.head, "</th><th>"),
+                     rows_of(table.rows, names_shown(table)));
 }
 
 std::string html_section(std::string_view title, std::string_view body) {
@@ -88,7 +93,8 @@ std::string script_json(const nlohmann::ordered_json& data) {
   return text;
 }
 
-std::string fill_in(std::string_view page, const std::map<std::string, std::string, std::less<>>& contents) {
+std::string fill_in(std::string_view page,
+                    const std::map<std::string, std::string, std::less<>>& contents) {
   std::string filled;
   while (true) {
     const std::size_t open = page.find("{{");

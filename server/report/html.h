@@ -9,7 +9,8 @@
 
 namespace trammel {
 
-/// Text that shows as it stands, whatever it holds; what controls a terminal is spelled out (plain_text.h).
+/// Text that shows as it stands, whatever it holds; what controls a terminal is spelled out
+/// (plain_text.h).
 [[nodiscard]] std::string html_text(std::string_view text);
 
 /// A row of a table; its cells are HTML.
@@ -20,8 +21,9 @@ struct HtmlRow {
 };
 [[nodiscard]] std::string html_rows(const std::vector<HtmlRow>& rows);
 
-/// With `stacks` in its kind each cell stands on a line of its own on narrow screens, behind the name of its column;
-/// with `flows` they follow each other like words. A table of another kind stays one.
+/// With `stacks` in its kind each cell stands on a line of its own on narrow screens, behind the
+/// name of its column; with `flows` they follow each other like words. A table of another kind
+/// stays one.
 struct HtmlTable {
   std::string kind = {};          ///< classes for the style sheet; empty: none
   std::vector<std::string> head;  ///< empty: no row of names

@@ -8,20 +8,24 @@
 
 namespace trammel {
 
-/// `"measured"` of every result that rests on a model: what its training poses were, as far as a promise is about it.
-/// Of a model that has it not on record the sentence says so, and nothing else stands beside it.
+/// `"measured"` of every result that rests on a model: what its training poses were, as far as a
+/// promise is about it. Of a model that has it not on record the sentence says so, and nothing else
+/// stands beside it.
 [[nodiscard]] inline nlohmann::ordered_json measured_json(const CompensatedModel& model) {
   const std::optional<WhatWasMeasured>& measured = model.parts().measured;
   nlohmann::ordered_json json = {{"sentence", in_words(measured, model.cell())}};
   if (!measured) return json;
-  const auto corner = [](const Vector3& p) { return std::vector{to_mm(p.x()), to_mm(p.y()), to_mm(p.z())}; };
+  const auto corner = [](const Vector3& p) {
+    return std::vector{to_mm(p.x()), to_mm(p.y()), to_mm(p.z())};
+  };
   json["poses"] = measured->poses;
   json["sides"] = nlohmann::ordered_json::array();
   for (const auto& one : measured->approaches)
     json["sides"].push_back({{"from_above", one.falling}, {"from_below", one.rising}});
   json["temperature_c"] = nullptr;
   if (measured->temperature)
-    json["temperature_c"] = {{"min", measured->temperature->first}, {"max", measured->temperature->second}};
+    json["temperature_c"] = {{"min", measured->temperature->first},
+                             {"max", measured->temperature->second}};
   json["box_mm"] = {{"lower", corner(measured->lower)}, {"upper", corner(measured->upper)}};
   json["volume_m3"] = measured->volume;
   json["reach_mm"] = nullptr;

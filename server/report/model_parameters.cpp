@@ -14,10 +14,10 @@ namespace {
 constexpr int kColumns = 7;
 
 HtmlRow source_row(const ErrorSource& source) {
-  return {
-      .cells = {fmt::format("{} <span>{}</span>", html_text(in_words(source.name())), html_text(source.explanation()))},
-      .kind = "cause",
-      .last_spans = kColumns};
+  return {.cells = {fmt::format("{} <span>{}</span>", html_text(in_words(source.name())),
+                                html_text(source.explanation()))},
+          .kind = "cause",
+          .last_spans = kColumns};
 }
 
 /// The number of a link that a parameter like `alpha4` changes; SI.
@@ -36,7 +36,8 @@ std::optional<double> nominal_of_link(const Chain& robot, const std::string& nam
 }
 
 /// What the drawing or the cell file says where the parameter says by how much it is off; SI.
-std::optional<double> stated(const CompensatedModel& model, const ErrorSource& source, const std::string& name) {
+std::optional<double> stated(const CompensatedModel& model, const ErrorSource& source,
+                             const std::string& name) {
   const causes::ActsOn on = source.cause().acts.on;
   if (on == causes::ActsOn::kLinks) return nominal_of_link(model.cell().robot, name);
   if (on != causes::ActsOn::kBase || name.size() != 2 || name[1] != '0') return std::nullopt;
@@ -45,7 +46,8 @@ std::optional<double> stated(const CompensatedModel& model, const ErrorSource& s
   return model.parts().physics.X_WB.translation()(static_cast<Eigen::Index>(axis));
 }
 
-HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source, const IdentifiedParameter& identified) {
+HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source,
+                      const IdentifiedParameter& identified) {
   const Parameter& parameter = identified.parameter;
   const Reading reading = reading_of(parameter.unit);
   const std::optional<double> drawn = stated(model, source, parameter.name);
@@ -53,9 +55,11 @@ HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source, 
   const double correction = drawn ? identified.value : identified.value - parameter.prior;
   const double u95 = kExpanded * parameter.scale * identified.stddev;
   const ShownValue shown = show_read(parameter.scale * correction, u95, reading);
-  return {.cells = {html_text(parameter.name), fmt::format("{:.7g}", reading.scale * parameter.scale * nominal),
-                    shown.value, show_read(parameter.scale * (nominal + correction), u95, reading).value,
-                    shown.expanded, html_text(reading.unit), identified.identified ? "" : "not identified by itself"},
+  return {.cells = {html_text(parameter.name),
+                    fmt::format("{:.7g}", reading.scale * parameter.scale * nominal), shown.value,
+                    show_read(parameter.scale * (nominal + correction), u95, reading).value,
+                    shown.expanded, html_text(reading.unit),
+                    identified.identified ? "" : "not identified by itself"},
           .kind = identified.identified ? "" : "unknown"};
 }
 
@@ -71,19 +75,21 @@ std::string parameter_table(const CompensatedModel& model) {
     for (std::size_t k = 0; k < source->parameters().size(); ++k)
       rows.push_back(parameter_row(model, *source, parts.parameters[next++]));
   }
-  return html_table(
-             {"parameters flows", {"parameter", "nominal", "correction", "result", "± U (k = 2)", "unit", ""}, rows}) +
+  return html_table({"parameters flows",
+                     {"parameter", "nominal", "correction", "result", "± U (k = 2)", "unit", ""},
+                     rows}) +
          "\n";
 }
 
 std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
   if (parts.unidentifiable.empty()) {
-    return parts.parameters.empty() ? "<p>Nothing was asked of them.</p>\n"
-                                    : "<p>Nothing: every combination of parameters shows in them.</p>\n";
+    return parts.parameters.empty()
+               ? "<p>Nothing was asked of them.</p>\n"
+               : "<p>Nothing: every combination of parameters shows in them.</p>\n";
   }
   std::string html = fmt::format(
-      "<p>{} of {} directions in parameter space are determined. In the others the measurements say less than what was "
-      "believed before, so the model keeps that belief:</p>\n<ul>\n",
+      "<p>{} of {} directions in parameter space are determined. In the others the measurements "
+      "say less than what was believed before, so the model keeps that belief:</p>\n<ul>\n",
       parts.rank, parts.parameters.size());
   for (const UnidentifiableCombination& combination : parts.unidentifiable) {
     html += "<li>" + html_text(combination.sentence) + "</li>\n";

@@ -29,14 +29,16 @@ ShownPoses poses_of(const CompensatedModel& model, const MeasurementBatch& batch
   for (Eigen::Index i = 0; i < errors.compensated.cols(); ++i) {
     const auto row = static_cast<std::size_t>(i);
     const Measurement& m = batch.measurements[row];
-    shown.poses.push_back({m.pose_id, m.context.q, m.context, Vector3(errors.nominal.col(i)), errors.calibrated.col(i),
-                           errors.compensated.col(i), errors.stddev.col(i), errors.in_domain[row]});
+    shown.poses.push_back({m.pose_id, m.context.q, m.context, Vector3(errors.nominal.col(i)),
+                           errors.calibrated.col(i), errors.compensated.col(i),
+                           errors.stddev.col(i), errors.in_domain[row]});
   }
   return shown;
 }
 
 /// With which tool and payload observation `i` was measured, if the file says it.
-std::optional<PoseContext> context_of(const ModelParts& parts, std::size_t i, const JointVector& q) {
+std::optional<PoseContext> context_of(const ModelParts& parts, std::size_t i,
+                                      const JointVector& q) {
   PoseContext context;
   if (i < parts.bias_contexts.size()) {
     context = parts.bias_contexts[i];
@@ -57,8 +59,10 @@ ShownPoses poses_learned(const CompensatedModel& model, const BiasModel& bias) {
   const Eigen::MatrixXd stddev = bias.leave_one_out_stddev_B();
   const Pose X_BW = parts.physics.X_WB.inverse();
   for (Eigen::Index i = 0; i < left.rows(); ++i) {
-    ShownPose pose{
-        .id = fmt::format("training pose {}", i + 1), .q = state.q.row(i).transpose(), .context = {}, .nominal = {}};
+    ShownPose pose{.id = fmt::format("training pose {}", i + 1),
+                   .q = state.q.row(i).transpose(),
+                   .context = {},
+                   .nominal = {}};
     pose.context = context_of(parts, static_cast<std::size_t>(i), pose.q);
     pose.calibrated = state.residual_B.row(i).transpose();
     pose.compensated = left.row(i).transpose();
@@ -74,7 +78,8 @@ ShownPoses poses_learned(const CompensatedModel& model, const BiasModel& bias) {
 }
 
 int bin_of(const Vector3& error) {
-  return static_cast<int>(std::floor(kBinsPerDecade * std::log10(std::max(to_mm(error.norm()), kLeastShown)) + 1e-9));
+  return static_cast<int>(
+      std::floor(kBinsPerDecade * std::log10(std::max(to_mm(error.norm()), kLeastShown)) + 1e-9));
 }
 
 double lower_end(int bin) { return std::pow(10, static_cast<double>(bin) / kBinsPerDecade); }
@@ -117,7 +122,8 @@ std::optional<LeftOut> left_out(const BiasModel& bias, int keep, int of) {
   const Eigen::MatrixXd mean = part->mean_all_B(q, features);
   double squares = 0;
   for (std::size_t k = 0; k < out.size(); ++k)
-    squares += (state.residual_B.row(out[k]) - mean.row(static_cast<Eigen::Index>(k))).squaredNorm();
+    squares +=
+        (state.residual_B.row(out[k]) - mean.row(static_cast<Eigen::Index>(k))).squaredNorm();
   return LeftOut{static_cast<int>(state.q.rows()) - static_cast<int>(out.size()),
                  std::sqrt(squares / static_cast<double>(out.size()))};
 }
@@ -128,7 +134,8 @@ std::string worth(double fewer, double more) {
 
 std::optional<LearningCurve> curve_of_bias(const BiasModel& bias) {
   const Eigen::Index count = bias.state().q.rows();
-  if (count < kFewestToLearn || count > (bias.needs_features() ? kMostCoupled : kMostToLearn)) return std::nullopt;
+  if (count < kFewestToLearn || count > (bias.needs_features() ? kMostCoupled : kMostToLearn))
+    return std::nullopt;
   LearningCurve curve{"error at poses left out, instrument included, mm rms", ""};
   for (const int keep : {1, 2, 3}) {
     const auto part = left_out(bias, keep, 4);
@@ -140,9 +147,10 @@ std::optional<LearningCurve> curve_of_bias(const BiasModel& bias) {
   curve.poses.push_back(static_cast<int>(count));
   curve.error.push_back(std::sqrt(left.squaredNorm() / static_cast<double>(count)));
   const std::size_t half = curve.error.size() < 4 ? 0 : 1;
-  curve.sentence = fmt::format("From {} to {} poses the error at poses left out went from {:.4f} to {:.4f} mm: {}.",
-                               curve.poses[half], curve.poses.back(), to_mm(curve.error[half]),
-                               to_mm(curve.error.back()), worth(curve.error[half], curve.error.back()));
+  curve.sentence = fmt::format(
+      "From {} to {} poses the error at poses left out went from {:.4f} to {:.4f} mm: {}.",
+      curve.poses[half], curve.poses.back(), to_mm(curve.error[half]), to_mm(curve.error.back()),
+      worth(curve.error[half], curve.error.back()));
   return curve;
 }
 
@@ -160,14 +168,16 @@ std::optional<LearningCurve> curve_of_parameters(const CompensatedModel& model) 
     curve.poses.push_back(static_cast<int>(std::lround(times * count)));
     curve.error.push_back(accuracy->at(PositionAccuracy::kShare));
   }
-  curve.sentence = fmt::format("Twice as many poses would bring what can be promised from {:.4f} to {:.4f} mm: {}.",
-                               to_mm(curve.error[1]), to_mm(curve.error[2]), worth(curve.error[1], curve.error[2]));
+  curve.sentence = fmt::format(
+      "Twice as many poses would bring what can be promised from {:.4f} to {:.4f} mm: {}.",
+      to_mm(curve.error[1]), to_mm(curve.error[2]), worth(curve.error[1], curve.error[2]));
   return curve;
 }
 
 }  // namespace
 
-ShownPoses poses_to_show(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
+ShownPoses poses_to_show(const CompensatedModel& model,
+                         const std::optional<MeasurementBatch>& batch) {
   if (batch) return poses_of(model, *batch);
   if (model.bias()) return poses_learned(model, *model.bias());
   return {};
@@ -196,13 +206,14 @@ ordered_json histogram_json(const ShownPoses& shown) {
 
 ordered_json coverage_json(const ShownPoses& shown) {
   if (shown.poses.size() < kFewestToJudge) return nullptr;
-  const std::vector<std::pair<double, double>> intervals = {{50, 0.67449}, {68.3, 1},     {80, 1.28155},
-                                                            {90, 1.64485}, {95, 1.95996}, {99, 2.57583}};
+  const std::vector<std::pair<double, double>> intervals = {
+      {50, 0.67449}, {68.3, 1}, {80, 1.28155}, {90, 1.64485}, {95, 1.95996}, {99, 2.57583}};
   ordered_json json{{"stated", ordered_json::array()}, {"found", ordered_json::array()}};
   for (const auto& [percent, deviations] : intervals) {
     double inside = 0;
     for (const ShownPose& pose : shown.poses)
-      inside += static_cast<double>((pose.compensated.array().abs() <= deviations * pose.stddev.array()).count());
+      inside += static_cast<double>(
+          (pose.compensated.array().abs() <= deviations * pose.stddev.array()).count());
     json["stated"].push_back(percent);
     json["found"].push_back(100 * inside / (3.0 * static_cast<double>(shown.poses.size())));
   }
@@ -211,8 +222,8 @@ ordered_json coverage_json(const ShownPoses& shown) {
 
 std::string worst_poses(const ShownPoses& shown) {
   if (shown.poses.empty())
-    return "<p>This file knows no pose by itself: give <code>trammel report --batch</code> one that was not trained "
-           "on.</p>";
+    return "<p>This file knows no pose by itself: give <code>trammel report --batch</code> one "
+           "that was not trained on.</p>";
   std::vector<const ShownPose*> order;
   for (const ShownPose& pose : shown.poses) order.push_back(&pose);
   std::stable_sort(order.begin(), order.end(), [](const ShownPose* a, const ShownPose* b) {
@@ -222,13 +233,16 @@ std::string worst_poses(const ShownPoses& shown) {
   std::vector<HtmlRow> rows;
   for (const ShownPose* pose : order) {
     const double size = pose->compensated.norm();
-    rows.push_back({{html_text(pose->id), pose->nominal ? fmt::format("{:.4f}", to_mm(pose->nominal->norm())) : "–",
-                     fmt::format("{:.4f}", to_mm(pose->calibrated.norm())), fmt::format("{:.4f}", to_mm(size)),
-                     fmt::format("{:.1f}", size / std::max(pose->stddev.norm(), 1e-12)),
-                     pose->in_domain ? "" : "outside the domain"}});
+    rows.push_back(
+        {{html_text(pose->id),
+          pose->nominal ? fmt::format("{:.4f}", to_mm(pose->nominal->norm())) : "–",
+          fmt::format("{:.4f}", to_mm(pose->calibrated.norm())), fmt::format("{:.4f}", to_mm(size)),
+          fmt::format("{:.1f}", size / std::max(pose->stddev.norm(), 1e-12)),
+          pose->in_domain ? "" : "outside the domain"}});
   }
   return html_table({"poses flows",
-                     {"pose", "nominal, mm", "calibrated, mm", "compensated, mm", "times its stated deviation", ""},
+                     {"pose", "nominal, mm", "calibrated, mm", "compensated, mm",
+                      "times its stated deviation", ""},
                      rows});
 }
 

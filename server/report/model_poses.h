@@ -13,8 +13,9 @@ namespace trammel {
 struct ShownPose {
   std::string id;
   JointVector q;
-  std::optional<PoseContext> context;  ///< with tool and payload; empty where a model file does not say them
-  std::optional<Vector3> nominal;      ///< measured - nominal; empty where the context is not known
+  std::optional<PoseContext>
+      context;  ///< with tool and payload; empty where a model file does not say them
+  std::optional<Vector3> nominal;  ///< measured - nominal; empty where the context is not known
   Vector3 calibrated = Vector3::Zero(), compensated = Vector3::Zero();
   Vector3 stddev = Vector3::Zero();  ///< of compensated, as the model states it for a measurement
   bool in_domain = true;
@@ -25,12 +26,15 @@ struct ShownPoses {
   std::vector<ShownPose> poses;
 };
 
-/// Those of `batch`; else those that the bias learned from, each predicted from all the others; else none.
-[[nodiscard]] ShownPoses poses_to_show(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch);
+/// Those of `batch`; else those that the bias learned from, each predicted from all the others;
+/// else none.
+[[nodiscard]] ShownPoses poses_to_show(const CompensatedModel& model,
+                                       const std::optional<MeasurementBatch>& batch);
 
 /// How many poses have which error at each level: bins of thirds of a decade. Null without poses.
 [[nodiscard]] nlohmann::ordered_json histogram_json(const ShownPoses& shown);
-/// Which share of coordinates lies inside the interval that should hold 50 %, 68 %...; null with fewer than 8 poses.
+/// Which share of coordinates lies inside the interval that should hold 50 %, 68 %...; null with
+/// fewer than 8 poses.
 [[nodiscard]] nlohmann::ordered_json coverage_json(const ShownPoses& shown);
 
 /// The poses with the largest errors, as HTML.
@@ -42,9 +46,9 @@ struct LearningCurve {
   std::vector<int> poses = {};     ///< rising
   std::vector<double> error = {};  ///< m
 };
-/// Of a bias: the error at the poses left out, with a part of the poses and with all but one. Of a model without: the
-/// promise (PositionAccuracy) if the parameters' covariance shrinks as poses are added. Empty where there are too few
-/// poses, or so many that it would take long.
+/// Of a bias: the error at the poses left out, with a part of the poses and with all but one. Of a
+/// model without: the promise (PositionAccuracy) if the parameters' covariance shrinks as poses are
+/// added. Empty where there are too few poses, or so many that it would take long.
 [[nodiscard]] std::optional<LearningCurve> learning_curve(const CompensatedModel& model);
 
 }  // namespace trammel

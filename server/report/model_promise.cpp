@@ -20,16 +20,17 @@ namespace trammel {
 
 namespace {
 
-constexpr int kFewestToJudge = 10;  // fresh poses: with fewer the promise says by how many it was tested
-/// Degrees of freedom of the residuals: with fewer their rms may be wrong by half and more (1 / sqrt(2 k) is 22 % of it
-/// at 10), and nothing else says how far the model is off.
+constexpr int kFewestToJudge =
+    10;  // fresh poses: with fewer the promise says by how many it was tested
+/// Degrees of freedom of the residuals: with fewer their rms may be wrong by half and more (1 /
+/// sqrt(2 k) is 22 % of it at 10), and nothing else says how far the model is off.
 constexpr double kFewestFreedom = 10;
 constexpr std::int64_t kDay = 86400;
 /// How long a model is taken for good where no check has told how fast its arm drifts, days.
 constexpr std::int64_t kFirstCheck = 30;
 constexpr int kFewestRepeats = 6;  // degrees of freedom
-/// RP of ISO 9283 is the mean distance from the barycentre and three of its standard deviations: 3.615 standard
-/// deviations of an axis, where the three axes are alike and normal.
+/// RP of ISO 9283 is the mean distance from the barycentre and three of its standard
+/// deviations: 3.615 standard deviations of an axis, where the three axes are alike and normal.
 constexpr double kRepeatability = 3.615;
 
 std::int64_t newest_measurement(const ModelProvenance& provenance) {
@@ -40,7 +41,8 @@ std::string check_by(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance);
   if (from <= 0) return "when it was measured is not known, so check before use";
   const std::int64_t due = from + kFirstCheck * kDay;
-  return fmt::format("check again by {}{}", shown_day(due), unix_now() > due ? ", a day that has passed" : "");
+  return fmt::format("check again by {}{}", shown_day(due),
+                     unix_now() > due ? ", a day that has passed" : "");
 }
 
 /// Where the day of the next check has passed.
@@ -48,21 +50,24 @@ std::string overdue(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance), now = unix_now();
   if (from <= 0 || now <= from + kFirstCheck * kDay) return "";
   return fmt::format(
-      "<p class=\"warning\">That day had passed when this page was written, on {}: check the robot before you rely on "
-      "it.</p>\n",
+      "<p class=\"warning\">That day had passed when this page was written, on {}: check the robot "
+      "before you rely on it.</p>\n",
       shown_day(now));
 }
 
-std::string or_not_told(const std::string& text) { return text.empty() ? "not in the cell file" : text; }
+std::string or_not_told(const std::string& text) {
+  return text.empty() ? "not in the cell file" : text;
+}
 
 std::string joint_ranges(const CompensatedModel& model) {
   const ModelParts& parts = model.parts();
   std::string text;
   for (int j = 0; j < model.cell().robot.size(); ++j) {
     const JointType type = model.cell().robot.joint(j).type;
-    text += fmt::format("{}q{}\u00a0{:.1f}\u00a0to\u00a0{:.1f}\u00a0{}", j == 0 ? "" : ", ", j + 1,
-                        joint_to_column(parts.q_min(j), type), joint_to_column(parts.q_max(j), type),
-                        type == JointType::kRevolute ? "deg" : "mm");
+    text +=
+        fmt::format("{}q{}\u00a0{:.1f}\u00a0to\u00a0{:.1f}\u00a0{}", j == 0 ? "" : ", ", j + 1,
+                    joint_to_column(parts.q_min(j), type), joint_to_column(parts.q_max(j), type),
+                    type == JointType::kRevolute ? "deg" : "mm");
   }
   return text;
 }
@@ -78,32 +83,40 @@ std::string judged_by(const std::optional<PositionAccuracy>& accuracy) {
   if (!accuracy) return "nothing";
   return accuracy->judged_by() > 0
              ? fmt::format("{} pose{} that {} not trained on", accuracy->judged_by(),
-                           accuracy->judged_by() == 1 ? "" : "s", accuracy->judged_by() == 1 ? "was" : "were")
-             : "the scatter of its own training poses; none was held out, so it is believed, not tested";
+                           accuracy->judged_by() == 1 ? "" : "s",
+                           accuracy->judged_by() == 1 ? "was" : "were")
+             : "the scatter of its own training poses; none was held out, so it is believed, not "
+               "tested";
 }
 
-std::string papers_table(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
+std::string papers_table(const CompensatedModel& model,
+                         const std::optional<PositionAccuracy>& accuracy) {
   const CellPapers papers = papers_of(model.cell()).value_or(CellPapers{});
   const ModelProvenance& made = model.provenance();
   const MeasuredWords measured = words_of(model.parts().measured, model.cell());
   std::vector<HtmlRow> rows;
-  const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
+  const auto add = [&](const char* name, const std::string& value) {
+    rows.push_back({{name, html_text(value)}});
+  };
   add("robot", model.cell().robot.name());
   add("serial number", or_not_told(papers.serial_number));
   add("cell", model.cell().name);
   const auto confirmed = confirmation_of(model.cell());
-  add("robot file",
-      confirmed ? fmt::format("compared with {} poses of the controller on {}: {:.3f} mm and {:.3f} deg at the most",
-                              confirmed->poses, confirmed->day, confirmed->position_mm, confirmed->orientation_deg)
-                : std::string("not compared with the controller (trammel confirm-robot)"));
+  add("robot file", confirmed
+                        ? fmt::format("compared with {} poses of the controller on {}: {:.3f} mm "
+                                      "and {:.3f} deg at the most",
+                                      confirmed->poses, confirmed->day, confirmed->position_mm,
+                                      confirmed->orientation_deg)
+                        : std::string("not compared with the controller (trammel confirm-robot)"));
   add("tool", tools(model.parts()));
   add("instrument", measured.instrument);
   add("operator", or_not_told(papers.operator_name));
   // A batch that says no time has the date of its file, which the model does not tell from a time.
-  add("measured", made.measured_at ? shown_day(*made.measured_at) + " (by time_s, else the date of the file)"
-                                   : std::string("not recorded"));
-  add("model", fmt::format("{}, trained {} on {} poses of {}", made.id, shown_day(made.trained_at), made.training_poses,
-                           made.batch_id));
+  add("measured", made.measured_at
+                      ? shown_day(*made.measured_at) + " (by time_s, else the date of the file)"
+                      : std::string("not recorded"));
+  add("model", fmt::format("{}, trained {} on {} poses of {}", made.id, shown_day(made.trained_at),
+                           made.training_poses, made.batch_id));
   add("this volume", measured.volume);
   add("joints", joint_ranges(model));
   add("sides of approach", measured.sides);
@@ -117,23 +130,28 @@ std::string repeatability(const std::optional<MeasurementBatch>& batch, double s
   const RepeatStatistics repeats = merge_repeats(*batch, sigma).statistics;
   if (repeats.degrees_of_freedom < kFewestRepeats) return "not measured";
   return fmt::format("{} mm, instrument included ({} measurements of {} poses)",
-                     rounded_up_mm(kRepeatability * repeats.sigma), repeats.measurements, repeats.groups);
+                     rounded_up_mm(kRepeatability * repeats.sigma), repeats.measurements,
+                     repeats.groups);
 }
 
 std::string iso_table(const CompensatedModel& model, const PositionAccuracy& accuracy,
                       const std::optional<MeasurementBatch>& batch) {
   std::vector<HtmlRow> rows;
-  rows.push_back({{"positioning accuracy AP", rounded_up_mm(accuracy.at(PositionAccuracy::kShare)) + " mm",
-                   fmt::format("95 % of positions; between {} and {} mm, as few poses judged it and the instrument is "
-                               "known to 10 %",
-                               rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()))}});
-  rows.push_back({{"distance accuracy AD", "at most " + rounded_up_mm(accuracy.of_distances()) + " mm",
-                   "95 % of distances between two positions"}});
   rows.push_back(
-      {{"repeatability RP", repeatability(batch, model.cell().tracker.sigma), "from repeats of a pose only"}});
+      {{"positioning accuracy AP", rounded_up_mm(accuracy.at(PositionAccuracy::kShare)) + " mm",
+        fmt::format("95 % of positions; between {} and {} mm, as few poses judged it and the "
+                    "instrument is known to 10 %",
+                    rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()))}});
+  rows.push_back(
+      {{"distance accuracy AD", "at most " + rounded_up_mm(accuracy.of_distances()) + " mm",
+        "95 % of distances between two positions"}});
+  rows.push_back({{"repeatability RP", repeatability(batch, model.cell().tracker.sigma),
+                   "from repeats of a pose only"}});
   if (const auto& held_out = model.parts().validation; held_out && held_out->orientation)
-    rows.push_back({{"orientation accuracy", fmt::format("{:.4f} deg", to_deg(held_out->orientation->compensated)),
-                     fmt::format("rms of {} poses held out, instrument included", held_out->orientation->poses)}});
+    rows.push_back({{"orientation accuracy",
+                     fmt::format("{:.4f} deg", to_deg(held_out->orientation->compensated)),
+                     fmt::format("rms of {} poses held out, instrument included",
+                                 held_out->orientation->poses)}});
   return html_table({"iso", {"as ISO 9283 names it", "value", "of what"}, rows});
 }
 
@@ -149,7 +167,8 @@ std::string share_text(double share) {
   return percent > 99.9 ? "over 99.9 %" : fmt::format("{:.1f} %", percent);
 }
 
-std::string tolerance_table(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
+std::string tolerance_table(const PositionAccuracy& accuracy,
+                            const std::optional<double>& of_cell) {
   std::vector<double> tolerances = {0.05e-3, 0.1e-3, 0.2e-3, 0.5e-3, 1e-3};
   if (of_cell) tolerances.push_back(*of_cell);
   std::sort(tolerances.begin(), tolerances.end());
@@ -161,23 +180,28 @@ std::string tolerance_table(const PositionAccuracy& accuracy, const std::optiona
                      held(accuracy, tolerance), share_text(accuracy.within(tolerance))},
                     asked ? "asked" : ""});
   }
-  return html_table({"tolerances", {"may I ask for", "at 95 % of positions?", "positions that near the target"}, rows});
+  return html_table({"tolerances",
+                     {"may I ask for", "at 95 % of positions?", "positions that near the target"},
+                     rows});
 }
 
-std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
+std::string tolerance_sentence(const PositionAccuracy& accuracy,
+                               const std::optional<double>& of_cell) {
   if (!of_cell) return "";
   const double promised = accuracy.at(PositionAccuracy::kShare);
   return fmt::format(
-      "<p class=\"against\">The cell must hold {:.4g} mm: <b>{}</b> ({} mm at 95 %, between {} and {}).</p>\n",
-      to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised), rounded_up_mm(accuracy.least()),
-      rounded_up_mm(accuracy.most()));
+      "<p class=\"against\">The cell must hold {:.4g} mm: <b>{}</b> ({} mm at 95 %, between {} and "
+      "{}).</p>\n",
+      to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised),
+      rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()));
 }
 
 /// What the promise stands on, where that is little; it follows "in this volume".
 std::string hardly_judged(const PositionAccuracy& accuracy) {
   if (accuracy.judged_by() >= kFewestToJudge) return "";
   if (accuracy.judged_by() == 0) return ", by its training poses alone";
-  return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(), accuracy.judged_by() == 1 ? "" : "s");
+  return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(),
+                     accuracy.judged_by() == 1 ? "" : "s");
 }
 
 /// From which side poses must come, where they were measured from one; it follows "in this volume".
@@ -186,8 +210,8 @@ std::string from_that_side(const ModelParts& parts) {
   return side.empty() ? "" : ", for poses that the arm comes to " + side;
 }
 
-/// How many parameters the measurements determine: P - tr(prior^-1 posterior) (MacKay, Bayesian Interpolation, 1992),
-/// and where the instrument stood in each further session.
+/// How many parameters the measurements determine: P - tr(prior^-1 posterior) (MacKay, Bayesian
+/// Interpolation, 1992), and where the instrument stood in each further session.
 double determined(const ModelParts& parts) {
   double sum = parts.sessions.empty() ? 0 : 6 * (static_cast<double>(parts.sessions.size()) - 1);
   for (const IdentifiedParameter& one : parts.parameters)
@@ -195,12 +219,13 @@ double determined(const ModelParts& parts) {
   return sum;
 }
 
-/// Coordinates of positions (and distances) that were trained on, less their share of what was determined from them and
-/// from orientations; three more for every pose that was not trained on.
+/// Coordinates of positions (and distances) that were trained on, less their share of what was
+/// determined from them and from orientations; three more for every pose that was not trained on.
 double freedom_left(const CompensatedModel& model, const PositionAccuracy& accuracy) {
   const ModelParts& parts = model.parts();
   const double gauges = parts.training.gauges ? parts.training.gauges->rows : 0;
-  const double positions = std::max<double>(parts.training.poses, parts.provenance.training_poses - gauges);
+  const double positions =
+      std::max<double>(parts.training.poses, parts.provenance.training_poses - gauges);
   const double told = 3 * positions + gauges;
   const bool oriented = parts.training.orientation && parts.oriented_poses == 0;
   const double all = told + (oriented ? 3 * parts.training.orientation->poses : 0);
@@ -222,14 +247,14 @@ std::optional<std::string> why_no_promise(const CompensatedModel& model,
   if (!accuracy || freedom_left(model, *accuracy) >= kFewestFreedom) return std::nullopt;
   const int poses = model.provenance().training_poses;
   return fmt::format(
-      "How good this model is cannot be said from so few poses: it was trained on {} for {} parameters, and {}. "
-      "Measure "
-      "more (trammel plan chooses the poses), train again, and give trammel report --batch at least {} that were not "
-      "trained on.",
+      "How good this model is cannot be said from so few poses: it was trained on {} for {} "
+      "parameters, and {}. Measure more (trammel plan chooses the poses), train again, and give "
+      "trammel report --batch at least {} that were not trained on.",
       poses, model.parts().parameters.size(),
-      accuracy->judged_by() == 0 ? std::string("none was held out")
-                                 : fmt::format("{} that {} not trained on are too few", accuracy->judged_by(),
-                                               accuracy->judged_by() == 1 ? "was" : "were"),
+      accuracy->judged_by() == 0
+          ? std::string("none was held out")
+          : fmt::format("{} that {} not trained on are too few", accuracy->judged_by(),
+                        accuracy->judged_by() == 1 ? "was" : "were"),
       kFewestToJudge);
 }
 
@@ -241,34 +266,40 @@ std::string rounded_up_mm(double length) {
   return fmt::format("{:.{}f}", std::ceil(mm / step - 1e-9) * step, decimals);
 }
 
-std::string promise_sentence(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
-  if (!accuracy) return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
+std::string promise_sentence(const CompensatedModel& model,
+                             const std::optional<PositionAccuracy>& accuracy) {
+  if (!accuracy)
+    return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
   return fmt::format("Good to {} mm at 95 % in this volume{}{}; not known beyond; {}.",
-                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), from_that_side(model.parts()),
-                     hardly_judged(*accuracy), check_by(model.provenance()));
+                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)),
+                     from_that_side(model.parts()), hardly_judged(*accuracy),
+                     check_by(model.provenance()));
 }
 
-std::string certificate(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy,
+std::string certificate(const CompensatedModel& model,
+                        const std::optional<PositionAccuracy>& accuracy,
                         const std::optional<MeasurementBatch>& batch) {
   const std::string papers = papers_table(model, accuracy);
-  const std::string about =
-      "<p class=\"about\">It rests on " + html_text(in_words(model.parts().measured, model.cell())) + ".</p>\n";
+  const std::string about = "<p class=\"about\">It rests on " +
+                            html_text(in_words(model.parts().measured, model.cell())) + ".</p>\n";
   if (!accuracy) return about + papers;
   const std::string late = overdue(model.provenance());
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
-  return about + late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
-         "\n<p>Distances are from the wanted position (half of a true position's diameter). This holds in the volume "
-         "and with the tool and payload named below, for targets that <code>trammel correct</code> has corrected; it "
-         "says of each target whether it is inside that volume and what error to expect. "
-         "Not counted: how well the part is located, forces of the process, wear of the tool, and a robot that has "
-         "changed since.</p>\n<h3>In numbers</h3>\n" +
+  return about + late + tolerance_sentence(*accuracy, tolerance) +
+         tolerance_table(*accuracy, tolerance) +
+         "\n<p>Distances are from the wanted position (half of a true position's diameter). This "
+         "holds in the volume and with the tool and payload named below, for targets that "
+         "<code>trammel correct</code> has corrected; it says of each target whether it is inside "
+         "that volume and what error to expect. Not counted: how well the part is located, forces "
+         "of the process, wear of the tool, and a robot that has changed since.</p>\n<h3>In "
+         "numbers</h3>\n" +
          iso_table(model, *accuracy, batch) + "\n<h3>Of what</h3>\n" + papers +
          fmt::format(
-             "\n<p class=\"note\">The figures are of the tool's true position after correction by this model, at any "
-             "fresh "
-             "pose of the volume, not at ISO's five poses; the instrument's noise is taken out. That they hold for {} "
-             "days is an assumption, until a check (<code>trammel check</code>) tells how fast this robot changes. A "
-             "lasting error of up to {} mm an axis would not show, as nobody knows the instrument's sigma "
+             "\n<p class=\"note\">The figures are of the tool's true position after correction by "
+             "this model, at any fresh pose of the volume, not at ISO's five poses; the "
+             "instrument's noise is taken out. That they hold for {} days is an assumption, until "
+             "a check (<code>trammel check</code>) tells how fast this robot changes. A lasting "
+             "error of up to {} mm an axis would not show, as nobody knows the instrument's sigma "
              "better than to 10 %.</p>\n",
              kFirstCheck, rounded_up_mm(accuracy->hidden()));
 }

@@ -28,7 +28,8 @@ ordered_json error(const Vector3& e_B) {
   return {fine(e_B.x()), fine(e_B.y()), fine(e_B.z())};
 }
 
-/// The corners of the nominal arm: along the axis, then along the link, of each DH row; the tool last.
+/// The corners of the nominal arm: along the axis, then along the link, of each DH row; the tool
+/// last.
 ordered_json arm(const CompensatedModel& model, const PoseContext& context) {
   ordered_json corners = {point(Vector3::Zero())};
   Pose X = Pose::Identity();
@@ -41,7 +42,8 @@ ordered_json arm(const CompensatedModel& model, const PoseContext& context) {
     X.rotate(Eigen::AngleAxisd(link.theta, Vector3::UnitZ()));
     corner(link.d * Vector3::UnitZ());
     corner(link.a * Vector3::UnitX());
-    X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX())).rotate(Eigen::AngleAxisd(link.beta, Vector3::UnitY()));
+    X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX()))
+        .rotate(Eigen::AngleAxisd(link.beta, Vector3::UnitY()));
   }
   const auto tool = model.parts().physics.tools.find(context.tool);
   if (tool != model.parts().physics.tools.end()) corner(tool->second.translation());
@@ -75,7 +77,8 @@ ordered_json shell_json(const std::vector<PoseContext>& range, const Compensated
   const PhysicalModel& physics = model.parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   std::vector<Vector3> places;
-  for (const PoseContext& context : range) places.push_back(X_BW * physics.nominal_pose_W(context).translation());
+  for (const PoseContext& context : range)
+    places.push_back(X_BW * physics.nominal_pose_W(context).translation());
   const Shell shell = shell_of(places);
   ordered_json rings = ordered_json::array();
   for (int r = 0; r < kRings; ++r) {
@@ -84,7 +87,8 @@ ordered_json shell_json(const std::vector<PoseContext>& range, const Compensated
     for (int s = 0; s < kSectors; ++s) {
       const double angle = 2 * kPi * (s + 0.5) / kSectors - kPi;
       const double radius = shell.radius[static_cast<std::size_t>(r)][static_cast<std::size_t>(s)];
-      ring.push_back(radius > 0 ? point({radius * std::cos(angle), radius * std::sin(angle), z}) : ordered_json());
+      ring.push_back(radius > 0 ? point({radius * std::cos(angle), radius * std::sin(angle), z})
+                                : ordered_json());
     }
     rings.push_back(ring);
   }
@@ -127,7 +131,8 @@ ordered_json scene_json(const CompensatedModel& model, const ShownPoses& shown) 
   const bool known = !poses.empty();
   if (!known) poses = expected(model, poses_of_domain(model, kUnmeasured));
   ordered_json scene = {{"poses", poses}, {"shell", shell_json(range, model)}, {"measured", known}};
-  if (const auto& box = model.parts().measured) scene["box"] = {point(box->lower), point(box->upper)};
+  if (const auto& box = model.parts().measured)
+    scene["box"] = {point(box->lower), point(box->upper)};
   return scene;
 }
 

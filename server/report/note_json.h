@@ -11,7 +11,8 @@ namespace trammel {
 [[nodiscard]] inline nlohmann::ordered_json notes_json(const std::vector<Note>& notes) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Note& note : notes)
-    list.push_back({{"code", note.code}, {"severity", to_text(note.severity)}, {"text", note.text}});
+    list.push_back(
+        {{"code", note.code}, {"severity", to_text(note.severity)}, {"text", note.text}});
   return list;
 }
 

@@ -22,7 +22,8 @@ std::string shown_day(std::int64_t unix_s) {
 
 std::string with_micro(std::string text) {
   for (std::size_t at = text.find(" um"); at != std::string::npos; at = text.find(" um", at + 1)) {
-    const bool ends = at + 3 == text.size() || std::string_view(" ,.;:)").find(text[at + 3]) != std::string_view::npos;
+    const bool ends = at + 3 == text.size() ||
+                      std::string_view(" ,.;:)").find(text[at + 3]) != std::string_view::npos;
     if (ends) text.replace(at + 1, 1, "µ");
   }
   return text;

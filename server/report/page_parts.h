@@ -8,7 +8,8 @@ namespace trammel {
 
 /// The style that all pages share; it stands alone in a `<style>` of its own.
 [[nodiscard]] std::string_view page_style();
-/// JavaScript: `view3d()` draws points and lines in space in a canvas, turned and zoomed by the pointer.
+/// JavaScript: `view3d()` draws points and lines in space in a canvas, turned and zoomed by the
+/// pointer.
 [[nodiscard]] std::string_view view3d_script();
 
 /// `2026-11-22`, UTC; a dash where no time is known (0 or less).

@@ -45,8 +45,8 @@ std::string source_of(const std::string& text) {
   EVP_Digest(text.data(), text.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
   std::array<unsigned char, 48> base64{};
   const int length = EVP_EncodeBlock(base64.data(), hash.data(), static_cast<int>(hash.size()));
-  return fmt::format("'sha256-{}'",
-                     std::string_view(reinterpret_cast<const char*>(base64.data()), static_cast<std::size_t>(length)));
+  return fmt::format("'sha256-{}'", std::string_view(reinterpret_cast<const char*>(base64.data()),
+                                                     static_cast<std::size_t>(length)));
 }
 
 std::string sources_of(const std::vector<std::string>& texts) {
@@ -57,7 +57,9 @@ std::string sources_of(const std::vector<std::string>& texts) {
 
 }  // namespace
 
-PageInserts inserts_of(std::string_view page) { return {texts_of(page, "script"), texts_of(page, "style")}; }
+PageInserts inserts_of(std::string_view page) {
+  return {texts_of(page, "script"), texts_of(page, "style")};
+}
 
 PageInserts inserts_of_our_pages() {
   PageInserts all;
@@ -73,8 +75,8 @@ PageInserts inserts_of_our_pages() {
 
 std::string content_policy(const PageInserts& allowed) {
   return fmt::format(
-      "default-src 'none'; script-src {}; style-src {}; img-src data:; base-uri 'none'; form-action 'none'; "
-      "frame-ancestors 'none'",
+      "default-src 'none'; script-src {}; style-src {}; img-src data:; base-uri 'none'; "
+      "form-action 'none'; frame-ancestors 'none'",
       sources_of(allowed.scripts), sources_of(allowed.styles));
 }
 

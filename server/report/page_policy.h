@@ -6,7 +6,8 @@
 
 namespace trammel {
 
-/// The scripts and the style sheets that stand in a page, each the text between its tags. Data in JSON is no script.
+/// The scripts and the style sheets that stand in a page, each the text between its tags. Data in
+/// JSON is no script.
 struct PageInserts {
   std::vector<std::string> scripts, styles;
 };
@@ -14,8 +15,8 @@ struct PageInserts {
 /// Those of all pages of this program, before anything that comes from outside is filled in.
 [[nodiscard]] PageInserts inserts_of_our_pages();
 
-/// A Content-Security-Policy that lets exactly these run and apply, and nothing be loaded, sent or framed. A name that
-/// got into a page as HTML would do nothing under it.
+/// A Content-Security-Policy that lets exactly these run and apply, and nothing be loaded, sent or
+/// framed. A name that got into a page as HTML would do nothing under it.
 [[nodiscard]] std::string content_policy(const PageInserts& allowed);
 
 }  // namespace trammel

@@ -24,14 +24,15 @@ constexpr std::string_view kPlace = "<nav class=\"beside\"></nav>";
 constexpr std::string_view kMark = "<meta name=\"trammel-page\"";
 
 /// What links call a page of this kind, in their order.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kKinds = {{{"fleet", "fleet"},
-                                                                                  {"history", "history"},
-                                                                                  {"model", "model"},
-                                                                                  {"diagnosis", "diagnosis"},
-                                                                                  {"health", "health"},
-                                                                                  {"remedies", "remedies"},
-                                                                                  {"comparison", "comparison"},
-                                                                                  {"program", "corrected program"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kKinds = {
+    {{"fleet", "fleet"},
+     {"history", "history"},
+     {"model", "model"},
+     {"diagnosis", "diagnosis"},
+     {"health", "health"},
+     {"remedies", "remedies"},
+     {"comparison", "comparison"},
+     {"program", "corrected program"}}};
 
 /// A mark as a file has it: its texts are escaped.
 struct FoundMark {
@@ -52,7 +53,8 @@ std::optional<FoundMark> mark_in(std::string_view page) {
   if (from == std::string_view::npos) return std::nullopt;
   const std::string_view tag = page.substr(from, page.find('>', from) - from);
   const std::string kind = attribute(tag, "content");
-  const auto known = std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& one) { return one.first == kind; });
+  const auto known = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const auto& one) { return one.first == kind; });
   if (known == kKinds.end() || tag.find('<', 1) != std::string_view::npos) return std::nullopt;
   return FoundMark{static_cast<std::size_t>(known - kKinds.begin()), attribute(tag, "data-cell"),
                    attribute(tag, "data-model"), ""};
@@ -75,7 +77,8 @@ std::vector<FoundMark> marks_in(const fs::path& folder, const std::string& but) 
   std::vector<FoundMark> marks;
   std::error_code error;
   int seen = 0;
-  for (fs::directory_iterator at(folder, error), end; !error && at != end && seen < kMostEntries; at.increment(error)) {
+  for (fs::directory_iterator at(folder, error), end; !error && at != end && seen < kMostEntries;
+       at.increment(error)) {
     ++seen;
     if (!is_page(*at) || at->path().filename() == but) continue;
     if (auto mark = mark_in(beginning_of(at->path()))) {
@@ -86,12 +89,13 @@ std::vector<FoundMark> marks_in(const fs::path& folder, const std::string& but) 
   return marks;
 }
 
-/// `./file` with everything spelled as bytes that an address may not have, so that no name is read as one.
+/// `./file` with everything spelled as bytes that an address may not have, so that no name is read
+/// as one.
 std::string address_of(const std::string& file) {
   std::string address = "./";
   for (const char c : file) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-                       c == '_' || c == '.' || c == '~';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_' || c == '.' || c == '~';
     address += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
   return address;
@@ -101,14 +105,15 @@ std::string link_to(const FoundMark& mark, bool names_cell) {
   std::string what(kKinds[mark.kind].second);
   if (names_cell && !mark.cell.empty()) what += " of " + mark.cell;
   if (!mark.model.empty()) what += " " + mark.model;
-  return fmt::format("<a href=\"{}\">{} ({})</a>", address_of(mark.file), what, html_text(mark.file));
+  return fmt::format("<a href=\"{}\">{} ({})</a>", address_of(mark.file), what,
+                     html_text(mark.file));
 }
 
 }  // namespace
 
 std::string page_mark(const PageMark& mark) {
-  return fmt::format("{} content=\"{}\" data-cell=\"{}\" data-model=\"{}\">", kMark, mark.kind, html_text(mark.cell),
-                     html_text(mark.model));
+  return fmt::format("{} content=\"{}\" data-cell=\"{}\" data-model=\"{}\">", kMark, mark.kind,
+                     html_text(mark.cell), html_text(mark.model));
 }
 
 std::string with_pages_beside(std::string page, const std::string& path) {
@@ -117,15 +122,18 @@ std::string with_pages_beside(std::string page, const std::string& path) {
   if (path == "-" || place == std::string::npos || !own) return page;
   const fs::path folder = fs::path(path).parent_path();
   auto marks = marks_in(folder.empty() ? "." : folder, fs::path(path).filename().string());
-  std::erase_if(marks,
-                [&](const FoundMark& one) { return !own->cell.empty() && !one.cell.empty() && one.cell != own->cell; });
+  std::erase_if(marks, [&](const FoundMark& one) {
+    return !own->cell.empty() && !one.cell.empty() && one.cell != own->cell;
+  });
   std::sort(marks.begin(), marks.end(), [](const FoundMark& a, const FoundMark& b) {
     return std::tie(a.kind, a.cell, a.file) < std::tie(b.kind, b.cell, b.file);
   });
   if (marks.size() > kMostLinks) marks.resize(kMostLinks);
   std::string links;
   for (const FoundMark& one : marks) links += link_to(one, own->cell.empty()) + "\n";
-  if (!links.empty()) page.replace(place, kPlace.size(), "<nav class=\"beside\">Beside this page: " + links + "</nav>");
+  if (!links.empty())
+    page.replace(place, kPlace.size(),
+                 "<nav class=\"beside\">Beside this page: " + links + "</nav>");
   return page;
 }
 

@@ -12,7 +12,8 @@ std::string plain_page(const PlainPage& page) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{}\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n"
+      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n<p "
+      "class=\"subtitle\">{}</p>\n"
       "<nav class=\"beside\"></nav>\n{}\n</main>\n</body>\n</html>\n",
       page_mark(page.mark), title, page_style(), title, html_text(page.subtitle), page.body);
 }

@@ -21,7 +21,8 @@ std::string steps_table(const ErrorBudget& budget) {
   std::vector<HtmlRow> rows;
   for (const PutRight& step : budget.put_right) {
     const double share = longest > 0 ? step.left_rms / longest : 0;
-    rows.push_back({{html_text(step.name), bar_of(share, "step_bar"), fmt::format("{:.4f}", to_mm(step.left_rms))}});
+    rows.push_back({{html_text(step.name), bar_of(share, "step_bar"),
+                     fmt::format("{:.4f}", to_mm(step.left_rms))}});
   }
   return html_table({"steps", {"put right, one after the other", "", "left, mm rms"}, rows});
 }
@@ -34,23 +35,29 @@ std::string zeros_table(const ErrorBudget& budget, const Chain& robot) {
   for (const ZeroRemedy& zero : zeros) {
     const ShownValue read = show_read(zero.add, zero.u95, {1, zero.unit});
     rows.push_back({{fmt::format("joint {}", zero.joint + 1),
-                     fmt::format("{}{} ± {} {}", zero.add > 0 ? "+" : "", read.value, read.expanded, zero.unit)}});
+                     fmt::format("{}{} ± {} {}", zero.add > 0 ? "+" : "", read.value, read.expanded,
+                                 zero.unit)}});
   }
   return fmt::format("<p>The joint stands at the angle shown plus this. {}: {}.</p>",
-                     html_text(words.maker.empty() ? "In the controller" : words.maker), html_text(words.zeros)) +
+                     html_text(words.maker.empty() ? "In the controller" : words.maker),
+                     html_text(words.zeros)) +
          html_table({"zeros", {"zero of", "add to the angle shown"}, rows}) +
-         fmt::format("<p>Lengths: {}. Load data: {}.</p>", html_text(words.lengths), html_text(words.load));
+         fmt::format("<p>Lengths: {}. Load data: {}.</p>", html_text(words.lengths),
+                     html_text(words.load));
 }
 
 }  // namespace
 
-std::string remedies_page(const CompensatedModel& model, const ErrorBudget& budget, const std::string& where) {
+std::string remedies_page(const CompensatedModel& model, const ErrorBudget& budget,
+                          const std::string& where) {
   const Chain& robot = model.cell().robot;
-  return plain_page({.mark = {"remedies", model.cell().name, model.provenance().id},
-                     .title = fmt::format("Cell {}: what could be put right where", model.cell().name),
-                     .subtitle = fmt::format("{} · model {} · {}", robot.name(), model.provenance().id, where),
-                     .body = html_section("What each step leaves", steps_table(budget)) +
-                             html_section("Zeros of the joints", zeros_table(budget, robot)) + budget_section(budget)});
+  return plain_page(
+      {.mark = {"remedies", model.cell().name, model.provenance().id},
+       .title = fmt::format("Cell {}: what could be put right where", model.cell().name),
+       .subtitle = fmt::format("{} · model {} · {}", robot.name(), model.provenance().id, where),
+       .body = html_section("What each step leaves", steps_table(budget)) +
+               html_section("Zeros of the joints", zeros_table(budget, robot)) +
+               budget_section(budget)});
 }
 
 }  // namespace trammel

@@ -35,24 +35,28 @@ ordered_json change_json(const SessionChange& change) {
   json["parameters"] = ordered_json::object();
   for (const SessionChange::Size& one : change.sizes)
     json["parameters"][one.name] = {{"value", one.value}, {"u95", one.u95}, {"unit", one.unit}};
-  if (change.course == SessionChange::Course::kWanders) json["wanders_mrad_per_session"] = change.rate;
+  if (change.course == SessionChange::Course::kWanders)
+    json["wanders_mrad_per_session"] = change.rate;
   json["strength"] = change.strength;
   json["p_value"] = change.p_value;
   json["could_also_be"] = ordered_json::array();
-  for (const std::string& other : change.could_also_be) json["could_also_be"].push_back(cause_json(named_cause(other)));
+  for (const std::string& other : change.could_also_be)
+    json["could_also_be"].push_back(cause_json(named_cause(other)));
   json["rests_on_order"] = change.rests_on_order;
   json["sentence"] = sentence(change);
   return json;
 }
 
 std::string since_words(const SessionChange& change) {
-  const char* words = change.course == SessionChange::Course::kThatAlone ? "{} alone (pose {})" : "{} (pose {})";
+  const char* words =
+      change.course == SessionChange::Course::kThatAlone ? "{} alone (pose {})" : "{} (pose {})";
   return fmt::format(fmt::runtime(words), html_text(change.session_id), html_text(change.pose_id));
 }
 
 std::string others_words(const SessionChange& change) {
   std::vector<std::string> words;
-  for (const std::string& other : change.could_also_be) words.push_back(html_text(cause_in_words(other)));
+  for (const std::string& other : change.could_also_be)
+    words.push_back(html_text(cause_in_words(other)));
   if (change.course == SessionChange::Course::kWanders)
     words.push_back(fmt::format("wanders, {:.4f} mrad a session", change.rate));
   return fmt::format("{}", fmt::join(words, ", or "));
@@ -72,12 +76,17 @@ std::string session_changes_html(const std::vector<SessionChange>& changes) {
   for (const SessionChange& change : changes) {
     for (const SessionChange::Size& one : change.sizes) {
       const ShownValue shown = show_with_uncertainty(one.value, one.u95);
-      rows.push_back({{since_words(change), html_text(cause_in_words(change.source)), html_text(one.name), shown.value,
-                       shown.expanded, html_text(one.unit), others_words(change)}});
+      rows.push_back(
+          {{since_words(change), html_text(cause_in_words(change.source)), html_text(one.name),
+            shown.value, shown.expanded, html_text(one.unit), others_words(change)}});
     }
   }
   return "<h3>What changed on the arm between sessions</h3>\n" +
-         html_table({"", {"since session", "what", "parameter", "value", "U (k = 2)", "unit", "or else"}, rows}) + "\n";
+         html_table(
+             {"",
+              {"since session", "what", "parameter", "value", "U (k = 2)", "unit", "or else"},
+              rows}) +
+         "\n";
 }
 
 }  // namespace trammel

@@ -14,7 +14,8 @@ struct WorkVersions {
 };
 
 /// For programs; lengths in mm, joints in deg, or mm on a rail.
-[[nodiscard]] nlohmann::ordered_json work_json(const WorkAsked& work, const WorkVersions& versions, const Chain& robot);
+[[nodiscard]] nlohmann::ordered_json work_json(const WorkAsked& work, const WorkVersions& versions,
+                                               const Chain& robot);
 /// For people, of what work_json() made.
 [[nodiscard]] std::string work_text(const nlohmann::ordered_json& work);
 

@@ -22,7 +22,8 @@ double nearest_turn(const Joint& joint, double angle, double near) {
 JointVector joints_of_angles(const Chain& chain, const std::array<double, 6>& theta,
                              const std::optional<JointVector>& near) {
   Vector6 value;
-  for (int i = 0; i < 6; ++i) value(i) = theta[static_cast<std::size_t>(i)] - chain.joint(i).link.theta;
+  for (int i = 0; i < 6; ++i)
+    value(i) = theta[static_cast<std::size_t>(i)] - chain.joint(i).link.theta;
   JointVector q = Eigen::Matrix<double, 6, 6>(chain.transmission()).partialPivLu().solve(value);
   for (int i = 0; i < 6; ++i) q(i) = nearest_turn(chain.joint(i), q(i), near ? (*near)(i) : 0.0);
   return q;

@@ -11,7 +11,8 @@ namespace trammel {
 void ArmState::add_to_joint(int joint, double delta) {
   for (int i = 0; i < chain->size(); ++i) {
     LinkGeometry& link = links[static_cast<std::size_t>(i)];
-    (chain->joint(i).type == JointType::kRevolute ? link.theta : link.d) += chain->drive()(i, joint) * delta;
+    (chain->joint(i).type == JointType::kRevolute ? link.theta : link.d) +=
+        chain->drive()(i, joint) * delta;
   }
 }
 
@@ -21,9 +22,12 @@ StateJacobian::StateJacobian(const Chain& chain, int parameters)
   entries_.reserve(kRowsOfMost * static_cast<std::size_t>(parameters));
 }
 
-void StateJacobian::add(int row, int column, double rate) { entries_.push_back({row, column, rate}); }
+void StateJacobian::add(int row, int column, double rate) {
+  entries_.push_back({row, column, rate});
+}
 
-void StateJacobian::add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates) {
+void StateJacobian::add_block(int first_row, int first_column,
+                              const Eigen::Ref<const Eigen::MatrixXd>& rates) {
   for (int column = 0; column < rates.cols(); ++column) {
     for (int row = 0; row < rates.rows(); ++row) {
       if (rates(row, column) != 0) add(first_row + row, first_column + column, rates(row, column));
@@ -39,7 +43,8 @@ void StateJacobian::add_to_joint(int joint, int column, double rate) {
 }
 
 void StateJacobian::pass_on(std::vector<int> into, Eigen::MatrixXd by_state) {
-  TRAMMEL_CHECK(by_state.rows() == static_cast<Eigen::Index>(into.size()) && by_state.cols() == rows.size());
+  TRAMMEL_CHECK(by_state.rows() == static_cast<Eigen::Index>(into.size()) &&
+                by_state.cols() == rows.size());
   passages_.push_back({entries_.size(), std::move(into), 0, std::move(by_state)});
 }
 
@@ -52,13 +57,14 @@ void StateJacobian::pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_sta
 void StateJacobian::transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor) {
   std::vector<int> into(static_cast<std::size_t>(factor.rows()));
   std::iota(into.begin(), into.end(), first_row);
-  passages_.push_back(
-      {entries_.size(), std::move(into), first_row, factor - Eigen::MatrixXd::Identity(factor.rows(), factor.cols())});
+  passages_.push_back({entries_.size(), std::move(into), first_row,
+                       factor - Eigen::MatrixXd::Identity(factor.rows(), factor.cols())});
 }
 
 Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
-  // A passage multiplies d(state) by (I + E L): L is the passage's own by_state, E puts its rows into the state. So,
-  // going backwards, `by_state` becomes by_state (I + E L) for the entries recorded before the passage.
+  // A passage multiplies d(state) by (I + E L): L is the passage's own by_state, E puts its rows
+  // into the state. So, going backwards, `by_state` becomes by_state (I + E L) for the entries
+  // recorded before the passage.
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(6, parameters_);
   std::size_t end = entries_.size();
   const auto collect = [&](std::size_t begin) {
@@ -69,10 +75,12 @@ Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
   };
   for (auto passage = passages_.rbegin(); passage != passages_.rend(); ++passage) {
     collect(passage->entries);
-    const Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints> through = by_state(Eigen::all, passage->rows);
+    const Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints> through =
+        by_state(Eigen::all, passage->rows);
     for (Eigen::Index column = 0; column < passage->by_state.cols(); ++column) {
       Vector6 sum = by_state.col(passage->first_column + column);
-      for (Eigen::Index k = 0; k < through.cols(); ++k) sum += passage->by_state(k, column) * through.col(k);
+      for (Eigen::Index k = 0; k < through.cols(); ++k)
+        sum += passage->by_state(k, column) * through.col(k);
       by_state.col(passage->first_column + column) = sum;
     }
   }
@@ -81,8 +89,12 @@ Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
 }
 
 ArmKinematics::ArmKinematics(const ArmState& state)
-    : chain_(state.chain), spring_torque_(state.spring_torque), X_WB_(state.X_WB), gravity_W_(state.gravity_W) {
-  TRAMMEL_CHECK(chain_ != nullptr && state.links.size() == static_cast<std::size_t>(chain_->size()));
+    : chain_(state.chain),
+      spring_torque_(state.spring_torque),
+      X_WB_(state.X_WB),
+      gravity_W_(state.gravity_W) {
+  TRAMMEL_CHECK(chain_ != nullptr &&
+                state.links.size() == static_cast<std::size_t>(chain_->size()));
   Vector3 x = state.X_WB.linear().col(0);
   Vector3 y = state.X_WB.linear().col(1);
   Vector3 z = state.X_WB.linear().col(2);
@@ -115,7 +127,8 @@ ArmKinematics::ArmKinematics(const ArmState& state)
     const Joint& joint = chain_->joint(static_cast<int>(i));
     if (joint.mass > 0) {
       const Vector3 cog = p + x * joint.p_cog.x() + y * joint.p_cog.y() + z * joint.p_cog.z();
-      bodies_[static_cast<std::size_t>(body_count_++)] = {cog, joint.mass * kGravity * gravity_W_, static_cast<int>(i)};
+      bodies_[static_cast<std::size_t>(body_count_++)] = {cog, joint.mass * kGravity * gravity_W_,
+                                                          static_cast<int>(i)};
     }
   }
   X_WF_ = Pose::Identity();
@@ -174,7 +187,8 @@ StateMatrix<6> ArmKinematics::pose_jacobian() const {
   J.block<3, 3>(3, rows.tool(3)) = R_WF;
   if (!tip_rotation_W_.isZero(0)) {  // R_WT = exp(tip) R_kinematic
     const Matrix3 R_tip = rotation_exp(tip_rotation_W_);
-    for (int row = 0; row < rows.tip(0); ++row) J.col(row).tail<3>() = (R_tip * J.col(row).tail<3>()).eval();
+    for (int row = 0; row < rows.tip(0); ++row)
+      J.col(row).tail<3>() = (R_tip * J.col(row).tail<3>()).eval();
   }
   J.block<3, 3>(0, rows.tip(0)).setIdentity();
   J.block<3, 3>(3, rows.tip(3)) = left_jacobian(tip_rotation_W_);
@@ -202,20 +216,23 @@ ArmKinematics::JointJacobian ArmKinematics::axis_jacobian() const {
 
 StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& of_gears) const {
   const StateRows rows(chain_->size());
-  const JointArray deflection = chain_->has_bars() ? JointArray(chain_->bars() * of_gears) : of_gears;
+  const JointArray deflection =
+      chain_->has_bars() ? JointArray(chain_->bars() * of_gears) : of_gears;
   const JointJacobian J = axis_jacobian();
   const LinkVectors velocity = velocities_of(kinematic_tip_W_);
   const LinkVectors turn = turns();
   StateMatrix<6> D = StateMatrix<6>::Zero(6, rows.size());
-  // When a link turns, the Jacobian columns of joints beyond it turn too. In the columns of the joints up to it only
-  // the lever changes.
+  // When a link turns, the Jacobian columns of joints beyond it turn too. In the columns of the
+  // joints up to it only the lever changes.
   Vector6 beyond = J * deflection;
   Vector3 up_to = Vector3::Zero();
   const auto turned = [&](int row, const Vector3& w) {
     D.col(row).head<3>() += w.cross(beyond.head<3>());
     D.col(row).tail<3>() += w.cross(beyond.tail<3>());
   };
-  const auto shifted = [&](int row, const Vector3& tip_motion) { D.col(row).head<3>() += up_to.cross(tip_motion); };
+  const auto shifted = [&](int row, const Vector3& tip_motion) {
+    D.col(row).head<3>() += up_to.cross(tip_motion);
+  };
   for (int axis = 0; axis < 3; ++axis) turned(rows.base(3 + axis), Vector3::Unit(axis));
   for (int i = 0; i < chain_->size(); ++i) {
     beyond -= deflection(i) * J.col(i);
@@ -227,7 +244,8 @@ StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& o
   }
   for (int axis = 0; axis < 3; ++axis) {
     shifted(rows.tool(axis), X_WF_.linear().col(axis));
-    shifted(rows.tool(3 + axis), X_WF_.linear().col(axis).cross(kinematic_tip_W_ - X_WF_.translation()));
+    shifted(rows.tool(3 + axis),
+            X_WF_.linear().col(axis).cross(kinematic_tip_W_ - X_WF_.translation()));
   }
   return D;
 }
@@ -238,8 +256,9 @@ JointArray ArmKinematics::gravity_torque() const {
     const Body& body = bodies_[static_cast<std::size_t>(k)];
     for (int j = 0; j <= body.last; ++j) {
       const Link& link = links_[static_cast<std::size_t>(j)];
-      torque(j) += chain_->joint(j).type == JointType::kRevolute ? link.z.dot((body.p - link.p).cross(body.force))
-                                                                 : link.z.dot(body.force);
+      torque(j) += chain_->joint(j).type == JointType::kRevolute
+                       ? link.z.dot((body.p - link.p).cross(body.force))
+                       : link.z.dot(body.force);
     }
   }
   const Vector3 gravity = kGravity * gravity_W_;
@@ -267,12 +286,15 @@ JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
       const Vector3& z = links_[static_cast<std::size_t>(j)].z;
       const bool revolute = chain_->joint(j).type == JointType::kRevolute;
       // The direction in which a force does work on the joint: tau = leverage . F.
-      const Vector3 leverage = revolute ? z.cross(body.p - links_[static_cast<std::size_t>(j)].p) : z;
-      // A rotation upstream of the joint turns lever and axis together. That equals turning the force back.
+      const Vector3 leverage =
+          revolute ? z.cross(body.p - links_[static_cast<std::size_t>(j)].p) : z;
+      // A rotation upstream of the joint turns lever and axis together. That equals turning the
+      // force back.
       const Vector3 by_turn = leverage.cross(body.force);
       const Vector3 by_cog = revolute ? body.force.cross(z) : Vector3::Zero();
       for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));
-      for (int row = rows.theta(j); row < 5 * (body.last + 1); ++row) T(j, row) += by_cog.dot(velocity.col(row));
+      for (int row = rows.theta(j); row < 5 * (body.last + 1); ++row)
+        T(j, row) += by_cog.dot(velocity.col(row));
       T.block<1, 3>(j, rows.base(3)) += by_turn.transpose();
       if (k + 1 < body_count_) continue;
       T(j, rows.mass()) += kGravity * leverage.dot(gravity_W_);
@@ -293,13 +315,14 @@ void ArmKinematics::add_first_moments(const LinkVectors& turn, JointStateMatrix&
     for (int j = 0; j <= i; ++j) {
       if (chain_->joint(j).type != JointType::kRevolute) continue;
       const Vector3& z = links_[static_cast<std::size_t>(j)].z;
-      // As for a body: a rotation before the joint turns axis and moment together, a rotation beyond it the moment
-      // alone.
+      // As for a body: a rotation before the joint turns axis and moment together, a rotation
+      // beyond it the moment alone.
       const Vector3 by_turn = z.cross(first.moment).cross(gravity);
       const Vector3 by_moment = gravity.cross(z);
       for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));
       const Vector3 by_turn_beyond = first.moment.cross(by_moment);
-      for (int row = rows.theta(j); row <= rows.theta(i); ++row) T(j, row) += by_turn_beyond.dot(turn.col(row));
+      for (int row = rows.theta(j); row <= rows.theta(i); ++row)
+        T(j, row) += by_turn_beyond.dot(turn.col(row));
       T.block<1, 3>(j, rows.base(3)) += by_turn.transpose();
       T(j, rows.first_moment(i, 0)) += by_moment.dot(first.x);
       T(j, rows.first_moment(i, 1)) += by_moment.dot(first.y);
@@ -353,8 +376,8 @@ StateMatrix<15> ArmKinematics::loaded_link_jacobian(int joint) const {
   const LoadedLink link = loaded_link(joint);
   StateMatrix<15> J = StateMatrix<15>::Zero(15, rows.size());
   const Vector3 points[] = {link.start, link.end, link.cog, link.tip};
-  // The rows that move each point are those of the links before it. alpha and beta of a link turn about its far end,
-  // which stays.
+  // The rows that move each point are those of the links before it. alpha and beta of a link turn
+  // about its far end, which stays.
   const int moving[] = {rows.theta(joint), rows.theta(joint) + 5, rows.base(0), rows.base(0)};
   for (int p = 0; p < 4; ++p) {
     J.block(3 * p, 0, 3, moving[p]) = velocities_of(points[p]).leftCols(moving[p]);

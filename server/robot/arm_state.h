@@ -7,7 +7,8 @@
 #include "server/robot/chain.h"
 #include "server/robot/pose.h"
 
-/// The state of the arm at one pose, and the derivative of the tool pose by every number of that state.
+/// The state of the arm at one pose, and the derivative of the tool pose by every number of that
+/// state.
 namespace trammel {
 
 struct Payload {
@@ -17,11 +18,13 @@ struct Payload {
 
 constexpr double kGravity = 9.80665;  // m/s^2
 
-/// kg m, of each link: first moment of everything that it carries as one piece, about its joint's axis. Along x of the
-/// link, and along z x x, z the joint's axis. Without columns: nothing but the payload and the links' told masses.
+/// kg m, of each link: first moment of everything that it carries as one piece, about its joint's
+/// axis. Along x of the link, and along z x x, z the joint's axis. Without columns: nothing but the
+/// payload and the links' told masses.
 using FirstMoments = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxJoints>;
 
-/// The state that the error sources change, one after the other: nominal at first, the real arm at the end.
+/// The state that the error sources change, one after the other: nominal at first, the real arm at
+/// the end.
 struct ArmState {
   const Chain* chain = nullptr;     ///< not owned
   std::vector<LinkGeometry> links;  ///< n, joint values included
@@ -29,17 +32,21 @@ struct ArmState {
   Pose X_FT = Pose::Identity();
   Payload payload;
   Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
-  Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation; rotation vector] in W
+  Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation;
+                                    ///< rotation vector] in W
   FirstMoments first_moments;       ///< beyond the told masses; 2 x n or empty
-  JointArray spring_torque;         ///< n or empty, Nm (N): what springs add to the gravity torque on each gear
+  JointArray
+      spring_torque;  ///< n or empty, Nm (N): what springs add to the gravity torque on each gear
 
-  /// Adds `delta` (rad, m) to the joint as its gear would: through signs, and bars that couple it (Chain::drive).
+  /// Adds `delta` (rad, m) to the joint as its gear would: through signs, and bars that couple it
+  /// (Chain::drive).
   void add_to_joint(int joint, double delta);
 };
 
-/// The row of each number of an ArmState in a derivative: five rows per link, then base, tool, payload, tip, first
-/// moments, springs. Base and tool rows are small motions [translation; rotation vector]. The base motion is that of B
-/// in W, about the origin of B; the tool motion is that of T in F, about the origin of F.
+/// The row of each number of an ArmState in a derivative: five rows per link, then base, tool,
+/// payload, tip, first moments, springs. Base and tool rows are small motions [translation;
+/// rotation vector]. The base motion is that of B in W, about the origin of B; the tool motion is
+/// that of T in F, about the origin of F.
 class StateRows {
  public:
   explicit StateRows(int joints) : joints_(joints) {}
@@ -57,7 +64,9 @@ class StateRows {
   [[nodiscard]] int mass() const { return 5 * joints_ + 12; }
   [[nodiscard]] int cog(int k) const { return 5 * joints_ + 13 + k; }
   [[nodiscard]] int tip(int k) const { return 5 * joints_ + 16 + k; }
-  [[nodiscard]] std::vector<int> whole_tip() const { return {tip(0), tip(1), tip(2), tip(3), tip(4), tip(5)}; }
+  [[nodiscard]] std::vector<int> whole_tip() const {
+    return {tip(0), tip(1), tip(2), tip(3), tip(4), tip(5)};
+  }
   [[nodiscard]] int first_moment(int link, int k) const { return 5 * joints_ + 22 + 2 * link + k; }
   [[nodiscard]] int spring(int joint) const { return 7 * joints_ + 22 + joint; }
   [[nodiscard]] int size() const { return 8 * joints_ + 22; }
@@ -72,25 +81,31 @@ constexpr int kMaxStateRows = 8 * kMaxJoints + 22;
 template <int Rows>
 using StateMatrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, kMaxStateRows>;
 /// The same with a row for each joint.
-using JointStateMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxStateRows>;
+using JointStateMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxStateRows>;
 
-/// d(state)/d(parameters). Recorded while the sources act, and multiplied out once, from the last source to the first.
-/// So the cost of a source does not grow with the number of parameters before it.
+/// d(state)/d(parameters). Recorded while the sources act, and multiplied out once, from the last
+/// source to the first. So the cost of a source does not grow with the number of parameters before
+/// it.
 class StateJacobian {
  public:
   StateJacobian(const Chain& chain, int parameters);
   /// Records that the parameter in `column` moves state row `row` by `rate` per unit.
   void add(int row, int column, double rate);
-  /// The same for several rows from `first_row` and columns from `first_column`; zeros cost nothing.
+  /// The same for several rows from `first_row` and columns from `first_column`; zeros cost
+  /// nothing.
   void add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates);
-  /// Records that the parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per unit.
+  /// Records that the parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per
+  /// unit.
   void add_to_joint(int joint, int column, double rate);
-  /// Records that every change of the state so far also changes the numbers in `rows`, by `by_state` (one row for each
-  /// of `rows`, one column for each of StateRows).
+  /// Records that every change of the state so far also changes the numbers in `rows`, by
+  /// `by_state` (one row for each of `rows`, one column for each of StateRows).
   void pass_on(std::vector<int> rows, Eigen::MatrixXd by_state);
-  /// Records that every change of the state so far also moves `joint` (as ArmState::add_to_joint), by `by_state`.
+  /// Records that every change of the state so far also moves `joint` (as ArmState::add_to_joint),
+  /// by `by_state`.
   void pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_state);
-  /// Multiplies the numbers in the state rows from `first_row` on, and their derivatives so far, by `factor`.
+  /// Multiplies the numbers in the state rows from `first_row` on, and their derivatives so far, by
+  /// `factor`.
   void transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor);
   /// `by_state` (6 x StateRows::size()) times the recorded derivative: 6 x parameters.
   [[nodiscard]] Eigen::MatrixXd times(StateMatrix<6> by_state) const;
@@ -123,26 +138,30 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: torque of all weights on the gear of each joint, Nm (for a prismatic joint the force along it, N), and of the
-  /// springs. It is the moment about the joint's axis, less what bars take over (Chain::bars). The weights are the
-  /// payload's and, if the robot file gives them, the links', each at its centre of gravity (the physical wrench), and
-  /// those that the links' first moments stand for, which push no prismatic joint. Eq. (3.6) without C and the outer J.
+  /// n: torque of all weights on the gear of each joint, Nm (for a prismatic joint the force along
+  /// it, N), and of the springs. It is the moment about the joint's axis, less what bars take over
+  /// (Chain::bars). The weights are the payload's and, if the robot file gives them, the links',
+  /// each at its centre of gravity (the physical wrench), and those that the links' first moments
+  /// stand for, which push no prismatic joint. Eq. (3.6) without C and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
-  /// Moment of all weights about the origin of B, Nm in W. Of first moments without what lies along the first axis.
+  /// Moment of all weights about the origin of B, Nm in W. Of first moments without what lies along
+  /// the first axis.
   [[nodiscard]] Vector3 base_moment() const;
   /// Derivative of base_moment().
   [[nodiscard]] StateMatrix<3> base_moment_jacobian() const;
   using JointJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints>;
-  /// 6 x n: the tool's motion in W per turn of each joint about its axis (signs and couplings do not enter).
+  /// 6 x n: the tool's motion in W per turn of each joint about its axis (signs and couplings do
+  /// not enter).
   [[nodiscard]] JointJacobian axis_jacobian() const;
-  /// The same per deflection of each joint's gear (signs do not enter, bars do), the J of eq. (3.6).
+  /// The same per deflection of each joint's gear (signs do not enter, bars do), the J of eq.
+  /// (3.6).
   [[nodiscard]] JointJacobian deflection_jacobian() const;
   /// Derivative of deflection_jacobian() * `of_gears` with that deflection (n) held.
   [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& of_gears) const;
-  /// Points in W that bending depends on: a point on the axis of `joint`, the far end of its link, the centre of
-  /// gravity, the tool point. Also the weight, N.
+  /// Points in W that bending depends on: a point on the axis of `joint`, the far end of its link,
+  /// the centre of gravity, the tool point. Also the weight, N.
   struct LoadedLink {
     Vector3 start, end, cog, tip, weight;
   };
@@ -165,7 +184,8 @@ class ArmKinematics {
     Vector3 moment, x, y;
   };
   using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
-  /// One column per link row: the velocity in W of `point`, fixed to what is downstream of the link.
+  /// One column per link row: the velocity in W of `point`, fixed to what is downstream of the
+  /// link.
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
   /// One column per link row: the rotation of everything downstream of the link.
   [[nodiscard]] LinkVectors turns() const;
@@ -180,7 +200,8 @@ class ArmKinematics {
   int first_moment_count_ = 0;  // n or 0
   JointArray spring_torque_;
   Pose X_WB_, X_WF_, X_WT_;
-  Vector3 kinematic_tip_W_, tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
+  Vector3 kinematic_tip_W_,
+      tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
   Vector3 p_cog_W_, force_W_, gravity_W_;
 };
 

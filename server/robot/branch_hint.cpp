@@ -8,7 +8,8 @@ namespace trammel {
 
 namespace {
 
-constexpr std::string_view kJoins = "; ", kConf = "conf ", kComma = ", ", kOr = " or ", kEnd = " would reach it";
+constexpr std::string_view kJoins = "; ", kConf = "conf ", kComma = ", ", kOr = " or ",
+                           kEnd = " would reach it";
 
 /// Takes `word` from the front of `text` if it stands there.
 bool take(std::string_view& text, std::string_view word) {
@@ -41,7 +42,8 @@ std::string branch_list(const std::vector<int>& branches) {
 }
 
 std::string with_branch_hint(const std::string& before, const std::vector<int>& branches) {
-  return branches.empty() ? before : fmt::format("{}{}{}{}", before, kJoins, branch_list(branches), kEnd);
+  return branches.empty() ? before
+                          : fmt::format("{}{}{}{}", before, kJoins, branch_list(branches), kEnd);
 }
 
 BranchHint branch_hint_in(std::string_view message) {
@@ -49,7 +51,8 @@ BranchHint branch_hint_in(std::string_view message) {
   if (joint != std::string_view::npos) {
     std::string_view rest = message.substr(joint + kJoins.size());
     std::vector<int> branches = take_branches(rest);
-    if (!branches.empty() && rest == kEnd) return {std::string(message.substr(0, joint)), std::move(branches)};
+    if (!branches.empty() && rest == kEnd)
+      return {std::string(message.substr(0, joint)), std::move(branches)};
   }
   return {std::string(message), {}};
 }

@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-/// Branches (conf) that would reach a target, at the end of the message that says why its own does not:
-/// `joint 5 would be at 121.3 deg, limit 120; conf 1, 3 or 7 would reach it`. On the wire and in files they stand
-/// nowhere else, so this form is written and read here alone.
+/// Branches (conf) that would reach a target, at the end of the message that says why its own does
+/// not: `joint 5 would be at 121.3 deg, limit 120; conf 1, 3 or 7 would reach it`. On the wire and
+/// in files they stand nowhere else, so this form is written and read here alone.
 namespace trammel {
 
 /// A message taken apart. Without branches `before` is all of it.
@@ -16,7 +16,8 @@ struct BranchHint {
 };
 
 /// `before` with the branches at its end; `before` alone without any.
-[[nodiscard]] std::string with_branch_hint(const std::string& before, const std::vector<int>& branches);
+[[nodiscard]] std::string with_branch_hint(const std::string& before,
+                                           const std::vector<int>& branches);
 /// The reverse.
 [[nodiscard]] BranchHint branch_hint_in(std::string_view message);
 

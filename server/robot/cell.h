@@ -13,20 +13,23 @@
 namespace trammel {
 
 struct Tracker {
-  double sigma = 13e-6;                        ///< m, one measurement, one axis
-  double sigma_rotation = 61e-6;               ///< rad, one measurement, one axis
-  std::optional<Vector3> p_W;                  ///< position of the tracker, for visibility
-  std::optional<double> aperture;              ///< rad, half angle of the cone in which the target is visible
-  Vector3 target_normal_T = Vector3::UnitZ();  ///< direction in which the target faces, unit vector in T
+  double sigma = 13e-6;            ///< m, one measurement, one axis
+  double sigma_rotation = 61e-6;   ///< rad, one measurement, one axis
+  std::optional<Vector3> p_W;      ///< position of the tracker, for visibility
+  std::optional<double> aperture;  ///< rad, half angle of the cone in which the target is visible
+  Vector3 target_normal_T =
+      Vector3::UnitZ();  ///< direction in which the target faces, unit vector in T
 };
 
-/// What to identify and what to learn. Sources as spelled on the command line: `geometry`, `gear_transmission:3`.
+/// What to identify and what to learn. Sources as spelled on the command line: `geometry`,
+/// `gear_transmission:3`.
 struct ModelSpec {
   std::vector<std::string> error_sources = {"base", "geometry", "compliance"};
   std::string bias = "se";
 };
 
-/// Which of a cell's batches a training by the service takes: those that it was trained from before, and its own.
+/// Which of a cell's batches a training by the service takes: those that it was trained from
+/// before, and its own.
 struct SessionRule {
   enum class Kind { kAll, kLast, kDays };
   Kind kind = Kind::kAll;
@@ -43,22 +46,25 @@ struct Workspace {
 struct Cell {
   std::string name;
   Chain robot;
-  std::optional<Pose> X_WB;                          ///< nominal base; empty = unknown, found from data
-  Vector3 gravity_W = -Vector3::UnitZ();             ///< unit vector
+  std::optional<Pose> X_WB;               ///< nominal base; empty = unknown, found from data
+  Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
   std::map<std::string, std::optional<Pose>> tools;  ///< X_FT; empty = unknown, found from data
   std::map<std::string, Payload> payloads;
   Tracker tracker;
   ModelSpec model;
-  std::vector<std::pair<double, double>> joint_ranges;  ///< rad, of this cell; empty = the robot's limits
+  std::vector<std::pair<double, double>>
+      joint_ranges;  ///< rad, of this cell; empty = the robot's limits
   std::optional<Workspace> workspace;
   SessionRule sessions;
-  std::optional<double> step_limit;  ///< m: a model that moves a pose recently asked for by more waits for a person
-  std::string cell_yaml;             ///< the texts it was read from, kept so that a stored model is self-contained
+  std::optional<double>
+      step_limit;  ///< m: a model that moves a pose recently asked for by more waits for a person
+  std::string
+      cell_yaml;  ///< the texts it was read from, kept so that a stored model is self-contained
   std::string robot_yaml;
 };
 
-/// Reads the two texts (DESIGN section 3); `where` names the cell file in errors. Refuses unknown keys, wrong types,
-/// non-unit quaternions, missing rows, each with file, key and limit.
+/// Reads the two texts (DESIGN section 3); `where` names the cell file in errors. Refuses unknown
+/// keys, wrong types, non-unit quaternions, missing rows, each with file, key and limit.
 [[nodiscard]] Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml,
                                       const std::string& where);
 /// Reads a cell file and the robot file it names, relative to itself.
@@ -67,8 +73,8 @@ struct Cell {
 [[nodiscard]] Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where);
 [[nodiscard]] Result<Chain> read_robot(const std::string& path);
 
-/// The tool of a request: `requested`, or the only tool if that is empty. Refuses an unknown name. Refuses an empty
-/// name if the cell has several tools.
+/// The tool of a request: `requested`, or the only tool if that is empty. Refuses an unknown name.
+/// Refuses an empty name if the cell has several tools.
 [[nodiscard]] Result<std::string> resolve_tool(const Cell& cell, const std::string& requested);
 /// The same for payloads; a cell without payloads has the one called "" (nothing carried).
 [[nodiscard]] Result<std::string> resolve_payload(const Cell& cell, const std::string& requested);

@@ -14,8 +14,10 @@ namespace {
 
 constexpr std::size_t kHashDigits = 32;
 
-/// Keys of a cell file that decide no number: the robot file counts by its content, and the others are for people.
-const std::set<std::string> kWithoutNumbers = {"robot", "robot_confirmed", "serial_number", "instrument", "operator"};
+/// Keys of a cell file that decide no number: the robot file counts by its content, and the others
+/// are for people.
+const std::set<std::string> kWithoutNumbers = {"robot", "robot_confirmed", "serial_number",
+                                               "instrument", "operator"};
 
 /// `0.10` and `1e-1` are one number.
 std::string spelled(const std::string& scalar) {
@@ -25,7 +27,8 @@ std::string spelled(const std::string& scalar) {
   return error == std::errc() && stopped == end ? fmt::format("{:.17g}", number) : scalar;
 }
 
-/// One spelling for values that mean the same. Texts carry their length, so that no two texts are spelled alike.
+/// One spelling for values that mean the same. Texts carry their length, so that no two texts are
+/// spelled alike.
 std::string spelled(const YAML::Node& node) {
   if (node.IsSequence()) {
     std::string text = "[";

@@ -19,8 +19,8 @@ void doubt_gravity(const Cell& cell, std::vector<CellDoubt>& doubts) {
   if (!up || !standing) return;
   doubts.push_back(
       {"gravity_up",
-       fmt::format("gravity [{:g}, {:g}, {:g}] points up, and the robot's base stands upright: gravity is the "
-                   "direction in which things fall, [0, 0, -1] in most cells",
+       fmt::format("gravity [{:g}, {:g}, {:g}] points up, and the robot's base stands upright: "
+                   "gravity is the direction in which things fall, [0, 0, -1] in most cells",
                    cell.gravity_W.x(), cell.gravity_W.y(), cell.gravity_W.z())});
 }
 
@@ -31,10 +31,14 @@ Matrix3 reordered(const Matrix3& R) {
 }
 
 void doubt_order(const Cell& cell, std::vector<CellDoubt>& doubts) {
-  const auto half_turn = [](const Matrix3& R) { return std::abs(Eigen::Quaterniond(R).z()) > 1 - 1e-9; };
+  const auto half_turn = [](const Matrix3& R) {
+    return std::abs(Eigen::Quaterniond(R).z()) > 1 - 1e-9;
+  };
   const auto add = [&](const std::string& key, const char* seen) {
-    doubts.push_back({"quaternion_order",
-                      fmt::format("{}: q_wxyz {}: is it written in the order x, y, z, w? w stands first", key, seen)});
+    doubts.push_back(
+        {"quaternion_order",
+         fmt::format("{}: q_wxyz {}: is it written in the order x, y, z, w? w stands first", key,
+                     seen)});
   };
   if (cell.X_WB) {
     const Vector3 up = -cell.gravity_W;
@@ -45,31 +49,35 @@ void doubt_order(const Cell& cell, std::vector<CellDoubt>& doubts) {
       add("base", "lays the base on its side, and the other order puts it upright");
   }
   for (const auto& [name, X_FT] : cell.tools)
-    if (X_FT && half_turn(X_FT->linear())) add("tools: " + name, "turns the tool by 180 degrees about z");
+    if (X_FT && half_turn(X_FT->linear()))
+      add("tools: " + name, "turns the tool by 180 degrees about z");
 }
 
 void doubt_lengths(const Cell& cell, std::vector<CellDoubt>& doubts) {
   const auto look = [&](const std::string& key, const Vector3& p) {
     if (p.norm() == 0 || p.norm() >= kShort) return;
     doubts.push_back(
-        {"lengths_in_metres", fmt::format("{} [{:g}, {:g}, {:g}] is less than {:g} mm: is it in metres? write it in mm",
-                                          key, to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), to_mm(kShort))});
+        {"lengths_in_metres",
+         fmt::format("{} [{:g}, {:g}, {:g}] is less than {:g} mm: is it in metres? write it in mm",
+                     key, to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), to_mm(kShort))});
   };
   if (cell.X_WB) look("base: xyz_mm", cell.X_WB->translation());
   for (const auto& [name, X_FT] : cell.tools)
     if (X_FT) look("tools: " + name + ": xyz_mm", X_FT->translation());
-  for (const auto& [name, payload] : cell.payloads) look("payloads: " + name + ": cog_mm", payload.p_FoCog_F);
+  for (const auto& [name, payload] : cell.payloads)
+    look("payloads: " + name + ": cog_mm", payload.p_FoCog_F);
 }
 
 void doubt_parallel(const Chain& robot, std::vector<CellDoubt>& doubts) {
   for (const int j : rows_without_hayati(robot)) {
     doubts.push_back(
         {"hayati_missing",
-         fmt::format("the axes of joints {} and {} are parallel, and joint {} of the robot file has no `hayati: true`: "
-                     "no number of the model is the tilt of the one axis against the other, so that it is taken for "
-                     "something else, and no measurement tells d of one from d of the other; write `hayati: true` "
-                     "there, its d in the row behind it",
-                     j + 1, j + 2, j + 1),
+         fmt::format(
+             "the axes of joints {} and {} are parallel, and joint {} of the robot file has no "
+             "`hayati: true`: no number of the model is the tilt of the one axis against the "
+             "other, so that it is taken for something else, and no measurement tells d of one "
+             "from d of the other; write `hayati: true` there, its d in the row behind it",
+             j + 1, j + 2, j + 1),
          true});
   }
 }

@@ -58,7 +58,8 @@ void read_motion(const YamlMap& map, Joint& joint) {
   if (map.has(limits)) {
     const std::vector<double> range = map.numbers(limits, 2);
     if (!(range[0] < range[1])) {
-      map.refuse(limits, refused("lower limit {:g} {} is not below upper limit {:g} {}", range[0], unit, range[1], unit)
+      map.refuse(limits, refused("lower limit {:g} {} is not below upper limit {:g} {}", range[0],
+                                 unit, range[1], unit)
                              .beyond(range[0], range[1]));
     }
     joint.lower = si(range[0]);
@@ -68,8 +69,9 @@ void read_motion(const YamlMap& map, Joint& joint) {
 }
 
 Joint read_joint(const YamlMap& map) {
-  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg", "limits_mm", "sign",
-            "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm", "max_speed_deg_s", "max_speed_mm_s"});
+  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
+            "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
+            "max_speed_deg_s", "max_speed_mm_s"});
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");
@@ -100,7 +102,8 @@ Pose read_pose(const YamlMap& map) {
     const std::vector<double> v = map.numbers("q_wxyz", 4);
     const Eigen::Quaterniond quaternion(v[0], v[1], v[2], v[3]);
     if (std::abs(quaternion.norm() - 1) > 1e-3) {
-      map.refuse("q_wxyz", refused("length {:.6f}, expected a unit quaternion (limit 1e-3)", quaternion.norm())
+      map.refuse("q_wxyz", refused("length {:.6f}, expected a unit quaternion (limit 1e-3)",
+                                   quaternion.norm())
                                .beyond(quaternion.norm(), 1));
     }
     X.linear() = quaternion.normalized().toRotationMatrix();
@@ -117,7 +120,8 @@ Tracker read_tracker(const YamlMap& map) {
   Tracker tracker;
   tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
   tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
-  if (tracker.sigma <= 0) map.refuse("sigma_mm", refused("must be above 0").beyond(to_mm(tracker.sigma), 0));
+  if (tracker.sigma <= 0)
+    map.refuse("sigma_mm", refused("must be above 0").beyond(to_mm(tracker.sigma), 0));
   if (tracker.sigma > kWorstSigma) {
     map.refuse("sigma_mm", refused("{:g}, limit {:g}", to_mm(tracker.sigma), to_mm(kWorstSigma))
                                .beyond(to_mm(tracker.sigma), to_mm(kWorstSigma))
@@ -129,13 +133,14 @@ Tracker read_tracker(const YamlMap& map) {
   if (map.has("aperture_deg")) {
     tracker.aperture = from_deg(map.number("aperture_deg"));
     if (!(*tracker.aperture > 0 && *tracker.aperture <= kPi))
-      map.refuse(
-          "aperture_deg",
-          refused("must be above 0, at most 180").beyond(to_deg(*tracker.aperture), *tracker.aperture > 0 ? 180 : 0));
+      map.refuse("aperture_deg",
+                 refused("must be above 0, at most 180")
+                     .beyond(to_deg(*tracker.aperture), *tracker.aperture > 0 ? 180 : 0));
   }
   if (map.has("target_normal")) {
     tracker.target_normal_T = read_vector(map, "target_normal");
-    if (tracker.target_normal_T.norm() < 1e-9) map.refuse("target_normal", "a direction of length 0");
+    if (tracker.target_normal_T.norm() < 1e-9)
+      map.refuse("target_normal", "a direction of length 0");
     tracker.target_normal_T.normalize();
   }
   return tracker;
@@ -153,7 +158,8 @@ void read_tools(const YamlMap& map, Cell& cell) {
     }
   }
   if (cell.tools.empty())
-    map.refuse("tools", refused("no tool").beyond(0, 1).next("name at least one, as null where its pose is unknown"));
+    map.refuse("tools", refused("no tool").beyond(0, 1).next(
+                            "name at least one, as null where its pose is unknown"));
 }
 
 constexpr double kHeaviest = 2300;  // kg; no robot carries more
@@ -193,10 +199,12 @@ double read_radius(const YamlMap& map, const std::string& key) {
 
 /// The shape of an anchor: a point, unless a key says that it is a sphere, a plane or a ring.
 void read_shape(const YamlMap& map, Anchor& anchor) {
-  const bool sphere = map.has("sphere_radius_mm"), plane = map.has("plane_normal"), ring = map.has("ring_axis");
+  const bool sphere = map.has("sphere_radius_mm"), plane = map.has("plane_normal"),
+             ring = map.has("ring_axis");
   if (sphere + plane + ring > 1)
     map.refuse(plane ? "plane_normal" : "ring_axis", "an anchor is one of sphere, plane and ring");
-  if (ring != map.has("ring_radius_mm")) map.refuse("ring_radius_mm", "ring_axis and ring_radius_mm belong together");
+  if (ring != map.has("ring_radius_mm"))
+    map.refuse("ring_radius_mm", "ring_axis and ring_radius_mm belong together");
   if (sphere) {
     anchor.shape = Anchor::Shape::kSphere;
     anchor.radius = read_radius(map, "sphere_radius_mm");
@@ -208,11 +216,13 @@ void read_shape(const YamlMap& map, Anchor& anchor) {
     anchor.direction_W = read_direction(map, "ring_axis");
     anchor.radius = read_radius(map, "ring_radius_mm");
   }
-  if ((plane || ring) && !anchor.p_W) map.refuse("xyz_mm", "where a plane or a ring is must be known");
+  if ((plane || ring) && !anchor.p_W)
+    map.refuse("xyz_mm", "where a plane or a ring is must be known");
 }
 
 Anchor read_anchor(const YamlMap& map) {
-  map.only({"xyz_mm", "zero_mm", "sigma_mm", "sphere_radius_mm", "plane_normal", "ring_axis", "ring_radius_mm"});
+  map.only({"xyz_mm", "zero_mm", "sigma_mm", "sphere_radius_mm", "plane_normal", "ring_axis",
+            "ring_radius_mm"});
   Anchor anchor;
   if (!map.is_null("xyz_mm")) anchor.p_W = read_vector(map, "xyz_mm") * from_mm(1);
   if (!map.is_null("zero_mm")) anchor.zero = from_mm(map.number("zero_mm"));
@@ -256,7 +266,8 @@ SessionRule read_sessions(const YamlMap& map) {
   } catch (const YamlRefusal&) {
     const YamlMap rule = map.map("sessions");
     rule.only({"last", "days"});
-    if (rule.has("last") == rule.has("days")) map.refuse("sessions", "expected all, {last: N} or {days: N}");
+    if (rule.has("last") == rule.has("days"))
+      map.refuse("sessions", "expected all, {last: N} or {days: N}");
     const bool last = rule.has("last");
     const char* key = last ? "last" : "days";
     const int count = rule.integer(key, 0);
@@ -264,7 +275,8 @@ SessionRule read_sessions(const YamlMap& map) {
     return {last ? SessionRule::Kind::kLast : SessionRule::Kind::kDays, count};
   }
   if (word != "all")
-    map.refuse("sessions", refused("'{}', expected all, {{last: N}} or {{days: N}}", word).with_text(word));
+    map.refuse("sessions",
+               refused("'{}', expected all, {{last: N}} or {{days: N}}", word).with_text(word));
   return {};
 }
 
@@ -294,20 +306,25 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
     if (!map.has("workspace_mm")) return;
     const YamlMap box = map.map("workspace_mm");
     box.only({"lower", "upper"});
-    cell.workspace = Workspace{read_vector(box, "lower") * from_mm(1), read_vector(box, "upper") * from_mm(1)};
+    cell.workspace =
+        Workspace{read_vector(box, "lower") * from_mm(1), read_vector(box, "upper") * from_mm(1)};
   });
 }
 
-/// An axis that carries the robot is one of its joints, so that there is one thing to say of the others.
+/// An axis that carries the robot is one of its joints, so that there is one thing to say of the
+/// others.
 std::vector<std::string> read_idle_axes(const YamlMap& axes) {
   std::vector<std::string> names = axes.keys();
   for (const std::string& name : names) {
     axes.attempt([&] {
       const std::string carries = axes.text(name);
       if (carries != "carries nothing")
-        axes.refuse(name,
-                    refused("'{}', expected carries nothing; a rail that carries the robot is a joint of it", carries)
-                        .with_text(carries));
+        axes.refuse(
+            name,
+            refused(
+                "'{}', expected carries nothing; a rail that carries the robot is a joint of it",
+                carries)
+                .with_text(carries));
     });
   }
   return names;
@@ -318,7 +335,8 @@ CellRules read_rules(const YamlMap& map) {
   map.attempt([&] {
     if (map.is_null("tolerance_mm")) return;
     const double tolerance = map.number("tolerance_mm");
-    if (!(tolerance > 0)) map.refuse("tolerance_mm", refused("expected more than 0").beyond(tolerance, 0));
+    if (!(tolerance > 0))
+      map.refuse("tolerance_mm", refused("expected more than 0").beyond(tolerance, 0));
     rules.tolerance = tolerance * from_mm(1);
   });
   map.attempt([&] {
@@ -352,8 +370,9 @@ std::optional<RobotConfirmation> read_confirmation(const YamlMap& map) {
   if (map.is_null("robot_confirmed")) return std::nullopt;
   const YamlMap said = map.map("robot_confirmed");
   said.only({"robot_sha256", "poses", "position_mm", "orientation_deg", "day"});
-  return RobotConfirmation{said.text("robot_sha256"), said.integer("poses", 0), said.number("position_mm"),
-                           said.number("orientation_deg"), said.text("day")};
+  return RobotConfirmation{said.text("robot_sha256"), said.integer("poses", 0),
+                           said.number("position_mm"), said.number("orientation_deg"),
+                           said.text("day")};
 }
 
 Cell read_cell_map(const YamlMap& map) {
@@ -376,9 +395,11 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] {
     cell.name = map.text("cell");
     if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
-      map.refuse("cell", refused("'{}', expected a name without blanks, '@' and '/'", cell.name).with_text(cell.name));
+      map.refuse("cell", refused("'{}', expected a name without blanks, '@' and '/'", cell.name)
+                             .with_text(cell.name));
     }
-    if (const Status fine = check_name(cell.name, "cell"); !fine) map.refuse("cell", Failure(fine.error()));
+    if (const Status fine = check_name(cell.name, "cell"); !fine)
+      map.refuse("cell", Failure(fine.error()));
   });
   read_surroundings(map, cell);
   map.attempt([&] { read_tools(map, cell); });
@@ -397,13 +418,14 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
   for (int i = 0; i < cell.robot.size(); ++i) {
     const std::vector<double> range = ranges.numbers(fmt::format("q{}", i + 1), 2);
     if (!(range[0] <= range[1])) {
-      ranges.refuse(fmt::format("q{}", i + 1), refused("lower end above upper end").beyond(range[0], range[1]));
+      ranges.refuse(fmt::format("q{}", i + 1),
+                    refused("lower end above upper end").beyond(range[0], range[1]));
     };
     cell.joint_ranges.emplace_back(from_deg(range[0]), from_deg(range[1]));
   }
   if (ranges.keys().size() != static_cast<std::size_t>(cell.robot.size())) {
-    ranges.refuse("q1...",
-                  refused("expected {} joints", cell.robot.size()).beyond(ranges.keys().size(), cell.robot.size()));
+    ranges.refuse("q1...", refused("expected {} joints", cell.robot.size())
+                               .beyond(ranges.keys().size(), cell.robot.size()));
   }
 }
 
@@ -411,11 +433,13 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
 
 namespace {
 
-/// The index from 0 of a joint that the file counts from 1. Chain::make() checks that the robot has it.
+/// The index from 0 of a joint that the file counts from 1. Chain::make() checks that the robot has
+/// it.
 int joint_index(const YamlMap& map, const std::string& key) {
   const int number = map.integer(key, 0);
   if (number < 1 || number > kMaxJoints)
-    map.refuse(key, refused("{}, limit 1 to {}", number, kMaxJoints).beyond(number, number < 1 ? 1 : kMaxJoints));
+    map.refuse(key, refused("{}, limit 1 to {}", number, kMaxJoints)
+                        .beyond(number, number < 1 ? 1 : kMaxJoints));
   return number - 1;
 }
 
@@ -441,45 +465,49 @@ void check_lengths(const YamlMap& map, const std::vector<Joint>& joints) {
     rails = rails || joint.type == JointType::kPrismatic;
   }
   if (rails || joints.size() < 3 || sum >= kShortestArm) return;
-  map.refuse("joints", refused("all lengths of the links together are {:g} mm, expected {:g} or more", to_mm(sum),
-                               to_mm(kShortestArm))
-                           .beyond(to_mm(sum), to_mm(kShortestArm))
-                           .next("in metres? write them in mm"));
+  map.refuse("joints",
+             refused("all lengths of the links together are {:g} mm, expected {:g} or more",
+                     to_mm(sum), to_mm(kShortestArm))
+                 .beyond(to_mm(sum), to_mm(kShortestArm))
+                 .next("in metres? write them in mm"));
 }
 
 }  // namespace
 
 Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where) {
-  return read_yaml(robot_yaml, where,
-                   [&](const YamlMap& map) {
-                     map.only({"version", "name", "source", "joints", "coupling"});
-                     if (map.integer("version", 0) != 1)
-                       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
-                     std::vector<Joint> joints;
-                     for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
-                     map.attempt([&] { check_lengths(map, joints); });
-                     std::vector<Coupling> couplings;
-                     if (!map.is_null("coupling")) {
-                       for (const YamlMap& entry : map.maps("coupling")) {
-                         entry.only({"joint", "follows", "ratio", "kind"});
-                         couplings.push_back({joint_index(entry, "joint"), joint_index(entry, "follows"),
-                                              entry.number("ratio"), coupling_kind(entry)});
-                       }
-                     }
-                     return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
-                   })
+  return read_yaml(
+             robot_yaml, where,
+             [&](const YamlMap& map) {
+               map.only({"version", "name", "source", "joints", "coupling"});
+               if (map.integer("version", 0) != 1)
+                 map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
+               std::vector<Joint> joints;
+               for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
+               map.attempt([&] { check_lengths(map, joints); });
+               std::vector<Coupling> couplings;
+               if (!map.is_null("coupling")) {
+                 for (const YamlMap& entry : map.maps("coupling")) {
+                   entry.only({"joint", "follows", "ratio", "kind"});
+                   couplings.push_back({joint_index(entry, "joint"), joint_index(entry, "follows"),
+                                        entry.number("ratio"), coupling_kind(entry)});
+                 }
+               }
+               return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
+             })
       .and_then([](Result<Chain> chain) { return chain; })
       .map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
 Result<Chain> read_robot(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_robot(text, path); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_robot(text, path); });
 }
 
 namespace {
 
 /// Reads the cell even if its robot was refused, so that all errors of the cell file are reported.
-Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml, const std::string& where) {
+Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
+                       const std::string& where) {
   return read_yaml(cell_yaml, where, [&](const YamlMap& map) {
     Cell cell = read_cell_map(map);
     if (!robot) throw YamlRefusal{robot.error()};
@@ -490,8 +518,8 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
   });
 }
 
-/// The text of a file that another file names. Refuses a pipe: whoever starts a program does not know that it would
-/// wait there.
+/// The text of a file that another file names. Refuses a pipe: whoever starts a program does not
+/// know that it would wait there.
 Result<std::string> file_text_of(const std::string& path) {
   std::error_code unknown;
   if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
@@ -502,22 +530,29 @@ Result<std::string> file_text_of(const std::string& path) {
 /// The path of the robot file that the cell names, relative to the cell file.
 Result<std::string> robot_path_in(const std::string& cell_yaml, const std::string& path) {
   return read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); })
-      .map([&](const std::string& name) { return (std::filesystem::path(path).parent_path() / name).string(); });
+      .map([&](const std::string& name) {
+        return (std::filesystem::path(path).parent_path() / name).string();
+      });
 }
 
 /// The text of the robot file that the cell names.
-Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
+Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path,
+                                  std::string& robot_path) {
   const std::string found = TRY(robot_path_in(cell_yaml, path));
   robot_path = found;
   return file_text_of(robot_path).map_error([&](Error error) {
-    return Failure(std::move(error)).of("robot").next(fmt::format("{} names it as its robot", path)).value();
+    return Failure(std::move(error))
+        .of("robot")
+        .next(fmt::format("{} names it as its robot", path))
+        .value();
   });
 }
 
 }  // namespace
 
 Result<std::string> robot_path_of(const std::string& path) {
-  return file_text_of(path).and_then([&](const std::string& text) { return robot_path_in(text, path); });
+  return file_text_of(path).and_then(
+      [&](const std::string& text) { return robot_path_in(text, path); });
 }
 
 std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
@@ -539,7 +574,8 @@ Result<CellPapers> papers_of(const Cell& cell) {
 
 std::optional<RobotConfirmation> confirmation_of(const Cell& cell) {
   if (cell.cell_yaml.empty()) return std::nullopt;
-  const auto said = read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_confirmation(map); });
+  const auto said = read_yaml(cell.cell_yaml, cell.name,
+                              [](const YamlMap& map) { return read_confirmation(map); });
   if (!said || !*said || (*said)->robot_sha256 != sha256_hex(cell.robot_yaml)) return std::nullopt;
   return *said;
 }
@@ -549,7 +585,8 @@ Result<Anchors> anchors_of(const Cell& cell) {
   return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_anchors(map); });
 }
 
-Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {
+Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml,
+                        const std::string& where) {
   Result<Cell> cell = cell_with(parse_robot(robot_yaml, where + " (robot)"), cell_yaml, where);
   if (cell) cell->robot_yaml = robot_yaml;
   return cell;
@@ -569,7 +606,8 @@ Result<Cell> read_cell(const std::string& path) {
 namespace {
 
 template <typename Map>
-Result<std::string> resolve(const Map& known, const std::string& requested, const std::string& cell, const char* kind) {
+Result<std::string> resolve(const Map& known, const std::string& requested, const std::string& cell,
+                            const char* kind) {
   std::string names;
   for (const auto& [name, value] : known) names += (names.empty() ? "" : ", ") + name;
   if (requested.empty()) {

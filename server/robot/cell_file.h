@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// {xyz_mm: [...], q_wxyz: [...]} as cell and truth files write a pose; the quaternion may be left out (no rotation).
+/// {xyz_mm: [...], q_wxyz: [...]} as cell and truth files write a pose; the quaternion may be left
+/// out (no rotation).
 [[nodiscard]] Pose read_pose(const YamlMap& map);
 
 /// The path of the robot file that a cell file names.

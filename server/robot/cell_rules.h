@@ -11,9 +11,11 @@ namespace trammel {
 
 /// What the owner of a cell demands of it, beside its description.
 struct CellRules {
-  std::optional<double> tolerance;      ///< m: what the cell must hold, 95 % of its positions
-  bool fleet_prior = false;             ///< robots of its type that were trained before say what to expect of it
-  bool controller_compensates = false;  ///< the controller corrects errors of its own; batches were measured so
+  std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
+  bool fleet_prior =
+      false;  ///< robots of its type that were trained before say what to expect of it
+  bool controller_compensates =
+      false;  ///< the controller corrects errors of its own; batches were measured so
   /// External axes that carry neither robot nor part, by the names that programs have for them.
   std::vector<std::string> idle_axes = {};
 };

@@ -15,7 +15,9 @@ struct Span {
   std::size_t begin = 0, end = 0;
 };
 
-std::string list_of(const std::vector<std::string>& sources) { return fmt::format("[{}]", fmt::join(sources, ", ")); }
+std::string list_of(const std::vector<std::string>& sources) {
+  return fmt::format("[{}]", fmt::join(sources, ", "));
+}
 
 std::size_t line_start(const std::string& text, std::size_t at) {
   const std::size_t newline = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
@@ -55,11 +57,13 @@ Span block_list(const std::string& text, std::size_t first_dash) {
 }
 
 /// The text with the present list replaced, in the same style (flow or block).
-std::string replaced(const std::string& text, std::size_t mark, const std::vector<std::string>& sources) {
+std::string replaced(const std::string& text, std::size_t mark,
+                     const std::vector<std::string>& sources) {
   const bool flow = text[mark] == '[';
   const Span span = flow ? flow_list(text, mark) : block_list(text, mark);
   const std::string indent(mark - line_start(text, mark), ' ');
-  const std::string list = flow ? list_of(sources) : fmt::format("- {}", fmt::join(sources, "\n" + indent + "- "));
+  const std::string list =
+      flow ? list_of(sources) : fmt::format("- {}", fmt::join(sources, "\n" + indent + "- "));
   return text.substr(0, span.begin) + list + text.substr(span.end);
 }
 
@@ -70,13 +74,15 @@ std::string inserted(const std::string& text, const YAML::Node& model, const std
   if (text[mark] == '{') {
     const std::size_t next = text.find_first_not_of(' ', mark + 1);
     const bool empty = next != std::string::npos && text[next] == '}';
-    return text.substr(0, mark + 1) + entry + (empty ? "" : ", ") + text.substr(empty ? next : mark + 1);
+    return text.substr(0, mark + 1) + entry + (empty ? "" : ", ") +
+           text.substr(empty ? next : mark + 1);
   }
   const std::size_t indent = mark - line_start(text, mark);
   return text.substr(0, mark) + entry + "\n" + std::string(indent, ' ') + text.substr(mark);
 }
 
-std::string edited(const std::string& text, const YAML::Node& root, const std::vector<std::string>& sources) {
+std::string edited(const std::string& text, const YAML::Node& root,
+                   const std::vector<std::string>& sources) {
   const std::string list = list_of(sources);
   const YAML::Node model = root["model"];
   if (!model.IsDefined() || !model.IsMap()) {
@@ -99,7 +105,8 @@ std::string all_but_the_list(const std::string& text) {
 
 }  // namespace
 
-Result<std::string> with_error_sources(const std::string& cell_yaml, const std::vector<std::string>& sources,
+Result<std::string> with_error_sources(const std::string& cell_yaml,
+                                       const std::vector<std::string>& sources,
                                        const std::string& where) {
   std::string why = "the list stands elsewhere";
   try {

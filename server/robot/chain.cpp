@@ -17,23 +17,27 @@ const char* to_string(CouplingKind kind) {
   return kind == CouplingKind::kParallelogram ? "parallelogram" : "controller";
 }
 
-Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vector<Coupling> couplings) {
+Result<Chain> Chain::make(std::string name, std::vector<Joint> joints,
+                          std::vector<Coupling> couplings) {
   const int n = static_cast<int>(joints.size());
   if (n == 0) return refused("robot {}: no joints", name).of("joints").beyond(0, 1);
   if (n > kMaxJoints)
-    return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints).of("joints").beyond(n, kMaxJoints);
+    return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints)
+        .of("joints")
+        .beyond(n, kMaxJoints);
   Chain chain;
   Eigen::VectorXd signs(n);
   for (int i = 0; i < n; ++i) {
     const Joint& joint = joints[static_cast<std::size_t>(i)];
     if (!(joint.lower < joint.upper)) {
-      return refused("robot {} joint {}: lower limit {} is not below upper limit {}", name, i + 1, joint.lower,
-                     joint.upper)
+      return refused("robot {} joint {}: lower limit {} is not below upper limit {}", name, i + 1,
+                     joint.lower, joint.upper)
           .of(fmt::format("joints {}: limits", i + 1))
           .beyond(joint.lower, joint.upper);
     }
     if (std::abs(joint.sign) != 1.0) {
-      return refused("robot {} joint {}: sign is {}, only 1 and -1 are allowed", name, i + 1, joint.sign)
+      return refused("robot {} joint {}: sign is {}, only 1 and -1 are allowed", name, i + 1,
+                     joint.sign)
           .of(fmt::format("joints {}: sign", i + 1))
           .with_value(joint.sign);
     }
@@ -41,10 +45,10 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
   }
   chain.transmission_ = chain.drive_ = signs.asDiagonal();
   for (const Coupling& coupling : couplings) {
-    if (coupling.joint < 0 || coupling.joint >= n || coupling.follows < 0 || coupling.follows >= n ||
-        coupling.joint == coupling.follows) {
-      return refused("robot {}: coupling of joint {} to joint {} in a robot of {} joints", name, coupling.joint + 1,
-                     coupling.follows + 1, n)
+    if (coupling.joint < 0 || coupling.joint >= n || coupling.follows < 0 ||
+        coupling.follows >= n || coupling.joint == coupling.follows) {
+      return refused("robot {}: coupling of joint {} to joint {} in a robot of {} joints", name,
+                     coupling.joint + 1, coupling.follows + 1, n)
           .of("coupling")
           .beyond(std::max(coupling.joint, coupling.follows) + 1, n);
     }
@@ -88,7 +92,8 @@ JointVector Chain::commanded(const JointVector& gears) const {
 }
 
 bool Chain::has_link_masses() const {
-  return std::any_of(joints_.begin(), joints_.end(), [](const Joint& joint) { return joint.mass > 0; });
+  return std::any_of(joints_.begin(), joints_.end(),
+                     [](const Joint& joint) { return joint.mass > 0; });
 }
 
 std::optional<int> Chain::joint_outside_limits(const JointVector& q, double tolerance) const {

@@ -13,13 +13,14 @@ namespace trammel {
 
 enum class JointType { kRevolute, kPrismatic };
 
-constexpr int kMaxJoints = 12;  // of a chain; computations at every pose use fixed storage of this size
+constexpr int kMaxJoints =
+    12;  // of a chain; computations at every pose use fixed storage of this size
 
 /// One number per joint.
 using JointArray = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxJoints, 1>;
 
-/// The five numbers of a link. Link i is Tz(d) Rz(theta) Tx(a) Rx(alpha), eq. (3.3), or, where the axis is parallel
-/// to the next one, Rz(theta) Tx(a) Rx(alpha) Ry(beta), eq. (3.4). m, rad.
+/// The five numbers of a link. Link i is Tz(d) Rz(theta) Tx(a) Rx(alpha), eq. (3.3), or, where the
+/// axis is parallel to the next one, Rz(theta) Tx(a) Rx(alpha) Ry(beta), eq. (3.4). m, rad.
 struct LinkGeometry {
   double theta = 0;
   double d = 0;
@@ -31,28 +32,32 @@ struct LinkGeometry {
 /// One joint and the link that follows it.
 struct Joint {
   JointType type = JointType::kRevolute;
-  LinkGeometry link;    ///< nominal; theta (revolute) or d (prismatic) is the offset at joint value 0
+  LinkGeometry link;  ///< nominal; theta (revolute) or d (prismatic) is the offset at joint value 0
   bool hayati = false;  ///< beta is a parameter of this link and d is not
   double sign = 1;      ///< -1 where the controller counts against the right-hand rule, else +1
   double lower = -std::numeric_limits<double>::infinity();  ///< rad (m), of the commanded value
   double upper = std::numeric_limits<double>::infinity();
-  double gear_ratio = 0;            ///< motor turns per joint turn; 0 when unknown
-  double compliance_prior = 0;      ///< rad/Nm
-  double mass = 0;                  ///< kg, of the link that follows; 0: the controller compensates its weight
-  Vector3 p_cog = Vector3::Zero();  ///< m, its centre of gravity in the link's own frame (at its far end)
+  double gear_ratio = 0;        ///< motor turns per joint turn; 0 when unknown
+  double compliance_prior = 0;  ///< rad/Nm
+  double mass = 0;  ///< kg, of the link that follows; 0: the controller compensates its weight
+  Vector3 p_cog =
+      Vector3::Zero();  ///< m, its centre of gravity in the link's own frame (at its far end)
   std::optional<double> max_speed;  ///< rad/s (m/s)
 };
 
 /// Who lets a joint follow another one: server/robot/README.md says what that means for gears.
 enum class CouplingKind {
-  kController,     ///< the controller's way of counting; the arm is serial, each gear sits between two links
-  kParallelogram,  ///< bars: the gear of the joint turns its link against the base, whatever the other joint does
+  kController,  ///< the controller's way of counting; the arm is serial, each gear sits between two
+                ///< links
+  kParallelogram,  ///< bars: the gear of the joint turns its link against the base, whatever the
+                   ///< other joint does
 };
 
 /// As robot files spell it.
 [[nodiscard]] const char* to_string(CouplingKind kind);
 
-/// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its own (0-based).
+/// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its
+/// own (0-based).
 struct Coupling {
   int joint = 0;
   int follows = 0;
@@ -64,8 +69,8 @@ struct Coupling {
 class Chain {
  public:
   Chain() = default;
-  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit, a coupling of a joint that does not exist
-  /// or with itself.
+  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit, a coupling of a joint
+  /// that does not exist or with itself.
   [[nodiscard]] static Result<Chain> make(std::string name, std::vector<Joint> joints,
                                           std::vector<Coupling> couplings = {});
 
@@ -77,14 +82,15 @@ class Chain {
   [[nodiscard]] const Eigen::MatrixXd& transmission() const { return transmission_; }
   /// n x n: d(kinematic joint value)/d(gear angle): signs, and what bars couple.
   [[nodiscard]] const Eigen::MatrixXd& drive() const { return drive_; }
-  /// n x n: drive() of gears that are counted as their axes turn. What a gear gives way moves the joints by it; its
-  /// transpose makes the torques on the gears of those about the axes.
+  /// n x n: drive() of gears that are counted as their axes turn. What a gear gives way moves the
+  /// joints by it; its transpose makes the torques on the gears of those about the axes.
   [[nodiscard]] const Eigen::MatrixXd& bars() const { return bars_; }
   /// Whether bars couple joints: else bars() is the identity.
   [[nodiscard]] bool has_bars() const { return has_bars_; }
   /// Whether the controller counts the angles of the gears: else gear_angles() changes something.
   [[nodiscard]] bool counts_gears() const { return transmission_ == drive_; }
-  /// The angles of the gears at the commanded `q`; commanded() is the way back. Linear: of differences as well.
+  /// The angles of the gears at the commanded `q`; commanded() is the way back. Linear: of
+  /// differences as well.
   [[nodiscard]] JointVector gear_angles(const JointVector& q) const;
   [[nodiscard]] JointVector commanded(const JointVector& gears) const;
 
@@ -92,14 +98,18 @@ class Chain {
   [[nodiscard]] std::vector<LinkGeometry> links_at(const JointVector& q) const;
   /// X_BF at the commanded `q` (size n), eq. (3.2) without base and tool.
   [[nodiscard]] Pose flange_pose(const JointVector& q) const;
-  /// 6 x n geometric Jacobian of the point `p_F` (m, in F): [dp; rotation vector] in B per commanded joint, eq. (3.7).
-  [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
+  /// 6 x n geometric Jacobian of the point `p_F` (m, in F): [dp; rotation vector] in B per
+  /// commanded joint, eq. (3.7).
+  [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q,
+                                         const Vector3& p_F = Vector3::Zero()) const;
   /// The same per gear angle.
-  [[nodiscard]] Eigen::MatrixXd gear_jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
+  [[nodiscard]] Eigen::MatrixXd gear_jacobian(const JointVector& q,
+                                              const Vector3& p_F = Vector3::Zero()) const;
   /// Whether any link's weight is known.
   [[nodiscard]] bool has_link_masses() const;
   /// Index of the first joint outside its limits (beyond `tolerance`), if any.
-  [[nodiscard]] std::optional<int> joint_outside_limits(const JointVector& q, double tolerance = 1e-9) const;
+  [[nodiscard]] std::optional<int> joint_outside_limits(const JointVector& q,
+                                                        double tolerance = 1e-9) const;
 
  private:
   std::string name_;

@@ -23,7 +23,9 @@ ArmKinematics::JointJacobian by_axes(const Chain& chain, const JointVector& q, c
 
 }  // namespace
 
-Pose Chain::flange_pose(const JointVector& q) const { return ArmKinematics(bare_arm(*this, q)).tool_pose_W(); }
+Pose Chain::flange_pose(const JointVector& q) const {
+  return ArmKinematics(bare_arm(*this, q)).tool_pose_W();
+}
 
 Eigen::MatrixXd Chain::jacobian(const JointVector& q, const Vector3& p_F) const {
   return by_axes(*this, q, p_F) * transmission_;

@@ -14,7 +14,8 @@ std::vector<Matrix3> all_turns() {
   do {
     for (int signs = 0; signs < 8; ++signs) {
       Matrix3 R = Matrix3::Zero();
-      for (int k = 0; k < 3; ++k) R(axis[static_cast<std::size_t>(k)], k) = (signs >> k & 1) != 0 ? -1 : 1;
+      for (int k = 0; k < 3; ++k)
+        R(axis[static_cast<std::size_t>(k)], k) = (signs >> k & 1) != 0 ? -1 : 1;
       if (R.determinant() > 0) turns.push_back(R);
     }
   } while (std::next_permutation(axis.begin(), axis.end()));

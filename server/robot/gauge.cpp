@@ -12,7 +12,8 @@ GaugedLength length_of(const Vector3& d) {
 
 }  // namespace
 
-GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA, const Vector3& p_W) {
+GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA,
+                           const Vector3& p_W) {
   const Vector3 d = p_W - p_WA;
   if (kind == Gauge::Kind::kDistance) return length_of(d);
   const Vector3& n = anchor.direction_W;

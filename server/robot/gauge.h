@@ -9,20 +9,22 @@
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
 
-/// Instruments that tell one number of a pose instead of a position: draw wires, ballbars and ranges, which measure a
-/// distance; dial gauges and probes, which touch a surface.
+/// Instruments that tell one number of a pose instead of a position: draw wires, ballbars and
+/// ranges, which measure a distance; dial gauges and probes, which touch a surface.
 namespace trammel {
 
 /// What an instrument measures to, as the cell file has it under `anchors`.
 struct Anchor {
   enum class Shape { kPoint, kSphere, kPlane, kRing };
   Shape shape = Shape::kPoint;
-  std::optional<Vector3> p_W;              ///< m: the point, a point of the plane, of the ring's axis; empty: unknown
-  Vector3 direction_W = Vector3::UnitZ();  ///< unit vector: normal of the plane, away from its body; axis of the ring
-  double radius = 0;                       ///< m, of sphere or ring
-  std::optional<double> sigma;             ///< m, of one value of this instrument
-  std::optional<double> zero;              ///< m: what it tells too much; empty: it is looked for
-  bool zero_open = false;                  ///< it is unknown for certain; else the data decide whether there is one
+  std::optional<Vector3>
+      p_W;  ///< m: the point, a point of the plane, of the ring's axis; empty: unknown
+  Vector3 direction_W =
+      Vector3::UnitZ();  ///< unit vector: normal of the plane, away from its body; axis of the ring
+  double radius = 0;     ///< m, of sphere or ring
+  std::optional<double> sigma;  ///< m, of one value of this instrument
+  std::optional<double> zero;   ///< m: what it tells too much; empty: it is looked for
+  bool zero_open = false;  ///< it is unknown for certain; else the data decide whether there is one
 };
 /// By their ids.
 using Anchors = std::map<std::string, Anchor>;
@@ -34,13 +36,13 @@ using Anchors = std::map<std::string, Anchor>;
 struct Gauge {
   enum class Kind {
     kDistance,  ///< from the tool point to the anchor's point
-    kTouch,     ///< from the anchor's surface to the tool point, positive outside of a sphere, above a plane, and
-                ///< beyond the wall of a ring that is touched from within
+    kTouch,  ///< from the anchor's surface to the tool point, positive outside of a sphere, above a
+             ///< plane, and beyond the wall of a ring that is touched from within
   };
   Kind kind = Kind::kDistance;
   std::string anchor;
-  double value = 0;                          ///< m
-  std::string minus_pose;                    ///< id of the pose that the value is told against; empty: of itself
+  double value = 0;        ///< m
+  std::string minus_pose;  ///< id of the pose that the value is told against; empty: of itself
   std::shared_ptr<const PoseContext> minus;  ///< that pose
 };
 
@@ -50,7 +52,7 @@ struct GaugedLength {
   Vector3 by_point_W = Vector3::Zero();
 };
 /// From `p_W` to the anchor whose point is `p_WA`, without any zero error.
-[[nodiscard]] GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA,
-                                         const Vector3& p_W);
+[[nodiscard]] GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor,
+                                         const Vector3& p_WA, const Vector3& p_W);
 
 }  // namespace trammel

@@ -22,27 +22,32 @@ struct InverseResult {
   int iterations = 0;
 };
 
-/// Joints for `X_BF` near `seed`: damped least squares (Levenberg-Marquardt) on [position; rotation vector], kept
-/// within the limits. Converged means 1e-10 m and rad. Singular means the smallest singular value of the Jacobian,
-/// lengths in metres, is below 1e-3.
-[[nodiscard]] InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF, const JointVector& seed);
+/// Joints for `X_BF` near `seed`: damped least squares (Levenberg-Marquardt) on [position; rotation
+/// vector], kept within the limits. Converged means 1e-10 m and rad. Singular means the smallest
+/// singular value of the Jacobian, lengths in metres, is below 1e-3.
+[[nodiscard]] InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF,
+                                               const JointVector& seed);
 
-/// What is to say of joints that bring the flange to where it is wanted: kOk, kJointLimit or kSingular, as above.
+/// What is to say of joints that bring the flange to where it is wanted: kOk, kJointLimit or
+/// kSingular, as above.
 [[nodiscard]] InverseResult judged_joints(const Chain& chain, const JointVector& q, int iterations);
 
-/// True when the chain is an elbow arm with a spherical wrist (axes 2 and 3 parallel, axes 4, 5, 6 through one point),
-/// so that its eight branches have a closed form.
+/// True when the chain is an elbow arm with a spherical wrist (axes 2 and 3 parallel, axes 4, 5, 6
+/// through one point), so that its eight branches have a closed form.
 [[nodiscard]] bool has_spherical_wrist(const Chain& chain);
 
-/// The branch of `X_BF` in closed form. `conf` is 0..7, numbered as ABB's cfx: +4 the wrist centre stands behind axis
-/// 1, +2 it stands behind the lower arm, +1 joint 5 is negative. Joints turn to the values nearest to `near` (zero when
-/// absent) that the limits allow. Refuses a chain without spherical wrist and a conf outside 0..7.
-[[nodiscard]] Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, int conf,
-                                                       const std::optional<JointVector>& near = std::nullopt);
+/// The branch of `X_BF` in closed form. `conf` is 0..7, numbered as ABB's cfx: +4 the wrist centre
+/// stands behind axis 1, +2 it stands behind the lower arm, +1 joint 5 is negative. Joints turn to
+/// the values nearest to `near` (zero when absent) that the limits allow. Refuses a chain without
+/// spherical wrist and a conf outside 0..7.
+[[nodiscard]] Result<InverseResult> inverse_kinematics(
+    const Chain& chain, const Pose& X_BF, int conf,
+    const std::optional<JointVector>& near = std::nullopt);
 
-/// The same joints, not held against limits and singular places. For an arm with a spherical wrist; `conf` is 0..7.
-/// Empty where the flange cannot be brought there.
-[[nodiscard]] std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF, int conf,
+/// The same joints, not held against limits and singular places. For an arm with a spherical wrist;
+/// `conf` is 0..7. Empty where the flange cannot be brought there.
+[[nodiscard]] std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF,
+                                                          int conf,
                                                           const std::optional<JointVector>& near);
 
 /// The branch that `q` is in, numbered as above. Refuses a chain without spherical wrist.

@@ -41,9 +41,10 @@ Pose make_pose(const Matrix3& R, const Vector3& p) {
 }
 
 Pose pose_zyx(const Vector3& translation, double gamma, double beta, double alpha) {
-  const Matrix3 R = (Eigen::AngleAxisd(gamma, Vector3::UnitZ()) * Eigen::AngleAxisd(beta, Vector3::UnitY()) *
-                     Eigen::AngleAxisd(alpha, Vector3::UnitX()))
-                        .toRotationMatrix();
+  const Matrix3 R =
+      (Eigen::AngleAxisd(gamma, Vector3::UnitZ()) * Eigen::AngleAxisd(beta, Vector3::UnitY()) *
+       Eigen::AngleAxisd(alpha, Vector3::UnitX()))
+          .toRotationMatrix();
   return make_pose(R, translation);
 }
 

@@ -19,13 +19,17 @@ struct PoseContext {
   std::optional<double> time;           ///< s
   std::optional<double> temperature;    ///< degrees Celsius
   std::optional<JointVector> velocity;  ///< rad/s (m/s), size n; from neighbouring poses in time
-  std::vector<int> direction;           ///< approach side of each joint's gear, -1, 0, +1; empty: not recorded
-  std::optional<JointVector> before;    ///< joints of the pose that the robot came from, size n; where that is known
-  std::vector<double> lagged;           ///< degrees Celsius, as bodies feel it that follow by kHeatLags; empty: unknown
-  std::string tool;                     ///< id in the cell file
-  std::string payload;                  ///< id in the cell file
-  int index = 0;                        ///< position in its batch, for effects that begin at a pose
-  bool served = false;  ///< of a request, not measured: later than every pose of the batch, and without its tracker
+  std::vector<int>
+      direction;  ///< approach side of each joint's gear, -1, 0, +1; empty: not recorded
+  std::optional<JointVector>
+      before;  ///< joints of the pose that the robot came from, size n; where that is known
+  std::vector<double>
+      lagged;  ///< degrees Celsius, as bodies feel it that follow by kHeatLags; empty: unknown
+  std::string tool;     ///< id in the cell file
+  std::string payload;  ///< id in the cell file
+  int index = 0;        ///< position in its batch, for effects that begin at a pose
+  bool served = false;  ///< of a request, not measured: later than every pose of the batch, and
+                        ///< without its tracker
 
   /// True from the pose with index `first` on, and for every served pose.
   [[nodiscard]] bool from(int first) const { return served || index >= first; }

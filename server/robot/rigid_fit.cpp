@@ -13,7 +13,8 @@ constexpr double kLeastSpread = 1e-6;  // ratio of singular values below which p
 Result<Pose> fit_transform(const Eigen::Matrix3Xd& points_A, const Eigen::Matrix3Xd& points_B) {
   TRAMMEL_CHECK(points_A.cols() == points_B.cols());
   if (points_A.cols() < 3)
-    return refused("localisation: {} points, at least 3 are needed", points_A.cols()).beyond(points_A.cols(), 3);
+    return refused("localisation: {} points, at least 3 are needed", points_A.cols())
+        .beyond(points_A.cols(), 3);
   const Vector3 mean_A = points_A.rowwise().mean();
   const Vector3 mean_B = points_B.rowwise().mean();
   const Matrix3 cross = (points_A.colwise() - mean_A) * (points_B.colwise() - mean_B).transpose();

@@ -12,15 +12,15 @@ constexpr const char* kKey = "robot_confirmed:";
 
 std::string line_of(const RobotConfirmation& one) {
   return fmt::format(
-      "{} {{robot_sha256: {}, poses: {}, position_mm: {:.4f}, orientation_deg: {:.4f}, day: {}}}   # written by "
-      "trammel "
-      "confirm-robot\n",
+      "{} {{robot_sha256: {}, poses: {}, position_mm: {:.4f}, orientation_deg: {:.4f}, day: {}}}   "
+      "# written by trammel confirm-robot\n",
       kKey, one.robot_sha256, one.poses, one.position_mm, one.orientation_deg, one.day);
 }
 
 }  // namespace
 
-Result<std::string> with_confirmation(const Cell& cell, const std::optional<RobotConfirmation>& confirmation) {
+Result<std::string> with_confirmation(const Cell& cell,
+                                      const std::optional<RobotConfirmation>& confirmation) {
   std::istringstream lines(cell.cell_yaml);
   std::string text;
   for (std::string line; std::getline(lines, line);)

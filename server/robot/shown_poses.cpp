@@ -14,8 +14,9 @@ constexpr std::size_t kFewest = 3;             // poses
 constexpr double kPositionSlack = 0.02e-3;     // m, beside rounding: what controllers compute with
 const double kRotationSlack = from_deg(0.02);  // rad
 constexpr double kCoarsest = 0.5e-3;           // m: joints that are rounded to more show nothing
-const double kMoved = from_deg(15);            // rad: a joint that turns by less shows neither its sign nor its zero
-constexpr double kMovedRail = 0.1;             // m
+const double kMoved =
+    from_deg(15);  // rad: a joint that turns by less shows neither its sign nor its zero
+constexpr double kMovedRail = 0.1;  // m
 
 /// The place of the last decimal that any of `values` has; 1e-6 at the least.
 double rounding_of(const std::vector<double>& values) {
@@ -29,7 +30,8 @@ double rounding_of(const std::vector<double>& values) {
   return step;
 }
 
-/// How far rounding to the digits that are shown may move joints and position, one standard deviation.
+/// How far rounding to the digits that are shown may move joints and position, one standard
+/// deviation.
 struct Rounding {
   JointArray joints;    // rad (m)
   double position = 0;  // m
@@ -68,7 +70,8 @@ std::vector<Frames> known_frames(const Cell& cell) {
       if (X_FT) all.push_back({"tool " + name + " in " + frame, X_SB, *X_FT});
   };
   add_tools("the robot's base", Pose::Identity());
-  if (cell.X_WB && !cell.X_WB->isApprox(Pose::Identity(), 1e-9)) add_tools("the cell's base", *cell.X_WB);
+  if (cell.X_WB && !cell.X_WB->isApprox(Pose::Identity(), 1e-9))
+    add_tools("the cell's base", *cell.X_WB);
   return all;
 }
 
@@ -80,7 +83,8 @@ struct Distance {
 
 class Comparison {
  public:
-  Comparison(const Chain& robot, const ShownPoses& shown) : shown_(shown), rounding_(rounding(robot, shown)) {
+  Comparison(const Chain& robot, const ShownPoses& shown)
+      : shown_(shown), rounding_(rounding(robot, shown)) {
     for (std::size_t i = 0; i < shown.q.size(); ++i) limits_.push_back(limits_at(robot, i));
   }
 
@@ -93,7 +97,9 @@ class Comparison {
       const auto k = static_cast<std::size_t>(i);
       const Pose X = frames.X_SB * robot.flange_pose(shown_.q[k]) * frames.X_FT;
       r.segment<3>(3 * i) = (shown_.p[k] - X.translation()) / limits_[k].first;
-      if (R != nullptr) r.segment<3>(3 * (n + i)) = rotation_log((*R)[k] * X.linear().transpose()) / limits_[k].second;
+      if (R != nullptr)
+        r.segment<3>(3 * (n + i)) =
+            rotation_log((*R)[k] * X.linear().transpose()) / limits_[k].second;
     }
     return r;
   }
@@ -119,10 +125,12 @@ class Comparison {
   }
 
  private:
-  /// m and rad: three standard deviations of the rounding there, and the precision that controllers compute with.
+  /// m and rad: three standard deviations of the rounding there, and the precision that controllers
+  /// compute with.
   [[nodiscard]] std::pair<double, double> limits_at(const Chain& robot, std::size_t i) const {
     const Eigen::MatrixXd J = robot.jacobian(shown_.q[i]) * rounding_.joints.matrix().asDiagonal();
-    const double position = std::sqrt(J.topRows<3>().squaredNorm() + 3 * std::pow(rounding_.position, 2));
+    const double position =
+        std::sqrt(J.topRows<3>().squaredNorm() + 3 * std::pow(rounding_.position, 2));
     return {kPositionSlack + 3 * position, kRotationSlack + 3 * J.bottomRows<3>().norm()};
   }
 
@@ -154,15 +162,16 @@ Reading nearest(const Cell& cell, const ShownPoses& shown, const Comparison& com
   for (const Frames& frames : known_frames(cell)) {
     for (const ShownPoses::Orientations* orientations : meanings(shown)) {
       Reading reading{frames, orientations, {}};
-      reading.distance = comparison.distance(comparison.residuals(cell.robot, frames, reading.rotations()));
+      reading.distance =
+          comparison.distance(comparison.residuals(cell.robot, frames, reading.rotations()));
       if (!best || reading.distance.worst < best->distance.worst) best = std::move(reading);
     }
   }
   return *best;
 }
 
-/// The base and the tool that fit best: R_shown = R_S R_BF R_T for all poses (linear in R_S^T and R_T; the null vector
-/// of all equations), then both translations, linear too.
+/// The base and the tool that fit best: R_shown = R_S R_BF R_T for all poses (linear in R_S^T and
+/// R_T; the null vector of all equations), then both translations, linear too.
 Frames free_frames(const Chain& robot, const ShownPoses& shown, const std::vector<Matrix3>& R) {
   const auto n = static_cast<Eigen::Index>(shown.q.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(9 * n, 18);
@@ -180,7 +189,8 @@ Frames free_frames(const Chain& robot, const ShownPoses& shown, const std::vecto
   Frames frames{"a frame and a tool of the controller's own", {}, {}};
   frames.X_SB = Pose::Identity();
   frames.X_FT = Pose::Identity();
-  frames.X_SB.linear() = nearest_rotation(sign * Eigen::Map<const Matrix3>(null.data())).transpose();
+  frames.X_SB.linear() =
+      nearest_rotation(sign * Eigen::Map<const Matrix3>(null.data())).transpose();
   frames.X_FT.linear() = nearest_rotation(sign * Eigen::Map<const Matrix3>(null.data() + 9));
   Eigen::MatrixXd B(3 * n, 6);
   Eigen::VectorXd b(3 * n);
@@ -221,28 +231,33 @@ std::vector<Joint> joints_of(const Chain& robot) {
 }
 
 /// The robot with some numbers changed.
-Chain changed(const Chain& robot, const std::vector<FileNumber>& numbers, const Eigen::VectorXd& by) {
+Chain changed(const Chain& robot, const std::vector<FileNumber>& numbers,
+              const Eigen::VectorXd& by) {
   std::vector<Joint> joints = joints_of(robot);
   for (std::size_t k = 0; k < numbers.size(); ++k)
-    joints[static_cast<std::size_t>(numbers[k].joint)].link.*numbers[k].number += by(static_cast<Eigen::Index>(k));
+    joints[static_cast<std::size_t>(numbers[k].joint)].link.*numbers[k].number +=
+        by(static_cast<Eigen::Index>(k));
   return Chain::make(robot.name(), std::move(joints), robot.couplings()).value_or(robot);
 }
 
 /// Gauss-Newton over the numbers; of those that the poses do not tell apart, the shortest change.
-Eigen::VectorXd fitted(const Chain& robot, const std::vector<FileNumber>& numbers, const Reading& reading,
-                       const Comparison& comparison) {
+Eigen::VectorXd fitted(const Chain& robot, const std::vector<FileNumber>& numbers,
+                       const Reading& reading, const Comparison& comparison) {
   constexpr int kSteps = 12;
   constexpr double kDifference = 1e-6;  // m, rad
   const auto count = static_cast<Eigen::Index>(numbers.size());
   Eigen::VectorXd by = Eigen::VectorXd::Zero(count);
   for (int step = 0; step < kSteps; ++step) {
-    const Eigen::VectorXd r = comparison.residuals(changed(robot, numbers, by), reading.frames, reading.rotations());
+    const Eigen::VectorXd r =
+        comparison.residuals(changed(robot, numbers, by), reading.frames, reading.rotations());
     Eigen::MatrixXd J(r.size(), count);
     for (Eigen::Index k = 0; k < count; ++k) {
       Eigen::VectorXd near = by;
       near(k) += kDifference;
-      J.col(k) =
-          (comparison.residuals(changed(robot, numbers, near), reading.frames, reading.rotations()) - r) / kDifference;
+      J.col(k) = (comparison.residuals(changed(robot, numbers, near), reading.frames,
+                                       reading.rotations()) -
+                  r) /
+                 kDifference;
     }
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
     decomposition.setThreshold(1e-7);
@@ -257,8 +272,8 @@ std::string change_text(const Chain& robot, const FileNumber& number, double by)
   const double of_file = robot.joint(number.joint).link.*number.number;
   const double there = number.angle ? to_deg(of_file) : to_mm(of_file);
   const double change = number.angle ? to_deg(by) : to_mm(by);
-  return fmt::format("{} of joint {} is {:.3f} by the poses, {:g} in the file", number.key, number.joint + 1,
-                     there + change, there);
+  return fmt::format("{} of joint {} is {:.3f} by the poses, {:g} in the file", number.key,
+                     number.joint + 1, there + change, there);
 }
 
 /// The arm with joint `j` counted the other way, or with its neighbour below counted into it.
@@ -273,26 +288,31 @@ std::vector<std::pair<std::string, Chain>> other_senses(const Chain& robot) {
   for (int j = 0; j < robot.size(); ++j) {
     std::vector<Joint> turned = joints;
     turned[static_cast<std::size_t>(j)].sign *= -1;
-    add(fmt::format("sign of joint {} is {:+g} by the poses", j + 1, turned[static_cast<std::size_t>(j)].sign), turned,
-        couplings);
+    add(fmt::format("sign of joint {} is {:+g} by the poses", j + 1,
+                    turned[static_cast<std::size_t>(j)].sign),
+        turned, couplings);
   }
   if (!couplings.empty()) {
     add("the controller shows joints without the file's coupling", joints, {});
   } else {
     for (int j = 1; j < robot.size(); ++j) {
       for (const double ratio : {1.0, -1.0})
-        add(fmt::format("joint {} follows joint {} (coupling, ratio {:+g}) by the poses", j + 1, j, ratio), joints,
-            {{j, j - 1, ratio}});
+        add(fmt::format("joint {} follows joint {} (coupling, ratio {:+g}) by the poses", j + 1, j,
+                        ratio),
+            joints, {{j, j - 1, ratio}});
     }
   }
   return all;
 }
 
-/// The single changes of the file that explain all poses; if there are none, the changes of all its numbers.
-std::vector<std::string> explanations(const Chain& robot, const Reading& reading, const Comparison& comparison) {
+/// The single changes of the file that explain all poses; if there are none, the changes of all its
+/// numbers.
+std::vector<std::string> explanations(const Chain& robot, const Reading& reading,
+                                      const Comparison& comparison) {
   std::vector<std::string> found;
   const auto explains = [&](const Chain& arm) {
-    return comparison.distance(comparison.residuals(arm, reading.frames, reading.rotations())).worst <= 1;
+    return comparison.distance(comparison.residuals(arm, reading.frames, reading.rotations()))
+               .worst <= 1;
   };
   for (const auto& [text, arm] : other_senses(robot))
     if (explains(arm)) found.push_back(text);
@@ -322,7 +342,8 @@ std::string still_joints(const Chain& robot, const ShownPoses& shown) {
       most = std::max(most, q(j));
     }
     const bool turns = robot.joint(j).type == JointType::kRevolute;
-    if (most - least < (turns ? kMoved : kMovedRail)) still += fmt::format("{}{}", still.empty() ? "" : ", ", j + 1);
+    if (most - least < (turns ? kMoved : kMovedRail))
+      still += fmt::format("{}{}", still.empty() ? "" : ", ", j + 1);
   }
   return still;
 }
@@ -354,8 +375,8 @@ RobotComparison described(const Reading& reading, std::size_t poses) {
 }
 
 std::string off_text(const RobotComparison& result) {
-  return fmt::format("position {:.3f} mm and orientation {:.3f} deg at the most", to_mm(result.position_max),
-                     to_deg(result.rotation_max));
+  return fmt::format("position {:.3f} mm and orientation {:.3f} deg at the most",
+                     to_mm(result.position_max), to_deg(result.rotation_max));
 }
 
 /// The answer where the arm fits the shown poses as `reading` takes them.
@@ -364,28 +385,35 @@ RobotComparison fitting(const Cell& cell, const ShownPoses& shown, const Reading
   const std::string still = still_joints(cell.robot, shown);
   if (result.position_limit > kCoarsest) {
     result.why = fmt::format(
-        "what is shown is rounded too much: its last digits are worth {:.1f} mm, limit {:g}; show more decimals",
+        "what is shown is rounded too much: its last digits are worth {:.1f} mm, limit {:g}; show "
+        "more decimals",
         to_mm(result.position_limit), to_mm(kCoarsest));
   } else if (reading.orientations == nullptr) {
     result.why =
-        "positions agree, but no orientation is shown, and only orientations tell of the wrist; show whole poses";
+        "positions agree, but no orientation is shown, and only orientations tell of the wrist; "
+        "show whole poses";
   } else if (!still.empty()) {
     result.why = fmt::format(
-        "the poses agree, but joint {} hardly moves over them; show poses that differ in every joint", still);
+        "the poses agree, but joint {} hardly moves over them; show poses that differ in every "
+        "joint",
+        still);
   } else {
     result.verdict = RobotComparison::Verdict::kConfirmed;
-    result.why = fmt::format("the robot file is the controller's: {} of {} poses", off_text(result), result.poses);
+    result.why = fmt::format("the robot file is the controller's: {} of {} poses", off_text(result),
+                             result.poses);
   }
   return result;
 }
 
 /// The first way in which the controller's own base and tool explain all, if any does.
-std::optional<Reading> with_free_frames(const Cell& cell, const ShownPoses& shown, const Comparison& comparison) {
+std::optional<Reading> with_free_frames(const Cell& cell, const ShownPoses& shown,
+                                        const Comparison& comparison) {
   constexpr std::size_t kFewestFree = 4;  // poses: twelve numbers are free
   if (shown.q.size() < kFewestFree) return std::nullopt;
   for (const ShownPoses::Orientations& one : shown.orientations) {
     Reading reading{free_frames(cell.robot, shown, one.R), &one, {}};
-    reading.distance = comparison.distance(comparison.residuals(cell.robot, reading.frames, &one.R));
+    reading.distance =
+        comparison.distance(comparison.residuals(cell.robot, reading.frames, &one.R));
     if (reading.distance.worst <= 1) return reading;
   }
   return std::nullopt;
@@ -393,7 +421,8 @@ std::optional<Reading> with_free_frames(const Cell& cell, const ShownPoses& show
 
 std::string place_text(const Pose& X) {
   const Vector3 p = to_mm(1) * X.translation(), turn = to_deg(1) * rotation_log(X.linear());
-  return fmt::format("({:.2f}, {:.2f}, {:.2f}) mm, turned by {:.2f} deg", p.x(), p.y(), p.z(), turn.norm());
+  return fmt::format("({:.2f}, {:.2f}, {:.2f}) mm, turned by {:.2f} deg", p.x(), p.y(), p.z(),
+                     turn.norm());
 }
 
 }  // namespace
@@ -422,15 +451,14 @@ Result<RobotComparison> compare_robot(const Cell& cell, const ShownPoses& shown)
     if (const auto free = with_free_frames(cell, shown, comparison)) {
       result = described(*free, shown.q.size());
       result.why = fmt::format(
-          "the poses fit with a base of the controller's at {} and a tool at {}, which hide the first and the last "
-          "length; show the "
-          "flange (tool 0) in the robot's own base",
+          "the poses fit with a base of the controller's at {} and a tool at {}, which hide the "
+          "first and the last length; show the flange (tool 0) in the robot's own base",
           place_text(free->frames.X_SB), place_text(free->frames.X_FT));
       return result;
     }
   }
-  result.why = fmt::format("the robot file is not the controller's: {} of {} poses, read as {}", off_text(result),
-                           result.poses, result.shown_as);
+  result.why = fmt::format("the robot file is not the controller's: {} of {} poses, read as {}",
+                           off_text(result), result.poses, result.shown_as);
   return result;
 }
 

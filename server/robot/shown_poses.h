@@ -5,24 +5,26 @@
 
 #include "server/robot/cell.h"
 
-/// Whether a robot file is the controller's: joints and poses that the controller shows, against the file's forward
-/// kinematics.
+/// Whether a robot file is the controller's: joints and poses that the controller shows, against
+/// the file's forward kinematics.
 ///
-/// A model corrects positions against the robot file, but it is the controller that solves a corrected pose for joints,
-/// with its own lengths. Where the two arms differ, every corrected pose lands off by the difference, however well the
-/// model fits.
+/// A model corrects positions against the robot file, but it is the controller that solves a
+/// corrected pose for joints, with its own lengths. Where the two arms differ, every corrected pose
+/// lands off by the difference, however well the model fits.
 namespace trammel {
 
 /// What a controller shows at some poses.
 struct ShownPoses {
-  /// One way in which the three angles may be meant. Makers differ: A B C, W P R, a rotation vector.
+  /// One way in which the three angles may be meant. Makers differ: A B C, W P R, a rotation
+  /// vector.
   struct Orientations {
     std::string meaning;     ///< `Rz(A) Ry(B) Rx(C)`
     std::vector<Matrix3> R;  ///< one a pose
   };
-  std::vector<JointVector> q;              ///< rad (m), as shown
-  std::vector<Vector3> p;                  ///< m
-  std::vector<Orientations> orientations;  ///< the ways in which they may be meant; empty: none is shown
+  std::vector<JointVector> q;  ///< rad (m), as shown
+  std::vector<Vector3> p;      ///< m
+  std::vector<Orientations>
+      orientations;  ///< the ways in which they may be meant; empty: none is shown
 };
 
 /// What comparing came to.
@@ -33,16 +35,18 @@ struct RobotComparison {
   int poses = 0;
   double position_rms = 0, position_max = 0;  ///< m, between shown and computed
   double rotation_rms = 0, rotation_max = 0;  ///< rad; 0 where no orientation is shown
-  double position_limit = 0;                  ///< m: what the rounding of what is shown explains, at the worst pose
-  std::string shown_as;                       ///< `the flange in the robot's base`, `tool spindle in the cell's base`
-  std::string angles;                         ///< how the orientation was read
-  std::vector<std::string> could_be;          ///< what would make the file's arm the controller's, the likeliest first
+  double position_limit = 0;  ///< m: what the rounding of what is shown explains, at the worst pose
+  std::string shown_as;  ///< `the flange in the robot's base`, `tool spindle in the cell's base`
+  std::string angles;    ///< how the orientation was read
+  std::vector<std::string>
+      could_be;  ///< what would make the file's arm the controller's, the likeliest first
 };
 [[nodiscard]] const char* to_text(RobotComparison::Verdict verdict);
 
-/// Compares. The poses may be shown of the flange or of a tool of the cell, in the robot's base or in the cell's. Where
-/// none of these fits but a base and a tool of the controller's own would, it cannot tell: they hide the first and the
-/// last length. Refuses fewer than 3 poses and another number of joints than the robot's.
+/// Compares. The poses may be shown of the flange or of a tool of the cell, in the robot's base or
+/// in the cell's. Where none of these fits but a base and a tool of the controller's own would, it
+/// cannot tell: they hide the first and the last length. Refuses fewer than 3 poses and another
+/// number of joints than the robot's.
 [[nodiscard]] Result<RobotComparison> compare_robot(const Cell& cell, const ShownPoses& shown);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::size_t kTurning = 6;
 constexpr double kRightAngle = 1e-9;  // cosine of a twist that counts as 90 deg
-constexpr double kLeastOther = 1e-2;  // singular value, m or rad per rad: below it another part of the arm is singular
+constexpr double kLeastOther =
+    1e-2;  // singular value, m or rad per rad: below it another part of the arm is singular
 
 std::vector<int> turning_joints(const Chain& chain) {
   std::vector<int> turning;
@@ -22,7 +23,8 @@ std::vector<int> turning_joints(const Chain& chain) {
 }
 
 bool crosses_next_at_right_angle(const Joint& joint) {
-  return std::abs(std::cos(joint.link.alpha)) < kRightAngle && std::abs(joint.link.beta) < kRightAngle;
+  return std::abs(std::cos(joint.link.alpha)) < kRightAngle &&
+         std::abs(joint.link.beta) < kRightAngle;
 }
 
 }  // namespace
@@ -31,7 +33,8 @@ std::optional<WristOpening> wrist_opening(const Chain& chain, const JointVector&
   const std::vector<int> turning = turning_joints(chain);
   if (turning.size() != kTurning) return std::nullopt;
   const int fourth = turning[3], fifth = turning[4];
-  if (!crosses_next_at_right_angle(chain.joint(fourth)) || !crosses_next_at_right_angle(chain.joint(fifth)))
+  if (!crosses_next_at_right_angle(chain.joint(fourth)) ||
+      !crosses_next_at_right_angle(chain.joint(fifth)))
     return std::nullopt;
   const double theta = chain.transmission().row(fifth).dot(q) + chain.joint(fifth).link.theta;
   WristOpening wrist;
@@ -42,15 +45,18 @@ std::optional<WristOpening> wrist_opening(const Chain& chain, const JointVector&
   closed(fifth) -= wrist.angle / wrist.by_joint(fifth);
   const auto all = flange_motion(chain, closed).jacobian;
   Eigen::Matrix<double, 6, 6> J;
-  for (std::size_t k = 0; k < kTurning; ++k) J.col(static_cast<Eigen::Index>(k)) = all.col(turning[k]);
+  for (std::size_t k = 0; k < kTurning; ++k)
+    J.col(static_cast<Eigen::Index>(k)) = all.col(turning[k]);
   const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 6>> svd(J, Eigen::ComputeFullV);
   if (svd.singularValues()(4) < kLeastOther) return std::nullopt;
   wrist.idle = JointVector::Zero(chain.size());
-  for (std::size_t k = 0; k < kTurning; ++k) wrist.idle(turning[k]) = svd.matrixV()(static_cast<Eigen::Index>(k), 5);
+  for (std::size_t k = 0; k < kTurning; ++k)
+    wrist.idle(turning[k]) = svd.matrixV()(static_cast<Eigen::Index>(k), 5);
   return wrist;
 }
 
-JointVector turned_idly(const Chain& chain, const JointVector& q, const WristOpening& wrist, double joint_4) {
+JointVector turned_idly(const Chain& chain, const JointVector& q, const WristOpening& wrist,
+                        double joint_4) {
   const int fourth = turning_joints(chain)[3];
   return q + (joint_4 - q(fourth)) / wrist.idle(fourth) * wrist.idle;
 }

@@ -19,18 +19,20 @@ Status check_joints(const JointVector& q, int index, const Chain& robot) {
   if (!joint) return {};
   const Joint& known = robot.joint(*joint);
   const double value = q(*joint);
-  return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1, *joint + 1,
-                 to_deg(value), to_deg(known.lower), to_deg(known.upper))
+  return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1,
+                 *joint + 1, to_deg(value), to_deg(known.lower), to_deg(known.upper))
       .of(fmt::format("q{}_deg", *joint + 1))
       .beyond(to_deg(value), to_deg(value < known.lower ? known.lower : known.upper));
 }
 
 /// `pose` completed by the options and the course: tool, payload, time and temperature.
-Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot, const SimulateOptions& options) {
+Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot,
+                              const SimulateOptions& options) {
   const Cell& cell = *robot.truth.cell;
   TRY(check_joints(pose.q, index, cell.robot));
   const std::string tool = TRY(resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool));
-  const std::string payload = TRY(resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload));
+  const std::string payload =
+      TRY(resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload));
   pose.tool = tool;
   pose.payload = payload;
   pose.index = index;
@@ -38,7 +40,8 @@ Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& r
   if (!pose.time && course.seconds_per_pose > 0) pose.time = index * course.seconds_per_pose;
   if (!pose.temperature && course.temperature_start) {
     const double warmed = 1 - std::exp(-pose.time.value_or(0) / course.temperature_time_constant);
-    pose.temperature = *course.temperature_start + warmed * (course.temperature_end - *course.temperature_start);
+    pose.temperature =
+        *course.temperature_start + warmed * (course.temperature_end - *course.temperature_start);
   }
   return pose;
 }
@@ -69,9 +72,11 @@ Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<P
   return batch;
 }
 
-Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q, const SimulateOptions& options) {
+Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
+                                  const SimulateOptions& options) {
   std::vector<PoseContext> poses(static_cast<std::size_t>(q.rows()));
-  for (Eigen::Index i = 0; i < q.rows(); ++i) poses[static_cast<std::size_t>(i)].q = q.row(i).transpose();
+  for (Eigen::Index i = 0; i < q.rows(); ++i)
+    poses[static_cast<std::size_t>(i)].q = q.row(i).transpose();
   return simulate(robot, poses, options);
 }
 

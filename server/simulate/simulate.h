@@ -38,7 +38,8 @@ struct VirtualRobot {
 /// course: {seconds_per_pose: 20, temperature_c: [20, 26], time_constant_s: 3600}   # optional
 /// ```
 /// Refuses an unknown source, parameter or key.
-[[nodiscard]] Result<VirtualRobot> read_virtual_robot(const std::string& path, std::shared_ptr<const Cell> cell);
+[[nodiscard]] Result<VirtualRobot> read_virtual_robot(const std::string& path,
+                                                      std::shared_ptr<const Cell> cell);
 
 struct SimulateOptions {
   std::uint64_t seed = 1;
@@ -47,13 +48,14 @@ struct SimulateOptions {
   std::string tool, payload;  ///< empty: the cell's only ones
 };
 
-/// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints, joints outside their
-/// limits, and an unknown tool or payload.
+/// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints,
+/// joints outside their limits, and an unknown tool or payload.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
                                                 const SimulateOptions& options);
-/// The same for poses with their own direction, time, temperature, tool and payload; what they leave open comes from
-/// the course and the options.
-[[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<PoseContext>& poses,
+/// The same for poses with their own direction, time, temperature, tool and payload; what they
+/// leave open comes from the course and the options.
+[[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot,
+                                                const std::vector<PoseContext>& poses,
                                                 const SimulateOptions& options);
 
 }  // namespace trammel

@@ -24,8 +24,9 @@ std::string key_of(const Parameter& parameter) {
 void set_values(const YamlMap& map, const ErrorSource& source, Eigen::Ref<Eigen::VectorXd> values) {
   const std::vector<Parameter>& parameters = source.parameters();
   for (const std::string& key : map.keys()) {
-    const auto found = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const Parameter& parameter) { return key_of(parameter) == key; });
+    const auto found =
+        std::find_if(parameters.begin(), parameters.end(),
+                     [&](const Parameter& parameter) { return key_of(parameter) == key; });
     if (found == parameters.end()) {
       std::string known;
       for (const Parameter& parameter : parameters) known += " " + key_of(parameter);
@@ -51,14 +52,17 @@ void read_course(const YamlMap& map, MeasuringCourse& course) {
     course.temperature_start = ends[0];
     course.temperature_end = ends[1];
   }
-  course.temperature_time_constant = map.number("time_constant_s", course.temperature_time_constant);
+  course.temperature_time_constant =
+      map.number("time_constant_s", course.temperature_time_constant);
   if (course.temperature_time_constant <= 0)
-    map.refuse("time_constant_s", refused("must be above 0").beyond(course.temperature_time_constant, 0));
+    map.refuse("time_constant_s",
+               refused("must be above 0").beyond(course.temperature_time_constant, 0));
 }
 
 void read_tools(const YamlMap& map, const Cell& cell, PhysicalModel& truth) {
   for (const std::string& name : map.keys()) {
-    if (!cell.tools.contains(name)) map.refuse(name, fmt::format("cell {} has no such tool", cell.name));
+    if (!cell.tools.contains(name))
+      map.refuse(name, fmt::format("cell {} has no such tool", cell.name));
     truth.tools[name] = read_pose(map.map(name));
   }
 }
@@ -76,7 +80,8 @@ void read_sources(const YamlMap& sources, PhysicalModel& truth) {
 
 VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& cell) {
   map.only({"version", "source", "error_sources", "noise", "base", "tools", "course"});
-  if (map.integer("version", 0) != 1) map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
+  if (map.integer("version", 0) != 1)
+    map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
   const YamlMap sources = map.map("error_sources");
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
   if (!model) {

@@ -13,8 +13,9 @@ Failure broken(std::int64_t number, const std::string& how) {
 
 std::string hash_of(const AuditRow& row) {
   std::string content;
-  for (const std::string& part : {std::to_string(row.number), std::to_string(row.at), row.who, row.cell, row.what,
-                                  row.subject, row.before, row.after, row.why, row.request, row.hash_before})
+  for (const std::string& part :
+       {std::to_string(row.number), std::to_string(row.at), row.who, row.cell, row.what,
+        row.subject, row.before, row.after, row.why, row.request, row.hash_before})
     content += fmt::format("{}:{},", part.size(), part);
   if (!row.server.empty()) content += fmt::format("{}:{},", row.server.size(), row.server);
   return sha256_hex(content);
@@ -24,7 +25,8 @@ Status AuditChain::add(const AuditRow& row) {
   if (row.number != rows_ + 1)
     return broken(rows_ + 1, fmt::format("missing, row {} comes after {}", row.number, rows_));
   if (row.hash != hash_of(row)) return broken(row.number, "its content is not what was written");
-  if (row.hash_before != hash_) return broken(row.number, "it was written after another row than the one before it");
+  if (row.hash_before != hash_)
+    return broken(row.number, "it was written after another row than the one before it");
   ++rows_;
   hash_ = row.hash;
   return {};

@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// The trail for programs: `rows` with the members of AuditRow, `verified`, and `broken` with `row` and `why`, or null.
+/// The trail for programs: `rows` with the members of AuditRow, `verified`, and `broken` with `row`
+/// and `why`, or null.
 [[nodiscard]] nlohmann::ordered_json audit_json(const AuditTrail& trail);
 /// The reverse. Refuses a text that is none.
 [[nodiscard]] Result<AuditTrail> audit_of_json(const std::string& text);

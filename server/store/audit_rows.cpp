@@ -35,40 +35,55 @@ AuditRow row_of(Rows& row) {
 
 namespace {
 
-/// The row before is looked at in the same statement: of a store that was moved services know only when they connect.
+/// The row before is looked at in the same statement: of a store that was moved services know only
+/// when they connect.
 constexpr const char* kAppend =
-    "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, server) "
-    "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
-    "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')";
+    "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, "
+    "hash_before, hash, server) SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, "
+    "$8, $9, $10, $11, $12, $13 WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE "
+    "number = $1 - 1 AND what = 'moved')";
 
-/// False: the store was moved elsewhere. Where everybody waits for the end of the trail, one statement does it all, and
-/// tells the others; however often a transaction tells them, they hear it once.
+/// False: the store was moved elsewhere. Where everybody waits for the end of the trail, one
+/// statement does it all, and tells the others; however often a transaction tells them, they hear
+/// it once.
 bool is_added(Database& database, const AuditRow& row) {
   const auto with_row = [&](const auto& run) {
-    return run(row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why,
-               row.request, row.hash_before, row.hash, row.server);
+    return run(row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after,
+               row.why, row.request, row.hash_before, row.hash, row.server);
   };
   if (database.is_shared()) {
     const std::string at_once = fmt::format(
-        "WITH added AS ({} RETURNING number, hash) UPDATE audit_end SET rows = added.number, hash = added.hash "
-        "FROM added RETURNING pg_notify('{}', '')",
+        "WITH added AS ({} RETURNING number, hash) UPDATE audit_end SET rows = added.number, hash "
+        "= added.hash FROM added RETURNING pg_notify('{}', '')",
         kAppend, kChangesChannel);
-    return with_row([&](const auto&... values) { return exists(database, at_once.c_str(), values...); });
+    return with_row(
+        [&](const auto&... values) { return exists(database, at_once.c_str(), values...); });
   }
-  if (with_row([&](const auto&... values) { return change(database, kAppend, values...); }) == 0) return false;
+  if (with_row([&](const auto&... values) { return change(database, kAppend, values...); }) == 0)
+    return false;
   change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
   return true;
 }
 
 void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
   const End end = end_of(database, locked(database, kEnd));
-  AuditRow row{
-      end.rows + 1,     unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
-      entry.before,     entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {},
-      database.writer()};
+  AuditRow row{end.rows + 1,
+               unix_now(),
+               by.who.empty() ? "service" : by.who,
+               entry.cell,
+               entry.what,
+               entry.subject,
+               entry.before,
+               entry.after,
+               entry.why.empty() ? by.reason : entry.why,
+               by.id,
+               end.hash,
+               {},
+               database.writer()};
   row.hash = hash_of(row);
   if (!is_added(database, row))
-    throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
+    throw DatabaseError(DatabaseError::Kind::kAway,
+                        "was moved elsewhere: its audit trail says where to");
 }
 
 }  // namespace
@@ -80,7 +95,8 @@ void record_audit(Database& database, const AuditEntry& entry, const ChangeId& b
 
 bool trail_names_servers(Database& database) {
   return database.is_shared() ||
-         integer_of(database, "SELECT COUNT(*) FROM pragma_table_info('audit') WHERE name = 'server'") > 0;
+         integer_of(database,
+                    "SELECT COUNT(*) FROM pragma_table_info('audit') WHERE name = 'server'") > 0;
 }
 
 void name_servers_in_trail(Database& database) {
@@ -99,9 +115,10 @@ void prepare_audit(Database& database, bool is_new, std::int64_t schema_before) 
   const auto count = [&database](const char* table) {
     return integer_of(database, (std::string("SELECT COUNT(*) FROM ") + table).c_str());
   };
-  record_audit(database, {"", "migrate", "store", fmt::format("schema {}, no audit trail", schema_before),
-                          fmt::format("schema {} with {} batches, {} models, {} activations", kSchemaVersion,
-                                      count("batches"), count("models"), count("activations"))});
+  record_audit(database,
+               {"", "migrate", "store", fmt::format("schema {}, no audit trail", schema_before),
+                fmt::format("schema {} with {} batches, {} models, {} activations", kSchemaVersion,
+                            count("batches"), count("models"), count("activations"))});
 }
 
 std::int64_t last_audit_at(Database& database) {
@@ -117,8 +134,8 @@ std::int64_t audit_rows(Database& database) { return end_of(database).rows; }
 
 bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {
   const std::string wanted = fmt::format(
-      "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, {} "
-      "FROM audit WHERE number > $1 ORDER BY number LIMIT $2",
+      "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, "
+      "hash, {} FROM audit WHERE number > $1 ORDER BY number LIMIT $2",
       trail_names_servers(database) ? "server" : "''");
   auto rows = prepare(database, wanted.c_str(), chain.rows(), kRowsAtOnce);
   bool any = false;
@@ -129,7 +146,8 @@ bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, A
     if (row.at < query.since || (!query.cell.empty() && row.cell != query.cell)) continue;
     trail.rows.push_back(std::move(row));
     if (query.most > 0 && trail.rows.size() > 2 * query.most)
-      trail.rows.erase(trail.rows.begin(), trail.rows.end() - static_cast<std::ptrdiff_t>(query.most));
+      trail.rows.erase(trail.rows.begin(),
+                       trail.rows.end() - static_cast<std::ptrdiff_t>(query.most));
   }
   trail.verified = chain.rows();
   if (any && !trail.broken) return true;
@@ -138,7 +156,8 @@ bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, A
     if (const Status good = chain.end(end.rows, end.hash); !good) trail.broken = good.error();
   }
   if (query.most > 0 && trail.rows.size() > query.most)
-    trail.rows.erase(trail.rows.begin(), trail.rows.end() - static_cast<std::ptrdiff_t>(query.most));
+    trail.rows.erase(trail.rows.begin(),
+                     trail.rows.end() - static_cast<std::ptrdiff_t>(query.most));
   return false;
 }
 

@@ -18,7 +18,8 @@ struct AuditEntry {
   std::string why = {};
 };
 
-/// Appends it to the trail at the end of the transaction that is open. `by`: who asked for it, and under which id.
+/// Appends it to the trail at the end of the transaction that is open. `by`: who asked for it, and
+/// under which id.
 void record_audit(Database& database, const AuditEntry& entry, const ChangeId& by = {});
 
 /// Makes the trail where there is none, and records how it began.
@@ -29,13 +30,16 @@ void prepare_audit(Database& database, bool is_new, std::int64_t schema_before);
 /// From now on they do.
 void name_servers_in_trail(Database& database);
 
-/// When the last row was written, as the clock stood then (Unix time, s); 0: there is none that can be read.
+/// When the last row was written, as the clock stood then (Unix time, s); 0: there is none that can
+/// be read.
 [[nodiscard]] std::int64_t last_audit_at(Database& database);
 
 /// How many rows the trail has.
 [[nodiscard]] std::int64_t audit_rows(Database& database);
 
-/// Takes the next rows into the chain and, as far as they are asked for, into the trail; false: there are no more.
-[[nodiscard]] bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail);
+/// Takes the next rows into the chain and, as far as they are asked for, into the trail; false:
+/// there are no more.
+[[nodiscard]] bool read_more(Database& database, const AuditQuery& query, AuditChain& chain,
+                             AuditTrail& trail);
 
 }  // namespace trammel

@@ -25,19 +25,22 @@ Result<AuditTrail> Store::audit(const AuditQuery& query) const {
   AuditChain chain;
   AuditTrail trail;
   for (bool more = true; more;) {
-    const auto read = TRY(connection_->exclusively(
-        [&](Database& database) -> Result<bool> { return read_more(database, query, chain, trail); }));
+    const auto read = TRY(connection_->exclusively([&](Database& database) -> Result<bool> {
+      return read_more(database, query, chain, trail);
+    }));
     more = read;
   }
   return trail;
 }
 
 Result<std::int64_t> Store::changes_made() const {
-  return connection_->exclusively([](Database& database) -> Result<std::int64_t> { return audit_rows(database); });
+  return connection_->exclusively(
+      [](Database& database) -> Result<std::int64_t> { return audit_rows(database); });
 }
 
 Result<AuditTrail> read_audit(const std::string& place, const AuditQuery& query) {
-  return look_into(place, [&](Database& database) { return read_all(database, query, spoken_place(place)); });
+  return look_into(
+      place, [&](Database& database) { return read_all(database, query, spoken_place(place)); });
 }
 
 }  // namespace trammel

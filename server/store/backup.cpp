@@ -26,7 +26,8 @@ Status check_is_store(Database& database, const std::string& path) {
 }
 
 Status check_size(Database& database, const std::string& path) {
-  const std::int64_t expected = integer_of(database, "PRAGMA page_size") * integer_of(database, "PRAGMA page_count");
+  const std::int64_t expected =
+      integer_of(database, "PRAGMA page_size") * integer_of(database, "PRAGMA page_count");
   std::error_code error;
   const auto size = static_cast<std::int64_t>(fs::file_size(path, error));
   if (!error && size == expected) return {};
@@ -56,8 +57,10 @@ Result<StoreCopy> checked(Database& database, const std::string& path) {
 }
 
 /// Copies one moment of it: what is read is held for as long as the transaction is open.
-Status copy_pages(const std::string& from, const std::string& to, const std::function<void(double)>& progress) {
-  SqliteDatabase source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+Status copy_pages(const std::string& from, const std::string& to,
+                  const std::function<void(double)>& progress) {
+  SqliteDatabase source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
+                        kBusyTimeout);
   const Transaction moment(source, Transaction::For::kReading);
   TRY(check_is_store(source, from));
   SqliteDatabase target(to, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
@@ -65,7 +68,8 @@ Status copy_pages(const std::string& from, const std::string& to, const std::fun
     SQLite::Backup backup(target.file(), source.file());
     while (backup.executeStep(kPagesAtOnce) != SQLITE_DONE) {
       const int total = backup.getTotalPageCount();
-      if (progress && total > 0) progress(1 - static_cast<double>(backup.getRemainingPageCount()) / total);
+      if (progress && total > 0)
+        progress(1 - static_cast<double>(backup.getRemainingPageCount()) / total);
     }
     return {};
   });
@@ -76,7 +80,9 @@ Status copy_pages(const std::string& from, const std::string& to, const std::fun
 Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
                                 const std::function<void(double)>& progress) {
   if (std::error_code error; !fs::exists(from, error))
-    return failure(ErrorCode::kNotFound, "no such store").in(from).next("its path stands in the server file as store");
+    return failure(ErrorCode::kNotFound, "no such store")
+        .in(from)
+        .next("its path stands in the server file as store");
   Result<StoreCopy> copy;
   const auto make = [&](const std::string& part) -> Status {
     try {
@@ -93,7 +99,8 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
 
 Result<StoreCopy> check_store_copy(const std::string& path) {
   try {
-    SqliteDatabase database(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    SqliteDatabase database(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
+                            kBusyTimeout);
     return checked(database, path);
   } catch (const DatabaseError& error) {
     return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);

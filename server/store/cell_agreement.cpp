@@ -15,43 +15,51 @@ using Mine = std::map<std::string, CellDescription>;
 using Disputes = std::map<std::string, std::string>;
 
 constexpr const char* kNewest =
-    "SELECT cell, cell_hash, robot_hash, server, described_at FROM cell_descriptions WHERE number IN "
-    "(SELECT MAX(number) FROM cell_descriptions WHERE $1 = '' OR cell = $1 GROUP BY cell)";
+    "SELECT cell, cell_hash, robot_hash, server, described_at FROM cell_descriptions WHERE number "
+    "IN (SELECT MAX(number) FROM cell_descriptions WHERE $1 = '' OR cell = $1 GROUP BY cell)";
 
 /// The others that are there and have this cell.
-std::vector<const ServerInRecord*> who_has(const std::vector<ServerInRecord>& others, const std::string& cell) {
+std::vector<const ServerInRecord*> who_has(const std::vector<ServerInRecord>& others,
+                                           const std::string& cell) {
   std::vector<const ServerInRecord*> having;
   for (const ServerInRecord& one : others)
     if (!one.is_gone && one.self.cells.contains(cell)) having.push_back(&one);
   return having;
 }
 
-bool describes_so(const ServerInRecord& server, const std::string& cell, const CellDescription& files) {
+bool describes_so(const ServerInRecord& server, const std::string& cell,
+                  const CellDescription& files) {
   return server.self.cells.at(cell).files == files;
 }
 
 /// `was_so`: its files were those of the record since it began.
 std::string why_not(const std::string& cell, const std::string& me, const DescribedCell& known,
-                    const CellDescription& mine, const std::vector<const ServerInRecord*>& having, bool was_so) {
-  const auto holder = std::find_if(having.begin(), having.end(),
-                                   [&](const ServerInRecord* one) { return describes_so(*one, cell, known.files); });
-  const std::string whose = holder != having.end()
-                                ? fmt::format("than {} (on {})", (*holder)->self.server, (*holder)->self.host)
-                                : fmt::format("than {} had", known.server == me ? "it" : known.server);
-  const std::string has = fmt::format("cell {}: {} has another {} {}, by which the record goes", cell, me,
-                                      what_differs(known.files, mine), whose);
+                    const CellDescription& mine, const std::vector<const ServerInRecord*>& having,
+                    bool was_so) {
+  const auto holder = std::find_if(having.begin(), having.end(), [&](const ServerInRecord* one) {
+    return describes_so(*one, cell, known.files);
+  });
+  const std::string whose =
+      holder != having.end()
+          ? fmt::format("than {} (on {})", (*holder)->self.server, (*holder)->self.host)
+          : fmt::format("than {} had", known.server == me ? "it" : known.server);
+  const std::string has = fmt::format("cell {}: {} has another {} {}, by which the record goes",
+                                      cell, me, what_differs(known.files, mine), whose);
   if (was_so)
     return fmt::format(
         "{} now: until it is started with the same one, {} answers with the model that it has, and "
         "changes nothing",
         has, me);
-  return fmt::format("{}: {} does not serve it until they agree (trammel store describe says whose counts)", has, me);
+  return fmt::format(
+      "{}: {} does not serve it until they agree (trammel store describe says whose counts)", has,
+      me);
 }
 
 /// What this server says of cells against what the record goes by.
 class Comparison {
  public:
-  Comparison(Database& database, const Worker& worker, bool starts, const std::set<std::string>& agreed)
+  Comparison(Database& database, const Worker& worker, bool starts,
+             const std::set<std::string>& agreed)
       : database_(database),
         worker_(worker),
         starts_(starts),
@@ -62,7 +70,8 @@ class Comparison {
     lock_cell(database_, cell);
     const auto known = cell_description(database_, cell);
     if (known && known->files == mine) return;
-    const bool was_so = agreed_.contains(cell);  // what was given up since is not wanted back by who has it still
+    const bool was_so =
+        agreed_.contains(cell);  // what was given up since is not wanted back by who has it still
     if (known && (was_so || !may_change(cell, *known, mine))) {
       disputes_[cell] = why_not(cell, worker_.server, *known, mine, who_has(others_, cell), was_so);
       return;
@@ -78,9 +87,11 @@ class Comparison {
 
   Disputes end() {
     if (!first_.empty())
-      record_audit(database_, {first_.size() == 1 ? first_.front() : "", "describe", "description", "",
-                               fmt::format("{} cell{} as {} has {}", first_.size(), first_.size() == 1 ? "" : "s",
-                                           worker_.server, first_.size() == 1 ? "it" : "them")});
+      record_audit(
+          database_,
+          {first_.size() == 1 ? first_.front() : "", "describe", "description", "",
+           fmt::format("{} cell{} as {} has {}", first_.size(), first_.size() == 1 ? "" : "s",
+                       worker_.server, first_.size() == 1 ? "it" : "them")});
     return std::move(disputes_);
   }
 
@@ -92,8 +103,9 @@ class Comparison {
     const auto wants = std::count_if(having.begin(), having.end(), [&](const ServerInRecord* one) {
       return describes_so(*one, cell, mine) && one->self.cells.at(cell).is_apart;
     });
-    const auto others = std::count_if(having.begin(), having.end(),
-                                      [&](const ServerInRecord* one) { return !describes_so(*one, cell, mine); });
+    const auto others = std::count_if(having.begin(), having.end(), [&](const ServerInRecord* one) {
+      return !describes_so(*one, cell, mine);
+    });
     return wants > 0 && wants + 1 > others;
   }
 
@@ -111,7 +123,8 @@ class Comparison {
 std::map<std::string, DescribedCell> cell_descriptions(Database& database) {
   std::map<std::string, DescribedCell> all;
   auto rows = prepare(database, kNewest, "");
-  while (rows.next()) all[rows.text(0)] = {{rows.text(1), rows.text(2)}, rows.text(3), rows.integer64(4)};
+  while (rows.next())
+    all[rows.text(0)] = {{rows.text(1), rows.text(2)}, rows.text(3), rows.integer64(4)};
   return all;
 }
 
@@ -124,8 +137,8 @@ std::optional<DescribedCell> cell_description(Database& database, const std::str
 void add_cell_description(Database& database, const std::string& cell, const CellDescription& files,
                           const std::string& server) {
   change(database,
-         "INSERT INTO cell_descriptions (cell, cell_hash, robot_hash, server, described_at) "
-         "VALUES ($1, $2, $3, $4, $5)",
+         "INSERT INTO cell_descriptions (cell, cell_hash, robot_hash, server, described_at) VALUES "
+         "($1, $2, $3, $4, $5)",
          cell, files.cell, files.robot, server, now_of(database));
 }
 
@@ -143,13 +156,15 @@ Result<std::int64_t> Store::descriptions_made() const {
 Result<RecordCounts> Store::counts() const {
   return connection_->exclusively([](Database& database) -> Result<RecordCounts> {
     auto row = prepare(database,
-                       "SELECT (SELECT rows FROM audit_end), (SELECT COALESCE(MAX(number), 0) FROM cell_descriptions)");
+                       "SELECT (SELECT rows FROM audit_end), (SELECT COALESCE(MAX(number), 0) FROM "
+                       "cell_descriptions)");
     if (!row.next()) return RecordCounts{};
     return RecordCounts{row.integer64(0), row.integer64(1)};
   });
 }
 
-Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts, const std::set<std::string>& agreed) {
+Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts,
+                                       const std::set<std::string>& agreed) {
   if (!is_shared()) return Disputes();
   const auto differing = TRY(connection_->exclusively([&](Database& database) -> Result<Mine> {
     Mine all;

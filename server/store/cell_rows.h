@@ -8,8 +8,8 @@
 /// Cells as rows, for the transactions of batches, jobs and models.
 namespace trammel {
 
-/// Nobody else changes anything of the cell until the transaction ends. It comes before every other lock: the order is
-/// cells, jobs, the rest, the end of the audit trail.
+/// Nobody else changes anything of the cell until the transaction ends. It comes before every other
+/// lock: the order is cells, jobs, the rest, the end of the audit trail.
 void lock_cell(Database& database, const std::string& cell);
 
 /// The number of the cell's next version, one model's for ever.

@@ -6,10 +6,13 @@
 
 namespace trammel {
 
-/// A change that happens once, however often it is asked for: also when the answer to it was lost in a crash.
+/// A change that happens once, however often it is asked for: also when the answer to it was lost
+/// in a crash.
 struct ChangeId {
-  std::string id;           ///< unique for ever: the client and the number of its request; empty: nothing is remembered
-  std::string asked;        ///< what is asked for, in any words; the same id for anything else is a conflict
+  std::string id;  ///< unique for ever: the client and the number of its request; empty: nothing is
+                   ///< remembered
+  std::string
+      asked;  ///< what is asked for, in any words; the same id for anything else is a conflict
   std::string who = {};     ///< for the audit trail; empty: the service itself
   std::string reason = {};  ///< likewise, in any words
   std::optional<int> expected_version =

@@ -8,18 +8,20 @@
 namespace trammel {
 
 /// What was recorded under the id, if anything. kConflict: for something else than is asked for.
-[[nodiscard]] Result<std::optional<ChangeOutcome>> find_change(Database& database, const ChangeId& change_id);
+[[nodiscard]] Result<std::optional<ChangeOutcome>> find_change(Database& database,
+                                                               const ChangeId& change_id);
 /// Records what was made, in the transaction that is open.
 void record_change(Database& database, const ChangeId& change_id, const ChangeOutcome& outcome);
 
 /// Refuses (kConflict) where another version of the cell is in force than the change expects.
-[[nodiscard]] Status check_expected_version(Database& database, const std::string& cell, const ChangeId& change_id);
+[[nodiscard]] Status check_expected_version(Database& database, const std::string& cell,
+                                            const ChangeId& change_id);
 
-/// Locks the cell, and runs `work`, which returns a Result<ChangeOutcome>, unless that was done before under this id;
-/// then what came of it.
+/// Locks the cell, and runs `work`, which returns a Result<ChangeOutcome>, unless that was done
+/// before under this id; then what came of it.
 template <typename Work>
-[[nodiscard]] Result<ChangeOutcome> once(Database& database, const std::string& cell, const ChangeId& change_id,
-                                         const Work& work) {
+[[nodiscard]] Result<ChangeOutcome> once(Database& database, const std::string& cell,
+                                         const ChangeId& change_id, const Work& work) {
   lock_cell(database, cell);
   if (!change_id.id.empty()) {
     auto made = find_change(database, change_id);

@@ -9,7 +9,8 @@ ClockWatch::Time ClockWatch::now() {
   using std::chrono::milliseconds;
   timespec time{};
   ::clock_gettime(CLOCK_BOOTTIME, &time);  // goes on while the host is suspended
-  const auto since_boot = std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  const auto since_boot =
+      std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
   return {duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()),
           duration_cast<milliseconds>(since_boot)};
 }

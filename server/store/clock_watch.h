@@ -6,10 +6,12 @@
 
 namespace trammel {
 
-/// Notices that this host's clock was set, by a clock that nobody sets. What is stored is dated by the former.
+/// Notices that this host's clock was set, by a clock that nobody sets. What is stored is dated by
+/// the former.
 class ClockWatch {
  public:
-  static constexpr std::chrono::seconds kNoticed{2};  ///< a smaller step does not matter to what is dated in seconds
+  static constexpr std::chrono::seconds kNoticed{
+      2};  ///< a smaller step does not matter to what is dated in seconds
   struct Time {
     std::chrono::milliseconds unix_time, since_boot;
   };
@@ -23,7 +25,9 @@ class ClockWatch {
   [[nodiscard]] std::chrono::seconds off() const { return whole(last_ - begin_); }
 
  private:
-  [[nodiscard]] static std::chrono::milliseconds shift(Time time) { return time.unix_time - time.since_boot; }
+  [[nodiscard]] static std::chrono::milliseconds shift(Time time) {
+    return time.unix_time - time.since_boot;
+  }
   [[nodiscard]] static std::chrono::seconds whole(std::chrono::milliseconds time) {
     return std::chrono::round<std::chrono::seconds>(time);
   }

@@ -5,7 +5,8 @@
 
 #include "server/store/database/database.h"
 
-/// What a change that PostgreSQL has committed survives, by its settings and the standbys that are there.
+/// What a change that PostgreSQL has committed survives, by its settings and the standbys that are
+/// there.
 namespace trammel {
 
 struct CommitSettings {
@@ -26,7 +27,9 @@ struct CommitSafety {
 /// By this connection's settings. Throws DatabaseError.
 [[nodiscard]] CommitSettings commit_settings(Database& database);
 
-/// Where Patroni runs on this host, and no watchdog would stop it if it hung: what to do about it. Else empty.
-[[nodiscard]] std::string missing_watchdog(const std::string& proc = "/proc", const std::string& sys = "/sys");
+/// Where Patroni runs on this host, and no watchdog would stop it if it hung: what to do about it.
+/// Else empty.
+[[nodiscard]] std::string missing_watchdog(const std::string& proc = "/proc",
+                                           const std::string& sys = "/sys");
 
 }  // namespace trammel

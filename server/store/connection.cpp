@@ -42,7 +42,8 @@ void StoreConnection::note_damage(const std::string& what) {
   const MutexLock guard(state_mutex);
   if (is_shared() && !state_now.readable) return;  // it is away, and that is said already
   auto& damages = state_now.damages;
-  if (damages.size() < kMostDamages && std::find(damages.begin(), damages.end(), what) == damages.end())
+  if (damages.size() < kMostDamages &&
+      std::find(damages.begin(), damages.end(), what) == damages.end())
     damages.push_back(what);
 }
 
@@ -54,17 +55,19 @@ std::optional<std::chrono::seconds> StoreConnection::note_clock() {
   state_now.clock = off.count() == 0
                         ? ""
                         : fmt::format(
-                              "the host's clock was set by {:+} s while the service ran: dates from before, or "
-                              "since, are wrong (trammel audit says when)",
+                              "the host's clock was set by {:+} s while the service ran: dates "
+                              "from before, or since, are wrong (trammel audit says when)",
                               off.count());
   return step;
 }
 
-void StoreConnection::wait_without_word(const std::stop_token& stop, std::chrono::steady_clock::time_point until) {
+void StoreConnection::wait_without_word(const std::stop_token& stop,
+                                        std::chrono::steady_clock::time_point until) {
   Mutex mutex;  // local: used only to wait
   Condition never;
   MutexLock lock(mutex);
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+  const auto left =
+      std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
   never.wait_for(lock, stop, std::max(left, std::chrono::milliseconds(0)), [] { return false; });
 }
 

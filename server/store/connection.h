@@ -29,13 +29,14 @@ class StoreConnection {
   StoreConnection(const StoreConnection&) = delete;
   StoreConnection& operator=(const StoreConnection&) = delete;
 
-  /// Runs `work(database)`, which reads, on one moment of it. An exception of the database becomes an error.
+  /// Runs `work(database)`, which reads, on one moment of it. An exception of the database becomes
+  /// an error.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> exclusively(const Work& work) {
     return through([this](const Job& job) { return read(job); }, work);
   }
-  /// The same in one transaction, committed only if `work` succeeds. Where several servers write, `work` may run more
-  /// than once: only its last run counts.
+  /// The same in one transaction, committed only if `work` succeeds. Where several servers write,
+  /// `work` may run more than once: only its last run counts.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> in_transaction(const Work& work) {
     return through([this](const Job& job) { return write(job); }, work);
@@ -51,8 +52,8 @@ class StoreConnection {
   [[nodiscard]] virtual bool is_shared() const = 0;
   /// Where it could not be written, or is not as it was left: whether it can be written now.
   [[nodiscard]] virtual Status try_again() = 0;
-  /// Returns when another server may have changed something, after `limit` at the latest, or when `stop` is requested.
-  /// For one thread.
+  /// Returns when another server may have changed something, after `limit` at the latest, or when
+  /// `stop` is requested. For one thread.
   virtual void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) = 0;
 
   [[nodiscard]] StoreState state() const;
@@ -67,16 +68,17 @@ class StoreConnection {
   const std::string path;  ///< a file, or a URL as it is told to people
   const std::unique_ptr<ServedCopies> copies;
   Worker worker = new_worker();  ///< its name is set before there are jobs
-  std::string told_cells;        ///< what the last heartbeat said of them; of the one thread that has it
-  bool has_told = false;         ///< that it is there; likewise
-  mutable Mutex state_mutex;     // taken last, and for moments only
+  std::string told_cells;  ///< what the last heartbeat said of them; of the one thread that has it
+  bool has_told = false;   ///< that it is there; likewise
+  mutable Mutex state_mutex;  // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);
   ClockWatch clock TRAMMEL_GUARDED_BY(state_mutex){ClockWatch::now()};
 
  protected:
   /// The time passes.
-  static void wait_without_word(const std::stop_token& stop, std::chrono::steady_clock::time_point until);
+  static void wait_without_word(const std::stop_token& stop,
+                                std::chrono::steady_clock::time_point until);
   using Job = std::function<Status(Database&)>;
 
  private:

@@ -13,8 +13,8 @@ constexpr std::chrono::seconds kBetweenTries{1};  // to open a file that cannot 
 
 }  // namespace
 
-FileConnection::FileConnection(WriterLock writer, StoreFile held, std::string name, OpenedDatabase opened,
-                               std::unique_ptr<ServedCopies> kept)
+FileConnection::FileConnection(WriterLock writer, StoreFile held, std::string name,
+                               OpenedDatabase opened, std::unique_ptr<ServedCopies> kept)
     : StoreConnection(std::move(name), std::move(kept)),
       lock_(std::move(writer)),
       file_(std::move(held)),
@@ -31,7 +31,8 @@ FileConnection::FileConnection(WriterLock writer, StoreFile held, std::string na
 FileConnection::~FileConnection() {
   const MutexLock guard(mutex_);
   const auto finding = file_.look();
-  if (finding == StoreFile::Finding::kGone || finding == StoreFile::Finding::kAnother) leave_no_journal();
+  if (finding == StoreFile::Finding::kGone || finding == StoreFile::Finding::kAnother)
+    leave_no_journal();
 }
 
 void FileConnection::note_opened() {
@@ -53,8 +54,10 @@ Result<std::unique_ptr<StoreConnection>> FileConnection::open(const std::string&
   StoreFile file(path);
   TRY(file.hold());
   auto opened = TRY(open_database(path, *copies));
-  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());  // where it was not there before
-  return std::make_unique<FileConnection>(std::move(lock), std::move(file), path, std::move(opened), std::move(copies));
+  if (auto held = file.hold(); !held)
+    return tl::make_unexpected(held.error());  // where it was not there before
+  return std::make_unique<FileConnection>(std::move(lock), std::move(file), path, std::move(opened),
+                                          std::move(copies));
 }
 
 Status FileConnection::read(const Job& job) {
@@ -113,7 +116,8 @@ Status FileConnection::try_again() {
 
 bool FileConnection::is_in_order() {
   const MutexLock guard(mutex_);
-  return !must_be_opened_anew_ && !state().why_not_written && file_.look() == StoreFile::Finding::kAsLeft;
+  return !must_be_opened_anew_ && !state().why_not_written &&
+         file_.look() == StoreFile::Finding::kAsLeft;
 }
 
 Status FileConnection::be_sure_of_file() {
@@ -134,7 +138,8 @@ Status FileConnection::open_anew() {
   Status opened = as_left ? opened_anew() : as_left;
   if (!opened) {
     // Whoever asked a service that was well asks again; see failure_of().
-    if (was_written_) opened = tl::make_unexpected(Failure(opened.error()).as(ErrorCode::kBusy).value());
+    if (was_written_)
+      opened = tl::make_unexpected(Failure(opened.error()).as(ErrorCode::kBusy).value());
     note_trouble(opened.error(), database_ == nullptr);
   }
   return opened;
@@ -160,8 +165,9 @@ Status FileConnection::check_as_left() {
       leave_no_journal();
       return failure(ErrorCode::kBusy, "was removed or renamed while it is served from")
           .in(path)
-          .next(fmt::format("put it back ({}), or start the service again to go on with the copies of its models",
-                            file_.how_to_bring_back()));
+          .next(fmt::format(
+              "put it back ({}), or start the service again to go on with the copies of its models",
+              file_.how_to_bring_back()));
     case StoreFile::Finding::kAnother:
       leave_no_journal();
       break;
@@ -176,7 +182,9 @@ Status FileConnection::check_in_place() {
   if (finding != StoreFile::Finding::kGone && finding != StoreFile::Finding::kAnother) return {};
   must_be_opened_anew_ = true;
   return open_anew().and_then([this]() -> Status {
-    return failure(ErrorCode::kBusy, "was put back while it was written").in(path).next("ask again");
+    return failure(ErrorCode::kBusy, "was put back while it was written")
+        .in(path)
+        .next("ask again");
   });
 }
 

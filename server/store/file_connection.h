@@ -13,10 +13,10 @@
 
 namespace trammel {
 
-/// An SQLite file: one connection behind one lock. Where the file cannot be written it is read, or not even that; it is
-/// tried again by whoever wants to write, once a second at most. Nothing is acknowledged but what is in the file that
-/// the path leads to: a file that was removed, replaced or written by another program is read at most, until it is back
-/// as it was.
+/// An SQLite file: one connection behind one lock. Where the file cannot be written it is read, or
+/// not even that; it is tried again by whoever wants to write, once a second at most. Nothing is
+/// acknowledged but what is in the file that the path leads to: a file that was removed, replaced
+/// or written by another program is read at most, until it is back as it was.
 class FileConnection final : public StoreConnection {
  public:
   /// Refuses what Store::open() refuses.
@@ -27,7 +27,8 @@ class FileConnection final : public StoreConnection {
 
   [[nodiscard]] bool is_shared() const override { return false; }
   [[nodiscard]] Status try_again() override;
-  void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) override;  // there is no other
+  void wait_for_change(const std::stop_token& stop,
+                       std::chrono::milliseconds limit) override;  // there is no other
 
  private:
   [[nodiscard]] Status read(const Job& job) override;
@@ -35,25 +36,30 @@ class FileConnection final : public StoreConnection {
   [[nodiscard]] Status transacted(const Job& job, bool* changed) TRAMMEL_REQUIRES(mutex_);
   /// Whether the file is as this process left it, and can be written as far as is known.
   [[nodiscard]] bool is_in_order();
-  /// Opens a file again that could not be written when it was opened, or that is not as it was left.
+  /// Opens a file again that could not be written when it was opened, or that is not as it was
+  /// left.
   [[nodiscard]] Status be_sure_of_file() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status opened_anew() TRAMMEL_REQUIRES(mutex_);
-  /// Whether what is at the path now is the store as it was left. Closes the database if that was written by others.
+  /// Whether what is at the path now is the store as it was left. Closes the database if that was
+  /// written by others.
   [[nodiscard]] Status check_as_left() TRAMMEL_REQUIRES(mutex_);
   /// Whether what was just committed is in the file that the path leads to.
   [[nodiscard]] Status check_in_place() TRAMMEL_REQUIRES(mutex_);
-  /// The journal of a file that is no longer at the path would be taken for that of the next one there.
+  /// The journal of a file that is no longer at the path would be taken for that of the next one
+  /// there.
   void leave_no_journal() TRAMMEL_REQUIRES(mutex_);
   void note_opened() TRAMMEL_REQUIRES(mutex_);
 
   const WriterLock lock_;
   Mutex mutex_;
-  StoreFile file_ TRAMMEL_GUARDED_BY(mutex_);                            // let go of after the database is closed
+  StoreFile file_ TRAMMEL_GUARDED_BY(mutex_);  // let go of after the database is closed
   std::unique_ptr<SqliteDatabase> database_ TRAMMEL_GUARDED_BY(mutex_);  // null: cannot be read
   bool must_be_opened_anew_ TRAMMEL_GUARDED_BY(mutex_) = false;
-  bool was_written_ TRAMMEL_GUARDED_BY(mutex_) = false;            // by this process: no other state is taken again
-  std::optional<StoreMark> mark_ TRAMMEL_GUARDED_BY(mutex_) = {};  // of that state; empty: it could not be read
+  bool was_written_ TRAMMEL_GUARDED_BY(mutex_) =
+      false;  // by this process: no other state is taken again
+  std::optional<StoreMark> mark_
+      TRAMMEL_GUARDED_BY(mutex_) = {};  // of that state; empty: it could not be read
   std::chrono::steady_clock::time_point tried_last_ TRAMMEL_GUARDED_BY(mutex_) = {};
 };
 

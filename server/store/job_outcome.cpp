@@ -7,9 +7,9 @@ namespace trammel {
 
 namespace {
 
-constexpr std::array<ErrorCode, 8> kCodes = {ErrorCode::kUsage,       ErrorCode::kRefused,  ErrorCode::kNotFound,
-                                             ErrorCode::kConflict,    ErrorCode::kTooLarge, ErrorCode::kBusy,
-                                             ErrorCode::kUnreachable, ErrorCode::kInternal};
+constexpr std::array<ErrorCode, 8> kCodes = {
+    ErrorCode::kUsage,    ErrorCode::kRefused, ErrorCode::kNotFound,    ErrorCode::kConflict,
+    ErrorCode::kTooLarge, ErrorCode::kBusy,    ErrorCode::kUnreachable, ErrorCode::kInternal};
 
 constexpr std::array<std::pair<JobVerdict, const char*>, 11> kVerdicts = {
     {{JobVerdict::kOpen, "open"},

@@ -11,17 +11,17 @@ namespace trammel {
 
 /// What became of a job.
 enum class JobVerdict {
-  kOpen,            ///< nothing yet; also of jobs from before outcomes were recorded
-  kInForce,         ///< its model was put in force
-  kNotBetter,       ///< its model is stored; the one in force stays, because the new one is not better
-  kUndecided,       ///< its model is stored; too few poses can judge it, a person decides
-  kDiagnosed,       ///< the diagnosis is made; nothing was to be applied
+  kOpen,       ///< nothing yet; also of jobs from before outcomes were recorded
+  kInForce,    ///< its model was put in force
+  kNotBetter,  ///< its model is stored; the one in force stays, because the new one is not better
+  kUndecided,  ///< its model is stored; too few poses can judge it, a person decides
+  kDiagnosed,  ///< the diagnosis is made; nothing was to be applied
   kNothingApplied,  ///< the diagnosis is made; it found nothing that a model could be extended by
   kQuarantined,     ///< its batch is in quarantine, nothing was learned from it
   kRefused,         ///< the data or the request cannot be trained from
   kOverLimit,       ///< over the memory or the processor time that a job may take
-  kBroken,          ///< its computing crashed or hung, as often as it may be tried, or the service failed
-  kCancelled        ///< somebody asked for that
+  kBroken,    ///< its computing crashed or hung, as often as it may be tried, or the service failed
+  kCancelled  ///< somebody asked for that
 };
 /// The spelling for programs: `in_force`, `not_better`.
 [[nodiscard]] const char* to_text(JobVerdict verdict);
@@ -34,9 +34,9 @@ enum class JobVerdict {
 /// The end of a job as data. Its message (StoredJob) says the same in one sentence.
 struct JobOutcome {
   JobVerdict verdict = JobVerdict::kOpen;
-  std::optional<double> before;             ///< m, held-out rms of the model in force; of a first one, nominal
-  std::optional<double> after;              ///< m, of the new model on the same poses
-  std::optional<double> limit;              ///< m, what `after` had to be below
+  std::optional<double> before;  ///< m, held-out rms of the model in force; of a first one, nominal
+  std::optional<double> after;   ///< m, of the new model on the same poses
+  std::optional<double> limit;   ///< m, what `after` had to be below
   std::optional<ErrorCode> code;            ///< of a job that failed
   std::string why;                          ///< for people, one clause
   std::string next;                         ///< what to do about it; empty: nothing

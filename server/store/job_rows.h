@@ -15,7 +15,8 @@ namespace trammel {
 /// Numbers as SQL lists them, `1, 2, 3`: they need not be bound.
 [[nodiscard]] std::string list_of(const std::set<std::int64_t>& ids);
 
-/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in health_checks, too.
+/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in
+/// health_checks, too.
 [[nodiscard]] const char* stored_kind(JobKind kind);
 
 /// Queues the job; its batches are not written yet.
@@ -29,10 +30,11 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);
 /// Marks an unfinished job failed, with the row of the audit trail; false: there is none.
-bool fail_job(Database& database, std::int64_t id, const std::string& message, const JobOutcome& outcome,
-              const ChangeId& by);
+bool fail_job(Database& database, std::int64_t id, const std::string& message,
+              const JobOutcome& outcome, const ChangeId& by);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.
-[[nodiscard]] Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell,
-                             int model_version, const std::string& message, const JobOutcome& outcome);
+[[nodiscard]] Status end_job(Database& database, const Worker& worker, std::int64_t id,
+                             const std::string& cell, int model_version, const std::string& message,
+                             const JobOutcome& outcome);
 
 }  // namespace trammel

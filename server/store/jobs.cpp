@@ -22,10 +22,11 @@ namespace {
 constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();  // rows
 constexpr int kPagesKept = 20;  // pages of diagnoses; findings are kept for ever
 
-constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
-                                                                         {JobState::kRunning, "running"},
-                                                                         {JobState::kDone, "done"},
-                                                                         {JobState::kFailed, "failed"}}};
+constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {
+    {{JobState::kQueued, "queued"},
+     {JobState::kRunning, "running"},
+     {JobState::kDone, "done"},
+     {JobState::kFailed, "failed"}}};
 
 const char* to_text(JobState state) {
   for (const auto& [value, text] : kJobStates) {
@@ -44,23 +45,26 @@ JobState job_state_of(std::string_view text) {
 /// The result of an UPDATE that should have changed one unfinished job.
 Status changed_one(int changes, std::int64_t id) {
   if (changes == 1) return {};
-  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);
+  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id)
+      .of("job")
+      .with_value(id);
 }
 
 std::vector<std::string> batches_of(Database& database, std::int64_t job) {
-  auto rows = prepare(database, "SELECT batch FROM job_batches WHERE job = $1 ORDER BY position", job);
+  auto rows =
+      prepare(database, "SELECT batch FROM job_batches WHERE job = $1 ORDER BY position", job);
   std::vector<std::string> ids;
   while (rows.next()) ids.push_back(rows.text(0));
   return ids;
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, "
-    "CASE WHEN EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, started_at, "
-    "finished_at, "
-    "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s, job_claims.server "
-    "FROM jobs LEFT JOIN job_claims ON job_claims.job = jobs.id LEFT JOIN job_times ON job_times.job = jobs.id LEFT "
-    "JOIN job_outcomes ON job_outcomes.job = jobs.id ";
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, CASE WHEN "
+    "EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, "
+    "started_at, finished_at, verdict, before_m, after_m, limit_m, code, why, next_step, "
+    "peak_bytes, processor_s, job_claims.server FROM jobs LEFT JOIN job_claims ON job_claims.job = "
+    "jobs.id LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON "
+    "job_outcomes.job = jobs.id ";
 
 /// The outcome in a row of kJobColumns.
 JobOutcome outcome_of(Rows& row) {
@@ -79,7 +83,9 @@ JobOutcome outcome_of(Rows& row) {
 }
 
 JobKind job_kind_of(const std::string& text) {
-  return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
+  return text == "diagnose" ? JobKind::kDiagnose
+         : text == "check"  ? JobKind::kCheck
+                            : JobKind::kTrain;
 }
 
 /// The job in a row of kJobColumns, without its batches.
@@ -111,8 +117,8 @@ void add_batch_ids(Database& database, std::vector<StoredJob>& jobs) {
     ids.insert(job.id);
   }
   if (ids.empty()) return;
-  const std::string wanted =
-      fmt::format("SELECT job, batch FROM job_batches WHERE job IN ({}) ORDER BY job, position", list_of(ids));
+  const std::string wanted = fmt::format(
+      "SELECT job, batch FROM job_batches WHERE job IN ({}) ORDER BY job, position", list_of(ids));
   auto rows = prepare(database, wanted.c_str());
   while (rows.next()) by_id.at(rows.integer64(0))->batch_ids.push_back(rows.text(1));
 }
@@ -126,18 +132,19 @@ std::vector<StoredJob> jobs_of(Database& database, Rows rows) {
 
 void record_start(Database& database, std::int64_t job) {
   change(database,
-         "INSERT INTO job_times (job, started_at) VALUES ($1, $2) "
-         "ON CONFLICT (job) DO UPDATE SET started_at = excluded.started_at",
+         "INSERT INTO job_times (job, started_at) VALUES ($1, $2) ON CONFLICT (job) DO UPDATE SET "
+         "started_at = excluded.started_at",
          job, unix_now());
 }
 
 void record_outcome(Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
-         "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, "
-         "processor_s) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON CONFLICT (job) DO UPDATE SET "
-         "verdict = excluded.verdict, before_m = excluded.before_m, after_m = excluded.after_m, "
-         "limit_m = excluded.limit_m, code = excluded.code, why = excluded.why, next_step = excluded.next_step, "
-         "peak_bytes = excluded.peak_bytes, processor_s = excluded.processor_s",
+         "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
+         "next_step, peak_bytes, processor_s) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON "
+         "CONFLICT (job) DO UPDATE SET verdict = excluded.verdict, before_m = excluded.before_m, "
+         "after_m = excluded.after_m, limit_m = excluded.limit_m, code = excluded.code, why = "
+         "excluded.why, next_step = excluded.next_step, peak_bytes = excluded.peak_bytes, "
+         "processor_s = excluded.processor_s",
          job, to_text(outcome.verdict), outcome.before, outcome.after, outcome.limit,
          outcome.code ? to_text(*outcome.code) : "", outcome.why, outcome.next, outcome.peak_memory,
          outcome.processor_time);
@@ -145,26 +152,29 @@ void record_outcome(Database& database, std::int64_t job, const JobOutcome& outc
 
 void record_end(Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
-         "INSERT INTO job_times (job, finished_at) VALUES ($1, $2) "
-         "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
+         "INSERT INTO job_times (job, finished_at) VALUES ($1, $2) ON CONFLICT (job) DO UPDATE SET "
+         "finished_at = excluded.finished_at",
          job, unix_now());
   record_outcome(database, job, outcome);
 }
 
 }  // namespace
 
-std::string list_of(const std::set<std::int64_t>& ids) { return fmt::format("{}", fmt::join(ids, ", ")); }
+std::string list_of(const std::set<std::int64_t>& ids) {
+  return fmt::format("{}", fmt::join(ids, ", "));
+}
 
 const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
 
 std::int64_t insert_job(Database& database, const StoredJob& job) {
-  Rows made = prepare(
-      database,
-      "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES ($1, $2, $3, $4, $5, $6, $7) "
-      "RETURNING id",
-      job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, stored_kind(job.kind));
+  Rows made = prepare(database,
+                      "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
+                      "VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING id",
+                      job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message,
+                      job.created_at, stored_kind(job.kind));
   const std::int64_t id = made.next() ? made.integer64(0) : 0;
-  if (job.kind == JobKind::kCheck) change(database, "INSERT INTO health_checks (job) VALUES ($1)", id);
+  if (job.kind == JobKind::kCheck)
+    change(database, "INSERT INTO health_checks (job) VALUES ($1)", id);
   return id;
 }
 
@@ -172,8 +182,8 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
                         const std::vector<std::string>& batch_ids) {
   int position = 0;
   for (const std::string& id : batch_ids) {
-    change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES ($1, $2, $3, $4)", job, position++,
-           cell, id);
+    change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES ($1, $2, $3, $4)",
+           job, position++, cell, id);
   }
 }
 
@@ -184,20 +194,22 @@ std::string cell_of_job(Database& database, std::int64_t job) {
 
 Result<StoredJob> read_job(Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = $1").c_str(), id);
-  if (!row.next()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
+  if (!row.next())
+    return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
   StoredJob job = job_of(row);
   job.batch_ids = batches_of(database, id);
   return job;
 }
 
-Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell, int model_version,
-               const std::string& message, const JobOutcome& outcome) {
+Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell,
+               int model_version, const std::string& message, const JobOutcome& outcome) {
   TRY(check_held(database, worker, id, true));
-  return changed_one(change(database,
-                            "UPDATE jobs SET state = 'done', model_version = $1, message = $2 "
-                            "WHERE id = $3 AND ($4 = '' OR cell = $4) AND state IN ('queued', 'running')",
-                            model_version, message, id, cell),
-                     id)
+  return changed_one(
+             change(database,
+                    "UPDATE jobs SET state = 'done', model_version = $1, message = $2 WHERE id = "
+                    "$3 AND ($4 = '' OR cell = $4) AND state IN ('queued', 'running')",
+                    model_version, message, id, cell),
+             id)
       .map([&] { record_end(database, id, outcome); });
 }
 
@@ -216,7 +228,9 @@ Result<StoredJob> read_alone(Database& database, std::int64_t id, const std::str
 Result<StoredJob> insert_job_over(Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
     if (!exists(database, "SELECT 1 FROM batches WHERE cell = $1 AND id = $2", job.cell, id)) {
-      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id)
+          .of("batch")
+          .with_text(id);
     }
     if (exists(database, "SELECT 1 FROM discarded WHERE cell = $1 AND batch = $2", job.cell, id))
       return discarded_failure(job.cell, id);
@@ -227,9 +241,11 @@ Result<StoredJob> insert_job_over(Database& database, const StoredJob& job) {
 }
 
 /// The end of a job that made no model.
-void record_job_end(Database& database, std::int64_t id, const std::string& verdict, const std::string& message,
-                    const ChangeId& by) {
-  record_audit(database, {cell_of_job(database, id), "job", fmt::format("job {}", id), "open", verdict, message}, by);
+void record_job_end(Database& database, std::int64_t id, const std::string& verdict,
+                    const std::string& message, const ChangeId& by) {
+  record_audit(
+      database,
+      {cell_of_job(database, id), "job", fmt::format("job {}", id), "open", verdict, message}, by);
 }
 
 const char* asked_for(JobKind kind) {
@@ -253,7 +269,8 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
       record_audit(database,
                    {made.cell, asked_for(made.kind), fmt::format("job {}", made.id), "",
                     fmt::format("of {}{}{}", made.batch_ids.empty() ? "a batch sent with it" : "",
-                                fmt::join(made.batch_ids, ", "), made.level.empty() ? "" : ", level " + made.level)},
+                                fmt::join(made.batch_ids, ", "),
+                                made.level.empty() ? "" : ", level " + made.level)},
                    change_id);
       return ChangeOutcome{0, made.id};
     });
@@ -263,11 +280,12 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
 
 }  // namespace
 
-bool fail_job(Database& database, std::int64_t id, const std::string& message, const JobOutcome& outcome,
-              const ChangeId& by) {
+bool fail_job(Database& database, std::int64_t id, const std::string& message,
+              const JobOutcome& outcome, const ChangeId& by) {
   if (change(database,
-             "UPDATE jobs SET state = 'failed', message = $1 WHERE id = $2 AND state IN ('queued', 'running')", message,
-             id) != 1)
+             "UPDATE jobs SET state = 'failed', message = $1 WHERE id = $2 AND state IN ('queued', "
+             "'running')",
+             message, id) != 1)
     return false;
   record_end(database, id, outcome);
   record_job_end(database, id, to_text(outcome.verdict), message, by);
@@ -280,7 +298,8 @@ Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const Chang
       Result<StoredJob> queued = insert_job_over(database, job);
       if (!queued || !release) return queued;
       for (const std::string& id : job.batch_ids)
-        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES ($1, $2, $3)", queued->id, job.cell, id);
+        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES ($1, $2, $3)",
+               queued->id, job.cell, id);
       return queued;
     });
   });
@@ -294,7 +313,8 @@ Result<bool> Store::may_release(std::int64_t job) const {
 
 Result<bool> Store::was_made_by_job(const std::string& cell, int version) const {
   return connection_->exclusively([&](Database& database) -> Result<bool> {
-    return exists(database, "SELECT 1 FROM jobs WHERE cell = $1 AND model_version = $2 LIMIT 1", cell, version);
+    return exists(database, "SELECT 1 FROM jobs WHERE cell = $1 AND model_version = $2 LIMIT 1",
+                  cell, version);
   });
 }
 
@@ -304,8 +324,8 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
     return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
       Result<StoredJob> queued = insert_job_over(database, job);
       if (queued) {
-        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES ($1, $2, $3)", queued->id, diagnosis.csv,
-               diagnosis.apply ? 1 : 0);
+        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES ($1, $2, $3)", queued->id,
+               diagnosis.csv, diagnosis.apply ? 1 : 0);
       }
       return queued;
     });
@@ -314,8 +334,10 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
 
 Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
   return connection_->exclusively([&](Database& database) -> Result<StoredDiagnosis> {
-    auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = $1", job);
-    if (!row.next()) return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
+    auto row =
+        prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = $1", job);
+    if (!row.next())
+      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
     if (const auto asked = read_job(database, job);
         asked && is_pruned(database, "answer of job", asked->cell, std::to_string(job)))
       return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
@@ -326,13 +348,13 @@ Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
 Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, std::int64_t since,
                                                       std::size_t most) const {
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredCheck>> {
-    auto rows = prepare(database,
-                        "SELECT jobs.id, finished_at, findings FROM health_checks "
-                        "JOIN jobs ON jobs.id = health_checks.job JOIN diagnoses ON diagnoses.job = jobs.id "
-                        "JOIN job_times ON job_times.job = jobs.id "
-                        "WHERE cell = $1 AND state = 'done' AND findings <> '' AND finished_at >= $2 "
-                        "ORDER BY jobs.id DESC LIMIT $3",
-                        cell, since, most == 0 ? kAll : static_cast<std::int64_t>(most));
+    auto rows =
+        prepare(database,
+                "SELECT jobs.id, finished_at, findings FROM health_checks JOIN jobs ON jobs.id = "
+                "health_checks.job JOIN diagnoses ON diagnoses.job = jobs.id JOIN job_times ON "
+                "job_times.job = jobs.id WHERE cell = $1 AND state = 'done' AND findings <> '' AND "
+                "finished_at >= $2 ORDER BY jobs.id DESC LIMIT $3",
+                cell, since, most == 0 ? kAll : static_cast<std::int64_t>(most));
     std::vector<StoredCheck> checks;
     while (rows.next()) {
       const std::int64_t job = rows.integer64(0);
@@ -343,14 +365,16 @@ Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, s
   });
 }
 
-Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
+Status Store::store_findings(std::int64_t job, const std::string& findings,
+                             const std::string& page) {
   return connection_->in_transaction([&](Database& database) -> Status {
     TRY(check_held(database, connection_->worker, job, true));
     const int changes =
-        change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings, page, job);
+        change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings,
+               page, job);
     change(database,
-           "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN "
-           "(SELECT job FROM diagnoses WHERE page <> '' ORDER BY job DESC LIMIT $1)",
+           "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN (SELECT job FROM "
+           "diagnoses WHERE page <> '' ORDER BY job DESC LIMIT $1)",
            kPagesKept);
     return changed_one(changes, job);
   });
@@ -362,7 +386,8 @@ Result<StoredJob> Store::job(std::int64_t id) const {
 
 Result<std::vector<StoredJob>> Store::jobs(const std::set<std::int64_t>& ids) const {
   if (ids.empty()) return std::vector<StoredJob>();
-  const std::string wanted = fmt::format("{}WHERE id IN ({}) ORDER BY id", kJobColumns, list_of(ids));
+  const std::string wanted =
+      fmt::format("{}WHERE id IN ({}) ORDER BY id", kJobColumns, list_of(ids));
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     return jobs_of(database, prepare(database, wanted.c_str()));
   });
@@ -371,8 +396,8 @@ Result<std::vector<StoredJob>> Store::jobs(const std::set<std::int64_t>& ids) co
 Result<std::set<std::int64_t>> Store::came_with_batches(const std::set<std::int64_t>& ids) const {
   if (ids.empty()) return std::set<std::int64_t>();
   const std::string wanted = fmt::format(
-      "SELECT own.job FROM job_batches AS own JOIN batches ON batches.cell = own.cell AND batches.id = own.batch "
-      "WHERE own.job IN ({}) AND batches.job = own.job",
+      "SELECT own.job FROM job_batches AS own JOIN batches ON batches.cell = own.cell AND "
+      "batches.id = own.batch WHERE own.job IN ({}) AND batches.job = own.job",
       list_of(ids));
   return connection_->exclusively([&](Database& database) -> Result<std::set<std::int64_t>> {
     std::set<std::int64_t> came;
@@ -383,11 +408,13 @@ Result<std::set<std::int64_t>> Store::came_with_batches(const std::set<std::int6
 }
 
 Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
-  const std::string all = fmt::format("{}WHERE state IN ('queued', 'running') ORDER BY id", kJobColumns);
+  const std::string all =
+      fmt::format("{}WHERE state IN ('queued', 'running') ORDER BY id", kJobColumns);
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     if (database.is_shared()) return jobs_of(database, prepare(database, all.c_str()));
     std::vector<std::int64_t> ids;  // of a file each is read alone: a row may be damaged
-    Rows rows = prepare(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
+    Rows rows =
+        prepare(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
     while (rows.next()) ids.push_back(rows.integer64(0));
     std::vector<StoredJob> jobs;
     for (const std::int64_t id : ids) {
@@ -403,13 +430,13 @@ Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int f
   // Each part by its own index: one condition for all three would read every job that ever was.
   const auto last = [](const char* state) {
     return fmt::format(
-        " UNION ALL SELECT id FROM (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = '{0}' "
-        "ORDER BY id DESC LIMIT $2) AS last_{0}",
+        " UNION ALL SELECT id FROM (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = "
+        "'{0}' ORDER BY id DESC LIMIT $2) AS last_{0}",
         state);
   };
   const std::string wanted = std::string(kJobColumns) +
-                             "WHERE id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state IN ('queued', "
-                             "'running')" +
+                             "WHERE id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND "
+                             "state IN ('queued', 'running')" +
                              last("done") + last("failed") + ") ORDER BY id";
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     return jobs_of(database, prepare(database, wanted.c_str(), cell, finished));
@@ -426,11 +453,11 @@ Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](Database& database) -> Status {
     TRY(check_held(database, connection_->worker, id));
     // Of a job that was not begun no attempt is taken back: it would be another server's.
-    const int changes = change(database,
-                               "UPDATE jobs SET state = 'queued', attempts = attempts - "
-                               "CASE WHEN attempts > 0 AND state = 'running' THEN $1 ELSE 0 END "
-                               "WHERE id = $2 AND state IN ('queued', 'running')",
-                               attempt_counts ? 0 : 1, id);
+    const int changes = change(
+        database,
+        "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 AND state "
+        "= 'running' THEN $1 ELSE 0 END WHERE id = $2 AND state IN ('queued', 'running')",
+        attempt_counts ? 0 : 1, id);
     tell_others(database);
     return changed_one(changes, id);
   });

@@ -12,8 +12,8 @@ std::string spelled(std::int64_t at) {
   const auto seconds = static_cast<std::time_t>(at);
   std::tm utc{};
   if (::gmtime_r(&seconds, &utc) == nullptr) return std::to_string(at);
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
-                     utc.tm_hour, utc.tm_min, utc.tm_sec);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec);
 }
 
 }  // namespace
@@ -34,7 +34,8 @@ Status check_not_moved(Database& database, const std::string& place) {
   return refused("was moved to {} at {}", to, spelled(at))
       .in(place)
       .of(kMovedField)
-      .next(fmt::format("name that one as store; to give it up and go on with this one: trammel store reopen '{}'",
+      .next(fmt::format("name that one as store; to give it up and go on with this one: trammel "
+                        "store reopen '{}'",
                         place));
 }
 

@@ -51,7 +51,8 @@ Status check_is_new(const std::string& path) {
 
 }  // namespace
 
-Status make_store_file(const std::string& path, const std::function<Status(const std::string& part)>& make) {
+Status make_store_file(const std::string& path,
+                       const std::function<Status(const std::string& part)>& make) {
   TRY(check_is_new(path));
   remove_leftover_parts(path);
   const std::string part = part_beside(path).string();
@@ -59,7 +60,9 @@ Status make_store_file(const std::string& path, const std::function<Status(const
   TRY(make(part));
   TRY(on_disk(part));
   if (::link(part.c_str(), path.c_str()) != 0)  // unlike a rename it replaces nothing
-    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(path).next(kElsewhere);
+    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno))
+        .in(path)
+        .next(kElsewhere);
   const fs::path folder = fs::path(path).parent_path();
   return on_disk(folder.empty() ? "." : folder.string());
 }

@@ -35,7 +35,8 @@ Attempt attempt(const std::string& path, const Open& open) {
   }
 }
 
-/// A file that is gone, empty or no file at all is damaged where models were served from it, and else a new beginning.
+/// A file that is gone, empty or no file at all is damaged where models were served from it, and
+/// else a new beginning.
 Status check_there(const std::string& path, const ServedCopies& copies) {
   std::error_code error;
   const bool exists = fs::exists(path, error);
@@ -49,25 +50,29 @@ Status check_there(const std::string& path, const ServedCopies& copies) {
                    : "put the store back, or move the copies away to begin anew");
 }
 
-/// Gives the copies the store's id. Refuses a store that is not the one whose models were served here.
+/// Gives the copies the store's id. Refuses a store that is not the one whose models were served
+/// here.
 Status check_identity(Database& database, const std::string& path, ServedCopies& copies) {
   const auto known = copies.stores();
   const auto id = TRY(identity_of(database, known.size() == 1 ? known.front() : ""));
   const bool is_known = std::find(known.begin(), known.end(), id) != known.end();
   if (!known.empty() && !is_known && has_models(database)) {
-    return failure(ErrorCode::kInternal, "another store than the one that served here, whose copies are in {}",
+    return failure(ErrorCode::kInternal,
+                   "another store than the one that served here, whose copies are in {}",
                    copies.root())
         .in(path)
         .next("put the right one back, or move the copies away if it is meant to be another");
   }
-  static_cast<void>(copies.belong_to(id, true));  // without the folder there are no copies: the store goes on
+  static_cast<void>(
+      copies.belong_to(id, true));  // without the folder there are no copies: the store goes on
   return {};
 }
 
 Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
   return attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
     TRY(check_there(path, copies));
-    file = std::make_unique<SqliteDatabase>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
+    file = std::make_unique<SqliteDatabase>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE,
+                                            kBusyTimeout);
     TRY(prepare_file(*file, path));
     TRY(check_not_moved(*file, path));
     return check_identity(*file, path, copies);
@@ -77,17 +82,20 @@ Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
 /// With its journal where that can be had, with one in memory, or without what the journal holds.
 Attempt open_for_reading(const std::string& path, ServedCopies& copies) {
   using Open = std::pair<std::string, int>;
-  const std::array<Open, 3> ways = {{{path, SQLite::OPEN_READONLY},
-                                     {path, SQLite::OPEN_READWRITE},
-                                     {immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI}}};
+  const std::array<Open, 3> ways = {
+      {{path, SQLite::OPEN_READONLY},
+       {path, SQLite::OPEN_READWRITE},
+       {immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI}}};
   Attempt last;
   for (const auto& [name, flags] : ways) {
-    last = attempt(path, [&, named = name, how = flags](std::unique_ptr<SqliteDatabase>& file) -> Status {
-      file = std::make_unique<SqliteDatabase>(named, how, kBusyTimeout);
-      if (how == SQLite::OPEN_READWRITE) file->execute("PRAGMA locking_mode = EXCLUSIVE");
-      TRY(check_readable(*file, path));
-      return check_identity(*file, path, copies);
-    });
+    last = attempt(path,
+                   [&, named = name, how = flags](std::unique_ptr<SqliteDatabase>& file) -> Status {
+                     file = std::make_unique<SqliteDatabase>(named, how, kBusyTimeout);
+                     if (how == SQLite::OPEN_READWRITE)
+                       file->execute("PRAGMA locking_mode = EXCLUSIVE");
+                     TRY(check_readable(*file, path));
+                     return check_identity(*file, path, copies);
+                   });
     if (last.file) return last;
   }
   return last;
@@ -104,7 +112,8 @@ Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copi
   }
   const auto stores = copies.stores();
   // A newer program serves it, or it is served elsewhere.
-  const bool is_served = writing.why_not->field == kSchemaField || writing.why_not->field == kMovedField;
+  const bool is_served =
+      writing.why_not->field == kSchemaField || writing.why_not->field == kMovedField;
   if (stores.empty() || is_served) return tl::make_unexpected(*writing.why_not);
   static_cast<void>(copies.belong_to(stores.front(), false));
   return OpenedDatabase{nullptr, std::move(writing.why_not)};
@@ -132,24 +141,30 @@ Status check_state(const std::string& path, const std::optional<StoreMark>& mark
   const auto wrong = [&path](const std::string& what) {
     return failure(ErrorCode::kBusy, "{}", what)
         .in(path)
-        .next("put back the file that was there, or start the service again to go on with what is there now");
+        .next(
+            "put back the file that was there, or start the service again to go on with what is "
+            "there now");
   };
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return wrong("was replaced by what is no file");
   const Attempt look = attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
-    file =
-        std::make_unique<SqliteDatabase>(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    file = std::make_unique<SqliteDatabase>(immutable_uri(path),
+                                            SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
     TRY(check_readable(*file, path));
     const auto is = mark_of(*file);
     if (!mark) return {};
     if (!is) return wrong("was replaced or written over by another program, and cannot be read");
-    if (is->identity != mark->identity) return wrong("was replaced by another store while it is served from");
+    if (is->identity != mark->identity)
+      return wrong("was replaced by another store while it is served from");
     if (is->counts != mark->counts)
-      return wrong("was replaced or written over by another state of it, without what was acknowledged since");
+      return wrong(
+          "was replaced or written over by another state of it, without what was acknowledged "
+          "since");
     return {};
   });
   if (look.file) return {};
-  if (look.why_not->code == ErrorCode::kBusy && !look.of_the_disk) return tl::make_unexpected(*look.why_not);
+  if (look.why_not->code == ErrorCode::kBusy && !look.of_the_disk)
+    return tl::make_unexpected(*look.why_not);
   return wrong("was replaced or written over by another program: " + look.why_not->message);
 }
 

@@ -23,12 +23,16 @@ Result<std::unique_ptr<Database>> open_url(const std::string& url, Session sessi
   return std::unique_ptr<Database>(std::move(*database));
 }
 
-Result<std::unique_ptr<Database>> open_file(const std::string& path, const std::string& name, int flags) {
+Result<std::unique_ptr<Database>> open_file(const std::string& path, const std::string& name,
+                                            int flags) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
-    return failure(ErrorCode::kNotFound, "no such store").in(path).next("its path stands in the server file as store");
+    return failure(ErrorCode::kNotFound, "no such store")
+        .in(path)
+        .next("its path stands in the server file as store");
   auto file = std::make_unique<SqliteDatabase>(name, flags, kBusyTimeout);
-  if (integer_of(*file, "PRAGMA application_id") != kApplicationId) return refused("no store").in(path);
+  if (integer_of(*file, "PRAGMA application_id") != kApplicationId)
+    return refused("no store").in(path);
   return std::unique_ptr<Database>(std::move(file));
 }
 

@@ -9,17 +9,19 @@
 
 namespace trammel {
 
-/// A store that is only looked at, also while services use it: a file, or a database by its URL. Leaves nothing behind.
-/// Refuses what is no store. Throws DatabaseError.
+/// A store that is only looked at, also while services use it: a file, or a database by its URL.
+/// Leaves nothing behind. Refuses what is no store. Throws DatabaseError.
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_read(const std::string& place);
-/// The same, to change what the services know nothing of. Of a file the caller holds the lock of who writes it.
+/// The same, to change what the services know nothing of. Of a file the caller holds the lock of
+/// who writes it.
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_write(const std::string& place);
 /// What is told where it cannot be read.
 [[nodiscard]] Failure unreadable(const DatabaseError& error, const std::string& place);
 
 /// Runs `work(database)` on one moment of the store at `place`.
 template <typename Work>
-auto look_into(const std::string& place, const Work& work) -> decltype(work(std::declval<Database&>())) {
+auto look_into(const std::string& place, const Work& work)
+    -> decltype(work(std::declval<Database&>())) {
   try {
     const auto database = open_to_read(place);
     if (!database) return tl::make_unexpected(database.error());

@@ -1,5 +1,6 @@
-// Pruning takes texts, never rows: what was there, when, with which hash and figures stays known, ids stay used, and
-// the audit trail says what went. One text a transaction, so that nobody waits for long.
+// Pruning takes texts, never rows: what was there, when, with which hash and figures stays known,
+// ids stay used, and the audit trail says what went. One text a transaction, so that nobody waits
+// for long.
 #include <set>
 #include <utility>
 
@@ -17,13 +18,13 @@ using Ids = std::set<std::string>;
 
 /// The version in force and those that rollbacks return to.
 Versions versions_needed(Database& database, const std::string& cell) {
-  auto rows = prepare(database,
-                      "WITH RECURSIVE way (number, version, back) AS ("
-                      "SELECT * FROM (SELECT number, version, back FROM activations WHERE cell = $1 "
-                      "ORDER BY number DESC LIMIT 1) AS present "
-                      "UNION SELECT a.number, a.version, a.back FROM activations a JOIN way ON a.number = way.back) "
-                      "SELECT DISTINCT version FROM way",
-                      cell);
+  auto rows =
+      prepare(database,
+              "WITH RECURSIVE way (number, version, back) AS (SELECT * FROM (SELECT number, "
+              "version, back FROM activations WHERE cell = $1 ORDER BY number DESC LIMIT 1) AS "
+              "present UNION SELECT a.number, a.version, a.back FROM activations a JOIN way ON "
+              "a.number = way.back) SELECT DISTINCT version FROM way",
+              cell);
   Versions needed;
   while (rows.next()) needed.insert(rows.integer(0));
   return needed;
@@ -47,10 +48,11 @@ Ids batches_needed(Database& database, const std::string& cell) {
   while (models.next()) {
     if (versions.contains(models.integer(0))) add_parts(models.text(1), needed);
   }
-  auto taken = prepare(database,
-                       "SELECT jobs.model_version, jobs.state IN ('queued', 'running'), job_batches.batch "
-                       "FROM job_batches JOIN jobs ON jobs.id = job_batches.job WHERE jobs.cell = $1",
-                       cell);
+  auto taken =
+      prepare(database,
+              "SELECT jobs.model_version, jobs.state IN ('queued', 'running'), job_batches.batch "
+              "FROM job_batches JOIN jobs ON jobs.id = job_batches.job WHERE jobs.cell = $1",
+              cell);
   while (taken.next()) {
     if (versions.contains(taken.integer(0)) || taken.truth(1)) needed.insert(taken.text(2));
   }
@@ -63,7 +65,8 @@ struct Text {
   std::string hash;
 };
 
-/// The oldest of `rows` (oldest first) that is not needed, unless at most `keep` are left; `keep` 0: none goes.
+/// The oldest of `rows` (oldest first) that is not needed, unless at most `keep` are left; `keep`
+/// 0: none goes.
 template <typename Needed>
 std::optional<Text> oldest_beyond(Rows rows, int keep, const Needed& needed) {
   std::optional<Text> oldest;
@@ -76,33 +79,37 @@ std::optional<Text> oldest_beyond(Rows rows, int keep, const Needed& needed) {
   return count > keep ? oldest : std::nullopt;
 }
 
-void record(Database& database, const std::string& cell, const char* kind, const Text& text, const std::string& rule) {
+void record(Database& database, const std::string& cell, const char* kind, const Text& text,
+            const std::string& rule) {
   change(database, "INSERT INTO pruned (kind, cell, id) VALUES ($1, $2, $3)", kind, cell, text.id);
   record_audit(database, {cell, "prune", fmt::format("{} {}", kind, text.id),
-                          text.hash.empty() ? "its text" : "its text, sha256 " + text.hash, "its record alone", rule});
+                          text.hash.empty() ? "its text" : "its text, sha256 " + text.hash,
+                          "its record alone", rule});
 }
 
 bool prune_model(Database& database, const std::string& cell, int keep) {
   const Versions needed = versions_needed(database, cell);
-  const auto text =
-      oldest_beyond(prepare(database,
-                            "SELECT version, hash FROM models WHERE cell = $1 AND CAST(version AS TEXT) NOT IN "
-                            "(SELECT id FROM pruned WHERE kind = 'version' AND cell = $1) ORDER BY version",
-                            cell),
-                    keep, [&](Rows& row) { return needed.contains(row.integer(0)); });
+  const auto text = oldest_beyond(
+      prepare(database,
+              "SELECT version, hash FROM models WHERE cell = $1 AND CAST(version AS TEXT) NOT IN "
+              "(SELECT id FROM pruned WHERE kind = 'version' AND cell = $1) ORDER BY version",
+              cell),
+      keep, [&](Rows& row) { return needed.contains(row.integer(0)); });
   if (!text) return false;
-  change(database, "UPDATE models SET content = '' WHERE cell = $1 AND version = $2", cell, std::stoi(text->id));
+  change(database, "UPDATE models SET content = '' WHERE cell = $1 AND version = $2", cell,
+         std::stoi(text->id));
   record(database, cell, "version", *text, fmt::format("keep_models {}", keep));
   return true;
 }
 
 bool prune_batch(Database& database, const std::string& cell, int keep) {
   const Ids needed = batches_needed(database, cell);
-  const auto text = oldest_beyond(prepare(database,
-                                          "SELECT id, hash FROM batches WHERE cell = $1 AND id NOT IN "
-                                          "(SELECT id FROM pruned WHERE kind = 'batch' AND cell = $1) ORDER BY number",
-                                          cell),
-                                  keep, [&](Rows& row) { return needed.contains(row.text(0)); });
+  const auto text =
+      oldest_beyond(prepare(database,
+                            "SELECT id, hash FROM batches WHERE cell = $1 AND id NOT IN (SELECT id "
+                            "FROM pruned WHERE kind = 'batch' AND cell = $1) ORDER BY number",
+                            cell),
+                    keep, [&](Rows& row) { return needed.contains(row.text(0)); });
   if (!text) return false;
   change(database, "UPDATE batches SET csv = '' WHERE cell = $1 AND id = $2", cell, text->id);
   record(database, cell, "batch", *text, fmt::format("keep_batches {}", keep));
@@ -111,11 +118,12 @@ bool prune_batch(Database& database, const std::string& cell, int keep) {
 
 bool prune_answer(Database& database, const std::string& cell, int keep) {
   const auto text = oldest_beyond(
-      prepare(database,
-              "SELECT jobs.id, '' FROM diagnoses JOIN jobs ON jobs.id = diagnoses.job WHERE jobs.cell = $1 "
-              "AND jobs.state IN ('done', 'failed') AND CAST(jobs.id AS TEXT) NOT IN "
-              "(SELECT id FROM pruned WHERE kind = 'answer of job' AND cell = $1) ORDER BY jobs.id",
-              cell),
+      prepare(
+          database,
+          "SELECT jobs.id, '' FROM diagnoses JOIN jobs ON jobs.id = diagnoses.job WHERE jobs.cell "
+          "= $1 AND jobs.state IN ('done', 'failed') AND CAST(jobs.id AS TEXT) NOT IN (SELECT id "
+          "FROM pruned WHERE kind = 'answer of job' AND cell = $1) ORDER BY jobs.id",
+          cell),
       keep, [](Rows&) { return false; });
   if (!text) return false;
   change(database, "UPDATE diagnoses SET csv = '', findings = '', page = '' WHERE job = $1",
@@ -126,8 +134,10 @@ bool prune_answer(Database& database, const std::string& cell, int keep) {
 
 }  // namespace
 
-bool is_pruned(Database& database, const char* kind, const std::string& cell, const std::string& id) {
-  return exists(database, "SELECT 1 FROM pruned WHERE kind = $1 AND cell = $2 AND id = $3", kind, cell, id);
+bool is_pruned(Database& database, const char* kind, const std::string& cell,
+               const std::string& id) {
+  return exists(database, "SELECT 1 FROM pruned WHERE kind = $1 AND cell = $2 AND id = $3", kind,
+                cell, id);
 }
 
 Failure pruned_failure(const std::string& what) {

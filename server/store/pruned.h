@@ -8,7 +8,8 @@
 namespace trammel {
 
 /// Whether the text of this `version`, `batch` or `answer of job` was pruned.
-[[nodiscard]] bool is_pruned(Database& database, const char* kind, const std::string& cell, const std::string& id);
+[[nodiscard]] bool is_pruned(Database& database, const char* kind, const std::string& cell,
+                             const std::string& id);
 /// kNotFound.
 [[nodiscard]] Failure pruned_failure(const std::string& what);
 

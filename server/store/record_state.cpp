@@ -6,7 +6,9 @@
 namespace trammel {
 const std::string& Store::server() const { return connection_->worker.server; }
 
-std::string Store::shared_identity() const { return is_shared() ? connection_->copies->store() : std::string(); }
+std::string Store::shared_identity() const {
+  return is_shared() ? connection_->copies->store() : std::string();
+}
 
 RecordState Store::record() const {
   const StoreState now = state();
@@ -22,8 +24,9 @@ RecordState Store::record() const {
       const CommitSafety safety = safety_of(commit_settings(database));
       record.survives = safety.survives;
       record.worry = safety.worry;
-      record.trail_is_safe =
-          !exists(database, "SELECT 1 WHERE has_table_privilege(current_user, 'audit', 'UPDATE, DELETE, TRUNCATE')");
+      record.trail_is_safe = !exists(
+          database,
+          "SELECT 1 WHERE has_table_privilege(current_user, 'audit', 'UPDATE, DELETE, TRUNCATE')");
       return {};
     }));
   }

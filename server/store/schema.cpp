@@ -17,9 +17,9 @@ constexpr const char* kModelsWithoutTimes =
 
 /// Also what programs of before have made since, which count none.
 constexpr const char* kCountVersions =
-    "INSERT INTO cells (cell, last_version) SELECT cell, MAX({1}) FROM {0} WHERE true GROUP BY cell "
-    "ON CONFLICT (cell) DO UPDATE SET last_version = excluded.last_version "
-    "WHERE excluded.last_version > cells.last_version";
+    "INSERT INTO cells (cell, last_version) SELECT cell, MAX({1}) FROM {0} WHERE true GROUP BY "
+    "cell ON CONFLICT (cell) DO UPDATE SET last_version = excluded.last_version WHERE "
+    "excluded.last_version > cells.last_version";
 
 /// Damage is an error of what reads the damaged row, and not of all.
 void execute_unless_damaged(Database& database, const std::string& statements) {
@@ -44,23 +44,24 @@ void fill_in_times(Database& database) {
   while (rows.next()) without.emplace_back(rows.text(0), rows.integer(1));
   for (const auto& [cell, version] : without) {
     change(database,
-           "INSERT INTO model_times (cell, version, trained_at) "
-           "SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models "
-           "WHERE cell = $1 AND version = $2 AND json_valid(content) "
-           "AND json_type(content, '$.stamp.trained_at') = 'integer'",
+           "INSERT INTO model_times (cell, version, trained_at) SELECT cell, version, "
+           "json_extract(content, '$.stamp.trained_at') FROM models WHERE cell = $1 AND version = "
+           "$2 AND json_valid(content) AND json_type(content, '$.stamp.trained_at') = 'integer'",
            cell, version);
   }
 }
 
-/// In stores of before, the cell of a release is not in the key of its row: there SQLite 3.40 takes it for missing
-/// where it checks a copy.
+/// In stores of before, the cell of a release is not in the key of its row: there SQLite 3.40 takes
+/// it for missing where it checks a copy.
 void put_cells_of_releases_into_their_key(Database& database) {
   constexpr const char* kOutside =
       "SELECT COUNT(*) FROM pragma_table_info('job_releases') WHERE name = 'cell' AND pk = 0";
   if (integer_of(database, kOutside) == 0) return;
   database.execute("ALTER TABLE job_releases RENAME TO job_releases_before");
   database.execute(in_sqlite(kTablesBeside));
-  database.execute("INSERT INTO job_releases (job, cell, batch) SELECT job, cell, batch FROM job_releases_before");
+  database.execute(
+      "INSERT INTO job_releases (job, cell, batch) SELECT job, cell, batch FROM "
+      "job_releases_before");
   database.execute("DROP TABLE job_releases_before");
 }
 
@@ -71,7 +72,8 @@ Status check_owner(Database& database, const std::string& path) {
   const bool empty = integer_of(database, "SELECT COUNT(*) FROM sqlite_master") == 0;
   if (empty && application == 0 && schema == 0) return {};
   if (application != kApplicationId) {
-    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+    return refused("a database of another program (application id {:#x}, not {:#x})", application,
+                   kApplicationId)
         .in(path);
   }
   if (schema > kSchemaVersion) {
@@ -89,7 +91,8 @@ Status check_owner(Database& database, const std::string& path) {
 Status prepare_file(Database& database, const std::string& path) {
   TRY(check_owner(database, path));
   const std::string mode = text_of(database, "PRAGMA journal_mode = WAL");
-  if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
+  if (mode != "wal")
+    return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
   database.execute("PRAGMA synchronous = FULL");
   database.execute("PRAGMA foreign_keys = ON");
   database.execute("PRAGMA cell_size_check = ON");
@@ -115,8 +118,8 @@ Status prepare_file(Database& database, const std::string& path) {
 
 Status check_readable(Database& database, const std::string& path) {
   TRY(check_owner(database, path));
-  const bool has_all =
-      database.has_table("audit_end") && database.has_table("cells") && database.has_table("job_claims");
+  const bool has_all = database.has_table("audit_end") && database.has_table("cells") &&
+                       database.has_table("job_claims");
   if (integer_of(database, "PRAGMA user_version") == kSchemaVersion && has_all) return {};
   return refused("of an older schema, and cannot be written").in(path);
 }
@@ -126,19 +129,21 @@ Result<std::string> identity_of(Database& database, const std::string& otherwise
     Rows row = prepare(database, "SELECT id FROM store_identity");
     if (row.next()) return row.text(0);
   }
-  const std::string id =
-      has_models(database) && !otherwise.empty() ? otherwise : text_of(database, "SELECT lower(hex(randomblob(16)))");
+  const std::string id = has_models(database) && !otherwise.empty()
+                             ? otherwise
+                             : text_of(database, "SELECT lower(hex(randomblob(16)))");
   change(database, "INSERT INTO store_identity (id) VALUES ($1)", id);
   return id;
 }
 
 std::optional<StoreMark> mark_of(Database& database) {
   constexpr const char* kCounts =
-      "SELECT (SELECT COALESCE(GROUP_CONCAT(name || ' ' || seq), '') FROM "
-      "(SELECT name, seq FROM sqlite_sequence ORDER BY name)) || ', models ' || (SELECT COUNT(*) FROM models) || "
-      "', unfinished ' || (SELECT COUNT(*) FROM jobs WHERE state IN ('queued', 'running'))";
+      "SELECT (SELECT COALESCE(GROUP_CONCAT(name || ' ' || seq), '') FROM (SELECT name, seq FROM "
+      "sqlite_sequence ORDER BY name)) || ', models ' || (SELECT COUNT(*) FROM models) || ', "
+      "unfinished ' || (SELECT COUNT(*) FROM jobs WHERE state IN ('queued', 'running'))";
   try {
-    return StoreMark{text_of(database, "SELECT id FROM store_identity WHERE id != ''"), text_of(database, kCounts)};
+    return StoreMark{text_of(database, "SELECT id FROM store_identity WHERE id != ''"),
+                     text_of(database, kCounts)};
   } catch (const DatabaseError&) {
     return std::nullopt;
   }

@@ -20,7 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kVersionsKept = 3;
-constexpr std::size_t kCellDigits = 32;  // of the hash of its name: a name may hold what a file's may not
+constexpr std::size_t kCellDigits =
+    32;  // of the hash of its name: a name may hold what a file's may not
 constexpr const char* kEnding = ".json";
 constexpr const char* kPart = ".part";  // of a copy that is being written
 
@@ -28,7 +29,8 @@ constexpr const char* kPart = ".part";  // of a copy that is being written
 std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::directory_entry> entries;
-  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator(); at.increment(error))
+  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
+       at.increment(error))
     entries.push_back(*at);
   return entries;
 }
@@ -59,7 +61,8 @@ std::optional<ServedCopies::Copy> copy_at(const fs::path& file) {
   if (!name.ends_with(kEnding)) return std::nullopt;
   std::string_view rest(name);
   ServedCopies::Copy copy{0, 0, file.string()};
-  if (!read_number(rest, &copy.activation) || !read_number(rest, &copy.version)) return std::nullopt;
+  if (!read_number(rest, &copy.activation) || !read_number(rest, &copy.version))
+    return std::nullopt;
   return copy;
 }
 
@@ -104,7 +107,8 @@ std::vector<std::string> ServedCopies::stores() const {
   std::vector<std::pair<fs::file_time_type, std::string>> found;
   for (const fs::directory_entry& entry : entries_of(root_)) {
     std::error_code error;
-    if (entry.is_directory(error)) found.emplace_back(entry.last_write_time(error), entry.path().filename().string());
+    if (entry.is_directory(error))
+      found.emplace_back(entry.last_write_time(error), entry.path().filename().string());
   }
   std::sort(found.rbegin(), found.rend());
   std::vector<std::string> stores;
@@ -119,7 +123,8 @@ Status ServedCopies::belong_to(const std::string& store, bool served) {
   }
   std::error_code error;
   if (served && !root_.empty()) fs::create_directories(folder(), error);
-  if (error) return failure(ErrorCode::kInternal, "cannot be created: {}", error.message()).in(folder());
+  if (error)
+    return failure(ErrorCode::kInternal, "cannot be created: {}", error.message()).in(folder());
   return {};
 }
 
@@ -140,7 +145,8 @@ std::vector<ServedCopies::Copy> ServedCopies::of(const std::string& cell) const 
   for (const fs::directory_entry& entry : entries_of(where)) {
     if (auto copy = copy_at(entry.path())) copies.push_back(std::move(*copy));
   }
-  std::sort(copies.begin(), copies.end(), [](const Copy& a, const Copy& b) { return a.activation > b.activation; });
+  std::sort(copies.begin(), copies.end(),
+            [](const Copy& a, const Copy& b) { return a.activation > b.activation; });
   return copies;
 }
 
@@ -163,7 +169,8 @@ Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int 
   remove_parts(where);
   TRY(write_part(part, content));
   fs::rename(part, file, error);
-  if (error) return failure(ErrorCode::kInternal, "cannot be renamed: {}", error.message()).in(part);
+  if (error)
+    return failure(ErrorCode::kInternal, "cannot be renamed: {}", error.message()).in(part);
   TRY(sync_folder(where));
   if (is_new) {
     TRY(sync_folder(folder()));

@@ -10,9 +10,10 @@
 
 namespace trammel {
 
-/// The last models in force of each cell as plain files: what is served where the store cannot be read. They lie in
-/// `<root>/<id of the store>/<hash of the cell's name>/`, one file a version, the newest three. Beside a file the root
-/// is
+/// The last models in force of each cell as plain files: what is served where the store cannot be
+/// read. They lie in
+/// `<root>/<id of the store>/<hash of the cell's name>/`, one file a version, the newest three.
+/// Beside a file the root is
 /// `<store>.models`. Thread-safe; one thread at a time keeps copies of a cell.
 class ServedCopies {
  public:
@@ -20,14 +21,15 @@ class ServedCopies {
   explicit ServedCopies(std::string root) : root_(std::move(root)) {}
 
   struct Copy {
-    std::int64_t activation = 0;  ///< number of the activation that put it in force: the larger, the newer
+    std::int64_t activation =
+        0;  ///< number of the activation that put it in force: the larger, the newer
     int version = 0;
     std::string file;
   };
   /// The stores that copies were made of, the one written to last first.
   [[nodiscard]] std::vector<std::string> stores() const;
-  /// From now on copies are those of this store. A store that is `served` from gets a folder even before its first
-  /// copy.
+  /// From now on copies are those of this store. A store that is `served` from gets a folder even
+  /// before its first copy.
   [[nodiscard]] Status belong_to(const std::string& store, bool served);
   /// Newest first; none where they cannot be read.
   [[nodiscard]] std::vector<Copy> of(const std::string& cell) const;

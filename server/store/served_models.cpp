@@ -24,7 +24,8 @@ Result<CompensatedModel> model_in(const Result<std::string>& text, const std::st
 
 /// The text in the row of a version in force.
 Result<std::string> text_at(const Rows& row, const std::string& cell, int version) {
-  if (row.is_null(1)) return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
+  if (row.is_null(1))
+    return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
   return row.text(1);
 }
 
@@ -41,7 +42,8 @@ Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& wher
   auto stored = model_in(on_disk.text, where);
   if (stored && stored->provenance().hash == on_disk.hash) return ReadModel{std::move(*stored)};
   const std::string hash_of_text = stored ? stored->provenance().hash : "";
-  const Error why = stored ? failure(ErrorCode::kInternal, "the text is that of another model, sha256 {} instead of {}",
+  const Error why = stored ? failure(ErrorCode::kInternal,
+                                     "the text is that of another model, sha256 {} instead of {}",
                                      hash_of_text, on_disk.hash)
                                  .in(where)
                                  .value()
@@ -51,11 +53,14 @@ Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& wher
     if (!copied) continue;
     const bool same_text = copied->provenance().hash == hash_of_text;
     const std::string bad =
-        same_text ? fmt::format("the hash in the store is bad: it is {}, its text there and the copy have {}",
-                                on_disk.hash.empty() ? "empty" : on_disk.hash, hash_of_text)
-                  : "the text in the store is bad: " + sentence(why);
-    return ReadModel{std::move(*copied), fmt::format("cell {}: version {} is served from its copy {}, since {}",
-                                                     on_disk.cell, on_disk.version, file, bad)};
+        same_text
+            ? fmt::format(
+                  "the hash in the store is bad: it is {}, its text there and the copy have {}",
+                  on_disk.hash.empty() ? "empty" : on_disk.hash, hash_of_text)
+            : "the text in the store is bad: " + sentence(why);
+    return ReadModel{std::move(*copied),
+                     fmt::format("cell {}: version {} is served from its copy {}, since {}",
+                                 on_disk.cell, on_disk.version, file, bad)};
   }
   return tl::make_unexpected(why);
 }
@@ -63,7 +68,8 @@ Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& wher
 Result<ServedModels> ServedModels::open(const std::string& place) {
   std::error_code error;
   const bool is_file = !is_postgres_url(place);
-  if (is_file && (!std::filesystem::exists(place, error) || std::filesystem::file_size(place, error) == 0))
+  if (is_file &&
+      (!std::filesystem::exists(place, error) || std::filesystem::file_size(place, error) == 0))
     return ServedModels("");
   return look_into(place, [&](Database&) -> Result<ServedModels> { return ServedModels(place); });
 }
@@ -75,17 +81,17 @@ Result<bool> ServedModels::find(const std::string& cell, const ModelVisitor& ser
     find_copies(database, copies);
     auto at =
         prepare(database,
-                "WITH RECURSIVE chain (number, version, back, step) AS ("
-                "SELECT * FROM (SELECT number, version, back, 0 FROM activations WHERE cell = $1 "
-                "ORDER BY number DESC LIMIT 1) AS present UNION ALL "
-                "SELECT a.number, a.version, a.back, step + 1 FROM chain JOIN activations a ON a.number = chain.back "
-                "WHERE step + 1 < $2) "
-                "SELECT chain.version, models.content, models.hash FROM chain LEFT JOIN models "
-                "ON models.cell = $1 AND models.version = chain.version ORDER BY step",
+                "WITH RECURSIVE chain (number, version, back, step) AS (SELECT * FROM (SELECT "
+                "number, version, back, 0 FROM activations WHERE cell = $1 ORDER BY number DESC "
+                "LIMIT 1) AS present UNION ALL SELECT a.number, a.version, a.back, step + 1 FROM "
+                "chain JOIN activations a ON a.number = chain.back WHERE step + 1 < $2) SELECT "
+                "chain.version, models.content, models.hash FROM chain LEFT JOIN models ON "
+                "models.cell = $1 AND models.version = chain.version ORDER BY step",
                 cell, kMostLookedAt);
     while (at.next()) {
       const int version = at.integer(0);
-      ModelOnDisk on_disk{cell, version, text_at(at, cell, version), "", copies.files_of(cell, version)};
+      ModelOnDisk on_disk{cell, version, text_at(at, cell, version), "",
+                          copies.files_of(cell, version)};
       if (!at.is_null(2)) on_disk.hash = at.text(2);
       if (serves(on_disk)) return true;
     }

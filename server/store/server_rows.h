@@ -11,8 +11,10 @@
 /// Servers, and descriptions of cells, as rows.
 namespace trammel {
 
-/// All that are there and those that went without a word, by name. `but`: the token of one that is left out.
-[[nodiscard]] std::vector<ServerInRecord> server_rows(Database& database, bool with_cells, const std::string& but = {});
+/// All that are there and those that went without a word, by name. `but`: the token of one that is
+/// left out.
+[[nodiscard]] std::vector<ServerInRecord> server_rows(Database& database, bool with_cells,
+                                                      const std::string& but = {});
 
 /// The description of a cell that the record goes by.
 struct DescribedCell {
@@ -21,7 +23,8 @@ struct DescribedCell {
   std::int64_t at = 0;  ///< Unix time, s, by the database's clock
 };
 [[nodiscard]] std::map<std::string, DescribedCell> cell_descriptions(Database& database);
-[[nodiscard]] std::optional<DescribedCell> cell_description(Database& database, const std::string& cell);
+[[nodiscard]] std::optional<DescribedCell> cell_description(Database& database,
+                                                            const std::string& cell);
 void add_cell_description(Database& database, const std::string& cell, const CellDescription& files,
                           const std::string& server);
 /// As the audit trail tells it.

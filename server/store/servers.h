@@ -19,9 +19,10 @@ constexpr std::chrono::seconds kGoneAfter = 3 * kHeartbeat;
 struct CellAtServer {
   int version = 0;  ///< that it answers with; 0: none
   CellDescription files;
-  std::string why_not = {};  ///< why it does not answer for the cell, or how otherwise than the record has it; one
-                             ///< sentence; empty: it does, or has no model
-  bool is_apart = false;     ///< it does not answer, since the record went by other files when it began, and still does
+  std::string why_not = {};  ///< why it does not answer for the cell, or how otherwise than the
+                             ///< record has it; one sentence; empty: it does, or has no model
+  bool is_apart = false;     ///< it does not answer, since the record went by other files when it
+                             ///< began, and still does
   bool operator==(const CellAtServer&) const = default;
 };
 

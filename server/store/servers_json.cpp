@@ -46,8 +46,9 @@ ordered_json servers_json(const std::vector<ServerInRecord>& servers) {
 }
 
 ordered_json record_json(const RecordState& record) {
-  ordered_json json = {{"kind", record.kind},          {"place", record.place},    {"reachable", record.reachable},
-                       {"away_since_unix_s", nullptr}, {"trail_is_safe", nullptr}, {"survives", record.survives}};
+  ordered_json json = {{"kind", record.kind},           {"place", record.place},
+                       {"reachable", record.reachable}, {"away_since_unix_s", nullptr},
+                       {"trail_is_safe", nullptr},      {"survives", record.survives}};
   if (record.trail_is_safe) json["trail_is_safe"] = *record.trail_is_safe;
   if (record.away_since) json["away_since_unix_s"] = *record.away_since;
   return json;

@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::size_t kMostConnections = 4;
 constexpr std::size_t kMostWithHeartbeat = kMostConnections + 1;
-constexpr std::chrono::seconds kPatience{6};  // for a connection that others use, and for rows that others lock
+constexpr std::chrono::seconds kPatience{
+    6};  // for a connection that others use, and for rows that others lock
 constexpr int kMostTries = 5;
 
 /// Longer each time, and not the same for all who were in each other's way.
@@ -29,8 +30,10 @@ std::chrono::milliseconds pause_after(int tries) {
 SharedConnection::SharedConnection(std::string url, std::unique_ptr<ServedCopies> kept)
     : StoreConnection(spoken_place(url), std::move(kept)), url_(std::move(url)) {}
 
-Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::string& url, const std::string& cache) {
-  std::unique_ptr<SharedConnection> made(new SharedConnection(url, std::make_unique<ServedCopies>(cache)));
+Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::string& url,
+                                                                const std::string& cache) {
+  std::unique_ptr<SharedConnection> made(
+      new SharedConnection(url, std::make_unique<ServedCopies>(cache)));
   auto connected = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   const auto stores = made->copies->stores();
   if (connected) {
@@ -52,7 +55,8 @@ Status SharedConnection::admit(Database& database) {
     const std::string id = text_of(database, "SELECT id FROM store_identity WHERE id <> ''");
     const auto known = copies->stores();
     if (!known.empty() && std::find(known.begin(), known.end(), id) == known.end())
-      return failure(ErrorCode::kInternal, "another store than the one that served here, whose copies are in {}",
+      return failure(ErrorCode::kInternal,
+                     "another store than the one that served here, whose copies are in {}",
                      copies->root())
           .in(path)
           .next("name the right one, or move the copies away if it is meant to be another");
@@ -79,9 +83,13 @@ Result<SharedConnection::Connected> SharedConnection::connect() {
 Result<SharedConnection::Connected> SharedConnection::borrow(std::size_t most) {
   {
     MutexLock guard(mutex_);
-    const bool free = given_back_.wait_until(guard, Clock::now() + kPatience,
-                                             [this, most]() TRAMMEL_REQUIRES(mutex_) { return lent_ < most; });
-    if (!free) return failure(ErrorCode::kBusy, "all {} connections are in use", lent_).in(path).next("ask again");
+    const bool free =
+        given_back_.wait_until(guard, Clock::now() + kPatience,
+                               [this, most]() TRAMMEL_REQUIRES(mutex_) { return lent_ < most; });
+    if (!free)
+      return failure(ErrorCode::kBusy, "all {} connections are in use", lent_)
+          .in(path)
+          .next("ask again");
     ++lent_;
     if (!idle_.empty()) {
       Connected connected = std::move(idle_.back());
@@ -108,7 +116,8 @@ void SharedConnection::give_back(Connected connected) {
 }
 
 Status SharedConnection::read(const Job& job) {
-  if (const StoreState now = state(); !now.readable) return tl::make_unexpected(*now.why_not_written);
+  if (const StoreState now = state(); !now.readable)
+    return tl::make_unexpected(*now.why_not_written);
   return run(job, Transaction::For::kReading, kMostConnections);
 }
 
@@ -171,14 +180,16 @@ std::string SharedConnection::who_holds() {
   if (!connected) return "";
   std::string who;
   try {
-    Rows row = prepare(**connected,
-                       "SELECT a.application_name, a.usename, a.pid FROM pg_locks AS l "
-                       "JOIN pg_stat_activity AS a ON a.pid = l.pid JOIN pg_class AS c ON c.oid = l.relation "
-                       "WHERE l.granted AND l.mode NOT IN ('AccessShareLock') AND a.pid <> pg_backend_pid() "
-                       "AND c.relname IN ('cells', 'jobs', 'batches', 'audit_end') "
-                       "AND COALESCE(a.application_name, '') <> 'trammel' ORDER BY a.pid LIMIT 1");
+    Rows row =
+        prepare(**connected,
+                "SELECT a.application_name, a.usename, a.pid FROM pg_locks AS l JOIN "
+                "pg_stat_activity AS a ON a.pid = l.pid JOIN pg_class AS c ON c.oid = l.relation "
+                "WHERE l.granted AND l.mode NOT IN ('AccessShareLock') AND a.pid <> "
+                "pg_backend_pid() AND c.relname IN ('cells', 'jobs', 'batches', 'audit_end') AND "
+                "COALESCE(a.application_name, '') <> 'trammel' ORDER BY a.pid LIMIT 1");
     if (row.next())
-      who = fmt::format("{} of role {} (process {}) holds rows locked", row.text(0), row.text(1), row.integer(2));
+      who = fmt::format("{} of role {} (process {}) holds rows locked", row.text(0), row.text(1),
+                        row.integer(2));
   } catch (const DatabaseError&) {  // nobody can say
   }
   give_back(std::move(*connected));
@@ -205,7 +216,8 @@ bool SharedConnection::hears_of_change(const std::stop_token& stop, Clock::time_
   return false;
 }
 
-void SharedConnection::wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) {
+void SharedConnection::wait_for_change(const std::stop_token& stop,
+                                       std::chrono::milliseconds limit) {
   const auto until = Clock::now() + limit;
   if (state().readable && hears_of_change(stop, until)) return;
   wait_without_word(stop, until);

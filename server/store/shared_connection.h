@@ -11,12 +11,13 @@
 
 namespace trammel {
 
-/// A database that several servers share. While it is away everything is refused at once; it is tried again by
-/// try_again() alone. What is served meanwhile are the copies.
+/// A database that several servers share. While it is away everything is refused at once; it is
+/// tried again by try_again() alone. What is served meanwhile are the copies.
 class SharedConnection final : public StoreConnection {
  public:
   /// A database that does not answer is away. Refuses what Store::open() refuses.
-  [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& url, const std::string& cache);
+  [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& url,
+                                                                     const std::string& cache);
 
   [[nodiscard]] bool is_shared() const override { return true; }
   [[nodiscard]] Status try_again() override;
@@ -30,7 +31,8 @@ class SharedConnection final : public StoreConnection {
   [[nodiscard]] Status read(const Job& job) override;
   [[nodiscard]] Status write(const Job& job) override;
   [[nodiscard]] Status write_urgently(const Job& job) override;
-  /// In one transaction, again where others were in the way. `most`: connections that may be in use with this one.
+  /// In one transaction, again where others were in the way. `most`: connections that may be in use
+  /// with this one.
   [[nodiscard]] Status run(const Job& job, Transaction::For what, std::size_t most);
   [[nodiscard]] Status told(const DatabaseError& error, bool lost);
 
@@ -40,7 +42,8 @@ class SharedConnection final : public StoreConnection {
   /// One that nobody uses, or a new one.
   [[nodiscard]] Result<Connected> borrow(std::size_t most);
   void give_back(Connected connected);
-  /// Whether the word of a change came. Connects where needed: what changed before that is not told.
+  /// Whether the word of a change came. Connects where needed: what changed before that is not
+  /// told.
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
   /// Who else holds rows locked, for people; empty: not known.
   [[nodiscard]] std::string who_holds();

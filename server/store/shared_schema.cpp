@@ -10,8 +10,8 @@
 namespace trammel {
 namespace {
 
-/// A step from the schema before it to the next one; the first makes all tables. A step that was released stays as it
-/// is.
+/// A step from the schema before it to the next one; the first makes all tables. A step that was
+/// released stays as it is.
 struct Migration {
   std::string statements;
   int works_from;  ///< the oldest schema whose programs work on this one, too
@@ -20,19 +20,21 @@ struct Migration {
 std::vector<Migration> all_migrations() {
   std::vector<Migration> all = {
       {in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
-           "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
-           "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
-           "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
+           "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT "
+           "NULL);INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);INSERT INTO "
+           "store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
        1},
-      {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
-                                  "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
+      {std::string(kTablesGone) +
+           "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);CREATE INDEX IF NOT EXISTS "
+           "jobs_failed ON jobs (id) WHERE state = 'failed';",
        2},
       {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3}};
 #ifdef TRAMMEL_NEXT_SCHEMA
-  // The program of the next minor version, for the test of an update that goes from server to server.
+  // The program of the next minor version, for the test of an update that goes from server to
+  // server.
   all.push_back(
-      {"ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';"
-       "CREATE TABLE job_colours (job BIGINT PRIMARY KEY REFERENCES jobs (id));",
+      {"ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';CREATE TABLE job_colours (job "
+       "BIGINT PRIMARY KEY REFERENCES jobs (id));",
        3});
 #endif
   return all;
@@ -47,8 +49,8 @@ std::int64_t newest() { return static_cast<std::int64_t>(migrations().size()); }
 
 bool is_empty(Database& database) {
   return integer_of(database,
-                    "SELECT COUNT(*) FROM pg_catalog.pg_class WHERE relkind IN ('r', 'v', 'p') "
-                    "AND relnamespace = to_regnamespace(current_schema())") == 0;
+                    "SELECT COUNT(*) FROM pg_catalog.pg_class WHERE relkind IN ('r', 'v', 'p') AND "
+                    "relnamespace = to_regnamespace(current_schema())") == 0;
 }
 
 struct Schema {
@@ -80,9 +82,9 @@ Result<Schema> schema_of(Database& database, const std::string& place) {
 /// Roles that were let in to use the store before; the owner needs no grant.
 std::vector<std::string> roles_let_in(Database& database) {
   Rows rows = prepare(database,
-                      "SELECT DISTINCT grantee FROM information_schema.role_table_grants "
-                      "WHERE table_schema = current_schema() AND table_name = 'audit' AND privilege_type = 'INSERT' "
-                      "AND grantee <> current_user");
+                      "SELECT DISTINCT grantee FROM information_schema.role_table_grants WHERE "
+                      "table_schema = current_schema() AND table_name = 'audit' AND privilege_type "
+                      "= 'INSERT' AND grantee <> current_user");
   std::vector<std::string> roles;
   while (rows.next()) roles.push_back(rows.text(0));
   return roles;
@@ -92,22 +94,22 @@ void grant(Database& database, const std::string& role) {
   Rows quoted = prepare(database, "SELECT quote_ident($1), quote_ident(current_schema())", role);
   if (!quoted.next()) return;
   const std::string to = quoted.text(0), in = quoted.text(1);
-  database.execute(
-      fmt::format("GRANT USAGE ON SCHEMA {1} TO {0};"
-                  "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA {1} TO {0};"
-                  "REVOKE UPDATE, DELETE, TRUNCATE ON audit FROM {0};"
-                  "REVOKE INSERT, DELETE, TRUNCATE ON audit_end FROM {0};"
-                  "REVOKE UPDATE, DELETE, TRUNCATE ON cell_descriptions FROM {0};"
-                  "REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
-                  to, in));
+  database.execute(fmt::format(
+      "GRANT USAGE ON SCHEMA {1} TO {0};GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN "
+      "SCHEMA {1} TO {0};REVOKE UPDATE, DELETE, TRUNCATE ON audit FROM {0};REVOKE INSERT, DELETE, "
+      "TRUNCATE ON audit_end FROM {0};REVOKE UPDATE, DELETE, TRUNCATE ON cell_descriptions FROM "
+      "{0};REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
+      to, in));
 }
 
 }  // namespace
 
 Status check_shared_schema(Database& database, const std::string& place) {
   const auto schema = TRY(schema_of(database, place));
-  const std::string init = fmt::format("run trammel store init '{}' as the role that is to own it", place);
-  if (schema.version == 0) return refused("the database is empty").in(place).of(kSchemaField).next(init);
+  const std::string init =
+      fmt::format("run trammel store init '{}' as the role that is to own it", place);
+  if (schema.version == 0)
+    return refused("the database is empty").in(place).of(kSchemaField).next(init);
   if (schema.version >= newest()) return {};
   return refused("schema {} is older than this program's, {}", schema.version, newest())
       .in(place)
@@ -130,7 +132,8 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
   for (std::int64_t version = schema.version; version < newest(); ++version) {
     const Migration& step = migrations()[static_cast<std::size_t>(version)];
     database.execute(step.statements);
-    change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1, step.works_from);
+    change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1,
+           step.works_from);
   }
   // New tables are for those who had the others.
   if (schema.version > 0 && schema.version < newest()) {
@@ -146,7 +149,8 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
 
 namespace {
 
-/// So that a service can say what a change survives. Only some owners may give that; without it, the service says so.
+/// So that a service can say what a change survives. Only some owners may give that; without it,
+/// the service says so.
 void let_see_standbys(Database& database, const std::string& role) {
   Rows quoted = prepare(database, "SELECT quote_ident($1)", role);
   if (!quoted.next()) return;
@@ -163,7 +167,8 @@ void let_see_standbys(Database& database, const std::string& role) {
 
 Status grant_shared_store(Database& database, const std::string& role) {
   if (text_of(database, "SELECT current_user") == role)
-    return refused("role {} owns the store, and could change its audit trail", role).next("grant it to another role");
+    return refused("role {} owns the store, and could change its audit trail", role)
+        .next("grant it to another role");
   Transaction transaction(database, Transaction::For::kWriting);
   grant(database, role);
   transaction.commit();

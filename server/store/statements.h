@@ -26,7 +26,8 @@ template <typename... Values>
   return prepare(database, sql, values...).next();
 }
 
-/// The rows that a decision rests on stay as they are until the transaction ends. SQLite locks the whole file.
+/// The rows that a decision rests on stay as they are until the transaction ends. SQLite locks the
+/// whole file.
 [[nodiscard]] inline std::string locked(const Database& database, std::string sql) {
   return database.is_shared() ? std::move(sql) + " FOR UPDATE" : std::move(sql);
 }

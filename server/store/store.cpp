@@ -17,7 +17,8 @@ Store::Store(std::unique_ptr<StoreConnection> connection) : connection_(std::mov
 Store::~Store() = default;
 
 Result<std::unique_ptr<Store>> Store::open(const std::string& place, const std::string& cache) {
-  auto connection = TRY(is_postgres_url(place) ? SharedConnection::open(place, cache) : FileConnection::open(place));
+  auto connection = TRY(is_postgres_url(place) ? SharedConnection::open(place, cache)
+                                               : FileConnection::open(place));
   return std::unique_ptr<Store>(new Store(std::move(connection)));
 }
 
@@ -25,15 +26,17 @@ StoreState Store::state() const { return connection_->state(); }
 
 namespace {
 
-/// A clock that was set stands in the trail, between what was dated by it before and after. Where that cannot be
-/// written, the state says so all the same.
+/// A clock that was set stands in the trail, between what was dated by it before and after. Where
+/// that cannot be written, the state says so all the same.
 void look_at_clock(StoreConnection& connection) {
   const auto step = connection.note_clock();
   if (!step) return;
   static_cast<void>(connection.in_transaction([&step](Database& database) -> Status {
     const std::int64_t now = unix_now();
-    record_audit(database, {"", "clock", "clock", fmt::format("{} s since 1970", now - step->count()),
-                            fmt::format("{} s since 1970", now), fmt::format("set by {:+} s", step->count())});
+    record_audit(
+        database,
+        {"", "clock", "clock", fmt::format("{} s since 1970", now - step->count()),
+         fmt::format("{} s since 1970", now), fmt::format("set by {:+} s", step->count())});
     return {};
   }));
 }
@@ -51,9 +54,10 @@ bool Store::wait_until_writable(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     if (try_again()) return true;
     MutexLock guard(connection.state_mutex);
-    connection.state_changed.wait_for(guard, stop, kTick, [&connection]() TRAMMEL_REQUIRES(connection.state_mutex) {
-      return !connection.state_now.why_not_written;
-    });
+    connection.state_changed.wait_for(guard, stop, kTick,
+                                      [&connection]() TRAMMEL_REQUIRES(connection.state_mutex) {
+                                        return !connection.state_now.why_not_written;
+                                      });
   }
   return false;
 }

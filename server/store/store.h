@@ -19,17 +19,17 @@
 #include "server/store/servers.h"
 #include "server/store/store_state.h"
 
-/// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
-/// synchronous=FULL), or in one PostgreSQL database where several servers share them.
+/// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file
+/// (WAL, synchronous=FULL), or in one PostgreSQL database where several servers share them.
 namespace trammel {
 
 struct StoredBatch {
   std::string cell;
-  std::string id;    ///< unique within the cell, for ever
-  std::string csv;   ///< as it came
-  std::string hash;  ///< SHA-256 of csv
-  std::string
-      request_id;  ///< client and sequence number of the request that brought it: a repeat of it is not a conflict
+  std::string id;          ///< unique within the cell, for ever
+  std::string csv;         ///< as it came
+  std::string hash;        ///< SHA-256 of csv
+  std::string request_id;  ///< client and sequence number of the request that brought it: a repeat
+                           ///< of it is not a conflict
   std::int64_t accepted_at = 0;  ///< Unix time, s
   int poses = 0;
   std::int64_t job = 0;         ///< the job that was queued with it
@@ -37,8 +37,9 @@ struct StoredBatch {
   std::string who = {};         ///< of a new one: who sent it, for the audit trail
   bool pruned = false;          ///< its text is gone
   bool discarded = false;       ///< it stays in quarantine for ever
-  bool learned = false;         ///< a model was made of it, here or on the server that this one followed
-  std::string outcome = {};     ///< what the training that was queued with it came to; empty: it is not over
+  bool learned = false;  ///< a model was made of it, here or on the server that this one followed
+  std::string outcome =
+      {};  ///< what the training that was queued with it came to; empty: it is not over
 };
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
@@ -49,18 +50,20 @@ enum class JobKind { kTrain, kDiagnose, kCheck };
 struct StoredJob {
   std::int64_t id = 0;
   std::string cell;
-  std::vector<std::string> batch_ids;  ///< trained together, in this order; none: a diagnosis of a batch sent with it
-  std::string level, bias;             ///< empty: as the cell file says
+  std::vector<std::string>
+      batch_ids;  ///< trained together, in this order; none: a diagnosis of a batch sent with it
+  std::string level, bias;  ///< empty: as the cell file says
   JobState state = JobState::kQueued;
   std::string message;          ///< why it failed, or the outcome for its model
   std::int64_t created_at = 0;  ///< Unix time, s
   int model_version = 0;        ///< 0 until done
-  int attempts = 0;             ///< how often it was started; putting it back in the queue takes one off
+  int attempts = 0;  ///< how often it was started; putting it back in the queue takes one off
   JobKind kind = JobKind::kTrain;
-  std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last start; empty: not yet, or not recorded
+  std::optional<std::int64_t> started_at =
+      {};  ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
   JobOutcome outcome = {};                       ///< the same as `message`, as data
-  std::string server = {};                       ///< that works on it, or did; empty: none, or not recorded
+  std::string server = {};  ///< that works on it, or did; empty: none, or not recorded
 };
 
 [[nodiscard]] inline bool is_over(const StoredJob& job) {
@@ -74,8 +77,9 @@ struct AcceptedJob : StoredJob {
 
 /// What became of the claim on a job that runs here.
 struct ClaimState {
-  bool is_held = false;                          ///< false: the lease was over, and another server has taken the job
-  std::optional<std::string> cancelled_by = {};  ///< who asked another server that it ends; empty: nobody
+  bool is_held = false;  ///< false: the lease was over, and another server has taken the job
+  std::optional<std::string> cancelled_by =
+      {};  ///< who asked another server that it ends; empty: nobody
 };
 
 /// How far a record is: another number, another state of what it counts.
@@ -122,14 +126,16 @@ struct StoredCheck {
 /// What a cell is served with, and how that was judged beside what was before.
 struct InForceRecord {
   int version = 0;
-  std::int64_t since = 0;                 ///< Unix time, s
-  std::optional<int> before = {};         ///< where a rollback leads; empty: nowhere
-  std::optional<JobOutcome> judged = {};  ///< when it was put in force, else when it was made; empty: never
+  std::int64_t since = 0;          ///< Unix time, s
+  std::optional<int> before = {};  ///< where a rollback leads; empty: nowhere
+  std::optional<JobOutcome> judged =
+      {};  ///< when it was put in force, else when it was made; empty: never
   bool judged_when_made = false;
 };
 
-/// How much of each cell is kept; 0: everything. What goes is the oldest of what nothing needs: never the version in
-/// force, one that a rollback returns to, what these were trained on, or what a job takes that is not over.
+/// How much of each cell is kept; 0: everything. What goes is the oldest of what nothing needs:
+/// never the version in force, one that a rollback returns to, what these were trained on, or what
+/// a job takes that is not over.
 struct KeepRule {
   int models = 0;   ///< versions besides those
   int batches = 0;  ///< likewise
@@ -138,128 +144,148 @@ struct KeepRule {
 
 class StoreConnection;
 
-/// Thread-safe: a file is one connection behind one lock. Every function that changes something is one transaction, and
-/// it is on disk when the function returns. Errors of the disk or the database name the file: kBusy where the disk does
-/// not let it be written now (full, read-only, broken) and may later, kInternal where the file is damaged. Damage of
-/// one row is an error of what reads that row, and of nothing else.
+/// Thread-safe: a file is one connection behind one lock. Every function that changes something is
+/// one transaction, and it is on disk when the function returns. Errors of the disk or the database
+/// name the file: kBusy where the disk does not let it be written now (full, read-only, broken) and
+/// may later, kInternal where the file is damaged. Damage of one row is an error of what reads that
+/// row, and of nothing else.
 ///
-/// Of each cell the last three versions in force are kept as plain files beside the store, too (`<file>.models`), and
-/// taken where the store does not give them.
+/// Of each cell the last three versions in force are kept as plain files beside the store, too
+/// (`<file>.models`), and taken where the store does not give them.
 class Store {
  public:
-  /// Creates the file if there is none, and no copies of models that were served from it. Refuses (kConflict) a second
-  /// writer on the same file, by whatever name. A file on a disk that cannot be written is read, and written as soon as
-  /// that is possible: state(). Of a file that is damaged, emptied, gone or of another store the copies are there, and
-  /// nothing is written to it; without copies it is refused (kInternal), as is a file of another program or of a newer
-  /// schema (kRefused). The file `<file>.lock` beside it holds the writer's process id.
-  /// A URL of PostgreSQL is a store that several servers share: `cache` is the folder of its copies (empty: none are
-  /// kept). One that is away is opened all the same, and state() says so. Refuses (kRefused) an empty database, one of
-  /// another program or of a newer schema, and a role that is not let in.
-  [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& place, const std::string& cache = "");
+  /// Creates the file if there is none, and no copies of models that were served from it. Refuses
+  /// (kConflict) a second writer on the same file, by whatever name. A file on a disk that cannot
+  /// be written is read, and written as soon as that is possible: state(). Of a file that is
+  /// damaged, emptied, gone or of another store the copies are there, and nothing is written to it;
+  /// without copies it is refused (kInternal), as is a file of another program or of a newer schema
+  /// (kRefused). The file `<file>.lock` beside it holds the writer's process id. A URL of
+  /// PostgreSQL is a store that several servers share: `cache` is the folder of its copies (empty:
+  /// none are kept). One that is away is opened all the same, and state() says so. Refuses
+  /// (kRefused) an empty database, one of another program or of a newer schema, and a role that is
+  /// not let in.
+  [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& place,
+                                                           const std::string& cache = "");
   ~Store();
 
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
   [[nodiscard]] RecordState record() const;
-  /// What the record of several servers is told from any other by; empty: it is a file, or not known yet. Waits for
-  /// nothing.
+  /// What the record of several servers is told from any other by; empty: it is a file, or not
+  /// known yet. Waits for nothing.
   [[nodiscard]] std::string shared_identity() const;
   /// As works_as() said.
   [[nodiscard]] const std::string& server() const;
-  /// Where it could not be written, or is not as it was left: whether it can be written now. Opens the file again where
-  /// needed, once a second at most.
+  /// Where it could not be written, or is not as it was left: whether it can be written now. Opens
+  /// the file again where needed, once a second at most.
   [[nodiscard]] Status try_again();
   /// False: `stop` was requested first.
   [[nodiscard]] bool wait_until_writable(const std::stop_token& stop);
 
-  /// The trail of all changes, verified as a whole. Every function that changes something else than the state of a
-  /// running job writes it in its own transaction.
+  /// The trail of all changes, verified as a whole. Every function that changes something else than
+  /// the state of a running job writes it in its own transaction.
   [[nodiscard]] Result<AuditTrail> audit(const AuditQuery& query = {}) const;
 
-  /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. The
-  /// same content under the same id again, from whomever, returns the job that the first one made. Refuses (kConflict)
-  /// an id that the cell has with other content.
+  /// Accepts the batch and queues its training job (over this batch alone) in one transaction;
+  /// returns the job. The same content under the same id again, from whomever, returns the job that
+  /// the first one made. Refuses (kConflict) an id that the cell has with other content.
   [[nodiscard]] Result<AcceptedJob> add_batch(const StoredBatch& batch, const StoredJob& job);
-  /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for something else. The
-  /// functions that take a ChangeId record it in the transaction of the change itself; where it is recorded already
-  /// they change nothing and return what was made then. The last 100,000 are kept.
+  /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for
+  /// something else. The functions that take a ChangeId record it in the transaction of the change
+  /// itself; where it is recorded already they change nothing and return what was made then. The
+  /// last 100,000 are kept.
   [[nodiscard]] Result<std::optional<ChangeOutcome>> outcome_of(const ChangeId& change_id) const;
-  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones, (kConflict) discarded ones.
-  /// With `release` it may also train from batches in quarantine. They leave quarantine in the transaction that puts
-  /// its model in force.
-  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false, const ChangeId& change_id = {});
+  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones,
+  /// (kConflict) discarded ones. With `release` it may also train from batches in quarantine. They
+  /// leave quarantine in the transaction that puts its model in force.
+  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false,
+                                          const ChangeId& change_id = {});
   /// Whether a job made that version here; false: it was imported.
   [[nodiscard]] Result<bool> was_made_by_job(const std::string& cell, int version) const;
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
-  /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as add_job().
-  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
+  /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as
+  /// add_job().
+  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job,
+                                                const StoredDiagnosis& diagnosis,
                                                 const ChangeId& change_id = {});
   /// kNotFound: there is no such job, it is no diagnosis, or its findings were pruned.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
-  /// Of the cell, oldest first: those that ended since then (Unix time, s), the newest `most` (0: all).
-  [[nodiscard]] Result<std::vector<StoredCheck>> health_checks(const std::string& cell, std::int64_t since,
+  /// Of the cell, oldest first: those that ended since then (Unix time, s), the newest `most` (0:
+  /// all).
+  [[nodiscard]] Result<std::vector<StoredCheck>> health_checks(const std::string& cell,
+                                                               std::int64_t since,
                                                                std::size_t most) const;
   /// Stores the findings of an unfinished diagnosis. The job goes on.
-  [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings, const std::string& page);
+  [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings,
+                                      const std::string& page);
   /// kNotFound also where its text was pruned.
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
   /// The same without its text: cheap.
-  [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
+  [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell,
+                                                 const std::string& id) const;
   /// How many changes the audit trail has: another number, another state of what it tells of.
   [[nodiscard]] Result<std::int64_t> changes_made() const;
   /// The same with descriptions_made(), by one statement. Of a store that several servers share.
   [[nodiscard]] Result<RecordCounts> counts() const;
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
-  /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
-  /// `by_job`: refuses (kNotFound), too, where another server has that job by now.
-  [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
-                                      const ChangeId& change_id = {}, std::int64_t by_job = 0);
-  /// Nothing takes the batch any more: it is in quarantine for ever. Its text stays until it is pruned.
-  [[nodiscard]] Status discard(const std::string& cell, const std::string& id, const ChangeId& change_id = {});
+  /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one
+  /// that was discarded. `by_job`: refuses (kNotFound), too, where another server has that job by
+  /// now.
+  [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id,
+                                      const std::string& reason, const ChangeId& change_id = {},
+                                      std::int64_t by_job = 0);
+  /// Nothing takes the batch any more: it is in quarantine for ever. Its text stays until it is
+  /// pruned.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& id,
+                               const ChangeId& change_id = {});
   /// Newest last, without their text.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
 
-  /// Takes the text of one model, batch or answer that `rule` lets go of; its record stays. False: there is none. Call
-  /// it until then: others use the store in between.
+  /// Takes the text of one model, batch or answer that `rule` lets go of; its record stays. False:
+  /// there is none. Call it until then: others use the store in between.
   [[nodiscard]] Result<bool> prune_one(const std::string& cell, const KeepRule& rule);
 
   /// Several servers share it.
   [[nodiscard]] bool is_shared() const;
   /// How this server is called where it claims a job. Set before there are jobs.
   void works_as(const std::string& server);
-  /// Tells that this server still works on the job that it claimed. It waits for no disk and no standby: a lease that
-  /// is lost with a host ends earlier.
+  /// Tells that this server still works on the job that it claimed. It waits for no disk and no
+  /// standby: a lease that is lost with a host ends earlier.
   [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
-  /// Ends a job that waits, and has the server that works on it end one that runs. Refuses (kConflict) one that is
-  /// over.
-  [[nodiscard]] Result<CancelledJob> cancel_job(std::int64_t job, const JobOutcome& outcome, const ChangeId& by);
-  /// A heartbeat: says to the others that this server is there, and what it does. Of a store that several servers
-  /// share; else nothing is told. It waits as little as renew_claim(). For one thread at a time.
+  /// Ends a job that waits, and has the server that works on it end one that runs. Refuses
+  /// (kConflict) one that is over.
+  [[nodiscard]] Result<CancelledJob> cancel_job(std::int64_t job, const JobOutcome& outcome,
+                                                const ChangeId& by);
+  /// A heartbeat: says to the others that this server is there, and what it does. Of a store that
+  /// several servers share; else nothing is told. It waits as little as renew_claim(). For one
+  /// thread at a time.
   [[nodiscard]] Status tell_presence(const ServerSelf& self);
   /// It ends: the others need not wait for its heartbeat.
   [[nodiscard]] Status take_leave();
-  /// All that are there, and those that went without a word during the last day, by name; `with_cells`: with what they
-  /// serve. Of a store that one server has: none.
+  /// All that are there, and those that went without a word during the last day, by name;
+  /// `with_cells`: with what they serve. Of a store that one server has: none.
   [[nodiscard]] Result<std::vector<ServerInRecord>> servers(bool with_cells) const;
   /// How many descriptions of cells there ever were: another number, another state of them.
   [[nodiscard]] Result<std::int64_t> descriptions_made() const;
-  /// Compares how this server's files describe cells with the descriptions that the record goes by. A cell that has
-  /// none gets this one. Another one is taken where more servers want it than have any other, two at least: those that
-  /// were started with it and are set apart for it; or where no other one is there and the one that is had was this
-  /// server's own, as it `starts`. Returns the cells whose files differ, and why it does not answer for them, or
-  /// changes nothing of them where they were the record's since it began (`agreed`), one sentence each. Needs
+  /// Compares how this server's files describe cells with the descriptions that the record goes by.
+  /// A cell that has none gets this one. Another one is taken where more servers want it than have
+  /// any other, two at least: those that were started with it and are set apart for it; or where no
+  /// other one is there and the one that is had was this server's own, as it `starts`. Returns the
+  /// cells whose files differ, and why it does not answer for them, or changes nothing of them
+  /// where they were the record's since it began (`agreed`), one sentence each. Needs
   /// tell_presence() before.
   [[nodiscard]] Result<std::map<std::string, std::string>> agree_on_cells(
-      const std::map<std::string, CellDescription>& mine, bool starts, const std::set<std::string>& agreed = {});
-  /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell; with
-  /// the cell of each. By one statement.
+      const std::map<std::string, CellDescription>& mine, bool starts,
+      const std::set<std::string>& agreed = {});
+  /// The jobs that wait and that no server works on that is believed to live, nor on another one of
+  /// their cell; with the cell of each. By one statement.
   [[nodiscard]] Result<std::map<std::int64_t, std::string>> jobs_to_take() const;
   /// What was changed by changes that came after so many; see changes_made().
   [[nodiscard]] Result<std::set<std::string>> cells_changed_after(std::int64_t changes) const;
-  /// Returns when another server may have changed something, after `limit` at the latest, or when `stop` is requested.
-  /// For one thread.
+  /// Returns when another server may have changed something, after `limit` at the latest, or when
+  /// `stop` is requested. For one thread.
   void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit);
   /// Refuses (kConflict) where another version of the cell is in force than the change expects.
   [[nodiscard]] Status check_expected(const std::string& cell, const ChangeId& change_id) const;
@@ -268,43 +294,54 @@ class Store {
   /// Those of these jobs that there are, oldest first. By two statements, however many they are.
   [[nodiscard]] Result<std::vector<StoredJob>> jobs(const std::set<std::int64_t>& ids) const;
   /// Those of these jobs that came with their batch. Somebody asked for the others.
-  [[nodiscard]] Result<std::set<std::int64_t>> came_with_batches(const std::set<std::int64_t>& ids) const;
-  /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
-  /// left out, and stands in state().
+  [[nodiscard]] Result<std::set<std::int64_t>> came_with_batches(
+      const std::set<std::int64_t>& ids) const;
+  /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be
+  /// read of them is left out, and stands in state().
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;
-  /// Jobs of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished` done and the last
-  /// `finished` failed.
-  [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
-  /// These refuse (kNotFound) a job that is done or failed already, or that another server works on. Setting it running
-  /// claims it for this server and counts an attempt, and refuses (kConflict) one of a cell that another server works
-  /// for; setting it queued takes the attempt back, unless it counts.
+  /// Jobs of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished`
+  /// done and the last `finished` failed.
+  [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell,
+                                                           int finished) const;
+  /// These refuse (kNotFound) a job that is done or failed already, or that another server works
+  /// on. Setting it running claims it for this server and counts an attempt, and refuses
+  /// (kConflict) one of a cell that another server works for; setting it queued takes the attempt
+  /// back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
-  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {},
-                                      const ChangeId& by = {});
+  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message,
+                                      const JobOutcome& outcome = {}, const ChangeId& by = {});
   /// For a job that makes no model.
-  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
+  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message,
+                                    const JobOutcome& outcome = {});
 
-  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and `outcome` and, if
-  /// asked, puts the model in force, all in one transaction. If the model is put in force, or if `release` is set, the
-  /// batches that the job may release leave quarantine. Returns the version.
-  [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                                      bool put_in_force, const std::string& message, bool release = false,
-                                      const ChangeId& change_id = {}, const JobOutcome& outcome = {});
-  /// Puts a stored version in force. Changes nothing if it is in force already. Refuses (kNotFound) an unknown one.
-  /// `judged`: how it did beside the one in force until now, for in_force_record() and the audit trail.
+  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and
+  /// `outcome` and, if asked, puts the model in force, all in one transaction. If the model is put
+  /// in force, or if `release` is set, the batches that the job may release leave quarantine.
+  /// Returns the version.
+  [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model,
+                                      std::int64_t job, bool put_in_force,
+                                      const std::string& message, bool release = false,
+                                      const ChangeId& change_id = {},
+                                      const JobOutcome& outcome = {});
+  /// Puts a stored version in force. Changes nothing if it is in force already. Refuses (kNotFound)
+  /// an unknown one. `judged`: how it did beside the one in force until now, for in_force_record()
+  /// and the audit trail.
   ///
-  /// How rollback works: an activation remembers the one that it replaced. A rollback restores that one with its own
-  /// memory, so the next rollback goes further back: after 1, 2, 3 it gives 2, then 1, then kNotFound. A new activation
-  /// remembers the version that is in force at that moment, even if a rollback put it there.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {},
+  /// How rollback works: an activation remembers the one that it replaced. A rollback restores that
+  /// one with its own memory, so the next rollback goes further back: after 1, 2, 3 it gives 2,
+  /// then 1, then kNotFound. A new activation remembers the version that is in force at that
+  /// moment, even if a rollback put it there.
+  [[nodiscard]] Status activate(const std::string& cell, int version,
+                                const ChangeId& change_id = {},
                                 const std::optional<JobOutcome>& judged = {});
   /// Empty: nothing is in force.
   [[nodiscard]] Result<std::optional<InForceRecord>> in_force_record(const std::string& cell) const;
   /// The versions that repeated rollbacks restore, the next one first. kNotFound: there is none.
   [[nodiscard]] Result<std::vector<int>> previous_in_force(const std::string& cell) const;
   /// Puts one of previous_in_force() in force, as `steps` rollbacks do; returns it.
-  [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1, const ChangeId& change_id = {});
+  [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1,
+                                     const ChangeId& change_id = {});
   /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   /// From the store or, where that does not give it, from its copy.
@@ -316,12 +353,12 @@ class Store {
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
   /// The same of every cell that has one, at one moment, by one statement.
   [[nodiscard]] Result<std::map<std::string, int>> versions_in_force() const;
-  /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what
-  /// only copies have. Those that came after what the store knows come before it. Never fails: empty where there are
-  /// none.
+  /// The versions to serve the cell with, the best first: the one in force, then as rollbacks
+  /// restore them, then what only copies have. Those that came after what the store knows come
+  /// before it. Never fails: empty where there are none.
   [[nodiscard]] std::vector<int> versions_to_serve(const std::string& cell) const;
-  /// Where the store has lost what was in force last and its copy is there: takes it back into the history, as the
-  /// version in force that it was.
+  /// Where the store has lost what was in force last and its copy is there: takes it back into the
+  /// history, as the version in force that it was.
   [[nodiscard]] Status take_back_from_copy(const std::string& cell);
   /// Copies the model in force, if it has no copy.
   [[nodiscard]] Status copy_model_in_force(const std::string& cell) const;

@@ -36,7 +36,9 @@ Status check_folder(const fs::path& path) {
   std::error_code error;
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!fs::exists(folder, error))
-    return refused("its folder {} is not there", folder.string()).in(path.string()).next("create it, or name another");
+    return refused("its folder {} is not there", folder.string())
+        .in(path.string())
+        .next("create it, or name another");
   if (!fs::is_directory(folder, error))
     return refused("{} is no folder", folder.string()).in(path.string()).next("name another");
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
@@ -46,19 +48,25 @@ Status check_folder(const fs::path& path) {
   return {};
 }
 
-/// Checks the header of a file that exists and is not empty. Does not see what is still in the journal.
+/// Checks the header of a file that exists and is not empty. Does not see what is still in the
+/// journal.
 Status check_header(const fs::path& path) {
   std::string header(kHeader, '\0');
   std::ifstream in(path, std::ios::binary);
-  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) || !header.starts_with(kMagic))
-    return refused("no store: not an SQLite file").in(path.string()).next("name another, or move this one away");
+  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) ||
+      !header.starts_with(kMagic))
+    return refused("no store: not an SQLite file")
+        .in(path.string())
+        .next("name another, or move this one away");
   const auto application = big_endian(std::string_view(header).substr(kApplicationAt, 4));
   const auto schema = big_endian(std::string_view(header).substr(kSchemaAt, 4));
   std::error_code error;
-  const bool in_journal = application == 0 && schema == 0 && fs::exists(path.string() + "-wal", error);
+  const bool in_journal =
+      application == 0 && schema == 0 && fs::exists(path.string() + "-wal", error);
   if (in_journal) return {};
   if (application != static_cast<std::uint32_t>(kApplicationId))
-    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+    return refused("a database of another program (application id {:#x}, not {:#x})", application,
+                   kApplicationId)
         .in(path.string())
         .of("application id")
         .with_value(application)
@@ -75,7 +83,8 @@ Status check_header(const fs::path& path) {
 Status check_file(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return {};
-  if (!fs::is_regular_file(path, error)) return refused("no store: not a file").in(path.string()).next("name another");
+  if (!fs::is_regular_file(path, error))
+    return refused("no store: not a file").in(path.string()).next("name another");
   if (::access(path.c_str(), R_OK | W_OK) != 0)
     return refused("cannot be read and written: {}", std::strerror(errno))
         .in(path.string())
@@ -89,8 +98,10 @@ Status check_file_is_here(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error) || fs::file_size(path, error) == 0) return {};
   try {
-    // Without its journal, of which a look at it would leave traces: a store is moved when nobody serves it.
-    SqliteDatabase file(immutable_uri(path.string()), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    // Without its journal, of which a look at it would leave traces: a store is moved when nobody
+    // serves it.
+    SqliteDatabase file(immutable_uri(path.string()), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
+                        kBusyTimeout);
     return check_not_moved(file, path.string());
   } catch (const DatabaseError&) {
     return {};

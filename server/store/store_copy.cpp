@@ -49,7 +49,10 @@ Result<StoreContent> content_of(Database& database, const std::string& place) {
   TRY(check_texts(database, place));
   const auto trail = check_trail(database);
   if (!trail) return Failure(trail.error()).in(place);
-  StoreContent content{text_of(database, "SELECT id FROM store_identity WHERE id <> ''"), {}, trail->rows, trail->hash};
+  StoreContent content{text_of(database, "SELECT id FROM store_identity WHERE id <> ''"),
+                       {},
+                       trail->rows,
+                       trail->hash};
   for (const StoreTable& table : store_tables()) {
     const TableDigest digest = digest_of(database, table);
     content.tables.push_back({digest.table, digest.rows, digest.hash});
@@ -76,16 +79,16 @@ void count_on(Database& database) {
       {{"jobs", "id"}, {"batches", "number"}, {"activations", "number"}, {"changes", "number"}}};
   if (!database.is_shared()) return;  // SQLite sees the highest one
   for (const auto& [table, column] : kCounted)
-    static_cast<void>(integer_of(
-        database, fmt::format("SELECT setval(pg_get_serial_sequence('{0}', '{1}'), COALESCE(MAX({1}), 0) + 1, false) "
-                              "FROM {0}",
-                              table, column)
-                      .c_str()));
+    static_cast<void>(
+        integer_of(database, fmt::format("SELECT setval(pg_get_serial_sequence('{0}', '{1}'), "
+                                         "COALESCE(MAX({1}), 0) + 1, false) FROM {0}",
+                                         table, column)
+                                 .c_str()));
 }
 
 /// Copies every row, and reads every row again.
-Result<StoreContent> fill(Database& source, const std::string& from, Database& target, const std::string& to,
-                          const Progress& progress) {
+Result<StoreContent> fill(Database& source, const std::string& from, Database& target,
+                          const std::string& to, const Progress& progress) {
   Transaction transaction(target, Transaction::For::kWriting);
   target.take_long();
   TRY(make_room(target, to));
@@ -100,10 +103,12 @@ Result<StoreContent> fill(Database& source, const std::string& from, Database& t
       return true;
     });
     if (digest_of(target, table) == sent.of(table)) continue;
-    return failure(ErrorCode::kInternal, "table {} is not in {} as it is here", table.name, to).in(from);
+    return failure(ErrorCode::kInternal, "table {} is not in {} as it is here", table.name, to)
+        .in(from);
   }
   Rows end = prepare(source, "SELECT rows, hash FROM audit_end");
-  if (end.next()) change(target, "UPDATE audit_end SET rows = $1, hash = $2", end.integer64(0), end.text(1));
+  if (end.next())
+    change(target, "UPDATE audit_end SET rows = $1, hash = $2", end.integer64(0), end.text(1));
   count_on(target);
   auto content = content_of(target, to);
   if (!content) return content;
@@ -129,8 +134,8 @@ Result<StoreContent> copy_to_file(Database& source, const std::string& from, con
   return content;
 }
 
-Result<StoreContent> copy_to_database(Database& source, const std::string& from, const std::string& url,
-                                      const Progress& progress) {
+Result<StoreContent> copy_to_database(Database& source, const std::string& from,
+                                      const std::string& url, const Progress& progress) {
   const std::string to = spoken_place(url);
   const auto target = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!target) return Failure(target.error()).in(to);
@@ -141,16 +146,19 @@ Result<StoreContent> copy_to_database(Database& source, const std::string& from,
 Result<StoreContent> copy_to(Database& source, const std::string& from, const std::string& to,
                              const Progress& progress) {
   TRY(source.is_shared() ? check_all_is_known(source, from) : Status());
-  return is_postgres_url(to) ? copy_to_database(source, from, to, progress) : copy_to_file(source, from, to, progress);
+  return is_postgres_url(to) ? copy_to_database(source, from, to, progress)
+                             : copy_to_file(source, from, to, progress);
 }
 
-/// Nothing of it changes until the open transaction ends: who changes something is told who holds it locked.
+/// Nothing of it changes until the open transaction ends: who changes something is told who holds
+/// it locked.
 void keep_as_it_is(Database& database) {
   if (database.is_shared()) database.execute("LOCK TABLE jobs, audit_end IN EXCLUSIVE MODE");
 }
 
 /// The copy is whole. A file was only read until now.
-void mark_as_moved(Database& source, Transaction& moment, const std::string& from, const std::string& to) {
+void mark_as_moved(Database& source, Transaction& moment, const std::string& from,
+                   const std::string& to) {
   if (source.is_shared()) {
     record_move(source, spoken_place(to));
     return moment.commit();
@@ -162,10 +170,12 @@ void mark_as_moved(Database& source, Transaction& moment, const std::string& fro
   transaction.commit();
 }
 
-Result<StoreContent> move_store(const std::string& from, const std::string& to, const Progress& progress) {
+Result<StoreContent> move_store(const std::string& from, const std::string& to,
+                                const Progress& progress) {
   const std::string said = spoken_place(from);
   const auto source = TRY(is_postgres_url(from) ? open_to_write(from) : open_to_read(from));
-  Transaction moment(*source, source->is_shared() ? Transaction::For::kWriting : Transaction::For::kReading);
+  Transaction moment(*source,
+                     source->is_shared() ? Transaction::For::kWriting : Transaction::For::kReading);
   keep_as_it_is(*source);
   source->take_long();
   TRY(check_not_moved(*source, said));
@@ -174,7 +184,8 @@ Result<StoreContent> move_store(const std::string& from, const std::string& to, 
   try {
     mark_as_moved(*source, moment, from, to);
   } catch (const DatabaseError& error) {
-    return failure(ErrorCode::kInternal, "{} is whole, but this one could not be marked as moved there: {}",
+    return failure(ErrorCode::kInternal,
+                   "{} is whole, but this one could not be marked as moved there: {}",
                    spoken_place(to), error.what())
         .in(said)
         .next("see that nobody serves this one any more");
@@ -182,7 +193,8 @@ Result<StoreContent> move_store(const std::string& from, const std::string& to, 
   return content;
 }
 
-Result<StoreContent> copy_and_keep(const std::string& from, const std::string& to, const Progress& progress) {
+Result<StoreContent> copy_and_keep(const std::string& from, const std::string& to,
+                                   const Progress& progress) {
   const auto source = TRY(open_to_read(from));
   const Transaction moment(*source, Transaction::For::kReading);
   source->take_long();
@@ -206,7 +218,8 @@ Result<StoreContent> copy_store(const std::string& from, const std::string& to, 
     nobody_writes.emplace(std::move(lock));
   }
   try {
-    return source == SourceAfter::kMoved ? move_store(from, to, progress) : copy_and_keep(from, to, progress);
+    return source == SourceAfter::kMoved ? move_store(from, to, progress)
+                                         : copy_and_keep(from, to, progress);
   } catch (const DatabaseError& error) {
     return failure_of(error, spoken_place(from));
   }

@@ -22,8 +22,8 @@ struct StoreContent {
   std::string audit_hash;       ///< of the last one; to be kept elsewhere
 };
 
-/// Looks through a whole store, a file or a database by its URL, also while services use it: every batch, model and row
-/// of the audit trail. Changes nothing. Refuses (kInternal) what is damaged.
+/// Looks through a whole store, a file or a database by its URL, also while services use it: every
+/// batch, model and row of the audit trail. Changes nothing. Refuses (kInternal) what is damaged.
 [[nodiscard]] Result<StoreContent> look_through_store(const std::string& place);
 
 /// What becomes of the store that was copied.
@@ -32,11 +32,13 @@ enum class SourceAfter {
   kKept    ///< it stays as it is: the copy is one to try, or to keep
 };
 
-/// Copies a store, a file or database, to another, with all that was ever in it: the same versions, the same trail, the
-/// same identity. It is verified table by table before it counts. The trail of the new one then says where it came
-/// from. A file must not be served meanwhile; of a database that is moved the services change nothing meanwhile, and
-/// nothing afterwards. Refuses a target that is not empty. `progress`: the share that is done.
-[[nodiscard]] Result<StoreContent> copy_store(const std::string& from, const std::string& to, SourceAfter source,
-                                              const std::function<void(double)>& progress = nullptr);
+/// Copies a store, a file or database, to another, with all that was ever in it: the same versions,
+/// the same trail, the same identity. It is verified table by table before it counts. The trail of
+/// the new one then says where it came from. A file must not be served meanwhile; of a database
+/// that is moved the services change nothing meanwhile, and nothing afterwards. Refuses a target
+/// that is not empty. `progress`: the share that is done.
+[[nodiscard]] Result<StoreContent> copy_store(
+    const std::string& from, const std::string& to, SourceAfter source,
+    const std::function<void(double)>& progress = nullptr);
 
 }  // namespace trammel

@@ -14,11 +14,13 @@ namespace {
 
 /// Runs `work` in one transaction.
 template <typename Work>
-std::invoke_result_t<const Work&, Database&> in_record(const std::string& url, Transaction::For what,
-                                                       const Work& work) {
+std::invoke_result_t<const Work&, Database&> in_record(const std::string& url,
+                                                       Transaction::For what, const Work& work) {
   const std::string place = spoken_place(url);
   if (!is_postgres_url(url))
-    return refused("is no URL of PostgreSQL").in(place).next("a file has one server, whose files count");
+    return refused("is no URL of PostgreSQL")
+        .in(place)
+        .next("a file has one server, whose files count");
   const auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!database) return Failure(database.error()).in(place);
   try {
@@ -33,8 +35,8 @@ std::invoke_result_t<const Work&, Database&> in_record(const std::string& url, T
 }
 
 /// The newest start of the server that has the cell.
-const ServerInRecord* find_server(const std::vector<ServerInRecord>& servers, const std::string& server,
-                                  const std::string& cell) {
+const ServerInRecord* find_server(const std::vector<ServerInRecord>& servers,
+                                  const std::string& server, const std::string& cell) {
   const ServerInRecord* found = nullptr;
   for (const ServerInRecord& one : servers) {
     if (one.self.server != server || !one.self.cells.contains(cell)) continue;
@@ -46,20 +48,22 @@ const ServerInRecord* find_server(const std::vector<ServerInRecord>& servers, co
 }  // namespace
 
 Result<std::vector<CellInRecord>> described_cells(const std::string& url) {
-  return in_record(url, Transaction::For::kReading, [](Database& database) -> Result<std::vector<CellInRecord>> {
-    const std::vector<ServerInRecord> servers = server_rows(database, true);
-    std::vector<CellInRecord> cells;
-    for (const auto& [cell, known] : cell_descriptions(database)) {
-      CellInRecord& one = cells.emplace_back(CellInRecord{cell, known.files, known.server, known.at, {}});
-      for (const ServerInRecord& server : servers) {
-        const auto has = server.self.cells.find(cell);
-        if (has == server.self.cells.end()) continue;
-        one.servers.push_back(
-            {server.self.server, server.self.host, server.is_gone, what_differs(known.files, has->second.files)});
-      }
-    }
-    return cells;
-  });
+  return in_record(
+      url, Transaction::For::kReading, [](Database& database) -> Result<std::vector<CellInRecord>> {
+        const std::vector<ServerInRecord> servers = server_rows(database, true);
+        std::vector<CellInRecord> cells;
+        for (const auto& [cell, known] : cell_descriptions(database)) {
+          CellInRecord& one =
+              cells.emplace_back(CellInRecord{cell, known.files, known.server, known.at, {}});
+          for (const ServerInRecord& server : servers) {
+            const auto has = server.self.cells.find(cell);
+            if (has == server.self.cells.end()) continue;
+            one.servers.push_back({server.self.server, server.self.host, server.is_gone,
+                                   what_differs(known.files, has->second.files)});
+          }
+        }
+        return cells;
+      });
 }
 
 Status describe_cell(const std::string& url, const std::string& cell, const std::string& server,
@@ -67,7 +71,10 @@ Status describe_cell(const std::string& url, const std::string& cell, const std:
   return in_record(url, Transaction::For::kWriting, [&](Database& database) -> Status {
     lock_cell(database, cell);
     const auto known = cell_description(database, cell);
-    if (!known) return failure(ErrorCode::kNotFound, "no server has told of cell {}", cell).of("cell").with_text(cell);
+    if (!known)
+      return failure(ErrorCode::kNotFound, "no server has told of cell {}", cell)
+          .of("cell")
+          .with_text(cell);
     const std::vector<ServerInRecord> servers = server_rows(database, true);
     const ServerInRecord* wanted = find_server(servers, server, cell);
     if (wanted == nullptr)
@@ -81,7 +88,9 @@ Status describe_cell(const std::string& url, const std::string& cell, const std:
     ChangeId by;
     by.who = who;
     record_audit(database,
-                 {cell, "describe", "description", spoken(known->files, known->server), spoken(files, server)}, by);
+                 {cell, "describe", "description", spoken(known->files, known->server),
+                  spoken(files, server)},
+                 by);
     return {};
   });
 }

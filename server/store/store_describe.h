@@ -28,11 +28,11 @@ struct CellInRecord {
 /// Every cell that has a description, by name. Refuses what is no URL of PostgreSQL.
 [[nodiscard]] Result<std::vector<CellInRecord>> described_cells(const std::string& url);
 
-/// From now on the record goes by the files of that server, which is there or was lately. Who has others and began with
-/// what was the record's goes on with the model that it has until it is started again, and changes nothing; who began
-/// otherwise does not answer for the cell. `who`: for the audit trail. Refuses (kNotFound) a server or a cell that the
-/// record does not know.
-[[nodiscard]] Status describe_cell(const std::string& url, const std::string& cell, const std::string& server,
-                                   const std::string& who);
+/// From now on the record goes by the files of that server, which is there or was lately. Who has
+/// others and began with what was the record's goes on with the model that it has until it is
+/// started again, and changes nothing; who began otherwise does not answer for the cell. `who`: for
+/// the audit trail. Refuses (kNotFound) a server or a cell that the record does not know.
+[[nodiscard]] Status describe_cell(const std::string& url, const std::string& cell,
+                                   const std::string& server, const std::string& who);
 
 }  // namespace trammel

@@ -12,12 +12,16 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kHeader = 100;  // bytes that an SQLite file begins with: sizes, counters, whose it is
+constexpr std::size_t kHeader =
+    100;  // bytes that an SQLite file begins with: sizes, counters, whose it is
 
-bool is_same_file(const struct stat& a, const struct stat& b) { return a.st_dev == b.st_dev && a.st_ino == b.st_ino; }
+bool is_same_file(const struct stat& a, const struct stat& b) {
+  return a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+}
 
 bool is_untouched(const struct stat& a, const struct stat& b) {
-  return a.st_size == b.st_size && a.st_ctim.tv_sec == b.st_ctim.tv_sec && a.st_ctim.tv_nsec == b.st_ctim.tv_nsec;
+  return a.st_size == b.st_size && a.st_ctim.tv_sec == b.st_ctim.tv_sec &&
+         a.st_ctim.tv_nsec == b.st_ctim.tv_nsec;
 }
 
 /// For writing, so that a file system that copies what is written to has done so.
@@ -33,7 +37,9 @@ StoreFile::~StoreFile() {
 }
 
 StoreFile::StoreFile(StoreFile&& other) noexcept
-    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), left_(std::move(other.left_)) {}
+    : path_(std::move(other.path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      left_(std::move(other.left_)) {}
 
 Status StoreFile::hold() {
   struct stat there {};
@@ -64,7 +70,8 @@ StoreFile::Left StoreFile::now(const struct stat& about) const {
 
 void StoreFile::remember() {
   struct stat about {};
-  const bool known = descriptor_ >= 0 ? ::fstat(descriptor_, &about) == 0 : ::stat(path_.c_str(), &about) == 0;
+  const bool known =
+      descriptor_ >= 0 ? ::fstat(descriptor_, &about) == 0 : ::stat(path_.c_str(), &about) == 0;
   if (known) left_ = now(about);
 }
 
@@ -80,7 +87,8 @@ StoreFile::Finding StoreFile::look() const {
 }
 
 std::string StoreFile::how_to_bring_back() const {
-  return descriptor_ < 0 ? "" : fmt::format("cp /proc/{}/fd/{} '{}'", ::getpid(), descriptor_, path_);
+  return descriptor_ < 0 ? ""
+                         : fmt::format("cp /proc/{}/fd/{} '{}'", ::getpid(), descriptor_, path_);
 }
 
 }  // namespace trammel

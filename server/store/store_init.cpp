@@ -9,7 +9,9 @@ namespace trammel {
 Status init_store(const std::string& url, const std::string& role) {
   const std::string place = spoken_place(url);
   if (!is_postgres_url(url))
-    return refused("is no URL of PostgreSQL").in(place).next("a file needs none of this: the service creates it");
+    return refused("is no URL of PostgreSQL")
+        .in(place)
+        .next("a file needs none of this: the service creates it");
   const auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!database) return Failure(database.error()).in(place);
   try {

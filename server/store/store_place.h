@@ -8,7 +8,8 @@ namespace trammel {
 /// Whether a store's place is a URL of libpq (`postgresql://...`, `postgres://...`) and no file.
 [[nodiscard]] bool is_postgres_url(std::string_view place);
 
-/// The same for people, without password and options: `postgresql://trammel@db-1,db-2/trammel`. A file stays as it is.
+/// The same for people, without password and options: `postgresql://trammel@db-1,db-2/trammel`. A
+/// file stays as it is.
 [[nodiscard]] std::string spoken_place(const std::string& place);
 
 }  // namespace trammel

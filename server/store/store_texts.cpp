@@ -12,21 +12,29 @@ namespace {
 /// Of both: cell, name, hash, text. A file of the first schema has them, too.
 const StoreTable& batches() {
   using Kind = StoreColumn::Kind;
-  static const StoreTable table{
-      "batches", 2, {{"cell", Kind::kBytes}, {"id", Kind::kBytes}, {"hash", Kind::kBytes}, {"csv", Kind::kBytes}}};
+  static const StoreTable table{"batches",
+                                2,
+                                {{"cell", Kind::kBytes},
+                                 {"id", Kind::kBytes},
+                                 {"hash", Kind::kBytes},
+                                 {"csv", Kind::kBytes}}};
   return table;
 }
 
 const StoreTable& models() {
   using Kind = StoreColumn::Kind;
-  static const StoreTable table{
-      "models",
-      2,
-      {{"cell", Kind::kBytes}, {"version", Kind::kInteger}, {"hash", Kind::kBytes}, {"content", Kind::kBytes}}};
+  static const StoreTable table{"models",
+                                2,
+                                {{"cell", Kind::kBytes},
+                                 {"version", Kind::kInteger},
+                                 {"hash", Kind::kBytes},
+                                 {"content", Kind::kBytes}}};
   return table;
 }
 
-const std::string& text(const StoredRow& row, std::size_t column) { return std::get<std::string>(row.at(column)); }
+const std::string& text(const StoredRow& row, std::size_t column) {
+  return std::get<std::string>(row.at(column));
+}
 
 Failure damaged(const std::string& what, const std::string& place) {
   return failure(ErrorCode::kInternal, "damaged: {}", what).in(place).next("take an older copy");
@@ -34,13 +42,16 @@ Failure damaged(const std::string& what, const std::string& place) {
 
 Status check_batch(const StoredRow& batch, const std::string& place) {
   if (text(batch, 3).empty() || sha256_hex(text(batch, 3)) == text(batch, 2)) return {};
-  return damaged(fmt::format("batch {} of cell {} is not what was accepted", text(batch, 1), text(batch, 0)), place);
+  return damaged(
+      fmt::format("batch {} of cell {} is not what was accepted", text(batch, 1), text(batch, 0)),
+      place);
 }
 
 /// By its own hashes and by that beside it.
 Status check_model(const StoredRow& model, const std::string& place) {
   if (text(model, 3).empty()) return {};
-  const std::string name = fmt::format("version {} of cell {}", std::get<std::int64_t>(model.at(1)), text(model, 0));
+  const std::string name =
+      fmt::format("version {} of cell {}", std::get<std::int64_t>(model.at(1)), text(model, 0));
   const auto hash = undamaged_hash(text(model, 3), name);
   if (!hash) return damaged(fmt::format("{}: {}", name, hash.error().message), place);
   if (*hash != text(model, 2)) return damaged(name + " is not the model that was stored", place);
@@ -60,8 +71,11 @@ Status check_rows(Database& database, const StoreTable& table, const Check& chec
 }  // namespace
 
 Status check_texts(Database& database, const std::string& place) {
-  const Status good = check_rows(database, batches(), [&](const StoredRow& row) { return check_batch(row, place); });
-  return good ? check_rows(database, models(), [&](const StoredRow& row) { return check_model(row, place); }) : good;
+  const Status good = check_rows(database, batches(),
+                                 [&](const StoredRow& row) { return check_batch(row, place); });
+  return good ? check_rows(database, models(),
+                           [&](const StoredRow& row) { return check_model(row, place); })
+              : good;
 }
 
 Result<TrailEnd> check_trail(Database& database) {

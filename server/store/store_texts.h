@@ -9,8 +9,8 @@
 /// What of a store can be verified by its own hashes.
 namespace trammel {
 
-/// Every batch is what was accepted, and every model what was stored. Those that were pruned have no text. Refuses
-/// (kInternal) the first that is not.
+/// Every batch is what was accepted, and every model what was stored. Those that were pruned have
+/// no text. Refuses (kInternal) the first that is not.
 [[nodiscard]] Status check_texts(Database& database, const std::string& place);
 
 struct TrailEnd {

@@ -18,7 +18,9 @@ using Kind = StoreColumn::Kind;
 std::vector<StoreColumn> columns_of(std::initializer_list<std::pair<const char*, char>> spelled) {
   std::vector<StoreColumn> columns;
   for (const auto& [name, kind] : spelled)
-    columns.push_back({name, kind == 'i' ? Kind::kInteger : kind == 'n' ? Kind::kNumber : Kind::kBytes});
+    columns.push_back({name, kind == 'i'   ? Kind::kInteger
+                             : kind == 'n' ? Kind::kNumber
+                                           : Kind::kBytes});
   return columns;
 }
 
@@ -47,7 +49,8 @@ const std::vector<StoreTable> kTables = {
                  {"poses", 'i'},
                  {"job", 'i'},
                  {"quarantine", 'b'}})},
-    {"job_batches", 2, columns_of({{"job", 'i'}, {"position", 'i'}, {"cell", 'b'}, {"batch", 'b'}})},
+    {"job_batches", 2,
+     columns_of({{"job", 'i'}, {"position", 'i'}, {"cell", 'b'}, {"batch", 'b'}})},
     {"models", 2,
      columns_of({{"cell", 'b'},
                  {"version", 'i'},
@@ -60,8 +63,10 @@ const std::vector<StoreTable> kTables = {
                  {"validation_rms", 'n'},
                  {"content", 'b'}})},
     {"activations", 1,
-     columns_of({{"number", 'i'}, {"cell", 'b'}, {"version", 'i'}, {"back", 'i'}, {"activated_at", 'i'}})},
-    {"diagnoses", 1, columns_of({{"job", 'i'}, {"csv", 'b'}, {"apply", 'i'}, {"findings", 'b'}, {"page", 'b'}})},
+     columns_of(
+         {{"number", 'i'}, {"cell", 'b'}, {"version", 'i'}, {"back", 'i'}, {"activated_at", 'i'}})},
+    {"diagnoses", 1,
+     columns_of({{"job", 'i'}, {"csv", 'b'}, {"apply", 'i'}, {"findings", 'b'}, {"page", 'b'}})},
     {"job_times", 1, columns_of({{"job", 'i'}, {"started_at", 'i'}, {"finished_at", 'i'}})},
     {"job_outcomes", 1,
      columns_of({{"job", 'i'},
@@ -77,10 +82,17 @@ const std::vector<StoreTable> kTables = {
     {"job_releases", 3, columns_of({{"job", 'i'}, {"cell", 'b'}, {"batch", 'b'}})},
     {"health_checks", 1, columns_of({{"job", 'i'}})},
     {"activation_figures", 1,
-     columns_of({{"number", 'i'}, {"before_m", 'n'}, {"after_m", 'n'}, {"limit_m", 'n'}, {"why", 'b'}})},
-    {"model_times", 2, columns_of({{"cell", 'b'}, {"version", 'i'}, {"trained_at", 'i'}, {"measured_at", 'i'}})},
+     columns_of(
+         {{"number", 'i'}, {"before_m", 'n'}, {"after_m", 'n'}, {"limit_m", 'n'}, {"why", 'b'}})},
+    {"model_times", 2,
+     columns_of({{"cell", 'b'}, {"version", 'i'}, {"trained_at", 'i'}, {"measured_at", 'i'}})},
     {"changes", 1,
-     columns_of({{"number", 'i'}, {"id", 'b'}, {"asked", 'b'}, {"version", 'i'}, {"job", 'i'}, {"made_at", 'i'}})},
+     columns_of({{"number", 'i'},
+                 {"id", 'b'},
+                 {"asked", 'b'},
+                 {"version", 'i'},
+                 {"job", 'i'},
+                 {"made_at", 'i'}})},
     {"pruned", 3, columns_of({{"kind", 'b'}, {"cell", 'b'}, {"id", 'b'}})},
     {"discarded", 2, columns_of({{"cell", 'b'}, {"batch", 'b'}})},
     {"audit", 1,
@@ -102,7 +114,8 @@ const std::vector<StoreTable> kTables = {
 std::string list_of(const StoreTable& table, std::size_t count, bool placeholders) {
   std::string list;
   for (std::size_t i = 0; i < count; ++i)
-    list += (i == 0 ? "" : ", ") + (placeholders ? fmt::format("${}", i + 1) : std::string(table.columns[i].name));
+    list += (i == 0 ? "" : ", ") +
+            (placeholders ? fmt::format("${}", i + 1) : std::string(table.columns[i].name));
   return list;
 }
 
@@ -141,7 +154,8 @@ std::string spelled(const StoredRow& row) {
 
 const std::vector<StoreTable>& store_tables() { return kTables; }
 
-void each_row(Database& database, const StoreTable& table, const std::function<bool(const StoredRow&)>& visit) {
+void each_row(Database& database, const StoreTable& table,
+              const std::function<bool(const StoredRow&)>& visit) {
   const auto keys = static_cast<std::size_t>(table.keys);
   const std::string names = list_of(table, keys, false);
   std::string columns = list_of(table, table.columns.size(), false);
@@ -150,7 +164,8 @@ void each_row(Database& database, const StoreTable& table, const std::function<b
   const std::string all = fmt::format("SELECT {} FROM {} ", columns, table.name);
   const std::string order = fmt::format("ORDER BY {} LIMIT {}", names, kRowsAtOnce);
   const std::string first = all + order;
-  const std::string next = fmt::format("{}WHERE ({}) > ({}) {}", all, names, list_of(table, keys, true), order);
+  const std::string next =
+      fmt::format("{}WHERE ({}) > ({}) {}", all, names, list_of(table, keys, true), order);
   for (StoredRow last;;) {
     std::vector<SqlValue> after;
     for (std::size_t i = 0; i < keys && !last.empty(); ++i) after.push_back(bound(last[i]));
@@ -171,8 +186,8 @@ void each_row(Database& database, const StoreTable& table, const std::function<b
 
 void insert_row(Database& database, const StoreTable& table, const StoredRow& row) {
   const std::size_t count = table.columns.size();
-  const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table.name, list_of(table, count, false),
-                                      list_of(table, count, true));
+  const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table.name,
+                                      list_of(table, count, false), list_of(table, count, true));
   std::vector<SqlValue> values;
   for (const StoredValue& value : row) values.push_back(bound(value));
   database.change(sql.c_str(), Database::Values(values));

@@ -24,8 +24,8 @@ struct StoreTable {
   std::vector<StoreColumn> columns;
 };
 
-/// What a store is moved with, what others refer to first. Not who is there and works on what, not how cells are
-/// described, and not the end of the audit trail.
+/// What a store is moved with, what others refer to first. Not who is there and works on what, not
+/// how cells are described, and not the end of the audit trail.
 [[nodiscard]] const std::vector<StoreTable>& store_tables();
 
 /// NULL, or what the column holds.
@@ -33,11 +33,12 @@ using StoredValue = std::variant<std::nullptr_t, std::int64_t, double, std::stri
 using StoredRow = std::vector<StoredValue>;
 
 /// Calls `visit` for each row, by its key; false ends it.
-void each_row(Database& database, const StoreTable& table, const std::function<bool(const StoredRow&)>& visit);
+void each_row(Database& database, const StoreTable& table,
+              const std::function<bool(const StoredRow&)>& visit);
 void insert_row(Database& database, const StoreTable& table, const StoredRow& row);
 
-/// So many rows, and a SHA-256 that any change of any row changes. The order of the rows does not matter: databases
-/// sort texts otherwise.
+/// So many rows, and a SHA-256 that any change of any row changes. The order of the rows does not
+/// matter: databases sort texts otherwise.
 struct TableDigest {
   std::string table;
   std::int64_t rows = 0;

@@ -29,7 +29,8 @@ std::string lock_path_of(const std::string& file) {
 }
 
 Failure held(const std::string& file, int descriptor, const std::string& lock) {
-  return failure(ErrorCode::kConflict, "process {} is writing it (lock {})", holder_of(descriptor), lock)
+  return failure(ErrorCode::kConflict, "process {} is writing it (lock {})", holder_of(descriptor),
+                 lock)
       .in(file)
       .next("one writer at a time");
 }
@@ -67,7 +68,8 @@ Result<WriterLock> WriterLock::take(const std::string& file) {
   // Who holds it is for people; on a full disk it is not known.
   const std::string pid = std::to_string(::getpid()) + "\n";
   if (writable)
-    static_cast<void>(::ftruncate(descriptor, 0) == 0 && ::pwrite(descriptor, pid.data(), pid.size(), 0) > 0);
+    static_cast<void>(::ftruncate(descriptor, 0) == 0 &&
+                      ::pwrite(descriptor, pid.data(), pid.size(), 0) > 0);
   return lock;
 }
 

@@ -7,15 +7,16 @@
 
 namespace trammel {
 
-/// Held by the one process that may write a file: an flock on `<file>.lock`, which contains the holder's process id.
-/// The kernel releases it when the process ends, even after a crash. The lock file itself stays.
+/// Held by the one process that may write a file: an flock on `<file>.lock`, which contains the
+/// holder's process id. The kernel releases it when the process ends, even after a crash. The lock
+/// file itself stays.
 class WriterLock {
  public:
-  /// Refuses (kConflict) when any process, this one included, has it already. Links and relative paths to the same file
-  /// share one lock.
+  /// Refuses (kConflict) when any process, this one included, has it already. Links and relative
+  /// paths to the same file share one lock.
   [[nodiscard]] static Result<WriterLock> take(const std::string& file);
-  /// Refuses (kConflict) when any process has it, or has the file itself by another name. Takes no lock and leaves no
-  /// file. Not for a process that has the file open.
+  /// Refuses (kConflict) when any process has it, or has the file itself by another name. Takes no
+  /// lock and leaves no file. Not for a process that has the file open.
   [[nodiscard]] static Status look(const std::string& file);
   WriterLock(WriterLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   WriterLock& operator=(WriterLock&&) = delete;

@@ -1,5 +1,5 @@
-// What a trainer does where several servers share its store: it follows what others change, keeps its claims, and says
-// that it is there.
+// What a trainer does where several servers share its store: it follows what others change, keeps
+// its claims, and says that it is there.
 #include <pthread.h>
 
 #include <chrono>
@@ -34,8 +34,10 @@ std::int64_t Trainer::follow_models(std::int64_t followed, std::int64_t made) {
   if (made == followed) return followed;
   const bool lost = made < followed;
   if (lost && trouble_listener_)
-    trouble_listener_(fmt::format("the record has {} changes and had {}: it is of an earlier moment", made, followed),
-                      false);
+    trouble_listener_(
+        fmt::format("the record has {} changes and had {}: it is of an earlier moment", made,
+                    followed),
+        false);
   const auto changed = store_.cells_changed_after(lost ? 0 : followed);
   if (!changed) return followed;
   bool all = true;
@@ -46,13 +48,15 @@ std::int64_t Trainer::follow_models(std::int64_t followed, std::int64_t made) {
 }
 
 void Trainer::follow_jobs() {
-  // Before the lock: whoever submits does not wait for it. What is made meanwhile is looked at the next time.
+  // Before the lock: whoever submits does not wait for it. What is made meanwhile is looked at the
+  // next time.
   const auto to_take = store_.jobs_to_take();
   if (!to_take) return;
   const MutexLock lock(submit_mutex_);
   std::set<std::int64_t> elsewhere, ready;
   for (const JobProgress& known : book_.unfinished()) {
-    if (!to_take->contains(known.job) && known.job != runner_.claimed()) elsewhere.insert(known.job);
+    if (!to_take->contains(known.job) && known.job != runner_.claimed())
+      elsewhere.insert(known.job);
   }
   const std::set<std::int64_t> waiting = queue_.jobs();
   for (const auto& [id, cell] : *to_take) {
@@ -66,7 +70,8 @@ void Trainer::follow_jobs() {
   std::vector<std::string> notices;  // the start of a server says them
   for (StoredJob& job : *jobs) {
     if (elsewhere.contains(job.id)) follow_job(job);
-    if (!ready.contains(job.id) || is_over(job) || !can_take_up(job, notices).value_or(false)) continue;
+    if (!ready.contains(job.id) || is_over(job) || !can_take_up(job, notices).value_or(false))
+      continue;
     job.state = JobState::kQueued;
     enqueue(job, !came || !came->contains(job.id));
   }
@@ -104,7 +109,8 @@ void Trainer::agree(std::int64_t descriptions) {
 
 void Trainer::beat(const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "heartbeat");
-  for (auto due = std::chrono::steady_clock::now(); !stop.stop_requested(); presence_.wait(stop, due)) {
+  for (auto due = std::chrono::steady_clock::now(); !stop.stop_requested();
+       presence_.wait(stop, due)) {
     const bool is_due = std::chrono::steady_clock::now() >= due;
     if (is_due) due = std::chrono::steady_clock::now() + kHeartbeat;
     if (is_due) keep_claim();
@@ -125,8 +131,8 @@ ServerSelf Trainer::self() const {
   auto files = presence_.descriptions();
   for (const auto& [name, cell] : cells()) {
     const bool is_apart = cells_.why_apart(name).has_value();
-    self.cells[name] = {is_apart ? 0 : registry_.version_in_force(name), std::move(files[name]), std::move(why[name]),
-                        is_apart};
+    self.cells[name] = {is_apart ? 0 : registry_.version_in_force(name), std::move(files[name]),
+                        std::move(why[name]), is_apart};
   }
   return self;
 }
@@ -154,7 +160,8 @@ ServerInRecord Trainer::alone() const {
 std::map<std::string, CellTrouble> Trainer::cell_troubles() const {
   auto troubles = history_.cell_troubles();
   for (const auto& [cell, one] : cells_.apart()) {
-    if (one.answers) troubles.try_emplace(cell, CellTrouble{CellTrouble::Kind::kFormerFiles, one.why});
+    if (one.answers)
+      troubles.try_emplace(cell, CellTrouble{CellTrouble::Kind::kFormerFiles, one.why});
     if (!one.answers) troubles[cell] = {CellTrouble::Kind::kSetApart, one.why};
   }
   return troubles;
@@ -166,7 +173,8 @@ void Trainer::keep_claim() {
   const auto claim = store_.renew_claim(job);
   if (!claim) return;  // a record that is away lets nobody else claim it, either
   if (!claim->is_held) runner_.lose_claim(job);
-  if (!claim->is_held || claim->cancelled_by) static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
+  if (!claim->is_held || claim->cancelled_by)
+    static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
 }
 
 Status Trainer::cancel_in_record(const StoredJob& job, const ChangeId& by) {

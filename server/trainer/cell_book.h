@@ -17,13 +17,14 @@ namespace trammel {
 /// A cell whose files the record does not go by.
 struct ApartCell {
   std::string why;
-  bool answers = false;  ///< the record did when this server began: it goes on with the model that it has
+  bool answers =
+      false;  ///< the record did when this server began: it goes on with the model that it has
   bool operator==(const ApartCell&) const = default;
 };
 
-/// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Some may be set apart:
-/// this server knows them and may change nothing of them now, nor answer for most. Thread-safe; whoever reads waits for
-/// moments only.
+/// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Some
+/// may be set apart: this server knows them and may change nothing of them now, nor answer for
+/// most. Thread-safe; whoever reads waits for moments only.
 class CellBook {
  public:
   explicit CellBook(ServedCells cells) { keep(std::move(cells)); }
@@ -62,7 +63,8 @@ class CellBook {
   /// Of those that are set apart.
   [[nodiscard]] bool all_answer() const {
     const MutexLock lock(apart_mutex_);
-    return std::all_of(apart_.begin(), apart_.end(), [](const auto& named) { return named.second.answers; });
+    return std::all_of(apart_.begin(), apart_.end(),
+                       [](const auto& named) { return named.second.answers; });
   }
 
   /// A cell that is there already stays as it was.
@@ -79,8 +81,9 @@ class CellBook {
     now_ = kept_.back().get();
   }
 
-  Mutex mutex_;                                           // one at a time adds
-  std::vector<std::unique_ptr<const ServedCells>> kept_;  // somebody may read one: pointers to cells, one map an add()
+  Mutex mutex_;  // one at a time adds
+  std::vector<std::unique_ptr<const ServedCells>>
+      kept_;  // somebody may read one: pointers to cells, one map an add()
   std::atomic<const ServedCells*> now_ = nullptr;
   mutable Mutex apart_mutex_;  // taken last
   std::map<std::string, ApartCell> apart_ TRAMMEL_GUARDED_BY(apart_mutex_);

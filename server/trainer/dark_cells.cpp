@@ -14,7 +14,8 @@ Result<CellAtStart> look_at(const ServedModels& models, const std::string& name,
   TRY(models.find(name, [&](const ModelOnDisk& on_disk) {
     const std::string where = fmt::format("version {} of cell {}", on_disk.version, name);
     const auto read = read_model(on_disk, where);
-    Status good = read ? check_fits_cell(read->model, cell, where) : Status(tl::make_unexpected(read.error()));
+    Status good = read ? check_fits_cell(read->model, cell, where)
+                       : Status(tl::make_unexpected(read.error()));
     fits_not = read && !good;
     if (one.version == 0) one.version = on_disk.version;
     if (good && !one.why.empty()) {

@@ -12,7 +12,8 @@ namespace trammel {
 struct CellAtStart {
   enum class State {
     kServed,
-    kCopyServed,   ///< with the one in force, from its copy beside the store: the text in the store is bad
+    kCopyServed,   ///< with the one in force, from its copy beside the store: the text in the store
+                   ///< is bad
     kOlderServed,  ///< with another version than the one in force
     kUntrained,    ///< nothing was ever in force
     kDark          ///< something was in force, and this program would serve nothing
@@ -23,8 +24,10 @@ struct CellAtStart {
   std::string why = {};
 };
 
-/// Every cell, by name, from the store at `path` and the copies beside it, which are only read, also while a service
-/// runs on them: whether this program can read the model in force, and whether it fits the cell as its file is now.
-[[nodiscard]] Result<std::vector<CellAtStart>> cells_at_start(const std::string& path, const ServedCells& cells);
+/// Every cell, by name, from the store at `path` and the copies beside it, which are only read,
+/// also while a service runs on them: whether this program can read the model in force, and whether
+/// it fits the cell as its file is now.
+[[nodiscard]] Result<std::vector<CellAtStart>> cells_at_start(const std::string& path,
+                                                              const ServedCells& cells);
 
 }  // namespace trammel

@@ -25,7 +25,8 @@ JobProgress progress_of(const StoredJob& job) {
   progress.job = job.id;
   progress.cell = job.cell;
   progress.stage = stage_of(job.state);
-  const bool is_elsewhere = job.state == JobState::kRunning && job.message.empty() && !job.server.empty();
+  const bool is_elsewhere =
+      job.state == JobState::kRunning && job.message.empty() && !job.server.empty();
   progress.what = is_elsewhere ? "on " + job.server : job.message;
   progress.share = job.state == JobState::kDone ? 1 : 0;
   progress.model_version = job.model_version;

@@ -31,7 +31,8 @@ void JobQueue::hold(bool held) {
 
 std::optional<TakenJob> JobQueue::take(const std::stop_token& stop) {
   MutexLock lock(mutex_);
-  if (!ready_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty() && !held_; }) ||
+  if (!ready_.wait(lock, stop,
+                   [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty() && !held_; }) ||
       stop.stop_requested())
     return std::nullopt;
   WaitingJob job = next();
@@ -86,7 +87,8 @@ void JobQueue::remove_cell(const std::string& cell) {
 
 bool JobQueue::is_removed(std::int64_t id) {
   for (auto cell = waiting_.begin(); cell != waiting_.end(); ++cell) {
-    if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0) continue;
+    if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0)
+      continue;
     if (cell->second.empty()) waiting_.erase(cell);
     return true;
   }
@@ -115,7 +117,8 @@ std::size_t JobQueue::asked_for(const std::string& cell) const {
   const auto found = waiting_.find(cell);
   if (found == waiting_.end()) return 0;
   return static_cast<std::size_t>(
-      std::count_if(found->second.begin(), found->second.end(), [](const WaitingJob& job) { return job.asked_for; }));
+      std::count_if(found->second.begin(), found->second.end(),
+                    [](const WaitingJob& job) { return job.asked_for; }));
 }
 
 }  // namespace trammel

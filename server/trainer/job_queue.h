@@ -25,9 +25,9 @@ struct TakenJob {
   std::stop_token cancelled;
 };
 
-/// The jobs that wait, those of a cell in their order, the cells in turn: many jobs of one cell hold up each other, and
-/// another cell's by one at most. Without a limit of its own: what came with a batch is accepted, and an id is small.
-/// Thread-safe; one thread takes.
+/// The jobs that wait, those of a cell in their order, the cells in turn: many jobs of one cell
+/// hold up each other, and another cell's by one at most. Without a limit of its own: what came
+/// with a batch is accepted, and an id is small. Thread-safe; one thread takes.
 class JobQueue {
  public:
   void push(WaitingJob job);
@@ -65,8 +65,9 @@ class JobQueue {
   [[nodiscard]] bool is_removed(std::int64_t id) TRAMMEL_REQUIRES(mutex_);
 
   mutable Mutex mutex_;
-  Condition ready_;                                                                   // there are jobs
-  std::map<std::string, std::deque<WaitingJob>> waiting_ TRAMMEL_GUARDED_BY(mutex_);  // by cell; none is empty
+  Condition ready_;  // there are jobs
+  std::map<std::string, std::deque<WaitingJob>> waiting_
+      TRAMMEL_GUARDED_BY(mutex_);  // by cell; none is empty
   bool held_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);  // whose turn it was
   std::optional<std::int64_t> taken_ TRAMMEL_GUARDED_BY(mutex_);

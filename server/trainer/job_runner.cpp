@@ -16,9 +16,10 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostEarlierJobs = 500;                     // among which earlier checks are looked for
+constexpr int kMostEarlierJobs = 500;  // among which earlier checks are looked for
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running job, for its watchers
-constexpr std::chrono::milliseconds kFirstPause{250};     // before the disk is asked again; twice as long each time
+constexpr std::chrono::milliseconds kFirstPause{
+    250};  // before the disk is asked again; twice as long each time
 constexpr std::chrono::milliseconds kLongestPause{5000};
 
 JobProgress progress_at(const StoredJob& job, JobStage stage) {
@@ -87,15 +88,22 @@ bool is_same(const Opponents& a, const Opponents& b) {
 
 }  // namespace
 
-JobRunner::JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
-                     ProgressBook& book, const TrainerOptions& options)
-    : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
+JobRunner::JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry,
+                     ModelHistory& history, ProgressBook& book, const TrainerOptions& options)
+    : cells_(cells),
+      store_(store),
+      registry_(registry),
+      history_(history),
+      book_(book),
+      options_(options) {}
 
-JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop, const CancelledBy& cancelled_by) {
+JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop,
+                              const CancelledBy& cancelled_by) {
   const Attempt attempted = [&]() -> Attempt {
     try {
       return attempt(id, stop);
-    } catch (const std::exception& error) {  // out of memory, for one: this job ends, the service goes on
+    } catch (const std::exception&
+                 error) {  // out of memory, for one: this job ends, the service goes on
       Failure broken = failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
       return tl::make_unexpected(Failed{broken.value(), JobVerdict::kBroken});
     }
@@ -106,17 +114,21 @@ JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop, const C
 }
 
 JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop) {
-  const auto failed = [](const Error& error) { return tl::make_unexpected(Failed{error, verdict_of(error)}); };
+  const auto failed = [](const Error& error) {
+    return tl::make_unexpected(Failed{error, verdict_of(error)});
+  };
   const auto job = store_.job(id);
   if (!job) return failed(job.error());
   if (const auto cell = cells_.find(job->cell); !cell) {
     const bool elsewhere = cell.error().code == ErrorCode::kConflict;  // others answer for it
-    return tl::make_unexpected(Failed{cell.error(), verdict_of(cell.error()), false, {}, elsewhere});
+    return tl::make_unexpected(
+        Failed{cell.error(), verdict_of(cell.error()), false, {}, elsewhere});
   }
   const Status running = once_the_disk_lets(id, stop, [&] { return store_.set_job_running(id); });
   if (!running) {
     const bool elsewhere = running.error().code == ErrorCode::kConflict;
-    return tl::make_unexpected(Failed{running.error(), verdict_of(running.error()), false, {}, elsewhere});
+    return tl::make_unexpected(
+        Failed{running.error(), verdict_of(running.error()), false, {}, elsewhere});
   }
   lost_ = 0;
   claimed_ = id;
@@ -133,7 +145,8 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   return compute(*job, asked, stop);
 }
 
-JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+JobRunner::Attempt JobRunner::compute(const StoredJob& job,
+                                      const std::optional<StoredDiagnosis>& asked,
                                       const StopRequests& stop) {
   auto task = task_of(job, asked);
   if (!task) return tl::make_unexpected(Failed{task.error(), verdict_of(task.error())});
@@ -145,16 +158,19 @@ JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<
   ComputeWatch watch;
   watch.progress = reporter(job, stop);
   watch.found = [&](const std::string& findings, const std::string& page) {
-    return once_the_disk_lets(job.id, stop, [&] { return store_.store_findings(job.id, findings, page); });
+    return once_the_disk_lets(job.id, stop,
+                              [&] { return store_.store_findings(job.id, findings, page); });
   };
   const auto made = (*computing)->make(watch);
   if (!made) return tl::make_unexpected(failed_by(**computing, made.error()));
-  if (!made->quarantine.empty()) return quarantine(job, made->quarantine, (*computing)->cost(), stop);
+  if (!made->quarantine.empty())
+    return quarantine(job, made->quarantine, (*computing)->cost(), stop);
   if (!made->model) return finish(job, *made, (*computing)->cost(), stop);
   return keep(job, *made, **computing, stop);
 }
 
-Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional<StoredDiagnosis>& asked) const {
+Result<ComputeTask> JobRunner::task_of(const StoredJob& job,
+                                       const std::optional<StoredDiagnosis>& asked) const {
   ComputeTask task;
   task.cell = cells_.now().at(job.cell);
   task.kind = job.kind;
@@ -186,14 +202,15 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
 Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch) const {
   if (job.kind != JobKind::kTrain) return true;
   if (came_with_batch) return false;
-  // Somebody asked: for what he released, with all that the cell knows; else for the batches that he named.
+  // Somebody asked: for what he released, with all that the cell knows; else for the batches that
+  // he named.
   const auto releases = store_.may_release(job.id);
   if (!releases) return releases;
   return !*releases;
 }
 
-/// From the models in force of other cells with robots of its type; empty where the cell does not want it, or where
-/// they are too few.
+/// From the models in force of other cells with robots of its type; empty where the cell does not
+/// want it, or where they are too few.
 std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
   const Cell& cell = *cells_.now().at(job.cell);
   const auto rules = rules_of(cell);
@@ -209,17 +226,20 @@ std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const 
 
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
   if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return false;
-  return store_.came_with_batches({job.id}).map([](const std::set<std::int64_t>& came) { return !came.empty(); });
+  return store_.came_with_batches({job.id}).map(
+      [](const std::set<std::int64_t>& came) { return !came.empty(); });
 }
 
-Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+Status JobRunner::give_batches(Computing& computing, const StoredJob& job,
+                               const std::optional<StoredDiagnosis>& asked,
                                const std::vector<std::string>& earlier) const {
   const auto sources = TRY(batch_sources(store_, job, !asked || asked->apply, earlier));
   for (const BatchSource& source : sources) {
     const auto stored = TRY(store_.batch(job.cell, source.id));
     TRY(computing.take({source.id, stored.csv, stored.accepted_at}, source.judges));
   }
-  if (asked && job.batch_ids.empty()) return computing.take({"", asked->csv, job.created_at}, false);
+  if (asked && job.batch_ids.empty())
+    return computing.take({"", asked->csv, job.created_at}, false);
   return {};
 }
 
@@ -230,7 +250,8 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
   book_.report(progress);
   const ComputeCost cost = computing.cost();
   const Candidate candidate{*made.model, job, made.remarks, cost.peak_memory, cost.processor_time};
-  std::optional<std::pair<Opponents, GateVerdict>> judged;  // the last time: the disk may make it be asked again
+  std::optional<std::pair<Opponents, GateVerdict>>
+      judged;  // the last time: the disk may make it be asked again
   const Judging judging = [&](const Opponents& opponents) -> Result<GateVerdict> {
     if (stop.any()) return given_up();
     if (judged && is_same(judged->first, opponents)) return judged->second;
@@ -238,7 +259,8 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
     if (verdict) judged = {opponents, *verdict};
     return verdict;
   };
-  const auto kept = once_the_disk_lets(job.id, stop, [&] { return history_.keep(candidate, judging, stop.service); });
+  const auto kept = once_the_disk_lets(
+      job.id, stop, [&] { return history_.keep(candidate, judging, stop.service); });
   if (!kept) return tl::make_unexpected(failed_by(computing, kept.error()));
   progress.stage = JobStage::kDone;
   progress.what = kept->message;
@@ -249,11 +271,11 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
   return {};
 }
 
-JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
-                                         const StopRequests& stop) {
+JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string& why,
+                                         const ComputeCost& cost, const StopRequests& stop) {
   const std::string& id = job.batch_ids.front();
-  const Status kept =
-      once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why, {}, job.id); });
+  const Status kept = once_the_disk_lets(
+      job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why, {}, job.id); });
   if (!kept) return tl::make_unexpected(Failed{kept.error(), verdict_of(kept.error())});
   Failure refusal = refused("batch {} is in quarantine: {}; nothing was learned from it", id, why)
                         .of("batch")
@@ -262,15 +284,15 @@ JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string
   return tl::make_unexpected(Failed{refusal.value(), JobVerdict::kQuarantined, false, cost});
 }
 
-JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, const ComputeCost& cost,
-                                     const StopRequests& stop) {
+JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made,
+                                     const ComputeCost& cost, const StopRequests& stop) {
   JobProgress progress = progress_at(job, JobStage::kDone);
   progress.share = 1;
   progress.what = made.message;
   progress.outcome = made.outcome;
   add_cost(progress.outcome, cost);
-  const Status done =
-      once_the_disk_lets(job.id, stop, [&] { return store_.set_job_done(job.id, made.message, progress.outcome); });
+  const Status done = once_the_disk_lets(
+      job.id, stop, [&] { return store_.set_job_done(job.id, made.message, progress.outcome); });
   if (!done) return tl::make_unexpected(Failed{done.error(), verdict_of(done.error())});
   book_.report(progress);
   return {};
@@ -290,16 +312,18 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   const bool cancelled = stop.job.stop_requested();
   if (stop.service.stop_requested() && !cancelled) return put_back(job, job.message, false, stop);
   const std::string why = sentence(failed.error);
-  // A record that was away or locked for a moment ends no job. If its result was taken all the same, the next attempt
-  // finds that it is over.
+  // A record that was away or locked for a moment ends no job. If its result was taken all the
+  // same, the next attempt finds that it is over.
   if (store_.is_shared() && failed.error.code == ErrorCode::kBusy && !cancelled)
     return put_back(job, fmt::format("{}; it is tried again", why), false, stop);
   if (!cancelled && failed.again && job.attempts < kMaxAttempts)
-    return put_back(job, fmt::format("{}; it is tried again ({} of {})", why, job.attempts + 1, kMaxAttempts), true,
-                    stop);
+    return put_back(
+        job, fmt::format("{}; it is tried again ({} of {})", why, job.attempts + 1, kMaxAttempts),
+        true, stop);
   JobProgress progress = progress_at(job, JobStage::kFailed);
   const std::string who = cancelled ? cancelled_by() : "";
-  progress.outcome = cancelled ? cancelled_outcome(who) : failed_outcome(failed.error, failed.verdict);
+  progress.outcome =
+      cancelled ? cancelled_outcome(who) : failed_outcome(failed.error, failed.verdict);
   add_cost(progress.outcome, failed.cost);
   progress.what = cancelled ? progress.outcome.why : why;
   if (!cancelled && failed.again) progress.what += fmt::format("; tried {} times", job.attempts);
@@ -308,7 +332,8 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   });
   if (ended) {
     book_.report(progress);
-  } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored, or it is another server's
+  } else if (ended.error().code !=
+             ErrorCode::kNotFound) {  // else its model is stored, or it is another server's
     // The store has it as unfinished still: the next start takes it up.
     progress.stage = JobStage::kQueued;
     progress.what += "; the store does not take that: " + sentence(ended.error());
@@ -317,10 +342,11 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   return End::kOver;
 }
 
-JobRunner::End JobRunner::put_back(const StoredJob& job, const std::string& why, bool attempt_counts,
-                                   const StopRequests& stop) {
+JobRunner::End JobRunner::put_back(const StoredJob& job, const std::string& why,
+                                   bool attempt_counts, const StopRequests& stop) {
   // Should the store refuse, the job counts as interrupted and is taken up all the same.
-  static_cast<void>(once_the_disk_lets(job.id, stop, [&] { return store_.set_job_queued(job.id, attempt_counts); }));
+  static_cast<void>(once_the_disk_lets(
+      job.id, stop, [&] { return store_.set_job_queued(job.id, attempt_counts); }));
   JobProgress progress = progress_at(job, JobStage::kQueued);
   progress.what = why;
   book_.report(progress);
@@ -331,8 +357,8 @@ JobRunner::Failed JobRunner::failed_by(const Computing& computing, const Error& 
   Failed failed{error, verdict_of(error), false, computing.cost()};
   const auto breakdown = computing.breakdown();
   if (!breakdown) return failed;
-  const bool over_limit =
-      breakdown->kind == Breakdown::Kind::kOverMemory || breakdown->kind == Breakdown::Kind::kOverTime;
+  const bool over_limit = breakdown->kind == Breakdown::Kind::kOverMemory ||
+                          breakdown->kind == Breakdown::Kind::kOverTime;
   failed.error = breakdown->error;
   failed.verdict = over_limit ? JobVerdict::kOverLimit : JobVerdict::kBroken;
   failed.again = !over_limit;
@@ -340,14 +366,17 @@ JobRunner::Failed JobRunner::failed_by(const Computing& computing, const Error& 
 }
 
 template <typename Work>
-auto JobRunner::once_the_disk_lets(std::int64_t job, const StopRequests& stop, const Work& work) -> decltype(work()) {
+auto JobRunner::once_the_disk_lets(std::int64_t job, const StopRequests& stop, const Work& work)
+    -> decltype(work()) {
   const EitherStop either(stop);
   for (auto length = kFirstPause;; length = std::min(2 * length, kLongestPause)) {
     auto worked = work();
-    const bool of_the_disk = !worked && worked.error().code == ErrorCode::kBusy && store_.state().why_not_written;
+    const bool of_the_disk =
+        !worked && worked.error().code == ErrorCode::kBusy && store_.state().why_not_written;
     if (!of_the_disk || stop.any()) return worked;
     report_waiting(job, worked.error());
-    if (!pause(length, either.token()) || !store_.wait_until_writable(either.token())) return worked;
+    if (!pause(length, either.token()) || !store_.wait_until_writable(either.token()))
+      return worked;
   }
 }
 
@@ -358,10 +387,11 @@ void JobRunner::report_waiting(std::int64_t job, const Error& why) {
   book_.report(*progress);
 }
 
-std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const StopRequests& stop) {
+std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job,
+                                                                    const StopRequests& stop) {
   auto reported = std::make_shared<std::chrono::steady_clock::time_point>();
-  return [this, running = progress_at(job, JobStage::kTraining), reported, stop](const std::string& stage,
-                                                                                 double share) mutable {
+  return [this, running = progress_at(job, JobStage::kTraining), reported, stop](
+             const std::string& stage, double share) mutable {
     const auto time = std::chrono::steady_clock::now();
     if (time >= *reported + kReportInterval) {
       *reported = time;

@@ -19,14 +19,14 @@ namespace trammel {
 
 constexpr int kMaxAttempts = 3;  // of one job whose computing, or the process, breaks off
 
-/// What is done for one job: it is taken from the store, computed (in a process of its own), and the outcome is stored
-/// and reported. What the disk does not let be stored now waits for it: nothing is reported as over that the store does
-/// not have so. Of the queue's thread.
+/// What is done for one job: it is taken from the store, computed (in a process of its own), and
+/// the outcome is stored and reported. What the disk does not let be stored now waits for it:
+/// nothing is reported as over that the store does not have so. Of the queue's thread.
 class JobRunner {
  public:
   /// The references outlive it.
-  JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
-            ProgressBook& book, const TrainerOptions& options);
+  JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry,
+            ModelHistory& history, ProgressBook& book, const TrainerOptions& options);
 
   using CancelledBy = std::function<std::string()>;
   enum class End {
@@ -35,7 +35,8 @@ class JobRunner {
     kElsewhere  ///< another server works on it, or on another job of its cell
   };
   /// `cancelled_by` says who asked for it to end, where somebody did.
-  [[nodiscard]] End run(std::int64_t job, const StopRequests& stop, const CancelledBy& cancelled_by);
+  [[nodiscard]] End run(std::int64_t job, const StopRequests& stop,
+                        const CancelledBy& cancelled_by);
   /// The job that is this server's now, until it is over; 0: none. Thread-safe.
   [[nodiscard]] std::int64_t claimed() const { return claimed_; }
   /// That job is not this server's any more: its attempt here leaves no trace. Thread-safe.
@@ -56,8 +57,10 @@ class JobRunner {
   [[nodiscard]] Attempt compute(const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
                                 const StopRequests& stop);
   /// What the job is computed from, but its batches.
-  [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job, const std::optional<StoredDiagnosis>& asked) const;
-  /// Whether the job came with its batch: somebody else's training was asked for, knowing the batch.
+  [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job,
+                                            const std::optional<StoredDiagnosis>& asked) const;
+  /// Whether the job came with its batch: somebody else's training was asked for, knowing the
+  /// batch.
   [[nodiscard]] std::optional<FleetPrior> fleet_prior_of(const StoredJob& job) const;
   [[nodiscard]] Result<bool> came_with_batch(const StoredJob& job) const;
   /// Whether it learns from the batches of the job alone: somebody named them.
@@ -65,9 +68,10 @@ class JobRunner {
   [[nodiscard]] Status give_batches(Computing& computing, const StoredJob& job,
                                     const std::optional<StoredDiagnosis>& asked,
                                     const std::vector<std::string>& earlier) const;
-  [[nodiscard]] Attempt keep(const StoredJob& job, const Made& made, Computing& computing, const StopRequests& stop);
-  [[nodiscard]] Attempt quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
-                                   const StopRequests& stop);
+  [[nodiscard]] Attempt keep(const StoredJob& job, const Made& made, Computing& computing,
+                             const StopRequests& stop);
+  [[nodiscard]] Attempt quarantine(const StoredJob& job, const std::string& why,
+                                   const ComputeCost& cost, const StopRequests& stop);
   /// Ends a job that makes no model.
   [[nodiscard]] Attempt finish(const StoredJob& job, const Made& made, const ComputeCost& cost,
                                const StopRequests& stop);
@@ -78,11 +82,11 @@ class JobRunner {
                              const StopRequests& stop);
   [[nodiscard]] Failed failed_by(const Computing& computing, const Error& error) const;
 
-  /// Asks the store for something until it does it or refuses it; while its disk does not let it, waits for that. An
-  /// error of the disk comes back only once the job is to end.
+  /// Asks the store for something until it does it or refuses it; while its disk does not let it,
+  /// waits for that. An error of the disk comes back only once the job is to end.
   template <typename Work>
-  [[nodiscard]] auto once_the_disk_lets(std::int64_t job, const StopRequests& stop, const Work& work)
-      -> decltype(work());
+  [[nodiscard]] auto once_the_disk_lets(std::int64_t job, const StopRequests& stop,
+                                        const Work& work) -> decltype(work());
   void report_waiting(std::int64_t job, const Error& why);
   /// Reports at most every few milliseconds; answers false once the job is to end.
   [[nodiscard]] std::function<bool(const std::string&, double)> reporter(const StoredJob& job,

@@ -31,8 +31,8 @@ Status check_released(const StoredBatch& batch) {
       .next("release it if it is good");
 }
 
-Result<std::vector<std::string>> earlier_sessions(const Store& store, const StoredJob& job, const SessionRule& rule,
-                                                  int max_poses) {
+Result<std::vector<std::string>> earlier_sessions(const Store& store, const StoredJob& job,
+                                                  const SessionRule& rule, int max_poses) {
   const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
   const auto stored = TRY(store.batches(job.cell));
   const auto learned = TRY(store.batches_learned_from(job.cell));
@@ -44,13 +44,14 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
   }
   std::vector<std::string> earlier;
   for (auto batch = stored.rbegin(); batch != stored.rend(); ++batch) {
-    if (own.contains(batch->id) || !batch->quarantine.empty() || batch->pruned || !learned.contains(batch->id))
+    if (own.contains(batch->id) || !batch->quarantine.empty() || batch->pruned ||
+        !learned.contains(batch->id))
       continue;
-    const bool too_old =
-        rule.kind == SessionRule::Kind::kDays && batch->accepted_at < newest - kSecondsPerDay * rule.count;
+    const bool too_old = rule.kind == SessionRule::Kind::kDays &&
+                         batch->accepted_at < newest - kSecondsPerDay * rule.count;
     if (too_old) continue;  // servers of one record have clocks of their own
-    const bool too_many =
-        rule.kind == SessionRule::Kind::kLast && earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
+    const bool too_many = rule.kind == SessionRule::Kind::kLast &&
+                          earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
     if (too_many || poses + batch->poses > max_poses) break;
     poses += batch->poses;
     earlier.push_back(batch->id);
@@ -59,7 +60,8 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
   return earlier;
 }
 
-Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job, bool judged,
+Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job,
+                                               bool judged,
                                                const std::vector<std::string>& earlier) {
   const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
   const auto stored = TRY(store.batches(job.cell));
@@ -67,9 +69,12 @@ Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJ
   std::vector<BatchSource> judging;
   if (judged) {
     const auto may_judge = TRY(store.batches_learned_from(job.cell));
-    for (auto batch = stored.rbegin(); batch != stored.rend() && judging.size() < kMostSessions; ++batch) {
+    for (auto batch = stored.rbegin(); batch != stored.rend() && judging.size() < kMostSessions;
+         ++batch) {
       if (batch->pruned) continue;
-      if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge.contains(batch->id))) continue;
+      if (!own.contains(batch->id) &&
+          (!batch->quarantine.empty() || !may_judge.contains(batch->id)))
+        continue;
       judging.push_back({batch->id, true});
     }
     std::reverse(judging.begin(), judging.end());
@@ -77,8 +82,8 @@ Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJ
   std::vector<BatchSource> sources;
   for (const std::vector<std::string>* some : {&job.batch_ids, &earlier}) {
     for (const std::string& id : *some) {
-      const bool judges =
-          std::any_of(judging.begin(), judging.end(), [&](const BatchSource& one) { return one.id == id; });
+      const bool judges = std::any_of(judging.begin(), judging.end(),
+                                      [&](const BatchSource& one) { return one.id == id; });
       if (!judges) sources.push_back({id, false});
     }
   }

@@ -11,9 +11,10 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostAttempts = 8;              // where others change what is in force meanwhile
-constexpr std::size_t kMostServedBefore = 4;  // versions that a new one is held against besides the one in force
-constexpr std::size_t kMostReadBefore = 8;    // of which some may not load
+constexpr int kMostAttempts = 8;  // where others change what is in force meanwhile
+constexpr std::size_t kMostServedBefore =
+    4;  // versions that a new one is held against besides the one in force
+constexpr std::size_t kMostReadBefore = 8;  // of which some may not load
 
 JobOutcome outcome_of(const GateVerdict& verdict) {
   JobOutcome outcome;
@@ -50,7 +51,8 @@ Mutex& ModelHistory::changes_of(const std::string& cell) {
 
 std::vector<std::string> ModelHistory::announce_all() {
   std::map<std::string, int> in_force;
-  if (store_.is_shared()) in_force = store_.versions_in_force().value_or(std::map<std::string, int>());
+  if (store_.is_shared())
+    in_force = store_.versions_in_force().value_or(std::map<std::string, int>());
   std::vector<std::string> notices;
   for (const auto& [name, cell] : cells_.now()) {
     if (const auto known = in_force.find(name); known != in_force.end()) {
@@ -79,26 +81,28 @@ Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
       if (!why_not) why_not = read.error();
       continue;
     }
-    const auto fits =
-        check_fits_cell(read->model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
+    const auto fits = check_fits_cell(read->model, *cells_.now().at(cell),
+                                      fmt::format("version {} of cell {}", version, cell));
     if (!fits) {
       set_trouble(cell, CellTrouble{CellTrouble::Kind::kOfAnotherRobot, sentence(fits.error())});
       return tl::make_unexpected(fits.error());
     }
-    // A version that lost its copy gets a new one; where the store cannot give it, it was made from its copy.
+    // A version that lost its copy gets a new one; where the store cannot give it, it was made from
+    // its copy.
     static_cast<void>(store_.copy_model_in_force(cell));
     std::optional<CellTrouble> trouble;
     if (!read->damage.empty()) trouble = {CellTrouble::Kind::kCopyServed, read->damage};
     if (why_not)
-      trouble = {
-          CellTrouble::Kind::kOlderServed,
-          fmt::format("cell {}: version {} is served instead of a newer one: {}", cell, version, sentence(*why_not))};
+      trouble = {CellTrouble::Kind::kOlderServed,
+                 fmt::format("cell {}: version {} is served instead of a newer one: {}", cell,
+                             version, sentence(*why_not))};
     set_trouble(cell, trouble);
     return ServedModel{cell, version, std::move(read->model)};
   }
   if (!why_not) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
-  set_trouble(cell, CellTrouble{CellTrouble::Kind::kUnreadable,
-                                fmt::format("cell {} is not served: {}", cell, sentence(*why_not))});
+  set_trouble(cell,
+              CellTrouble{CellTrouble::Kind::kUnreadable,
+                          fmt::format("cell {} is not served: {}", cell, sentence(*why_not))});
   return tl::make_unexpected(*why_not);
 }
 
@@ -123,10 +127,12 @@ void ModelHistory::set_trouble(const std::string& cell, const std::optional<Cell
   }
 }
 
-Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell, int version) const {
+Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell,
+                                                        int version) const {
   auto model = store_.model(cell, version);
   if (!model) return model;
-  TRY(check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell)));
+  TRY(check_fits_cell(*model, *cells_.now().at(cell),
+                      fmt::format("version {} of cell {}", version, cell)));
   return model;
 }
 
@@ -139,19 +145,22 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   const MutexLock lock(changes_of(cell));
   const auto made_meanwhile = TRY(store_.outcome_of(id));
   if (made_meanwhile) return {};
-  const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
+  const std::optional<JobOutcome> figures =
+      judged ? std::optional(outcome_of(*judged)) : std::nullopt;
   TRY(store_.activate(cell, version, id, figures));
   if (registry_.version_in_force(cell) != version) put_in_force(std::move(model));
   return {};
 }
 
 Status ModelHistory::follow(const std::string& cell) {
-  const MutexLock lock(changes_of(cell));  // what this server decides meanwhile is published before it is compared
+  const MutexLock lock(
+      changes_of(cell));  // what this server decides meanwhile is published before it is compared
   const auto decided = TRY(store_.version_in_force(cell));
   if (!decided || *decided == registry_.version_in_force(cell)) return {};
   auto model = registry_.version(cell, *decided);
   if (!model) {
-    // A model by files that the record goes by now may not fit those of before: this server goes on with what it has.
+    // A model by files that the record goes by now may not fit those of before: this server goes on
+    // with what it has.
     if (cells_.find_apart(cell) && model.error().code != ErrorCode::kBusy) return {};
     registry_.announce(cell, *decided);  // whoever asks for it hears why it is not served
     if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());
@@ -168,13 +177,14 @@ Result<ModelHistory::WayBack> ModelHistory::way_back(const std::string& cell) co
   return WayBack{now.value_or(0), std::move(before)};
 }
 
-Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::string& cell,
-                                                                const std::vector<int>& before) const {
+Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(
+    const std::string& cell, const std::vector<int>& before) const {
   std::optional<Error> why_not;
   for (std::size_t i = 0; i < before.size(); ++i) {
     auto model = registry_.version(cell, before[i]);
     if (model) return std::pair(static_cast<int>(i) + 1, std::move(*model));
-    if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());  // it is there, and not now
+    if (model.error().code == ErrorCode::kBusy)
+      return tl::make_unexpected(model.error());  // it is there, and not now
     if (!why_not) why_not = model.error();
   }
   return tl::make_unexpected(*why_not);
@@ -193,7 +203,8 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
     ChangeId decided = id;
     if (!decided.expected_version) decided.expected_version = way.version_now;
     const auto restored = store_.rollback(cell, found.first, decided);
-    const bool changed_elsewhere = !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
+    const bool changed_elsewhere =
+        !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
     if (changed_elsewhere) continue;
     if (!restored) return restored;
     // Where others went away from this version and back meanwhile, the way back is another one.
@@ -204,7 +215,8 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
     }
     return restored;
   }
-  return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");
+  return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell)
+      .next("try again later");
 }
 
 Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const std::string& text,
@@ -222,7 +234,8 @@ Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const
   return model;
 }
 
-Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text, const ChangeId& id) {
+Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text,
+                                       const ChangeId& id) {
   const auto model = TRY(model_from(cell, text, "imported model"));
   const MutexLock lock(changes_of(cell));
   const auto present = TRY(store_.models(cell));
@@ -238,18 +251,22 @@ GateVerdict ModelHistory::within_step_limit(GateVerdict verdict, const Candidate
                                             const ServedModel* present) const {
   const std::optional<double>& limit = cells_.now().at(candidate.job.cell)->step_limit;
   if (!verdict.put_in_force || present == nullptr || !limit) return verdict;
-  const auto step = farthest_step(present->model, candidate.model, recent_poses_.of(candidate.job.cell));
+  const auto step =
+      farthest_step(present->model, candidate.model, recent_poses_.of(candidate.job.cell));
   if (!step || *step <= *limit) return verdict;
   verdict.put_in_force = false;
   verdict.undecided = true;
-  verdict.why += fmt::format("; but a pose recently asked for would move by {:.4f} mm, limit {:g} mm", to_mm(*step),
-                             to_mm(*limit));
-  verdict.message = fmt::format("not in force: {}; version {} stays in force; activate the new one if it is wanted",
-                                verdict.why, present->version);
+  verdict.why +=
+      fmt::format("; but a pose recently asked for would move by {:.4f} mm, limit {:g} mm",
+                  to_mm(*step), to_mm(*limit));
+  verdict.message = fmt::format(
+      "not in force: {}; version {} stays in force; activate the new one if it is wanted",
+      verdict.why, present->version);
   return verdict;
 }
 
-Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate, const Judging& judging,
+Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate,
+                                                  const Judging& judging,
                                                   const ServedModel* present) const {
   const auto may_release = TRY(store_.may_release(candidate.job.id));
   const auto others = TRY(opponents(candidate.job.cell, present));
@@ -258,21 +275,25 @@ Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate, co
   const bool released = may_release && (verdict->put_in_force || verdict->undecided);
   std::string message = verdict->message + candidate.remarks;
   if (may_release && !released)
-    message += fmt::format("; what was in quarantine of {} stays there", fmt::join(candidate.job.batch_ids, ", "));
+    message += fmt::format("; what was in quarantine of {} stays there",
+                           fmt::join(candidate.job.batch_ids, ", "));
   JobOutcome outcome = outcome_of(*verdict);
   outcome.peak_memory = candidate.peak_memory;
   outcome.processor_time = candidate.processor_time;
   return Judged{verdict->put_in_force, released, std::move(message), std::move(outcome)};
 }
 
-Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop) {
+Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judging,
+                                const std::stop_token& stop) {
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
     // Of the record, since what it has in force may be a version that cannot be loaded here.
     const auto recorded = TRY(store_.version_in_force(cell));
-    if (store_.is_shared()) static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
-    // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
+    if (store_.is_shared())
+      static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
+    // Judging takes a while: nobody waits for it. Where somebody changed what is in force
+    // meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
     const int version = present ? present->version : 0;
     auto found = TRY(judged(candidate, judging, present.get()));
@@ -286,9 +307,11 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const auto recorded = TRY(store_.version_in_force(cell));
   auto found = TRY(judged(candidate, judging, registry_.in_force(cell).get()));
   auto kept = store(candidate, std::move(found), recorded.value_or(0));
-  // The lock holds up this server's decisions only. What others decide all the time is no fault of the model.
+  // The lock holds up this server's decisions only. What others decide all the time is no fault of
+  // the model.
   if (!kept && kept.error().code == ErrorCode::kConflict && store_.is_shared())
-    return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");
+    return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell)
+        .next("try again later");
   return kept;
 }
 
@@ -297,8 +320,9 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int 
   ChangeId decided;
   // Of a store with one server the cell's lock says the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
-  const auto version = TRY(store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force,
-                                            judged.message, judged.release, decided, judged.outcome));
+  const auto version =
+      TRY(store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force,
+                           judged.message, judged.release, decided, judged.outcome));
   auto served = registry_.reclaimed({cell, version, candidate.model});
   if (judged.put_in_force) {
     put_in_force(std::move(served));
@@ -314,12 +338,14 @@ void ModelHistory::put_in_force(ServedModelPtr model) {
   if (listener_) listener_(*model, true);
 }
 
-Result<Opponents> ModelHistory::opponents(const std::string& cell, const ServedModel* present) const {
+Result<Opponents> ModelHistory::opponents(const std::string& cell,
+                                          const ServedModel* present) const {
   Opponents opponents;
   opponents.most_before = kMostServedBefore;
   if (present != nullptr) {
     auto text = store_.model_text(cell, present->version);
-    opponents.in_force = ModelText{present->version, text ? std::move(*text) : serialize(present->model)};
+    opponents.in_force =
+        ModelText{present->version, text ? std::move(*text) : serialize(present->model)};
   }
   auto before = TRY(served_before(cell));
   opponents.served_before = std::move(before);
@@ -342,11 +368,14 @@ Result<std::vector<ModelText>> ModelHistory::served_before(const std::string& ce
   return served;
 }
 
-Result<std::optional<RecordInForce>> ModelHistory::record_not_loaded(const std::string& cell) const {
+Result<std::optional<RecordInForce>> ModelHistory::record_not_loaded(
+    const std::string& cell) const {
   if (registry_.in_force(cell)) return std::nullopt;
   const auto models = TRY(store_.models(cell));
-  const auto marked = std::find_if(models.begin(), models.end(), [](const StoredModel& m) { return m.in_force; });
-  // One that can be loaded was set aside for its robot or tools: its figures say nothing about others.
+  const auto marked =
+      std::find_if(models.begin(), models.end(), [](const StoredModel& m) { return m.in_force; });
+  // One that can be loaded was set aside for its robot or tools: its figures say nothing about
+  // others.
   if (marked == models.end() || store_.model(cell, marked->version)) return std::nullopt;
   return RecordInForce{marked->version, marked->validation_rms};
 }

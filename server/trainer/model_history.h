@@ -45,21 +45,24 @@ struct CellTrouble {
     kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
     kUnreadable,      ///< not served: no version in force can be read
     kSetApart,        ///< not served here: another server has other files of the cell
-    kFormerFiles,     ///< served as long as this server is not started again: the record went over to other files
-    kOlderServed,     ///< served with an older version
-    kCopyServed       ///< served with the right one, which only its copy still has
+    kFormerFiles,  ///< served as long as this server is not started again: the record went over to
+                   ///< other files
+    kOlderServed,  ///< served with an older version
+    kCopyServed    ///< served with the right one, which only its copy still has
   } kind = Kind::kUnreadable;
   std::string what;  ///< one sentence
 };
 
-/// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
+/// The models of all cells: which versions there are, which one is in force, and what takes its
+/// place by itself.
 ///
-/// Thread-safe, set_listener() excepted. One change of what is in force at a time, cell by cell: a cell never waits for
-/// another one. Models are judged before the lock of their cell is taken, so that nobody waits for that either.
+/// Thread-safe, set_listener() excepted. One change of what is in force at a time, cell by cell: a
+/// cell never waits for another one. Models are judged before the lock of their cell is taken, so
+/// that nobody waits for that either.
 class ModelHistory {
  public:
-  /// A model was stored (in_force: and put in force). Called in the order of the changes of its cell, while no other of
-  /// that cell can happen: it must not call back into what changes models.
+  /// A model was stored (in_force: and put in force). Called in the order of the changes of its
+  /// cell, while no other of that cell can happen: it must not call back into what changes models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
   /// What is given outlives it. It is where the registry's models come from.
@@ -69,9 +72,9 @@ class ModelHistory {
   ModelHistory& operator=(const ModelHistory&) = delete;
 
   void set_listener(Listener listener) { listener_ = std::move(listener); }
-  /// Announces the version that the store has in force, if any: it is loaded when it is asked for. Where it cannot be
-  /// loaded, the last one that served before it is, and troubles() says so. One that does not fit the cell is not
-  /// served, and nothing in its place.
+  /// Announces the version that the store has in force, if any: it is loaded when it is asked for.
+  /// Where it cannot be loaded, the last one that served before it is, and troubles() says so. One
+  /// that does not fit the cell is not served, and nothing in its place.
   [[nodiscard]] Status announce_from_store(const std::string& cell);
   /// The same for all cells; returns what is wrong, one sentence each.
   [[nodiscard]] std::vector<std::string> announce_all();
@@ -80,36 +83,42 @@ class ModelHistory {
   /// The same by cell.
   [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
 
-  /// What the cells were lately asked for: a candidate that moves one of these poses by more than the cell's step limit
-  /// is put in force by a person only.
+  /// What the cells were lately asked for: a candidate that moves one of these poses by more than
+  /// the cell's step limit is put in force by a person only.
   [[nodiscard]] RecentPoses& recent_poses() { return recent_poses_; }
 
-  /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
-  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
-  /// Puts a stored version in force and publishes it. A version that is served already is not published again.
-  /// `judged`: how it did beside the one in force.
+  /// Of a cell that is served here; refused when its robot or its tools are not the cell's any
+  /// more.
+  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell,
+                                                          int version) const;
+  /// Puts a stored version in force and publishes it. A version that is served already is not
+  /// published again. `judged`: how it did beside the one in force.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& id = {},
                                 const std::optional<GateVerdict>& judged = {});
-  /// Back to the version in force before, or the last one before it that can be served; returns it. Refuses (kBusy)
-  /// where others change what is in force all the time.
+  /// Back to the version in force before, or the last one before it that can be served; returns it.
+  /// Refuses (kBusy) where others change what is in force all the time.
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeId& id = {});
-  /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
-  /// same model is there already. Refuses one of another cell, robot or tool.
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
+  /// Takes a model file from elsewhere into the history, not in force; returns its version, the
+  /// present one when the same model is there already. Refuses one of another cell, robot or tool.
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text,
+                                         const ChangeId& id = {});
 
-  /// Serves the cell with the version that the store has in force: another server may have put it there.
-  /// An error: that is not known, or it cannot be read now.
+  /// Serves the cell with the version that the store has in force: another server may have put it
+  /// there. An error: that is not known, or it cannot be read now.
   Status follow(const std::string& cell);
 
-  /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may release leaves
-  /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
-  /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
-  /// `stop` was requested, and where other servers change what is in force all the time.
-  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop = {});
+  /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may
+  /// release leaves quarantine where the model goes in force, and where too few poses can judge it.
+  /// It is judged without its cell's lock, again where something else went in force meanwhile;
+  /// after a few times with the lock. Refuses (kBusy) once `stop` was requested, and where other
+  /// servers change what is in force all the time.
+  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging,
+                                  const std::stop_token& stop = {});
 
  private:
   /// A model file from elsewhere for this cell.
-  [[nodiscard]] Result<CompensatedModel> model_from(const std::string& cell, const std::string& text,
+  [[nodiscard]] Result<CompensatedModel> model_from(const std::string& cell,
+                                                    const std::string& text,
                                                     const char* what) const;
   [[nodiscard]] Mutex& changes_of(const std::string& cell);
   /// Of a model that the store has put in force; the cell's lock is held.
@@ -126,8 +135,8 @@ class ModelHistory {
   };
   [[nodiscard]] Result<WayBack> way_back(const std::string& cell) const;
   /// The first of `before` that can be served: how many steps back it is, and the model.
-  [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(const std::string& cell,
-                                                                  const std::vector<int>& before) const;
+  [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(
+      const std::string& cell, const std::vector<int>& before) const;
   /// What is to be said and stored of a candidate that was judged.
   struct Judged {
     bool put_in_force = false, release = false;
@@ -136,16 +145,20 @@ class ModelHistory {
   };
   [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const Judging& judging,
                                       const ServedModel* present) const;
-  /// The cell's lock is held. `expected`: the version that the record had in force when it was judged.
+  /// The cell's lock is held. `expected`: the version that the record had in force when it was
+  /// judged.
   [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged, int expected);
   /// What a candidate of the cell is held against; `present` null: none in force.
-  [[nodiscard]] Result<Opponents> opponents(const std::string& cell, const ServedModel* present) const;
+  [[nodiscard]] Result<Opponents> opponents(const std::string& cell,
+                                            const ServedModel* present) const;
   /// The last versions that served the cell before the one in force, as far as they can be read.
   [[nodiscard]] Result<std::vector<ModelText>> served_before(const std::string& cell) const;
   /// The version marked in force, where it could not be loaded.
-  [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(const std::string& cell) const;
+  [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(
+      const std::string& cell) const;
 
-  /// The verdict, unless the model would move what was lately asked for by more than the cell allows.
+  /// The verdict, unless the model would move what was lately asked for by more than the cell
+  /// allows.
   [[nodiscard]] GateVerdict within_step_limit(GateVerdict verdict, const Candidate& candidate,
                                               const ServedModel* present) const;
 
@@ -155,9 +168,9 @@ class ModelHistory {
   Listener listener_;
   RecentPoses recent_poses_;
   Mutex changing_mutex_;
-  std::map<std::string, Mutex> changing_
-      TRAMMEL_GUARDED_BY(changing_mutex_);  // nothing leaves it; one change of a cell's models at a time
-  mutable Mutex troubles_mutex_;            // taken last
+  // By cell; nothing leaves it. One change of a cell's models at a time.
+  std::map<std::string, Mutex> changing_ TRAMMEL_GUARDED_BY(changing_mutex_);
+  mutable Mutex troubles_mutex_;                                                     // taken last
   std::map<std::string, CellTrouble> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
 };
 

@@ -57,7 +57,8 @@ class Presence {
     return seen_;
   }
 
-  /// Returns a second later if there is news by then, else when the heartbeat is due; or when `stop` is requested.
+  /// Returns a second later if there is news by then, else when the heartbeat is due; or when
+  /// `stop` is requested.
   void wait(const std::stop_token& stop, std::chrono::steady_clock::time_point due) {
     constexpr std::chrono::seconds kSoonest{1};
     Condition never;

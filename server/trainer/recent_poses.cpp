@@ -30,7 +30,8 @@ std::optional<double> farthest_step(const CompensatedModel& before, const Compen
     if (knows(before, asked) && knows(after, asked)) known.push_back(pose);
   }
   if (known.empty()) return std::nullopt;
-  const std::vector<ErrorPrediction> old = before.predict_all(known), now = after.predict_all(known);
+  const std::vector<ErrorPrediction> old = before.predict_all(known),
+                                     now = after.predict_all(known);
   double farthest = 0;
   for (std::size_t i = 0; i < known.size(); ++i) {
     const Vector3 step = now[i].X_BT_predicted.translation() - old[i].X_BT_predicted.translation();

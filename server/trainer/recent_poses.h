@@ -12,8 +12,8 @@
 
 namespace trammel {
 
-/// Poses that a cell was lately asked for, the newest 200: where a change of models would be felt. Thread-safe. Kept in
-/// memory only.
+/// Poses that a cell was lately asked for, the newest 200: where a change of models would be felt.
+/// Thread-safe. Kept in memory only.
 class RecentPoses {
  public:
   static constexpr std::size_t kMost = 200;
@@ -26,9 +26,10 @@ class RecentPoses {
   std::map<std::string, std::deque<PoseContext>> poses_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// m, the farthest that the predictions of the two are apart at one of these poses; empty where there is none that both
-/// know.
-[[nodiscard]] std::optional<double> farthest_step(const CompensatedModel& before, const CompensatedModel& after,
+/// m, the farthest that the predictions of the two are apart at one of these poses; empty where
+/// there is none that both know.
+[[nodiscard]] std::optional<double> farthest_step(const CompensatedModel& before,
+                                                  const CompensatedModel& after,
                                                   const std::vector<PoseContext>& poses);
 
 }  // namespace trammel

@@ -13,9 +13,11 @@ namespace trammel {
 using ServedCells = std::map<std::string, std::shared_ptr<const Cell>>;
 
 /// kNotFound: another service's.
-[[nodiscard]] inline Result<std::shared_ptr<const Cell>> find_cell(const ServedCells& cells, const std::string& name) {
+[[nodiscard]] inline Result<std::shared_ptr<const Cell>> find_cell(const ServedCells& cells,
+                                                                   const std::string& name) {
   const auto found = cells.find(name);
-  if (found == cells.end()) return failure(ErrorCode::kNotFound, "cell {} is not served here", name);
+  if (found == cells.end())
+    return failure(ErrorCode::kNotFound, "cell {} is not served here", name);
   return found->second;
 }
 

@@ -9,9 +9,12 @@
 namespace trammel {
 
 struct TrainerOptions {
-  int queue_capacity = 16;  ///< jobs of one cell that were asked for and wait; one more is refused (kBusy)
-  int max_poses = 5000;     ///< of one training, all its batches together; memory grows with the square
-  double validation_share = kUsualJudgingShare;  ///< of the poses of a batch are held out to judge models by
+  int queue_capacity =
+      16;  ///< jobs of one cell that were asked for and wait; one more is refused (kBusy)
+  int max_poses =
+      5000;  ///< of one training, all its batches together; memory grows with the square
+  double validation_share =
+      kUsualJudgingShare;  ///< of the poses of a batch are held out to judge models by
   double accept_ratio = GateOptions::kUsualAcceptRatio;
   std::uint64_t seed = 1;
   bool trains = true;    ///< false: jobs wait for another server of the same store

@@ -14,8 +14,8 @@ TEST(HostPort, IsANameOrAnAddressWithItsPortOrTheUsualOne) {
 }
 
 TEST(HostPort, RefusesWhatIsNeitherAndAPortOutOfRange) {
-  for (const char* wrong :
-       {"", ":17500", "127.0.0.1:", "127.0.0.1:80", "127.0.0.1:70000", "127.0.0.1:17500x", "127.0.0.1:1:2"}) {
+  for (const char* wrong : {"", ":17500", "127.0.0.1:", "127.0.0.1:80", "127.0.0.1:70000",
+                            "127.0.0.1:17500x", "127.0.0.1:1:2"}) {
     const auto place = parse_host_port(wrong, 17500);
     ASSERT_FALSE(place) << wrong;
     EXPECT_EQ(place.error().code, ErrorCode::kUsage) << wrong;

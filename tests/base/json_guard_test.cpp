@@ -28,7 +28,8 @@ Refusal too_large(double count, double limit) {
 
 TEST(JsonGuard, WhatIsWithinTheLimitsPasses) {
   EXPECT_EQ(refusal("{}"), Refusal::none());
-  EXPECT_EQ(refusal(R"({"a": [1, -2.5e-3, "b\"]]]", true, null], "c": {"d": []}})"), Refusal::none());
+  EXPECT_EQ(refusal(R"({"a": [1, -2.5e-3, "b\"]]]", true, null], "c": {"d": []}})"),
+            Refusal::none());
   EXPECT_EQ(refusal(repeated("[", 16) + repeated("]", 16)), Refusal::none());
 }
 

@@ -20,8 +20,8 @@ namespace {
 class Ends {
  public:
   explicit Ends(bool sockets) {
-    const int made =
-        sockets ? ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, both_.data()) : ::pipe2(both_.data(), O_CLOEXEC);
+    const int made = sockets ? ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, both_.data())
+                             : ::pipe2(both_.data(), O_CLOEXEC);
     if (made != 0) ADD_FAILURE() << "no pipe";
   }
   ~Ends() {

@@ -61,10 +61,12 @@ TEST(Mutex, WaitingEndsWhenAskedToStop) {
   stop.request_stop();
   waits.join();
   counter.add();
-  EXPECT_TRUE(counter.wait_for(1, stop.get_token())) << "what is ready is said to be, stopped or not";
+  EXPECT_TRUE(counter.wait_for(1, stop.get_token()))
+      << "what is ready is said to be, stopped or not";
 }
 
-/// What clang, as `deploy/check threads` calls it, says of a class with a guarded member and this body of a function.
+/// What clang, as `deploy/check threads` calls it, says of a class with a guarded member and this
+/// body of a function.
 test::Finished clang_on(const std::string& body) {
   const test::TemporaryFolder folder;
   const std::string source = folder.file("snippet.cpp");
@@ -81,30 +83,33 @@ test::Finished clang_on(const std::string& body) {
                                   "  trammel::Condition changed_;\n"
                                   "  int last_ TRAMMEL_GUARDED_BY(mutex_) = 0;\n"
                                   "};\n"));
-  return test::run({"/usr/bin/clang++-14", "-std=c++20", "-fsyntax-only", "-Wthread-safety", "-Werror=thread-safety",
-                    std::string("-I") + TRAMMEL_SOURCE_DIR, source});
+  return test::run({"/usr/bin/clang++-14", "-std=c++20", "-fsyntax-only", "-Wthread-safety",
+                    "-Werror=thread-safety", std::string("-I") + TRAMMEL_SOURCE_DIR, source});
 }
 
 TEST(Mutex, CodeThatTouchesAGuardedMemberWithoutItsLockIsRefused) {
   if (!std::filesystem::exists("/usr/bin/clang++-14")) GTEST_SKIP() << "clang-14 is not installed";
   const auto accepted = [](const std::string& body) {
     const test::Finished finished = clang_on(body);
-    const bool understood = finished.exit_code == 0 || finished.err.find("thread-safety") != std::string::npos;
+    const bool understood =
+        finished.exit_code == 0 || finished.err.find("thread-safety") != std::string::npos;
     EXPECT_TRUE(understood) << finished.err;
     return finished.exit_code == 0;
   };
   EXPECT_TRUE(accepted("const trammel::MutexLock lock(mutex_); return ++last_;"));
-  EXPECT_TRUE(accepted("trammel::MutexLock lock(mutex_); lock.unlock(); lock.lock(); return last();"));
   EXPECT_TRUE(
-      accepted("trammel::MutexLock lock(mutex_);"
-               "changed_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return last_ > 0; }); return last_;"));
+      accepted("trammel::MutexLock lock(mutex_); lock.unlock(); lock.lock(); return last();"));
+  EXPECT_TRUE(
+      accepted("trammel::MutexLock lock(mutex_);changed_.wait(lock, [this]() "
+               "TRAMMEL_REQUIRES(mutex_) { return last_ > 0; }); return last_;"));
   EXPECT_FALSE(accepted("return last_;"));
   EXPECT_FALSE(accepted("last_ = 1; return 1;"));
   EXPECT_FALSE(accepted("return last();"));
   EXPECT_FALSE(accepted("{ const trammel::MutexLock lock(mutex_); ++last_; } return last_;"));
   EXPECT_FALSE(accepted("trammel::MutexLock lock(mutex_); lock.unlock(); return last_;"));
   EXPECT_FALSE(
-      accepted("trammel::MutexLock lock(mutex_); changed_.wait(lock, [this] { return last_ > 0; }); return 1;"));
+      accepted("trammel::MutexLock lock(mutex_); changed_.wait(lock, [this] { return last_ > 0; "
+               "}); return 1;"));
 }
 
 }  // namespace

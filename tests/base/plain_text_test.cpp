@@ -17,7 +17,8 @@ Refusal refusal(const std::string& name) {
 }
 
 TEST(PlainText, NamesOfAnyLanguagePass) {
-  for (const char* name : {"", "p1", "lt-07 (2)", "Fräser", "工具", "Ω", "🤖", "a\\b'\"`", "\xc2\xa0x"}) {
+  for (const char* name :
+       {"", "p1", "lt-07 (2)", "Fräser", "工具", "Ω", "🤖", "a\\b'\"`", "\xc2\xa0x"}) {
     EXPECT_TRUE(is_plain(name)) << name;
     EXPECT_EQ(refusal(name), Refusal::none()) << name;
     EXPECT_EQ(shown(name), name);
@@ -60,7 +61,8 @@ TEST(PlainText, ANameThatControlsATerminalOrIsNoTextIsRefusedAndShownHarmless) {
 
 TEST(PlainText, ANameHasALimit) {
   EXPECT_EQ(refusal(std::string(256, 'x')), Refusal::none());
-  EXPECT_EQ(refusal(std::string(257, 'x')), Refusal("", {}, "pose_id").of(ErrorCode::kTooLarge).beyond(257, 256));
+  EXPECT_EQ(refusal(std::string(257, 'x')),
+            Refusal("", {}, "pose_id").of(ErrorCode::kTooLarge).beyond(257, 256));
 }
 
 TEST(PlainText, LinesStayLinesAndNothingElse) {
@@ -76,7 +78,8 @@ TEST(PlainText, AShortFormCutsBetweenCharacters) {
 }
 
 TEST(PlainText, TheSentenceOfARefusalControlsNoTerminalWhateverItQuotes) {
-  const Error error = refused("unknown tool '{}'", "\x1b]0;owned\a").in("lt\x1b[31m.csv").next("\xff").value();
+  const Error error =
+      refused("unknown tool '{}'", "\x1b]0;owned\a").in("lt\x1b[31m.csv").next("\xff").value();
   EXPECT_EQ(sentence(error), "lt\\u001b[31m.csv: unknown tool '\\u001b]0;owned\\u0007'; \\xff");
 }
 

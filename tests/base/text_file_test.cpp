@@ -22,13 +22,15 @@ using test::refusal_of;
 namespace fs = std::filesystem;
 
 std::size_t files_in(const test::TemporaryFolder& folder) {
-  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()));
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()));
 }
 
 TEST(TextFile, WhatIsWrittenReadsBackAndReplacesWhatWasThere) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("a.txt");
-  for (const std::string& text : {std::string("first, longer"), std::string("second"), std::string("\0x", 2)}) {
+  for (const std::string& text :
+       {std::string("first, longer"), std::string("second"), std::string("\0x", 2)}) {
     ASSERT_TRUE(write_text_file(path, text));
     EXPECT_EQ(read_text_file(path).value(), text);
   }
@@ -47,7 +49,8 @@ TEST(TextFile, TheNextWriteClearsWhatAKilledOneLeftOfTheSameFile) {
   const std::string old = left("a.model.4194399.part", std::chrono::minutes(2));
   const std::vector<std::string> stay = {
       left("a.model.4194398.part", std::chrono::minutes(0)),  // perhaps of another host
-      left("a.model.1.part", std::chrono::minutes(2)), left("b.model.4194399.part", std::chrono::minutes(2)),
+      left("a.model.1.part", std::chrono::minutes(2)),
+      left("b.model.4194399.part", std::chrono::minutes(2)),
       left("a.model.notes.part", std::chrono::minutes(2))};
   ASSERT_TRUE(write_text_file(path, "text"));
   EXPECT_FALSE(fs::exists(old));

@@ -35,11 +35,13 @@ TEST(Try, LeavesTheFunctionWithTheErrorAsItWas) {
 
 TEST(Try, ANamedResultKeepsItsValue) {
   const auto both = []() -> Result<std::string> {
-    const Result<std::string> named = std::string("a long text that is not kept inside of the string itself");
+    const Result<std::string> named =
+        std::string("a long text that is not kept inside of the string itself");
     const std::string once = TRY(named);
     return once + *named;
   };
-  EXPECT_EQ(both()->size(), 2 * std::string("a long text that is not kept inside of the string itself").size());
+  EXPECT_EQ(both()->size(),
+            2 * std::string("a long text that is not kept inside of the string itself").size());
 }
 
 }  // namespace

@@ -39,15 +39,22 @@ TEST(YamlFile, WhatNobodyWritesIsRefusedBeforeItIsBuilt) {
       {repeated("? ", 500'000), too_large(21, 20)},
       {"a: [" + repeated("1,", 30'000) + "1]", too_large(20001, 20000)},
       {"a: &a 1\nb: [" + repeated("*a, ", 101) + "]", too_large(101, 100)}};
-  for (const auto& [text, expected] : wrong) EXPECT_EQ(refusal_of(keys_of(text)), expected) << text.substr(0, 20);
+  for (const auto& [text, expected] : wrong)
+    EXPECT_EQ(refusal_of(keys_of(text)), expected) << text.substr(0, 20);
 }
 
 TEST(YamlFile, ARefusalHasTheLineAndTheWayToItsKey) {
-  const auto weight = [](const YamlMap& map) { return map.map("tools").maps("list").at(1).number("mass_kg"); };
-  const auto refused = [&](const std::string& text) { return refusal_of(read_yaml(text, "x.yaml", weight)); };
-  EXPECT_EQ(refused("a: 1\ntools:\n  list:\n    - {mass_kg: 1}\n    - b: 2\n      mass_kg: heavy\n"),
-            Refusal("x.yaml", 6, "tools: list 2: mass_kg").text("heavy"));
-  EXPECT_EQ(refused("tools: {list: [{}, {b: 2}]}\n"), Refusal("x.yaml", 1, "tools: list 2: mass_kg"));
+  const auto weight = [](const YamlMap& map) {
+    return map.map("tools").maps("list").at(1).number("mass_kg");
+  };
+  const auto refused = [&](const std::string& text) {
+    return refusal_of(read_yaml(text, "x.yaml", weight));
+  };
+  EXPECT_EQ(
+      refused("a: 1\ntools:\n  list:\n    - {mass_kg: 1}\n    - b: 2\n      mass_kg: heavy\n"),
+      Refusal("x.yaml", 6, "tools: list 2: mass_kg").text("heavy"));
+  EXPECT_EQ(refused("tools: {list: [{}, {b: 2}]}\n"),
+            Refusal("x.yaml", 1, "tools: list 2: mass_kg"));
   EXPECT_EQ(refused("a: 1\ntools: [1\n"), Refusal("x.yaml", 3));
 }
 
@@ -80,21 +87,27 @@ TEST(YamlFile, ASyntaxErrorHasItsColumn) {
 TEST(YamlFile, TextThatIsNoneAndNumbersBeyondReasonAreRefused) {
   const auto text = [](const YamlMap& map) { return map.text("a"); };
   const auto number = [](const YamlMap& map) { return map.number("a"); };
-  const auto refused_text = [&](const std::string& yaml) { return refusal_of(read_yaml(yaml, "x.yaml", text)); };
+  const auto refused_text = [&](const std::string& yaml) {
+    return refusal_of(read_yaml(yaml, "x.yaml", text));
+  };
   EXPECT_EQ(refused_text("a: \xff\n"), Refusal("x.yaml"));
   EXPECT_EQ(refused_text("a: \"\\e[2J\"\n"), Refusal("x.yaml", 1, "a").text("\\u001b[2J"));
   EXPECT_EQ(refused_text("a: \"b\\nc\"\n"), Refusal("x.yaml", 1, "a").text("b\\u000ac"));
   EXPECT_EQ(refused_text("a: Fräser\n"), Refusal::none());
   EXPECT_FALSE(keys_of("\"a\\eb\": 1\n"));
-  EXPECT_EQ(refusal_of(read_yaml("a: 1e300\n", "x.yaml", number)), Refusal("x.yaml", 1, "a").beyond(1e300, 1e12));
-  EXPECT_EQ(refusal_of(read_yaml("a: .inf\n", "x.yaml", number)), Refusal("x.yaml", 1, "a").text(".inf"));
+  EXPECT_EQ(refusal_of(read_yaml("a: 1e300\n", "x.yaml", number)),
+            Refusal("x.yaml", 1, "a").beyond(1e300, 1e12));
+  EXPECT_EQ(refusal_of(read_yaml("a: .inf\n", "x.yaml", number)),
+            Refusal("x.yaml", 1, "a").text(".inf"));
 }
 
 TEST(YamlFile, AnyBytesEndInAnAnswer) {
-  const std::string good = "version: 1\ncell: a\nlist: [1, {b: \"c\"}, 'd']\nmap:\n  - x\n  - &y {z: 1}\n  - *y\n";
+  const std::string good =
+      "version: 1\ncell: a\nlist: [1, {b: \"c\"}, 'd']\nmap:\n  - x\n  - &y {z: 1}\n  - *y\n";
   for (std::size_t i = 0; i < good.size(); ++i) {
     static_cast<void>(keys_of(good.substr(0, i)));
-    for (const char c : {'\0', '\n', '[', '{', '&', '*', '!', '%', '\xff', '"', '?', ':', '-', '|'}) {
+    for (const char c :
+         {'\0', '\n', '[', '{', '&', '*', '!', '%', '\xff', '"', '?', ':', '-', '|'}) {
       std::string text = good;
       text[i] = c;
       static_cast<void>(keys_of(text));

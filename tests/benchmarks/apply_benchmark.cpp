@@ -1,8 +1,8 @@
-// What `diagnose --apply` is worth on another day. The second simulation hides an effect, its batch is diagnosed and
-// applied; then the same robot is measured on another day: it starts cold, the instrument stands elsewhere, and what
-// the instrument did the day before is gone. 1000 fresh noisy poses judge the models without and with what was found,
-// each with its base put where the fresh poses have it.
-// `apply_benchmark [--trials N] [--poses N] [--kinds A,B] [--lambda L]`
+// What `diagnose --apply` is worth on another day. The second simulation hides an effect, its batch
+// is diagnosed and applied; then the same robot is measured on another day: it starts cold, the
+// instrument stands elsewhere, and what the instrument did the day before is gone. 1000 fresh noisy
+// poses judge the models without and with what was found, each with its base put where the fresh
+// poses have it. `apply_benchmark [--trials N] [--poses N] [--kinds A,B] [--lambda L]`
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -94,8 +94,10 @@ struct Figures {
 };
 
 HiddenSpec spec_of(const std::string& kind, int seed, const Settings& settings) {
-  HiddenSpec spec{
-      .kind = kind, .seed = static_cast<std::uint64_t>(seed), .lambda = settings.lambda, .poses = settings.poses};
+  HiddenSpec spec{.kind = kind,
+                  .seed = static_cast<std::uint64_t>(seed),
+                  .lambda = settings.lambda,
+                  .poses = settings.poses};
   spec.orientation = seed % 2 == 1;
   return spec;
 }
@@ -118,9 +120,10 @@ void judge(const Extension& extension, double before, double after, Figures& fig
 void run(const std::string& kind, int seed, const Settings& settings, Figures& figures) {
   const HiddenSpec spec = spec_of(kind, seed, settings);
   const HiddenCase hidden = hidden::hide(spec);
-  const auto cell = std::make_shared<const Cell>(demand(parse_cell(hidden.cell_yaml, hidden.robot_yaml, "cell.yaml")));
-  const CheckedBatch batch =
-      demand(check_against_cell(demand(parse_batch_csv(hidden.batch_csv, "batch.csv")), *cell, drawn(kHeldOut, 1)));
+  const auto cell = std::make_shared<const Cell>(
+      demand(parse_cell(hidden.cell_yaml, hidden.robot_yaml, "cell.yaml")));
+  const CheckedBatch batch = demand(check_against_cell(
+      demand(parse_batch_csv(hidden.batch_csv, "batch.csv")), *cell, drawn(kHeldOut, 1)));
   ++figures.runs;
   const clock_t begun = std::clock();
   const auto diagnosis = diagnose(cell, batch, {});
@@ -136,15 +139,19 @@ void run(const std::string& kind, int seed, const Settings& settings, Figures& f
   const CheckedBatch fresh = demand(check_against_cell(another_day(hidden, spec), *cell));
   const double before = rms_of(extension->before, fresh);
   const double after = rms_of(extension->after, fresh);
-  std::printf("%-22s %3d  %5.1f s  %-9s fresh %.4f -> %.4f mm (%+.0f %%)  random rows %+.0f %%  %s  [%s]%s\n",
-              kind.c_str(), seed, seconds, extension->why_not().empty() ? "applied" : "not", to_mm(before),
-              to_mm(after), 100 * (1 - after / before),
-              100 * (1 - extension->gain.rms_after / extension->gain.rms_before),
-              extension->day ? fmt::format("another day {:+.0f} % [{:+.0f}, {:+.0f}]", 100 * extension->day->share,
-                                           100 * extension->day->lower, 100 * extension->day->upper)
-                                   .c_str()
-                             : "no day",
-              fmt::format("{}", fmt::join(extension->sources, " ")).c_str(), after > 1.02 * before ? "  WORSE" : "");
+  std::printf(
+      "%-22s %3d  %5.1f s  %-9s fresh %.4f -> %.4f mm (%+.0f %%)  random rows %+.0f %%  %s  "
+      "[%s]%s\n",
+      kind.c_str(), seed, seconds, extension->why_not().empty() ? "applied" : "not", to_mm(before),
+      to_mm(after), 100 * (1 - after / before),
+      100 * (1 - extension->gain.rms_after / extension->gain.rms_before),
+      extension->day
+          ? fmt::format("another day {:+.0f} % [{:+.0f}, {:+.0f}]", 100 * extension->day->share,
+                        100 * extension->day->lower, 100 * extension->day->upper)
+                .c_str()
+          : "no day",
+      fmt::format("{}", fmt::join(extension->sources, " ")).c_str(),
+      after > 1.02 * before ? "  WORSE" : "");
   std::fflush(stdout);
   if (extension->why_not().empty()) judge(*extension, before, after, figures);
 }
@@ -154,18 +161,20 @@ std::vector<std::string> kinds_of(const Settings& settings) {
   std::istringstream words(settings.kinds);
   for (std::string word; std::getline(words, word, ',');) kinds.push_back(word);
   if (!kinds.empty()) return kinds;
-  for (const auto* list : {&hidden::decidable_kinds(), &hidden::slow_kinds(), &hidden::foreign_kinds()})
+  for (const auto* list :
+       {&hidden::decidable_kinds(), &hidden::slow_kinds(), &hidden::foreign_kinds()})
     kinds.insert(kinds.end(), list->begin(), list->end());
   kinds.insert(kinds.end(), {"mixture2", "null_white"});
   return kinds;
 }
 
 void tell(const Figures& figures) {
-  std::printf("%d runs, %d applied, %d with nothing to apply\n", figures.runs, figures.applied, figures.refused);
+  std::printf("%d runs, %d applied, %d with nothing to apply\n", figures.runs, figures.applied,
+              figures.refused);
   std::printf("apply on another day: worst rms after over before %.3f (aim 1.02)\n", figures.worst);
   const auto line = [](const char* what, const Count& count, const char* aim) {
-    std::printf("apply on another day: %s %.1f %% (%d of %d) aim %s\n", what, count.percent(), count.yes, count.all,
-                aim);
+    std::printf("apply on another day: %s %.1f %% (%d of %d) aim %s\n", what, count.percent(),
+                count.yes, count.all, aim);
   };
   line("never worse by more than 2 %,", figures.no_worse, "100");
   line("gain of 30 % or more claimed within 15 %,", figures.within, ">= 90");
@@ -187,7 +196,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   trammel::Figures figures;
   for (int seed = 1; seed <= settings.trials; ++seed) {
-    for (const std::string& kind : trammel::kinds_of(settings)) trammel::run(kind, seed, settings, figures);
+    for (const std::string& kind : trammel::kinds_of(settings))
+      trammel::run(kind, seed, settings, figures);
   }
   trammel::tell(figures);
   return 0;

@@ -1,5 +1,5 @@
-// What a backup of a large store costs those who ask: one client corrects one target after the other, a hundred a
-// second, without and while `trammel backup` copies the store.
+// What a backup of a large store costs those who ask: one client corrects one target after the
+// other, a hundred a second, without and while `trammel backup` copies the store.
 // --mb N (of the store), --rounds N.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -36,21 +36,26 @@ std::string digits(std::uint64_t seed) {
 /// Batches that nothing learns from.
 void fill(const std::string& path, int mb) {
   const auto store = test::demand(Store::open(path));
-  for (int i = 0; static_cast<std::size_t>(i) * kBatch < static_cast<std::size_t>(mb) * 1'000'000; ++i) {
-    const std::string id = "large-" + std::to_string(i), text = digits(static_cast<std::uint64_t>(i));
+  for (int i = 0; static_cast<std::size_t>(i) * kBatch < static_cast<std::size_t>(mb) * 1'000'000;
+       ++i) {
+    const std::string id = "large-" + std::to_string(i),
+                      text = digits(static_cast<std::uint64_t>(i));
     StoredJob job;
     job.cell = "cell-7";
     job.batch_ids = {id};
     job.created_at = 1700000000;
-    job = test::demand(store->add_batch({"cell-7", id, text, sha256_hex(text), "client:" + id, 1700000000, 1}, job));
+    job = test::demand(store->add_batch(
+        {"cell-7", id, text, sha256_hex(text), "client:" + id, 1700000000, 1}, job));
     if (const Status failed = store->set_job_failed(job.id, "not asked for"); !failed)
       static_cast<void>(test::demand(Result<int>(tl::make_unexpected(failed.error()))));
   }
 }
 
 void learn(client::Session& session) {
-  const auto job = test::demand(session.submit_measurements("cell-7", "first", test::virtual_batch_csv(150, 3)));
-  const auto ended = test::demand(session.wait_for_job(job, kLimit, [](const client::JobStatus&) {}));
+  const auto job =
+      test::demand(session.submit_measurements("cell-7", "first", test::virtual_batch_csv(150, 3)));
+  const auto ended =
+      test::demand(session.wait_for_job(job, kLimit, [](const client::JobStatus&) {}));
   if (!ended.in_force) fmt::print(stderr, "{}\n", ended.why);
 }
 
@@ -87,15 +92,19 @@ void compare(client::Session& session, test::Daemon& daemon, int rounds) {
   int lost = 0;
   for (int round = 0; round < rounds; ++round) {
     const auto until = Clock::now() + kAlone;
-    const Asked alone =
-        ask(session, [&] { return daemon.process().wait(kPeriod).has_value() || Clock::now() > until; });
+    const Asked alone = ask(session, [&] {
+      return daemon.process().wait(kPeriod).has_value() || Clock::now() > until;
+    });
     const auto began = Clock::now();
-    test::Process copying({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--store", daemon.store_path(), "-o",
+    test::Process copying({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--store",
+                           daemon.store_path(), "-o",
                            folder.file("copy-" + std::to_string(round))});
     const Asked beside = ask(session, [&] { return copying.wait(kPeriod).has_value(); });
     fmt::print(
-        "one target: p50 {:.2f}, p99 {:.2f} ms; while the store was copied, {:.0f} s: p50 {:.2f}, p99 {:.2f} ms\n",
-        at(alone, 0.5), at(alone, 0.99), std::chrono::duration<double>(Clock::now() - began).count(), at(beside, 0.5),
+        "one target: p50 {:.2f}, p99 {:.2f} ms; while the store was copied, {:.0f} s: p50 {:.2f}, "
+        "p99 {:.2f} ms\n",
+        at(alone, 0.5), at(alone, 0.99),
+        std::chrono::duration<double>(Clock::now() - began).count(), at(beside, 0.5),
         at(beside, 0.99));
     if (copying.wait(kLimit) != 0) fmt::print(stderr, "{}\n", copying.standard_error());
     ratios.push_back(at(beside, 0.99) / at(alone, 0.99));
@@ -118,7 +127,8 @@ int main(int argc, char** argv) {
   trammel::test::Daemon daemon;
   trammel::fill(daemon.store_path(), mb);
   daemon.start();
-  const auto session = trammel::test::demand(trammel::client::Session::open(daemon.session_options()));
+  const auto session =
+      trammel::test::demand(trammel::client::Session::open(daemon.session_options()));
   trammel::learn(*session);
   trammel::compare(*session, daemon, rounds);
   return 0;

@@ -1,7 +1,8 @@
-// The learned bias beside scikit-learn's Gaussian process (package python3-sklearn) on the same data in one run: time
-// of a likelihood with its gradient, of a fit and of predictions, and how good they are; and how honest a model is
-// beyond its training poses. `bias_benchmark [--quick]` and the options of Google Benchmark. scikit-learn models one
-// output, ours three at once; its single start stands beside our 20.
+// The learned bias beside scikit-learn's Gaussian process (package python3-sklearn) on the same
+// data in one run: time of a likelihood with its gradient, of a fit and of predictions, and how
+// good they are; and how honest a model is beyond its training poses. `bias_benchmark [--quick]`
+// and the options of Google Benchmark. scikit-learn models one output, ours three at once; its
+// single start stands beside our 20.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -43,7 +44,8 @@ BiasModel fitted(Index count, int starts) {
   return *std::move(model);
 }
 
-// ---- Google Benchmark: ours alone, at every size ------------------------------------------------------------------
+// ---- Google Benchmark: ours alone, at every size
+// ------------------------------------------------------------------
 
 struct LikelihoodCase {
   ProfiledLikelihood likelihood;
@@ -56,7 +58,8 @@ LikelihoodCase likelihood_case(Index count) {
   prior.parameter_centre = VectorXd::Zero(6);
   VectorXd parameters = VectorXd::Constant(7, 0.3);
   parameters[6] = std::log(1e-3);
-  return {ProfiledLikelihood(make_kernel("se"), {problem.q, problem.residual_B, VectorXd::Ones(count)}, prior),
+  return {ProfiledLikelihood(make_kernel("se"),
+                             {problem.q, problem.residual_B, VectorXd::Ones(count)}, prior),
           parameters};
 }
 
@@ -93,14 +96,17 @@ void mean_and_stddev(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(model.predict_all(q));
 }
 
-// ---- one process: what a single target costs --------------------------------------------------------------------
+// ---- one process: what a single target costs
+// --------------------------------------------------------------------
 
 // Noise of a few per cent of the signal: what a calibrated robot leaves over.
 void variance(benchmark::State& state, VarianceForm form) {
   const auto count = static_cast<Index>(state.range(0));
   const MatrixXd q = random_joints(count, 3);
-  const GpHyperparameters at = {VectorXd::Constant(6, std::log(0.9)), std::log(1e-4), std::log(2.6e-5)};
-  const auto gp = GaussianProcess::condition(make_kernel("se"), q, q.col(0), VectorXd::Ones(count), at, form);
+  const GpHyperparameters at = {VectorXd::Constant(6, std::log(0.9)), std::log(1e-4),
+                                std::log(2.6e-5)};
+  const auto gp =
+      GaussianProcess::condition(make_kernel("se"), q, q.col(0), VectorXd::Ones(count), at, form);
   TRAMMEL_CHECK(gp.has_value());
   const MatrixXd targets = random_joints(1000, 4);
   Index next = 0;
@@ -110,7 +116,8 @@ void variance(benchmark::State& state, VarianceForm form) {
   }
 }
 
-// ---- coupled: a bias on top of M3 of a virtual robot with gear errors, asked as a cell asks -----------------------
+// ---- coupled: a bias on top of M3 of a virtual robot with gear errors, asked as a cell asks
+// -----------------------
 
 // Trained once for each number of poses; hundreds of columns.
 const CompensatedModel& coupled_model(int poses) {
@@ -125,7 +132,8 @@ const CompensatedModel& coupled_model(int poses) {
     const auto map = make_error_source(spec, *robot.truth.cell);
     TRAMMEL_CHECK(map.has_value());
     const Index first = add_source(robot.truth, *map);
-    robot.truth.values.segment(first, static_cast<Index>((*map)->parameters().size())).setConstant(4e-5);
+    robot.truth.values.segment(first, static_cast<Index>((*map)->parameters().size()))
+        .setConstant(4e-5);
   }
   auto model = train(robot.truth.cell, test::measured(robot, poses, 11), options);
   TRAMMEL_CHECK(model.has_value());
@@ -144,7 +152,8 @@ CoupledTargets coupled_targets(const CompensatedModel& model, Index count) {
   std::mt19937_64 random(7);
   for (Index i = 0; i < count; ++i) {
     for (Index j = 0; j < known.cols(); ++j)
-      targets.q(i, j) = std::uniform_real_distribution(model.parts().q_min(j), model.parts().q_max(j))(random);
+      targets.q(i, j) =
+          std::uniform_real_distribution(model.parts().q_min(j), model.parts().q_max(j))(random);
     PoseContext context = model.parts().bias_contexts.front();
     context.q = targets.q.row(i);
     targets.features.push_back(model.features(context));
@@ -155,13 +164,15 @@ CoupledTargets coupled_targets(const CompensatedModel& model, Index count) {
 void coupled_mean(benchmark::State& state) {
   const CompensatedModel& model = coupled_model(static_cast<int>(state.range(0)));
   const CoupledTargets targets = coupled_targets(model, state.range(1));
-  for (auto _ : state) benchmark::DoNotOptimize(model.bias()->mean_all_B(targets.q, targets.features));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(model.bias()->mean_all_B(targets.q, targets.features));
 }
 
 void coupled_mean_and_stddev(benchmark::State& state) {
   const CompensatedModel& model = coupled_model(static_cast<int>(state.range(0)));
   const CoupledTargets targets = coupled_targets(model, state.range(1));
-  for (auto _ : state) benchmark::DoNotOptimize(model.bias()->predict_all(targets.q, targets.features));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(model.bias()->predict_all(targets.q, targets.features));
 }
 
 void coupled_correction(benchmark::State& state) {
@@ -171,7 +182,8 @@ void coupled_correction(benchmark::State& state) {
   Target target;
   target.joint_target = true;
   target.seed = targets.q.row(0);
-  for (auto _ : state) benchmark::DoNotOptimize(model.correct(target, context.tool, context.payload));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(model.correct(target, context.tool, context.payload));
 }
 
 void sizes(benchmark::internal::Benchmark* benchmark) {
@@ -193,7 +205,10 @@ BENCHMARK_CAPTURE(variance, served, VarianceForm::kServed)
     ->ArgsProduct({{200, 1200, 4000}, {1, 1000}})
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK(coupled_mean)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);
-BENCHMARK(coupled_mean_and_stddev)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);
+BENCHMARK(coupled_mean_and_stddev)
+    ->Args({1200, 1})
+    ->Args({1200, 10000})
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(coupled_correction)->Arg(1200)->Unit(benchmark::kMicrosecond);
 
 // ---- beside scikit-learn
@@ -214,8 +229,8 @@ Table eight_joint_arm(Index count, std::uint64_t seed) {
     Matrix3 R = Matrix3::Identity();
     Vector3 p = Vector3::Zero();
     for (int j = 0; j < 8; ++j) {
-      const Vector3 axis =
-          j % 3 == 0 ? Vector3(Vector3::UnitZ()) : Vector3(j % 3 == 1 ? Vector3::UnitY() : Vector3::UnitX());
+      const Vector3 axis = j % 3 == 0 ? Vector3(Vector3::UnitZ())
+                                      : Vector3(j % 3 == 1 ? Vector3::UnitY() : Vector3::UnitX());
       R = R * Eigen::AngleAxisd(table.q(i, j), axis).toRotationMatrix();
       p += R * (length[j] * Vector3(0.6, 0.0, 0.8));
     }
@@ -262,11 +277,12 @@ void judge(const Table& train, const Table& test, Figures* figures) {
   const double centre = train.y.mean();
   const VectorXd noise_shape = VectorXd::Ones(train.y.size());
   const GpData data{train.q, train.y.array() - centre, noise_shape};
-  // No metrology here, as scikit-learn has none: the prior on the noise is put where it costs nothing.
+  // No metrology here, as scikit-learn has none: the prior on the noise is put where it costs
+  // nothing.
   const auto found = search_hyperparameters(make_kernel("se"), data, 1e-9, {});
   TRAMMEL_CHECK(found.has_value());
-  const auto process =
-      GaussianProcess::condition(make_kernel("se"), data.q, data.y, noise_shape, found->outputs.front());
+  const auto process = GaussianProcess::condition(make_kernel("se"), data.q, data.y, noise_shape,
+                                                  found->outputs.front());
   TRAMMEL_CHECK(process.has_value());
   VectorXd mean(test.y.size());
   process->mean(test.q, mean.data());
@@ -298,18 +314,23 @@ void time_ours(Index count, Figures* figures) {
   const BiasModel model = fitted(count, 20);
   const MatrixXd many = random_joints(10000, 7);
   const MatrixXd one = many.topRows(1);
-  (*figures)["mean_of_one_s"] = least_seconds(2000, [&] { benchmark::DoNotOptimize(model.mean_all_B(one)); });
-  (*figures)["stddev_of_one_s"] = least_seconds(500, [&] { benchmark::DoNotOptimize(model.predict_all(one)); });
-  (*figures)["mean_of_10000_s"] = least_seconds(5, [&] { benchmark::DoNotOptimize(model.mean_all_B(many)); });
-  (*figures)["stddev_of_10000_s"] = least_seconds(5, [&] { benchmark::DoNotOptimize(model.predict_all(many)); });
+  (*figures)["mean_of_one_s"] =
+      least_seconds(2000, [&] { benchmark::DoNotOptimize(model.mean_all_B(one)); });
+  (*figures)["stddev_of_one_s"] =
+      least_seconds(500, [&] { benchmark::DoNotOptimize(model.predict_all(one)); });
+  (*figures)["mean_of_10000_s"] =
+      least_seconds(5, [&] { benchmark::DoNotOptimize(model.mean_all_B(many)); });
+  (*figures)["stddev_of_10000_s"] =
+      least_seconds(5, [&] { benchmark::DoNotOptimize(model.predict_all(many)); });
 }
 
 void beside_sklearn(bool quick) {
   test::TemporaryFolder folder;
   std::map<std::string, Figures> ours;
-  std::string command = "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 /usr/bin/python3 " TRAMMEL_SOURCE_DIR
-                        "/tests/benchmarks/bias_sklearn.py " +
-                        folder.path().string();
+  std::string command =
+      "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 /usr/bin/python3 " TRAMMEL_SOURCE_DIR
+      "/tests/benchmarks/bias_sklearn.py " +
+      folder.path().string();
   const auto add = [&](const std::string& name, const Table& train, const Table& test) {
     write(train, folder.file(name + "_train.csv"));
     write(test, folder.file(name + "_test.csv"));
@@ -335,18 +356,21 @@ void beside_sklearn(bool quick) {
     words >> name >> figure >> theirs;
     const auto known = ours[name].find(figure);
     if (known == ours[name].end()) continue;
-    std::printf("%-10s %-26s %12.6g %12.6g %9.3g\n", name.c_str(), figure.c_str(), known->second, theirs,
-                theirs / known->second);
+    std::printf("%-10s %-26s %12.6g %12.6g %9.3g\n", name.c_str(), figure.c_str(), known->second,
+                theirs, theirs / known->second);
     std::fflush(stdout);
   }
   pclose(pipe);
 }
 
-// ---- beyond the training poses -------------------------------------------------------------------------------------
+// ---- beyond the training poses
+// -------------------------------------------------------------------------------------
 
-// Error, claimed stddev (mm, of a coordinate) and coverage of the 95 % interval at growing distances, all seeds
-// together; true outsiders caught and insiders refused.
-std::string share(int part, int all) { return all == 0 ? "none" : fmt::format("{:.1f} %", 100.0 * part / all); }
+// Error, claimed stddev (mm, of a coordinate) and coverage of the 95 % interval at growing
+// distances, all seeds together; true outsiders caught and insiders refused.
+std::string share(int part, int all) {
+  return all == 0 ? "none" : fmt::format("{:.1f} %", 100.0 * part / all);
+}
 
 /// The least and the most of a share, in %.
 struct Range {
@@ -363,7 +387,8 @@ void beyond_the_poses(bool quick) {
   Range within, farther, caught, refused;
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   std::printf("\n%-8s %-6s %6s", "box", "model", "learnt");
-  for (const char* band : {"within", "to 0.1 ranges", "to 0.3", "to 1", "farther"}) std::printf(" | %21s", band);
+  for (const char* band : {"within", "to 0.1 ranges", "to 0.3", "to 1", "farther"})
+    std::printf(" | %21s", band);
   std::printf(" | %8s %8s\n", "caught", "refused");
   for (const cli::BiasStudy& study : cli::kBiasStudies) {
     if (!study.name.starts_with("6dim")) continue;
@@ -371,10 +396,12 @@ void beyond_the_poses(bool quick) {
     for (const auto& [low, high] : study.ranges) ranges.emplace_back(from_deg(low), from_deg(high));
     for (const char* level : {"M0", "M1", "M2", "M3"}) {
       for (const int poses : quick ? std::vector{300} : std::vector{100, 300, 800}) {
-        const test::OutsideFigures figures = test::asked_outside(robot, ranges, level, "se", poses, quick ? 1 : 3);
+        const test::OutsideFigures figures =
+            test::asked_outside(robot, ranges, level, "se", poses, quick ? 1 : 3);
         std::printf("%-8s %-6s %6d", std::string(study.name).c_str(), level, poses);
         for (const test::OutsideBand& band : figures.bands) {
-          std::printf(" | %6.3f %6.3f %5.1f %%", to_mm(band.rms), to_mm(band.stddev), 100 * band.coverage_95);
+          std::printf(" | %6.3f %6.3f %5.1f %%", to_mm(band.rms), to_mm(band.stddev),
+                      100 * band.coverage_95);
         }
         within.take(100 * figures.bands.front().coverage_95);
         farther.take(100 * figures.bands.back().coverage_95);

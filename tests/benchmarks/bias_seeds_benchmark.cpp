@@ -1,5 +1,6 @@
-// What share of seeds finds the best optimum of a bias: `bias_seeds_benchmark [--data FOLDER] [--seeds N] [--coupled
-// N]`. FOLDER (default ../shared/data) holds the measured UR10; where it is not at hand, its rows are skipped.
+// What share of seeds finds the best optimum of a bias: `bias_seeds_benchmark [--data FOLDER]
+// [--seeds N] [--coupled N]`. FOLDER (default ../shared/data) holds the measured UR10; where it is
+// not at hand, its rows are skipped.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -27,8 +28,8 @@ double processor_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-BiasProblem left_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                    const MeasurementBatch& batch) {
+BiasProblem left_by(const std::shared_ptr<const Cell>& cell,
+                    const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   const auto found = calibrate(cell, sources, batch, {});
   TRAMMEL_CHECK(found.has_value());
   BiasProblem problem = leftover(found->model, batch);
@@ -39,9 +40,11 @@ BiasProblem left_by(const std::shared_ptr<const Cell>& cell, const std::vector<s
 
 // Every pose whose id ends in 0 to 6, as the tests train on.
 BiasProblem measured_ur10(const std::string& file) {
-  const auto cell = std::make_shared<const Cell>(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml").value());
+  const auto cell =
+      std::make_shared<const Cell>(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml").value());
   MeasurementBatch batch = check_against_cell(read_batch_csv(file).value(), *cell).value().rows();
-  std::erase_if(batch.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
+  std::erase_if(batch.measurements,
+                [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
   batch = merge_repeats(batch, cell->tracker.sigma).batch;
   return left_by(cell, {"base", "geometry", "compliance", "tool"}, batch);
 }
@@ -67,12 +70,14 @@ void print_row(const char* data, const BiasProblem& problem, const char* kernel,
   const double seconds = (processor_seconds() - start) / seeds;
   const auto [worst, best] = std::minmax_element(nats.begin(), nats.end());
   const auto within = [&, best = *best](double nat) {
-    return std::count_if(nats.begin(), nats.end(), [&](double value) { return value > best - nat; });
+    return std::count_if(nats.begin(), nats.end(),
+                         [&](double value) { return value > best - nat; });
   };
   std::printf(
-      "%-14s %-36s %6td poses: %ld of %d seeds within 0.2 nat of the best, %ld within 1; worst %.2f below %.2f; "
-      "%.1f s a fit\n",
-      data, kernel, problem.q.rows(), within(0.2), seeds, within(1.0), *best - *worst, *best, seconds);
+      "%-14s %-36s %6td poses: %ld of %d seeds within 0.2 nat of the best, %ld within 1; worst "
+      "%.2f below %.2f; %.1f s a fit\n",
+      data, kernel, problem.q.rows(), within(0.2), seeds, within(1.0), *best - *worst, *best,
+      seconds);
   test::tell_figure(fmt::format("{}, {}, share of seeds within 1 nat of the best, %", data, kernel),
                     100.0 * static_cast<double>(within(1.0)) / seeds);
   test::tell_figure(fmt::format("{}, {}, processor s a fit", data, kernel), seconds);

@@ -32,6 +32,7 @@ double milliseconds_of_a_budget(const std::string& bias) {
 
 int main() {
   trammel::test::tell_figure("budget of 300 poses, ms", trammel::milliseconds_of_a_budget("none"));
-  trammel::test::tell_figure("budget of 300 poses with a learned bias, ms", trammel::milliseconds_of_a_budget("se"));
+  trammel::test::tell_figure("budget of 300 poses with a learned bias, ms",
+                             trammel::milliseconds_of_a_budget("se"));
   return 0;
 }

@@ -1,7 +1,9 @@
-// The figures that diagnosis answers for, one row each, reached beside aim, and who was taken for whom. Every trial
-// hides an effect by the second simulation and shows the diagnosis its three files. `diagnose_benchmark [--trials N]
-// [--nulls N] [--poses N] [--kinds A,B] [--rows A,B] [--quick] [--jobs N] [--draws N]`; `diagnose_benchmark --replay
-// kind,seed,lambda[,position][,ranges]` tells one trial's whole verdict.
+// The figures that diagnosis answers for, one row each, reached beside aim, and who was taken for
+// whom. Every trial hides an effect by the second simulation and shows the diagnosis its three
+// files. `diagnose_benchmark [--trials N]
+// [--nulls N] [--poses N] [--kinds A,B] [--rows A,B] [--quick] [--jobs N] [--draws N]`;
+// `diagnose_benchmark --replay kind,seed,lambda[,position][,ranges]` tells one trial's whole
+// verdict.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
@@ -48,7 +50,10 @@ std::vector<std::string> split(const std::string& text) {
 
 /// Every second trial sees positions only, every third a smaller range.
 HiddenSpec spec_of(const std::string& kind, int seed, double lambda, const Settings& settings) {
-  HiddenSpec spec{.kind = kind, .seed = static_cast<std::uint64_t>(seed), .lambda = lambda, .poses = settings.poses};
+  HiddenSpec spec{.kind = kind,
+                  .seed = static_cast<std::uint64_t>(seed),
+                  .lambda = lambda,
+                  .poses = settings.poses};
   spec.orientation = seed % 2 == 1;
   spec.ranges = seed % 3 == 0 ? "6dim-m" : "calibration";
   return spec;
@@ -61,9 +66,11 @@ class Plan {
   [[nodiscard]] std::vector<Trial> trials() && {
     decidable();
     nulls();
-    for (const std::string& kind : hidden::unknown_kinds()) add("unknown", kind, 120, settings_.trials);
+    for (const std::string& kind : hidden::unknown_kinds())
+      add("unknown", kind, 120, settings_.trials);
     for (const std::string& kind : hidden::slow_kinds()) add("slow", kind, 120, settings_.trials);
-    for (const std::string& kind : hidden::undecidable_kinds()) add("undecidable", kind, 120, settings_.trials);
+    for (const std::string& kind : hidden::undecidable_kinds())
+      add("undecidable", kind, 120, settings_.trials);
     add("three", "mixture3", 60, settings_.trials);
     add("two", "mixture2", 60, settings_.trials);
     unrecorded();
@@ -84,8 +91,10 @@ class Plan {
   void add(const Trial& trial) {
     if (wanted(trial.row, trial.spec.kind)) trials_.push_back(trial);
   }
-  void add(const std::string& row, const std::string& kind, double lambda, int count, int first_seed = 1) {
-    for (int seed = first_seed; seed < first_seed + count; ++seed) add({row, spec_of(kind, seed, lambda, settings_)});
+  void add(const std::string& row, const std::string& kind, double lambda, int count,
+           int first_seed = 1) {
+    for (int seed = first_seed; seed < first_seed + count; ++seed)
+      add({row, spec_of(kind, seed, lambda, settings_)});
   }
   void decidable() {
     for (const std::string& kind : hidden::decidable_kinds()) {
@@ -96,7 +105,9 @@ class Plan {
   void nulls() {
     for (const std::string& kind : hidden::null_kinds()) {
       for (int seed = 1; seed <= (settings_.nulls + 2) / 3; ++seed) {
-        Trial trial{"null", spec_of(kind, seed, kind == "null_permuted" ? 100 : 20 + 20 * (seed % 3), settings_)};
+        Trial trial{
+            "null",
+            spec_of(kind, seed, kind == "null_permuted" ? 100 : 20 + 20 * (seed % 3), settings_)};
         add(trial);
         trial.row = "null_unrecorded";
         trial.spec.withheld = kCircumstances;
@@ -104,7 +115,8 @@ class Plan {
       }
     }
   }
-  /// Every second cell or so is approached from sides drawn at random, which no order of the rows tells.
+  /// Every second cell or so is approached from sides drawn at random, which no order of the rows
+  /// tells.
   void unrecorded() {
     for (const auto& [kind, column] : {std::pair{"backlash", "dir"},
                                        {"thermal_growth", "temperature_c"},
@@ -118,8 +130,8 @@ class Plan {
     }
   }
   void held_out() {
-    for (const char* kind : {"gear_transmission", "backlash", "encoder_eccentricity", "joint_slip", "wrist_coupling",
-                             "thermal_growth", "joint_map", "null_white"}) {
+    for (const char* kind : {"gear_transmission", "backlash", "encoder_eccentricity", "joint_slip",
+                             "wrist_coupling", "thermal_growth", "joint_map", "null_white"}) {
       for (int seed = 1; seed <= std::max(2, settings_.trials / 4); ++seed) {
         Trial trial{"heldout", spec_of(kind, 500 + seed, 200, settings_)};
         trial.spec.validation_share = 0.4;
@@ -129,7 +141,8 @@ class Plan {
     }
   }
   void next_poses() {
-    for (const char* kind : {"encoder_eccentricity", "geometry", "compliance", "payload_changed", "joint_slip"}) {
+    for (const char* kind :
+         {"encoder_eccentricity", "geometry", "compliance", "payload_changed", "joint_slip"}) {
       for (int seed = 1; seed <= std::max(2, settings_.trials / 4); ++seed) {
         Trial trial{"next", spec_of(kind, 700 + seed, 60, settings_)};
         trial.spec.ranges = seed % 2 == 0 ? "6dim-m" : "6dim-l";
@@ -162,11 +175,13 @@ class Plan {
 };
 
 std::string replay_of(const HiddenSpec& spec) {
-  return fmt::format("--replay {},{},{:g}{}{} --poses {}{}", spec.kind, spec.seed, spec.lambda,
-                     spec.orientation ? "" : ",position", spec.ranges == "calibration" ? "" : "," + spec.ranges,
-                     spec.poses,
-                     (spec.validation_share > 0 ? fmt::format(" --validation {}", spec.validation_share) : "") +
-                         (spec.withheld.empty() ? "" : fmt::format(" --without {}", fmt::join(spec.withheld, ","))));
+  return fmt::format(
+      "--replay {},{},{:g}{}{} --poses {}{}", spec.kind, spec.seed, spec.lambda,
+      spec.orientation ? "" : ",position", spec.ranges == "calibration" ? "" : "," + spec.ranges,
+      spec.poses,
+      (spec.validation_share > 0 ? fmt::format(" --validation {}", spec.validation_share) : "") +
+          (spec.withheld.empty() ? ""
+                                 : fmt::format(" --without {}", fmt::join(spec.withheld, ","))));
 }
 
 DiagnoseOptions options_of(const Settings& settings) {
@@ -200,8 +215,8 @@ std::vector<TrialResult> run_all(const std::vector<Trial>& trials, const Setting
       results[k] = run_trial(trials[k], options_of(settings));
       const std::lock_guard lock(printing);
       const TrialResult& r = results[k];
-      std::fprintf(stderr, "%zu/%zu %s %.1f s: %s -> %s%s\n", k + 1, trials.size(), r.trial.row.c_str(), r.seconds,
-                   r.truth.c_str(), r.judgement.said.c_str(),
+      std::fprintf(stderr, "%zu/%zu %s %.1f s: %s -> %s%s\n", k + 1, trials.size(),
+                   r.trial.row.c_str(), r.seconds, r.truth.c_str(), r.judgement.said.c_str(),
                    is_bad(r) ? ("   " + replay_of(r.trial.spec)).c_str() : "");
     }
   };
@@ -240,7 +255,8 @@ Share share(const Results& results, Asked asked) {
 
 void print(const std::string& what, const Share& share, const char* aim) {
   if (share.all == 0) return;
-  std::printf("%-72s %7.2f %%  (%d of %d)  aim %s\n", what.c_str(), share.percent(), share.yes, share.all, aim);
+  std::printf("%-72s %7.2f %%  (%d of %d)  aim %s\n", what.c_str(), share.percent(), share.yes,
+              share.all, aim);
 }
 
 bool is_wrong(const TrialResult& r) { return r.judgement.wrong > 0; }
@@ -266,12 +282,15 @@ void print_named(const Results& results) {
 }
 
 void print_abstaining(const Results& results) {
-  for (const auto& [row, how] : {std::pair{"null", ""}, {"null_unrecorded", ", no circumstances recorded"}}) {
+  for (const auto& [row, how] :
+       {std::pair{"null", ""}, {"null_unrecorded", ", no circumstances recorded"}}) {
     for (const std::string& kind : hidden::null_kinds()) {
       Results some = of_rows(results, {row});
       std::erase_if(some, [&](const TrialResult& r) { return r.trial.spec.kind != kind; });
       print("false names, " + kind + how,
-            share(some, [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }), "<= 1");
+            share(some,
+                  [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }),
+            "<= 1");
     }
   }
   print("false names, all nulls",
@@ -280,16 +299,21 @@ void print_abstaining(const Results& results) {
         "<= 1");
   const Results unrecorded = of_rows(results, {"unrecorded"});
   print("column not recorded: the truth among what is found, lambda 120",
-        share(unrecorded, [](const TrialResult& r) { return r.judgement.unrecorded_rightly; }), ">= 90");
+        share(unrecorded, [](const TrialResult& r) { return r.judgement.unrecorded_rightly; }),
+        ">= 90");
   print("column not recorded: a wrong name for certain", share(unrecorded, is_wrong), "<= 2");
   const Results unknown = of_rows(results, {"unknown"});
   print("unknown effects: unknown, of the right joints, lambda 120",
         share(unknown, [](const TrialResult& r) { return r.judgement.unknown_rightly; }), ">= 90");
-  print("unknown effects: a false name",
-        share(unknown, [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }), "<= 3");
+  print(
+      "unknown effects: a false name",
+      share(unknown, [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }),
+      "<= 3");
   Results slow = of_rows(results, {"slow"});
   print("something slow: unknown of what it depends on, or left open",
-        share(slow, [](const TrialResult& r) { return r.judgement.detected && r.judgement.wrong == 0; }), ">= 90");
+        share(slow,
+              [](const TrialResult& r) { return r.judgement.detected && r.judgement.wrong == 0; }),
+        ">= 90");
   const auto walks = [](const TrialResult& r) { return r.trial.spec.kind == "slow_walk"; };
   Results walk;
   std::copy_if(slow.begin(), slow.end(), std::back_inserter(walk), walks);
@@ -298,9 +322,11 @@ void print_abstaining(const Results& results) {
   print("a zero that wanders at random: a sure wrong name", share(walk, is_wrong), "<= 3");
   const Results undecidable = of_rows(results, {"undecidable"});
   print("undecidable: the set holds the truth",
-        share(undecidable, [](const TrialResult& r) { return r.judgement.set_holds_truth; }), ">= 98");
+        share(undecidable, [](const TrialResult& r) { return r.judgement.set_holds_truth; }),
+        ">= 98");
   print("undecidable: a single, over-confident name",
-        share(undecidable, [](const TrialResult& r) { return r.judgement.over_confident; }), "<= 5");
+        share(undecidable, [](const TrialResult& r) { return r.judgement.over_confident; }),
+        "<= 5");
 }
 
 void print_mixtures(const Results& results) {
@@ -312,11 +338,12 @@ void print_mixtures(const Results& results) {
       open += r.judgement.right_or_open;
       wrong += r.judgement.wrong;
     }
-    print(fmt::format("{} causes at once, lambda 60 each: recall", row), {right, size * static_cast<int>(some.size())},
-          ">= 95");
+    print(fmt::format("{} causes at once, lambda 60 each: recall", row),
+          {right, size * static_cast<int>(some.size())}, ">= 95");
     print(fmt::format("{} causes at once: named, or among what is left open", row),
           {open, size * static_cast<int>(some.size())}, "");
-    print(fmt::format("{} causes at once, lambda 60 each: precision", row), {right, right + wrong}, ">= 98");
+    print(fmt::format("{} causes at once, lambda 60 each: precision", row), {right, right + wrong},
+          ">= 98");
   }
 }
 
@@ -337,7 +364,8 @@ void print_orders(const Results& results) {
   }
   if (errors.empty()) return;
   std::sort(errors.begin(), errors.end());
-  print(fmt::format("order within 0.1 cycle a turn, lambda 120 (median error {:.3f}, rms {:.2f} stated sigma)",
+  print(fmt::format("order within 0.1 cycle a turn, lambda 120 (median error {:.3f}, rms {:.2f} "
+                    "stated sigma)",
                     errors[errors.size() / 2], std::sqrt(square / near.all)),
         near, "100");
 }
@@ -374,7 +402,8 @@ void print_held_out(const Results& results) {
     no_worse.yes += r.held_out_after_mm <= 1.01 * r.held_out_before_mm ? 1 : 0;
   }
   if (near.all == 0) return;
-  print(fmt::format("held-out rms within 5 % of the oracle's (mean ratio {:.4f}, worst {:.4f})", sum / near.all, worst),
+  print(fmt::format("held-out rms within 5 % of the oracle's (mean ratio {:.4f}, worst {:.4f})",
+                    sum / near.all, worst),
         near, "100");
   print("held-out rms not worse than before by more than 1 %", no_worse, "100");
 }
@@ -384,11 +413,12 @@ void print_next_poses(const Results& results) {
   const auto line = [](const std::string& what, std::vector<double> values) {
     if (values.empty()) return;
     std::sort(values.begin(), values.end());
-    std::printf("%-72s median %.2f, least %.2f, of %zu  aim >= 1.3\n", what.c_str(), values[values.size() / 2],
-                values.front(), values.size());
+    std::printf("%-72s median %.2f, least %.2f, of %zu  aim >= 1.3\n", what.c_str(),
+                values[values.size() / 2], values.front(), values.size());
   };
-  for (const auto& [by, which] : {std::pair{"as claimed", &TrialResult::next_poses_claimed},
-                                  {"by the second simulation", &TrialResult::next_poses_measured}}) {
+  for (const auto& [by, which] :
+       {std::pair{"as claimed", &TrialResult::next_poses_claimed},
+        {"by the second simulation", &TrialResult::next_poses_measured}}) {
     std::vector<double> ratio, reduction;
     for (const TrialResult& r : of_rows(results, {"next"})) {
       const std::optional<Worth>& worth = r.*which;
@@ -397,7 +427,8 @@ void print_next_poses(const Results& results) {
       reduction.push_back(worth->reduction());
     }
     line(fmt::format("ten random poses' stddev over ten suggested ones', {}", by), ratio);
-    line(fmt::format("stddev taken off by ten suggested poses over ten random ones, {}", by), reduction);
+    line(fmt::format("stddev taken off by ten suggested poses over ten random ones, {}", by),
+         reduction);
   }
 }
 
@@ -416,15 +447,16 @@ void print_replicas(const Results& results) {
 void print_times(const Results& results) {
   for (const auto& [row, aim] : {std::pair{"time300", 20}, {"time1000", 60}}) {
     for (const TrialResult& r : of_rows(results, {row})) {
-      std::printf("%-72s %7.1f s  aim <= %d\n", fmt::format("time for {} poses", r.trial.spec.poses).c_str(), r.seconds,
-                  aim);
+      std::printf("%-72s %7.1f s  aim <= %d\n",
+                  fmt::format("time for {} poses", r.trial.spec.poses).c_str(), r.seconds, aim);
     }
   }
 }
 
 /// What was hidden, by kind, and how often each thing was said of it.
 void print_confusion(const Results& results) {
-  std::printf("\nwho was taken for whom (row: kind, truth's cause; then what was said, how often)\n");
+  std::printf(
+      "\nwho was taken for whom (row: kind, truth's cause; then what was said, how often)\n");
   std::map<std::string, std::map<std::string, int>> said;
   std::map<std::string, Share> exact;
   for (const TrialResult& r : results) {
@@ -452,8 +484,8 @@ std::string circumstances(const TrialResult& r) {
     text += fmt::format(" (closest imitator {} leaves lambda {:.1f})", r.rival, *r.beside_rival);
   }
   if (r.oracle_mm) {
-    text += fmt::format(" (held out {:.4f} -> {:.4f} mm, the oracle {:.4f})", r.held_out_before_mm, r.held_out_after_mm,
-                        *r.oracle_mm);
+    text += fmt::format(" (held out {:.4f} -> {:.4f} mm, the oracle {:.4f})", r.held_out_before_mm,
+                        r.held_out_after_mm, *r.oracle_mm);
   }
   return text;
 }
@@ -462,8 +494,8 @@ void print_failures(const Results& results) {
   std::printf("\nreplays of what went wrong\n");
   for (const TrialResult& r : results) {
     if (!is_bad(r)) continue;
-    std::printf("%s: %s -> %s%s\n", replay_of(r.trial.spec).c_str(), r.truth.c_str(), r.judgement.said.c_str(),
-                circumstances(r).c_str());
+    std::printf("%s: %s -> %s%s\n", replay_of(r.trial.spec).c_str(), r.truth.c_str(),
+                r.judgement.said.c_str(), circumstances(r).c_str());
   }
 }
 
@@ -486,8 +518,10 @@ int replay(const Settings& settings) {
     std::fprintf(stderr, "--replay kind,seed,lambda[,position][,ranges]\n");
     return 2;
   }
-  HiddenSpec spec{
-      .kind = words[0], .seed = std::stoull(words[1]), .lambda = std::stod(words[2]), .poses = settings.poses};
+  HiddenSpec spec{.kind = words[0],
+                  .seed = std::stoull(words[1]),
+                  .lambda = std::stod(words[2]),
+                  .poses = settings.poses};
   for (std::size_t k = 3; k < words.size(); ++k) {
     if (words[k] == "position") {
       spec.orientation = false;
@@ -501,9 +535,10 @@ int replay(const Settings& settings) {
   std::printf("%s", to_json(hidden.truth, hidden.world).c_str());
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, options_of(settings)));
   std::printf("%s", test::told(diagnosis).c_str());
-  const TrialResult result = test::run_trial({"replay", spec, settings.validation > 0}, options_of(settings));
-  std::printf("judged: %s%s; %.1f s", result.judgement.exact ? "exact, " : "", result.judgement.said.c_str(),
-              result.seconds);
+  const TrialResult result =
+      test::run_trial({"replay", spec, settings.validation > 0}, options_of(settings));
+  std::printf("judged: %s%s; %.1f s", result.judgement.exact ? "exact, " : "",
+              result.judgement.said.c_str(), result.seconds);
   std::printf("%s", circumstances(result).c_str());
   std::printf("\n");
   return 0;
@@ -523,9 +558,8 @@ int main(int argc, char** argv) {
   app.add_option("--draws", settings.draws, "of the null, a diagnosis");
   app.add_option("--kinds", kinds, "only these, joined by ','");
   app.add_option("--rows", rows,
-                 "only these: named60, named120, null, null_unrecorded, unrecorded, unknown, undecidable, three, two, "
-                 "heldout, next, replica_..., "
-                 "time300, time1000");
+                 "only these: named60, named120, null, null_unrecorded, unrecorded, unknown, "
+                 "undecidable, three, two, heldout, next, replica_..., time300, time1000");
   app.add_flag("--quick", settings.quick, "few trials of few poses");
   app.add_option("--validation", settings.validation, "share of the poses set aside in a replay");
   app.add_option("--without", settings.without, "columns withheld in a replay, joined by ','");

@@ -1,6 +1,7 @@
-// What a daemon keeps up for long, with real clients: `endurance_benchmark [--minutes N] [--swaps N] [--clients N]
-// [--restarts N] [swaps] [restart] [clients] [mixed]`; none named: all of them. Ends with 1 where an answer was mixed,
-// lost or wrong.
+// What a daemon keeps up for long, with real clients: `endurance_benchmark [--minutes N] [--swaps
+// N] [--clients N]
+// [--restarts N] [swaps] [restart] [clients] [mixed]`; none named: all of them. Ends with 1 where
+// an answer was mixed, lost or wrong.
 #include <CLI/CLI.hpp>
 #include <array>
 #include <atomic>
@@ -52,7 +53,8 @@ class TwoModels {
     {
       const auto store = test::demand(Store::open(daemon_.store_path()));
       for (const std::uint64_t seed : {11, 12}) {
-        const int version = test::demand(store->add_model("cell-7", trained(200, seed), 0, seed == 11, "benchmark"));
+        const int version = test::demand(
+            store->add_model("cell-7", trained(200, seed), 0, seed == 11, "benchmark"));
         models_.push_back(test::demand(store->model("cell-7", version)));
       }
     }
@@ -71,7 +73,8 @@ class TwoModels {
       const JointVector q = Eigen::Map<const Eigen::VectorXd>(joints[i].data(), 6);
       const auto expected = model.predict(q, tool, payload);
       const client::PredictedError& item = answer.items.at(i);
-      const Vector3 error_mm = {to_mm(expected.error_B.x()), to_mm(expected.error_B.y()), to_mm(expected.error_B.z())};
+      const Vector3 error_mm = {to_mm(expected.error_B.x()), to_mm(expected.error_B.y()),
+                                to_mm(expected.error_B.z())};
       const Vector3 stddev_mm = {to_mm(expected.stddev_B.x()), to_mm(expected.stddev_B.y()),
                                  to_mm(expected.stddev_B.z())};
       if (Vector3(item.dx_mm, item.dy_mm, item.dz_mm) != error_mm) return false;
@@ -85,14 +88,16 @@ class TwoModels {
   test::Daemon daemon_;
 };
 
-// ---- swaps under load ----------------------------------------------------------------------------------------------
+// ---- swaps under load
+// ----------------------------------------------------------------------------------------------
 
 struct Answers {
   std::atomic<std::int64_t> asked{0}, lost{0}, wrong{0};
   std::array<std::atomic<std::int64_t>, 2> of_version{};
 };
 
-void ask_until(const std::stop_token& stop, TwoModels& service, std::uint64_t seed, Answers& answers) {
+void ask_until(const std::stop_token& stop, TwoModels& service, std::uint64_t seed,
+               Answers& answers) {
   const auto session = service.session();
   for (std::uint64_t round = 0; !stop.stop_requested(); ++round) {
     const auto joints = test::virtual_joints(8, 1000 * seed + round % 50);
@@ -114,7 +119,8 @@ bool swaps(int count) {
   {
     std::vector<std::jthread> clients;
     for (std::uint64_t k = 1; k <= 4; ++k)
-      clients.emplace_back([&, k](const std::stop_token& stop) { ask_until(stop, service, k, answers); });
+      clients.emplace_back(
+          [&, k](const std::stop_token& stop) { ask_until(stop, service, k, answers); });
     const auto person = service.session();
     for (int i = 0; i < count; ++i) {
       if (!person->activate("cell-7", 2 - i % 2)) ++failed;
@@ -122,14 +128,16 @@ bool swaps(int count) {
   }
   test::tell_figure("swaps under load", count - failed);
   test::tell_figure("swaps under load, answers recomputed", static_cast<double>(answers.asked));
-  test::tell_figure("swaps under load, share of the second model",
-                    static_cast<double>(answers.of_version[1]) / static_cast<double>(answers.asked));
+  test::tell_figure(
+      "swaps under load, share of the second model",
+      static_cast<double>(answers.of_version[1]) / static_cast<double>(answers.asked));
   test::tell_figure("swaps under load, answers lost", static_cast<double>(answers.lost));
   test::tell_figure("swaps under load, answers mixed or wrong", static_cast<double>(answers.wrong));
   return failed == 0 && answers.lost == 0 && answers.wrong == 0;
 }
 
-// ---- killed and started again --------------------------------------------------------------------------------------
+// ---- killed and started again
+// --------------------------------------------------------------------------------------
 
 bool restart(int count) {
   TwoModels service;
@@ -148,7 +156,8 @@ bool restart(int count) {
   return right;
 }
 
-// ---- what the daemon holds -----------------------------------------------------------------------------------------
+// ---- what the daemon holds
+// -----------------------------------------------------------------------------------------
 
 struct Holding {
   double memory_mb = 0;
@@ -196,31 +205,38 @@ bool clients(int count) {
   pause(std::chrono::seconds(3));
   const Holding before = holding(pid);
   good = come_and_vanish(service, count) && good;
-  // The lease of a client that said farewell is over at once; give the deleted endpoints time to go.
+  // The lease of a client that said farewell is over at once; give the deleted endpoints time to
+  // go.
   Holding after = holding(pid);
-  for (int i = 0; i < 30 && (after.descriptors > before.descriptors || after.threads > before.threads); ++i) {
+  for (int i = 0;
+       i < 30 && (after.descriptors > before.descriptors || after.threads > before.threads); ++i) {
     pause(std::chrono::seconds(1));
     after = holding(pid);
   }
   std::printf("clients: %d; memory %.1f to %.1f MB\n", count, before.memory_mb, after.memory_mb);
-  test::tell_figure("clients that come and vanish, more memory, MB", after.memory_mb - before.memory_mb);
-  test::tell_figure("clients that come and vanish, more descriptors", after.descriptors - before.descriptors);
+  test::tell_figure("clients that come and vanish, more memory, MB",
+                    after.memory_mb - before.memory_mb);
+  test::tell_figure("clients that come and vanish, more descriptors",
+                    after.descriptors - before.descriptors);
   test::tell_figure("clients that come and vanish, more threads", after.threads - before.threads);
   return good && after.descriptors <= before.descriptors && after.threads <= before.threads;
 }
 
-// ---- everything at once --------------------------------------------------------------------------------------------
+// ---- everything at once
+// --------------------------------------------------------------------------------------------
 
 /// Calls `work` with a session and a counter, `each` apart, until it is stopped; counts what fails.
-std::jthread repeated(TwoModels& service, std::chrono::milliseconds each, std::atomic<std::int64_t>& done,
-                      std::atomic<std::int64_t>& lost, std::function<bool(client::Session&, std::uint64_t)> work) {
-  return std::jthread([&service, each, &done, &lost, work = std::move(work)](const std::stop_token& stop) {
-    const auto session = service.session();
-    for (std::uint64_t i = 0; !stop.stop_requested(); ++i) {
-      ++(work(*session, i) ? done : lost);
-      pause(each);
-    }
-  });
+std::jthread repeated(TwoModels& service, std::chrono::milliseconds each,
+                      std::atomic<std::int64_t>& done, std::atomic<std::int64_t>& lost,
+                      std::function<bool(client::Session&, std::uint64_t)> work) {
+  return std::jthread(
+      [&service, each, &done, &lost, work = std::move(work)](const std::stop_token& stop) {
+        const auto session = service.session();
+        for (std::uint64_t i = 0; !stop.stop_requested(); ++i) {
+          ++(work(*session, i) ? done : lost);
+          pause(each);
+        }
+      });
 }
 
 std::vector<std::jthread> everybody(TwoModels& service, std::atomic<std::int64_t>& done,
@@ -228,35 +244,43 @@ std::vector<std::jthread> everybody(TwoModels& service, std::atomic<std::int64_t
   using std::chrono::milliseconds;
   std::vector<std::jthread> all;
   for (int k = 0; k < 3; ++k) {
-    all.push_back(
-        repeated(service, milliseconds(20), done, lost, [&service](client::Session& session, std::uint64_t i) {
+    all.push_back(repeated(
+        service, milliseconds(20), done, lost,
+        [&service](client::Session& session, std::uint64_t i) {
           const auto joints = test::virtual_joints(1 + static_cast<int>(i % 40), i % 97);
           const auto answer = session.predict_error(cell_7(), joints);
           return answer && (answer->model.version > 2 || service.is_right(joints, *answer));
         }));
   }
-  all.push_back(repeated(service, milliseconds(50), done, lost, [](client::Session& session, std::uint64_t i) {
-    std::vector<client::TargetMm> targets;
-    for (const auto& joints : test::virtual_joints(50, i % 89)) {
-      client::TargetMm target;
-      target.seed_rad = joints;
-      target.joint_target = true;
-      targets.push_back(target);
-    }
-    return session.correct_targets(cell_7(), targets).has_value();
-  }));
-  all.push_back(repeated(service, milliseconds(5000), done, lost, [](client::Session& session, std::uint64_t i) {
-    return session.submit_measurements("cell-7", fmt::format("b{}", i), test::virtual_batch_csv(40, i)).has_value();
-  }));
-  all.push_back(repeated(service, milliseconds(500), done, lost, [](client::Session& session, std::uint64_t) {
-    return session.models("cell-7").has_value() && session.jobs("cell-7").has_value();
-  }));
-  all.push_back(repeated(service, milliseconds(1000), done, lost, [](client::Session& session, std::uint64_t i) {
-    return session.activate("cell-7", 1 + static_cast<int>(i % 2)).has_value();
-  }));
-  all.push_back(repeated(service, milliseconds(1000), done, lost, [&service](client::Session&, std::uint64_t) {
-    return service.session()->predict_error(cell_7(), test::virtual_joints(1, 4)).has_value();
-  }));
+  all.push_back(repeated(service, milliseconds(50), done, lost,
+                         [](client::Session& session, std::uint64_t i) {
+                           std::vector<client::TargetMm> targets;
+                           for (const auto& joints : test::virtual_joints(50, i % 89)) {
+                             client::TargetMm target;
+                             target.seed_rad = joints;
+                             target.joint_target = true;
+                             targets.push_back(target);
+                           }
+                           return session.correct_targets(cell_7(), targets).has_value();
+                         }));
+  all.push_back(repeated(
+      service, milliseconds(5000), done, lost, [](client::Session& session, std::uint64_t i) {
+        return session
+            .submit_measurements("cell-7", fmt::format("b{}", i), test::virtual_batch_csv(40, i))
+            .has_value();
+      }));
+  all.push_back(
+      repeated(service, milliseconds(500), done, lost, [](client::Session& session, std::uint64_t) {
+        return session.models("cell-7").has_value() && session.jobs("cell-7").has_value();
+      }));
+  all.push_back(repeated(
+      service, milliseconds(1000), done, lost, [](client::Session& session, std::uint64_t i) {
+        return session.activate("cell-7", 1 + static_cast<int>(i % 2)).has_value();
+      }));
+  all.push_back(repeated(
+      service, milliseconds(1000), done, lost, [&service](client::Session&, std::uint64_t) {
+        return service.session()->predict_error(cell_7(), test::virtual_joints(1, 4)).has_value();
+      }));
   return all;
 }
 
@@ -271,8 +295,9 @@ bool mixed(int minutes) {
       pause(std::chrono::minutes(1));
       at_minute.push_back(holding(pid));
       const Holding& now = at_minute.back();
-      std::printf("minute %d: %.1f MB, %d descriptors, %d threads, %lld calls, %lld lost\n", minute, now.memory_mb,
-                  now.descriptors, now.threads, static_cast<long long>(done), static_cast<long long>(lost));
+      std::printf("minute %d: %.1f MB, %d descriptors, %d threads, %lld calls, %lld lost\n", minute,
+                  now.memory_mb, now.descriptors, now.threads, static_cast<long long>(done),
+                  static_cast<long long>(lost));
       std::fflush(stdout);
     }
   }
@@ -280,7 +305,8 @@ bool mixed(int minutes) {
   const Holding& late = at_minute.back();
   test::tell_figure("mixed load, calls", static_cast<double>(done));
   test::tell_figure("mixed load, calls lost or wrong", static_cast<double>(lost));
-  test::tell_figure("mixed load, more memory from minute 2 on, MB", late.memory_mb - early.memory_mb);
+  test::tell_figure("mixed load, more memory from minute 2 on, MB",
+                    late.memory_mb - early.memory_mb);
   test::tell_figure("mixed load, more descriptors", late.descriptors - early.descriptors);
   test::tell_figure("mixed load, more threads", late.threads - early.threads);
   return lost == 0;

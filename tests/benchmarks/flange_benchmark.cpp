@@ -1,6 +1,6 @@
-// Reflectors on one flange, and whether 95 % intervals hold 95 %, on drawn arms of the second simulation.
-// `flange_benchmark [--only fourth|coverage|ur10|speed] [--seeds N] [--poses N] [--bias KERNEL]`; with --poses coverage
-// of that many poses alone.
+// Reflectors on one flange, and whether 95 % intervals hold 95 %, on drawn arms of the second
+// simulation. `flange_benchmark [--only fourth|coverage|ur10|speed] [--seeds N] [--poses N] [--bias
+// KERNEL]`; with --poses coverage of that many poses alone.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -48,9 +48,11 @@ Eigen::Matrix4d reflector(double x_mm, double y_mm, double z_mm) {
 
 /// An arm with what no error source explains, and four reflectors on its flange.
 World drawn_world(std::uint64_t seed) {
-  hidden::TrainedRobot robot = hidden::draw_robot({.seed = seed, .poses = 30, .orientation = false});
+  hidden::TrainedRobot robot =
+      hidden::draw_robot({.seed = seed, .poses = 30, .orientation = false});
   World world = robot.world;
-  world.tools = {reflector(120, 10, 60), reflector(-70, 110, 90), reflector(-60, -115, 40), reflector(60, -90, 260)};
+  world.tools = {reflector(120, 10, 60), reflector(-70, 110, 90), reflector(-60, -115, 40),
+                 reflector(60, -90, 260)};
   Random random(seed * 7919 + 3);
   const hidden::Scene scene{world.arm, &world.poses};
   world.effects = {hidden::draw_foreign_effect("foreign_wave", scene, random),
@@ -85,8 +87,8 @@ std::vector<MeasuringPose> with_reflectors(const std::vector<MeasuringPose>& pos
   return all;
 }
 
-CompensatedModel trained(World world, const std::vector<MeasuringPose>& poses, const std::string& bias,
-                         std::uint64_t seed) {
+CompensatedModel trained(World world, const std::vector<MeasuringPose>& poses,
+                         const std::string& bias, std::uint64_t seed) {
   world.poses = poses;
   Random random(seed * 104729 + 11);
   hidden::Frames frames = frames_at(world, poses, world.effects);
@@ -94,9 +96,10 @@ CompensatedModel trained(World world, const std::vector<MeasuringPose>& poses, c
     for (int axis = 0; axis < 3; ++axis) frame(axis, 3) += world.sigma_mm * hidden::normal(random);
   }
   const std::string cell_yaml = cell_text(world, {world.tools, world.loads}, "6dim-l");
-  const auto cell = std::make_shared<const Cell>(demand(parse_cell(cell_yaml, hidden::robot_text(), "cell.yaml")));
-  const CheckedBatch batch =
-      demand(check_against_cell(demand(parse_batch_csv(batch_text(world, frames), "batch.csv")), *cell, drawn(0, 1)));
+  const auto cell = std::make_shared<const Cell>(
+      demand(parse_cell(cell_yaml, hidden::robot_text(), "cell.yaml")));
+  const CheckedBatch batch = demand(check_against_cell(
+      demand(parse_batch_csv(batch_text(world, frames), "batch.csv")), *cell, drawn(0, 1)));
   TrainOptions options;
   options.bias = bias;
   return demand(train(cell, batch, options));
@@ -108,8 +111,10 @@ struct Fresh {
   double inside = 0;  // share of coordinates inside their 95 %
   double in_domain = 0;
 };
-Fresh fresh_errors(const World& world, const CompensatedModel& model, int reflector, std::uint64_t seed) {
-  const std::vector<MeasuringPose> poses = with_reflectors(scattered(400, seed + 500000), {reflector});
+Fresh fresh_errors(const World& world, const CompensatedModel& model, int reflector,
+                   std::uint64_t seed) {
+  const std::vector<MeasuringPose> poses =
+      with_reflectors(scattered(400, seed + 500000), {reflector});
   const hidden::Frames real = frames_at(world, poses, world.effects);
   std::vector<PoseContext> asked(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -122,7 +127,8 @@ Fresh fresh_errors(const World& world, const CompensatedModel& model, int reflec
   Fresh fresh;
   const auto count = static_cast<double>(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Vector3d missed_mm = real[i].block<3, 1>(0, 3) - 1e3 * predictions[i].X_BT_predicted.translation();
+    const Eigen::Vector3d missed_mm =
+        real[i].block<3, 1>(0, 3) - 1e3 * predictions[i].X_BT_predicted.translation();
     fresh.rms_mm += missed_mm.squaredNorm() / count;
     const Eigen::Array3d z = missed_mm.array().abs() / (1e3 * predictions[i].true_stddev_B.array());
     fresh.inside += static_cast<double>((z < 1.96).count()) / (3 * count);
@@ -134,24 +140,27 @@ Fresh fresh_errors(const World& world, const CompensatedModel& model, int reflec
 
 void fourth(const Options& options) {
   double worst = 0, mean = 0, inside = 0, plain = 0;
-  std::printf("%6s %14s %14s %10s %10s %10s %s\n", "seed", "three, mm", "its own, mm", "ratio", "plain, mm", "inside %",
-              "in domain %");
+  std::printf("%6s %14s %14s %10s %10s %10s %s\n", "seed", "three, mm", "its own, mm", "ratio",
+              "plain, mm", "inside %", "in domain %");
   for (int seed = 1; seed <= options.seeds; ++seed) {
     const auto s = static_cast<std::uint64_t>(seed);
     const World world = drawn_world(s);
     const std::vector<MeasuringPose> poses = scattered(options.poses, s);
-    const CompensatedModel three = trained(world, with_reflectors(poses, {0, 1, 2}), "se + flange", s);
+    const CompensatedModel three =
+        trained(world, with_reflectors(poses, {0, 1, 2}), "se + flange", s);
     const CompensatedModel own = trained(world, with_reflectors(poses, {kFourth}), "se", s + 1000);
     const CompensatedModel without = trained(world, with_reflectors(poses, {0, 1, 2}), "se", s);
     const Fresh of_three = fresh_errors(world, three, kFourth, s);
     const Fresh of_own = fresh_errors(world, own, kFourth, s);
     const double ratio = of_three.rms_mm / of_own.rms_mm;
-    std::printf("%6d %14.4f %14.4f %10.3f %10.4f %10.1f %.1f\n", seed, of_three.rms_mm, of_own.rms_mm, ratio,
-                fresh_errors(world, without, kFourth, s).rms_mm, 100 * of_three.inside, 100 * of_three.in_domain);
+    std::printf("%6d %14.4f %14.4f %10.3f %10.4f %10.1f %.1f\n", seed, of_three.rms_mm,
+                of_own.rms_mm, ratio, fresh_errors(world, without, kFourth, s).rms_mm,
+                100 * of_three.inside, 100 * of_three.in_domain);
     worst = std::max(worst, ratio);
     mean += ratio / options.seeds;
     inside += 100 * of_three.inside / options.seeds;
-    plain += fresh_errors(world, without, 0, s).rms_mm / fresh_errors(world, three, 0, s).rms_mm / options.seeds;
+    plain += fresh_errors(world, without, 0, s).rms_mm / fresh_errors(world, three, 0, s).rms_mm /
+             options.seeds;
   }
   tell_figure("a fourth reflector by three others over its own training, mean", mean);
   tell_figure("a fourth reflector by three others over its own training, worst", worst);
@@ -161,7 +170,8 @@ void fourth(const Options& options) {
 
 // Each model: trained with few poses, asked at poses of the same ranges, tracker's noise left out.
 void coverage(const Options& options) {
-  for (const int poses : options.poses_asked ? std::vector<int>{options.poses} : std::vector<int>{20, 40, 60, 200}) {
+  for (const int poses :
+       options.poses_asked ? std::vector<int>{options.poses} : std::vector<int>{20, 40, 60, 200}) {
     double inside = 0, least = 1;
     for (int seed = 1; seed <= options.seeds; ++seed) {
       const auto s = static_cast<std::uint64_t>(seed);
@@ -170,18 +180,21 @@ void coverage(const Options& options) {
           trained(world, with_reflectors(scattered(poses, s + 77), {0}), options.bias, s + 2000);
       const Fresh fresh = fresh_errors(world, model, 0, s);
       const double share = fresh.inside;
-      std::printf("%3d poses, seed %2d: %-12s %.4f mm, inside %5.1f %%, in domain %5.1f %%\n", poses, seed,
-                  model.parts().bias ? model.parts().bias->kernel.c_str() : "none", fresh.rms_mm, 100 * share,
-                  100 * fresh.in_domain);
+      std::printf("%3d poses, seed %2d: %-12s %.4f mm, inside %5.1f %%, in domain %5.1f %%\n",
+                  poses, seed, model.parts().bias ? model.parts().bias->kernel.c_str() : "none",
+                  fresh.rms_mm, 100 * share, 100 * fresh.in_domain);
       inside += 100 * share / options.seeds;
       least = std::min(least, share);
     }
-    tell_figure("models of " + std::to_string(poses) + " poses, true error inside 95 %, mean", inside);
-    tell_figure("models of " + std::to_string(poses) + " poses, true error inside 95 %, least", 100 * least);
+    tell_figure("models of " + std::to_string(poses) + " poses, true error inside 95 %, mean",
+                inside);
+    tell_figure("models of " + std::to_string(poses) + " poses, true error inside 95 %, least",
+                100 * least);
   }
 }
 
-/// 95 % of the share inside, by runs of poses drawn with replacement: neighbours in time have errors in common.
+/// 95 % of the share inside, by runs of poses drawn with replacement: neighbours in time have
+/// errors in common.
 std::pair<double, double> block_bootstrap(const std::vector<double>& inside) {
   constexpr int kDraws = 4000;
   constexpr std::size_t kRun = 20;
@@ -191,7 +204,8 @@ std::pair<double, double> block_bootstrap(const std::vector<double>& inside) {
   for (int draw = 0; draw < kDraws; ++draw) {
     double sum = 0;
     for (std::size_t run = 0; run < runs; ++run) {
-      const auto first = static_cast<std::size_t>(hidden::whole(random, 0, static_cast<int>(inside.size()) - 1));
+      const auto first =
+          static_cast<std::size_t>(hidden::whole(random, 0, static_cast<int>(inside.size()) - 1));
       for (std::size_t i = 0; i < kRun; ++i) sum += inside[(first + i) % inside.size()];
     }
     means.push_back(sum / static_cast<double>(runs * kRun));
@@ -202,18 +216,23 @@ std::pair<double, double> block_bootstrap(const std::vector<double>& inside) {
 
 // Every pose whose id ends in 7, 8 or 9 is held out, as the tests do it.
 void ur10(const Options&) {
-  const auto cell = std::make_shared<const Cell>(demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
+  const auto cell =
+      std::make_shared<const Cell>(demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
   for (const char* name : {"c", "d"}) {
-    const std::string file = fmt::format(TRAMMEL_SOURCE_DIR "/../shared/data/ur10_series_{}.csv", name);
+    const std::string file =
+        fmt::format(TRAMMEL_SOURCE_DIR "/../shared/data/ur10_series_{}.csv", name);
     if (!std::filesystem::exists(file)) continue;
     MeasurementBatch batch = demand(check_against_cell(demand(read_batch_csv(file)), *cell)).rows();
     MeasurementBatch held_out = batch;
-    std::erase_if(held_out.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 < 7; });
-    std::erase_if(batch.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
+    std::erase_if(held_out.measurements,
+                  [](const Measurement& m) { return std::stoi(m.pose_id) % 10 < 7; });
+    std::erase_if(batch.measurements,
+                  [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
     TrainOptions options;
     options.level = "M3";
     options.bias = "matern52 + joint_map + parameters";
-    const CompensatedModel model = demand(train(cell, demand(check_against_cell(batch, *cell, drawn(0, 1))), options));
+    const CompensatedModel model =
+        demand(train(cell, demand(check_against_cell(batch, *cell, drawn(0, 1))), options));
     const CompensatedModel::LevelErrors errors = model.errors_B(held_out);
     std::vector<double> inside;
     for (Eigen::Index i = 0; i < errors.compensated.cols(); ++i) {
@@ -224,8 +243,10 @@ void ur10(const Options&) {
     double mean = 0;
     for (const double share : inside) mean += 100 * share / static_cast<double>(inside.size());
     tell_figure(fmt::format("UR10 {} held out inside 95 %", name), mean);
-    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks from", name), 100 * limits.first);
-    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks to", name), 100 * limits.second);
+    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks from", name),
+                100 * limits.first);
+    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks to", name),
+                100 * limits.second);
   }
 }
 

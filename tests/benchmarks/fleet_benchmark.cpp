@@ -1,5 +1,6 @@
-// What a cell costs a daemon: how long a start takes with many cells, how much memory a model needs, how long others
-// wait for a swap, and how long a large store takes to open. One figure a line. --cells N, --poses N, --store-gb N.
+// What a cell costs a daemon: how long a start takes with many cells, how much memory a model
+// needs, how long others wait for a swap, and how long a large store takes to open. One figure a
+// line. --cells N, --poses N, --store-gb N.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <malloc.h>
 #include <unistd.h>
@@ -23,9 +24,13 @@ namespace {
 using test::demand;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
-void print(const std::string& name, double value) { std::cout << fmt::format("figure {}: {:.4g}\n", name, value); }
+void print(const std::string& name, double value) {
+  std::cout << fmt::format("figure {}: {:.4g}\n", name, value);
+}
 
 /// Resident memory of this process, MB.
 double resident() {
@@ -47,7 +52,8 @@ BiasState learned(int poses, std::uint64_t seed) {
   state.residual_B.resize(poses, 3);
   for (int i = 0; i < poses; ++i) {
     for (int axis = 0; axis < 3; ++axis)
-      state.residual_B(i, axis) = 2e-4 * std::sin(1.3 * state.q(i, axis) + state.q(i, axis + 2)) + noise(random);
+      state.residual_B(i, axis) =
+          2e-4 * std::sin(1.3 * state.q(i, axis) + state.q(i, axis + 2)) + noise(random);
   }
   state.sigma = Eigen::VectorXd::Constant(poses, 2e-5);
   state.offset = Eigen::VectorXd::Zero(3);
@@ -79,8 +85,8 @@ void fill(Fleet& fleet, int cells, int poses) {
     const auto cell = test::small_cell(name, "se");
     fleet.cells[name] = cell;
     for (int version = 1; version <= (i == 0 ? 2 : 1); ++version)
-      static_cast<void>(
-          demand(store->add_model(name, model_of(cell, poses, static_cast<std::uint64_t>(version)), 0, true, "")));
+      static_cast<void>(demand(store->add_model(
+          name, model_of(cell, poses, static_cast<std::uint64_t>(version)), 0, true, "")));
   }
 }
 
@@ -117,7 +123,8 @@ void measure_memory(const Fleet& fleet, int poses) {
   print("as the registry counts it, MB", static_cast<double>(bytes_of(models.back())) / 1e6);
   // Three triangles, the features of the poses, the weights and what was measured.
   const double n = poses;
-  print("memory of a model over what predicts", each / ((3 * n * n / 2 * 8 + n * 3 * (8 + 2) * 8) / 1e6));
+  print("memory of a model over what predicts",
+        each / ((3 * n * n / 2 * 8 + n * 3 * (8 + 2) * 8) / 1e6));
 }
 
 void measure_large_store(int gigabytes) {
@@ -126,18 +133,19 @@ void measure_large_store(int gigabytes) {
   const auto cell = test::small_cell("cell-7");
   {
     const auto store = demand(Store::open(path));
-    static_cast<void>(demand(store->add_model("cell-7", test::nominal_model(cell, 1), 0, true, "")));
+    static_cast<void>(
+        demand(store->add_model("cell-7", test::nominal_model(cell, 1), 0, true, "")));
   }
   {
     SQLite::Database file(path, SQLite::OPEN_READWRITE);
     file.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
     file.exec(
-        "INSERT INTO jobs (id, cell, level, bias, state, message, created_at) VALUES (1, 'cell-7', '', '', 'done', "
-        "'', 0)");
+        "INSERT INTO jobs (id, cell, level, bias, state, message, created_at) VALUES (1, 'cell-7', "
+        "'', '', 'done', '', 0)");
     for (int i = 0; i < 100 * gigabytes; ++i)
       file.exec(
-          fmt::format("INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) VALUES "
-                      "('cell-7', '{}', zeroblob(10000000), '', '', 0, 1, 1)",
+          fmt::format("INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, "
+                      "job) VALUES ('cell-7', '{}', zeroblob(10000000), '', '', 0, 1, 1)",
                       i));
   }
   ::sync();  // what was just written is no part of a start

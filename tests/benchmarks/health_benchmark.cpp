@@ -1,6 +1,7 @@
-// What a check of a few planned poses sees. Robots of the second simulation, trained from their files; --robots of each
-// kind. False alarms of healthy robots; changes of a single cause of 50 um rms (base refitted, tool in turn); the size
-// at which 95 % are seen beside the size that the check states. Robots whose joints lost several zeros.
+// What a check of a few planned poses sees. Robots of the second simulation, trained from their
+// files; --robots of each kind. False alarms of healthy robots; changes of a single cause of 50 um
+// rms (base refitted, tool in turn); the size at which 95 % are seen beside the size that the check
+// states. Robots whose joints lost several zeros.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -33,12 +34,14 @@ std::vector<Kind> kinds() {
           {"60 full poses", {.poses = 60}},
           {"noise 30 um, 200 full poses", {.poses = 200, .sigma_mm = 0.03}},
           {"noise with t(4), 200 full poses", {.poses = 200, .tail_freedom = 4}},
-          {"an error of 20 um that no cause makes, 300 full poses, bias se", {.poses = 300, .ripple_mm = 0.02}, "se"}};
+          {"an error of 20 um that no cause makes, 300 full poses, bias se",
+           {.poses = 300, .ripple_mm = 0.02},
+           "se"}};
 }
 
-const std::vector<std::string> kCauses = {"joint_slip",        "compliance",  "geometry",     "encoder_eccentricity",
-                                          "gear_transmission", "joint_map",   "tool_changed", "payload_changed",
-                                          "wrist_coupling",    "link_bending"};
+const std::vector<std::string> kCauses = {
+    "joint_slip", "compliance",   "geometry",        "encoder_eccentricity", "gear_transmission",
+    "joint_map",  "tool_changed", "payload_changed", "wrist_coupling",       "link_bending"};
 
 HiddenCause drawn(const std::string& name, const CheckedRobot& robot, hidden::Random& random) {
   hidden::Scene scene{robot.robot.world.arm, &robot.robot.world.poses, 1, 1, true};
@@ -66,7 +69,8 @@ struct Seen {
 bool names(const HealthCheck& check, const HiddenCause& truth) {
   const auto is = [&](const SingleCause& cause) {
     if (cause.record->spelling != truth.cause) return false;
-    if (!truth.parameter.empty() && truth.cause == "geometry") return cause.parameter == truth.parameter;
+    if (!truth.parameter.empty() && truth.cause == "geometry")
+      return cause.parameter == truth.parameter;
     return truth.joint <= 0 || cause.joint + 1 == truth.joint;
   };
   if (check.changed.empty()) return false;
@@ -95,7 +99,8 @@ Seen healthy(const CheckedRobot& robot, const Options& options) {
   return seen;
 }
 
-void changes(const CheckedRobot& robot, const Options& options, std::map<std::string, Seen>& by_cause) {
+void changes(const CheckedRobot& robot, const Options& options,
+             std::map<std::string, Seen>& by_cause) {
   hidden::Random random(robot.robot.spec.seed * 17);
   for (const std::string& name : kCauses) {
     for (int k = 0; k < options.each; ++k) {
@@ -109,14 +114,15 @@ void changes(const CheckedRobot& robot, const Options& options, std::map<std::st
   }
 }
 
-/// Where the share seen passes 95 %, by a straight line through the probits of some sizes; over the stated size.
-double measured_over_stated(const CheckedRobot& robot, const HiddenCause& cause, double stated_mm, int each,
-                            std::uint64_t seed) {
+/// Where the share seen passes 95 %, by a straight line through the probits of some sizes; over the
+/// stated size.
+double measured_over_stated(const CheckedRobot& robot, const HiddenCause& cause, double stated_mm,
+                            int each, std::uint64_t seed) {
   const auto probit = [](double share) {  // Abramowitz and Stegun 26.2.23
     const double p = std::min(share, 1 - share);
     const double t = std::sqrt(-2 * std::log(p));
-    const double x =
-        t - (2.515517 + 0.802853 * t + 0.010328 * t * t) / (1 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
+    const double x = t - (2.515517 + 0.802853 * t + 0.010328 * t * t) /
+                             (1 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
     return share < 0.5 ? -x : x;
   };
   Eigen::MatrixX2d line(5, 2);
@@ -126,8 +132,10 @@ double measured_over_stated(const CheckedRobot& robot, const HiddenCause& cause,
     int changed = 0;
     hidden::Random random(seed + 1000 * static_cast<std::uint64_t>(step));
     for (int k = 0; k < each; ++k) {
-      const hidden::Effect effect = changed_by(robot.robot, cause, factor * stated_mm, false, random);
-      changed += checked(robot, {{effect}}, random(), {}).verdict == HealthVerdict::kChanged ? 1 : 0;
+      const hidden::Effect effect =
+          changed_by(robot.robot, cause, factor * stated_mm, false, random);
+      changed +=
+          checked(robot, {{effect}}, random(), {}).verdict == HealthVerdict::kChanged ? 1 : 0;
     }
     line.row(step) << 1, factor;
     at(step) = probit((changed + 0.5) / (each + 1.0));
@@ -141,7 +149,8 @@ double stated_mm(const CheckedRobot& robot, const HiddenCause& cause) {
   for (const SmallestEffect& one : checked(robot, {}, 1, {}).smallest) {
     const bool joint = cause.joint <= 0 || one.cause.joint + 1 == cause.joint;
     const bool parameter = cause.cause != "geometry" || one.cause.parameter == cause.parameter;
-    if (one.cause.record->spelling == cause.cause && joint && parameter && one.rms) return to_mm(*one.rms);
+    if (one.cause.record->spelling == cause.cause && joint && parameter && one.rms)
+      return to_mm(*one.rms);
   }
   return 0;
 }
@@ -156,7 +165,8 @@ void sizes(const CheckedRobot& robot, int each) {
     const double stated = stated_mm(robot, cause);
     const double ratio = measured_over_stated(robot, cause, stated, each, 99);
     farthest = std::max(farthest, std::abs(ratio - 1));
-    fmt::print("  {:28} stated {:.4f} mm, measured {:.2f} of it\n", to_string(cause), stated, ratio);
+    fmt::print("  {:28} stated {:.4f} mm, measured {:.2f} of it\n", to_string(cause), stated,
+               ratio);
     std::cout.flush();
   }
   test::tell_figure("health: stated smallest effect off by at most, %", 100 * farthest);
@@ -166,7 +176,8 @@ void sizes(const CheckedRobot& robot, int each) {
 struct Lost {
   int worlds = 0, named = 0, whole = 0, sure_and_wrong = 0;
 
-  void add(const std::string& kind, const test::Remastered& world, const Result<HealthCheck>& check) {
+  void add(const std::string& kind, const test::Remastered& world,
+           const Result<HealthCheck>& check) {
     ++worlds;
     const bool right = check && test::is_right(*check, world);
     named += right ? 1 : 0;
@@ -186,15 +197,16 @@ struct Lost {
     sure_and_wrong += other.sure_and_wrong;
   }
   void tell(const std::string& kind) const {
-    fmt::print("lost zeros, {}: {} worlds, {} named, {} of them all, {} sure and wrong\n", kind, worlds, named, whole,
-               sure_and_wrong);
+    fmt::print("lost zeros, {}: {} worlds, {} named, {} of them all, {} sure and wrong\n", kind,
+               worlds, named, whole, sure_and_wrong);
     std::cout.flush();
   }
 };
 
 /// Poses as planned for checks, and every second time as the training had them.
 Lost planned_and_spread(bool orientation, int poses, int worlds) {
-  const CheckedRobot planned = test::trained_robot({.seed = 11, .poses = 150, .orientation = orientation}, poses);
+  const CheckedRobot planned =
+      test::trained_robot({.seed = 11, .poses = 150, .orientation = orientation}, poses);
   const std::string kind = fmt::format("{} {}", poses, orientation ? "poses" : "positions");
   hidden::Random random(static_cast<std::uint64_t>(poses));
   Lost lost;
@@ -219,12 +231,13 @@ Lost at_elbows(const CompensatedModel& model, bool orientation, int poses, int w
     JointVector like(7);
     like << 0.2, 0.6, 0, -1.4, 0, 1.0, 0.1;
     for (Eigen::Index j = 0; j < like.size(); ++j) like(j) += hidden::uniform(random, -0.25, 0.25);
-    test::PlainCheck check{test::elbows(test::iiwa(), poses, like), JointVector::Zero(7), orientation};
+    test::PlainCheck check{test::elbows(test::iiwa(), poses, like), JointVector::Zero(7),
+                           orientation};
     check.seed = random();
     const test::Remastered world = test::draw_remastered(test::sets_of_seven_axes(), random);
     apply(world, check, random);
-    const CheckedBatch batch =
-        test::demand(check_against_cell(measured(test::iiwa(), check), model.cell(), trammel::drawn(0, 1)));
+    const CheckedBatch batch = test::demand(
+        check_against_cell(measured(test::iiwa(), check), model.cell(), trammel::drawn(0, 1)));
     lost.add(kind, world, check_health(model, batch, {}));
   }
   lost.tell(kind);
@@ -260,11 +273,11 @@ void run(const Options& options, int size_trials) {
       changes(robot, options, by_cause);
       would_have_seen = to_mm(checked(robot, {}, 1, {}).would_have_seen.value_or(1));
     }
-    fmt::print("{}: would have seen {:.3f} mm; healthy: {} false alarms, {} cannot tell of {}\n", kind.name,
-               would_have_seen, quiet.changed, quiet.cannot_tell, quiet.all());
+    fmt::print("{}: would have seen {:.3f} mm; healthy: {} false alarms, {} cannot tell of {}\n",
+               kind.name, would_have_seen, quiet.changed, quiet.cannot_tell, quiet.all());
     for (const auto& [cause, seen] : by_cause) {
-      fmt::print("  {:22} changed {}, cannot tell {}, missed {} of {}; named {}\n", cause, seen.changed,
-                 seen.cannot_tell, seen.missed, seen.all(), seen.named);
+      fmt::print("  {:22} changed {}, cannot tell {}, missed {} of {}; named {}\n", cause,
+                 seen.changed, seen.cannot_tell, seen.missed, seen.all(), seen.named);
       changed.add(seen);
     }
     all_healthy.add(quiet);
@@ -288,7 +301,8 @@ int main(int argc, char** argv) {
   app.add_option("--robots", options.robots, "of each kind");
   app.add_option("--healthy", options.healthy, "checks of each healthy robot");
   app.add_option("--each", options.each, "changes of each cause and robot");
-  app.add_option("--size-trials", size_trials, "at each of five sizes; 0: the stated size is not measured");
+  app.add_option("--size-trials", size_trials,
+                 "at each of five sizes; 0: the stated size is not measured");
   app.add_option("--zeros", zeros, "worlds of several lost zeros; 0: none");
   CLI11_PARSE(app, argc, argv);
   if (options.robots > 0) trammel::run(options, size_trials);

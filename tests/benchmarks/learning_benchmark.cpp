@@ -1,6 +1,6 @@
-// How much worse than before a model in force gets when bad batches are submitted, and which gains go in force by
-// themselves. A line a case: true error after over before (the virtual robot's, which the trainer never sees), over
-// all seeds. --seeds N, --cases a,b: less of it.
+// How much worse than before a model in force gets when bad batches are submitted, and which gains
+// go in force by themselves. A line a case: true error after over before (the virtual robot's,
+// which the trainer never sees), over all seeds. --seeds N, --cases a,b: less of it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <functional>
@@ -31,7 +31,8 @@ struct Outcome {
 };
 
 /// What `attack` makes of a model of a good first day.
-Outcome outcome_of(const World& world, std::uint64_t seed, const std::function<std::string(LearningCell&)>& attack) {
+Outcome outcome_of(const World& world, std::uint64_t seed,
+                   const std::function<std::string(LearningCell&)>& attack) {
   LearningCell cell(world.cell);
   cell.submit(measured_on(world.robot, {.seed = seed}));
   Outcome outcome;
@@ -61,14 +62,15 @@ std::string imported(LearningCell& cell, const World& world, std::uint64_t seed)
 }
 
 /// What `days` make of a model from `first`; judged by the robot as it is at the end.
-Outcome outcome(const World& world, const VirtualRobot& at_the_end, const std::vector<MeasurementBatch>& days,
-                const std::string& tool = {}) {
+Outcome outcome(const World& world, const VirtualRobot& at_the_end,
+                const std::vector<MeasurementBatch>& days, const std::string& tool = {}) {
   LearningCell cell(world.cell);
   cell.submit(days.front());
   Outcome outcome;
   outcome.before = true_error(cell.model(), at_the_end, tool);
   const int version = cell.in_force();
-  for (std::size_t i = 1; i < days.size(); ++i) outcome.what += "\n      " + cell.submit(days[i]).what;
+  for (std::size_t i = 1; i < days.size(); ++i)
+    outcome.what += "\n      " + cell.submit(days[i]).what;
   outcome.after = true_error(cell.model(), at_the_end, tool);
   outcome.changed = cell.in_force() != version;
   return outcome;
@@ -104,15 +106,19 @@ std::vector<std::pair<std::string, Case>> attacks() {
     return [day](std::uint64_t seed) mutable {
       const World world;
       day.seed = seed + 500;
-      return outcome(world, world.robot, {measured_on(world.robot, {.seed = seed}), measured_on(world.robot, day)});
+      return outcome(world, world.robot,
+                     {measured_on(world.robot, {.seed = seed}), measured_on(world.robot, day)});
     };
   };
   return {
-      {"corner, tracker set up anew, 25 poses", second({.poses = 25, .corner = 0.3, .set_up_anew = true})},
+      {"corner, tracker set up anew, 25 poses",
+       second({.poses = 25, .corner = 0.3, .set_up_anew = true})},
       {"corner, 100 poses", second({.poses = 100, .corner = 0.3})},
-      {"half the ranges, tracker set up anew, 60 poses", second({.poses = 60, .corner = 0.6, .set_up_anew = true})},
+      {"half the ranges, tracker set up anew, 60 poses",
+       second({.poses = 60, .corner = 0.6, .set_up_anew = true})},
       {"noise 1.45, 100 poses", second({.poses = 100, .noise = 1.45})},
-      {"noise 1.45, tracker set up anew, 100 poses", second({.poses = 100, .noise = 1.45, .set_up_anew = true})},
+      {"noise 1.45, tracker set up anew, 100 poses",
+       second({.poses = 100, .noise = 1.45, .set_up_anew = true})},
       {"noise 1, 100 poses", second({.poses = 100})},
       {"noise 1, 20 poses", second({.poses = 20})},
       {"corner judged by copies, 40 poses",
@@ -120,15 +126,18 @@ std::vector<std::pair<std::string, Case>> attacks() {
          const World world;
          return outcome(world, world.robot,
                         {measured_on(world.robot, {.seed = seed}),
-                         judged_by_copies(measured_on(world.robot, {.poses = 40, .seed = seed + 500, .corner = 0.3}))});
+                         judged_by_copies(measured_on(
+                             world.robot, {.poses = 40, .seed = seed + 500, .corner = 0.3}))});
        }},
       {"ten batches of 60, noise 1.2 to 3",
        [](std::uint64_t seed) {
          const World world;
          std::vector<MeasurementBatch> days{measured_on(world.robot, {.seed = seed})};
          for (int k = 1; k <= 10; ++k) {
-           days.push_back(measured_on(
-               world.robot, {.poses = 60, .seed = seed + 37 * days.size(), .noise = 1 + 0.2 * k, .set_up_anew = true}));
+           days.push_back(measured_on(world.robot, {.poses = 60,
+                                                    .seed = seed + 37 * days.size(),
+                                                    .noise = 1 + 0.2 * k,
+                                                    .set_up_anew = true}));
          }
          return outcome(world, world.robot, days);
        }},
@@ -136,21 +145,24 @@ std::vector<std::pair<std::string, Case>> attacks() {
        [](std::uint64_t seed) {
          const World world;
          const Day day{.poses = 40, .seed = seed + 500, .corner = 0.3, .set_up_anew = true};
-         return outcome_of(world, seed,
-                           [&](LearningCell& cell) { return applied_inline(cell, measured_on(world.robot, day)); });
+         return outcome_of(world, seed, [&](LearningCell& cell) {
+           return applied_inline(cell, measured_on(world.robot, day));
+         });
        }},
       {"import of a model of 40 noisy poses",
        [](std::uint64_t seed) {
          const World world;
-         return outcome_of(world, seed, [&](LearningCell& cell) { return imported(cell, world, seed + 500); });
+         return outcome_of(world, seed,
+                           [&](LearningCell& cell) { return imported(cell, world, seed + 500); });
        }},
       {"80 poses of another tool alone, for the first tool",
        [](std::uint64_t seed) {
          const World world = with_two_tools();
-         return outcome(world, world.robot,
-                        {measured_on(world.robot, {.seed = seed, .tool = "spindle"}),
-                         measured_on(world.robot, {.poses = 80, .seed = seed + 500, .tool = "probe"})},
-                        "spindle");
+         return outcome(
+             world, world.robot,
+             {measured_on(world.robot, {.seed = seed, .tool = "spindle"}),
+              measured_on(world.robot, {.poses = 80, .seed = seed + 500, .tool = "probe"})},
+             "spindle");
        }},
   };
 }
@@ -159,18 +171,20 @@ std::vector<std::pair<std::string, Case>> gains() {
   const auto more_poses = [](bool anew) {
     return [anew](std::uint64_t seed) {
       const World world;
-      return outcome(world, world.robot,
-                     {measured_on(world.robot, {.poses = 40, .seed = seed, .noise = 2}),
-                      measured_on(world.robot, {.poses = 400, .seed = seed + 500, .set_up_anew = anew})});
+      return outcome(
+          world, world.robot,
+          {measured_on(world.robot, {.poses = 40, .seed = seed, .noise = 2}),
+           measured_on(world.robot, {.poses = 400, .seed = seed + 500, .set_up_anew = anew})});
     };
   };
   const auto joint_2 = [](int poses, bool anew) {
     return [poses, anew](std::uint64_t seed) {
       const World world;
       const VirtualRobot changed = test::with_zero_off(world.robot, 2, 1e-3);
-      return outcome(world, changed,
-                     {measured_on(world.robot, {.seed = seed}),
-                      measured_on(changed, {.poses = poses, .seed = seed + 500, .set_up_anew = anew})});
+      return outcome(
+          world, changed,
+          {measured_on(world.robot, {.seed = seed}),
+           measured_on(changed, {.poses = poses, .seed = seed + 500, .set_up_anew = anew})});
     };
   };
   const auto better_noise = [](std::uint64_t seed) {
@@ -187,7 +201,8 @@ std::vector<std::pair<std::string, Case>> gains() {
           {"the same, 200 poses, tracker set up anew", joint_2(200, true)}};
 }
 
-void run(const std::vector<std::pair<std::string, Case>>& cases, int seeds, const std::string& only, bool talk) {
+void run(const std::vector<std::pair<std::string, Case>>& cases, int seeds, const std::string& only,
+         bool talk) {
   for (const auto& [name, ask] : cases) {
     if (name.find(only) == std::string::npos) continue;
     std::vector<double> ratios;
@@ -197,11 +212,14 @@ void run(const std::vector<std::pair<std::string, Case>>& cases, int seeds, cons
       ratios.push_back(one.after / one.before);
       changed += one.changed ? 1 : 0;
       worse += one.after > std::max(1.15 * one.before, one.before + 1e-6) ? 1 : 0;
-      if (talk) fmt::print("    {:.4f} -> {:.4f} mm{}\n", to_mm(one.before), to_mm(one.after), one.what);
+      if (talk)
+        fmt::print("    {:.4f} -> {:.4f} mm{}\n", to_mm(one.before), to_mm(one.after), one.what);
     }
     std::sort(ratios.begin(), ratios.end());
-    fmt::print("{:58} median {:.3f}, worst {:.3f}; another version in force {}/{}; worse than allowed {}\n", name,
-               ratios[ratios.size() / 2], ratios.back(), changed, seeds, worse);
+    fmt::print(
+        "{:58} median {:.3f}, worst {:.3f}; another version in force {}/{}; worse than allowed "
+        "{}\n",
+        name, ratios[ratios.size() / 2], ratios.back(), changed, seeds, worse);
     std::cout.flush();
   }
 }

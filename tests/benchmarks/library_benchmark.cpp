@@ -1,6 +1,6 @@
-// What it costs to ask libtrammel and the Python package for 10,000 predictions, in processor time, beside the rooms
-// that the program `trammel` is made of: the same model, joints and portions, one thread. All take turns, and the best
-// of each counts.
+// What it costs to ask libtrammel and the Python package for 10,000 predictions, in processor time,
+// beside the rooms that the program `trammel` is made of: the same model, joints and portions, one
+// thread. All take turns, and the best of each counts.
 #include <time.h>
 
 #include <algorithm>
@@ -62,7 +62,8 @@ double predicted_by_rooms(const CompensatedModel& model, const std::vector<doubl
   std::vector<PoseContext> poses(joints_deg.size() / n);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     poses[i].q.resize(cell.robot.size());
-    for (std::size_t j = 0; j < n; ++j) poses[i].q(static_cast<Eigen::Index>(j)) = from_deg(joints_deg[n * i + j]);
+    for (std::size_t j = 0; j < n; ++j)
+      poses[i].q(static_cast<Eigen::Index>(j)) = from_deg(joints_deg[n * i + j]);
     poses[i].tool = cell.tools.begin()->first;
     poses[i].payload = cell.payloads.begin()->first;
     poses[i].served = true;
@@ -79,16 +80,18 @@ double predicted_by_rooms(const CompensatedModel& model, const std::vector<doubl
 
 double sum_of(const std::vector<api::Prediction>& predictions) {
   double sum = 0;
-  for (const api::Prediction& p : predictions) sum += Vector3(p.error_mm[0], p.error_mm[1], p.error_mm[2]).norm();
+  for (const api::Prediction& p : predictions)
+    sum += Vector3(p.error_mm[0], p.error_mm[1], p.error_mm[2]).norm();
   return from_mm(sum);
 }
 
 /// Processor time of the Python package for the same, s, and the sum of the errors, m.
 std::pair<double, double> python(const std::string& model, const std::string& plan) {
-  const test::Finished done = test::run({"/usr/bin/env", "PYTHONPATH=" TRAMMEL_BINARY_DIR "/clients/python",
-                                         "PYTHONDONTWRITEBYTECODE=1", "OPENBLAS_NUM_THREADS=1", "/usr/bin/python3",
-                                         TRAMMEL_SOURCE_DIR "/tests/benchmarks/library_predictions.py", model, plan},
-                                        std::chrono::minutes(2));
+  const test::Finished done =
+      test::run({"/usr/bin/env", "PYTHONPATH=" TRAMMEL_BINARY_DIR "/clients/python",
+                 "PYTHONDONTWRITEBYTECODE=1", "OPENBLAS_NUM_THREADS=1", "/usr/bin/python3",
+                 TRAMMEL_SOURCE_DIR "/tests/benchmarks/library_predictions.py", model, plan},
+                std::chrono::minutes(2));
   if (done.exit_code != 0) std::puts(done.err.c_str());
   TRAMMEL_CHECK(done.exit_code == 0);
   const std::size_t space = done.out.find(' ');
@@ -99,9 +102,11 @@ void compare(const char* bias) {
   const std::string source = TRAMMEL_SOURCE_DIR;
   const auto cell = demand_api(api::Cell::load(source + "/config/cell-7.yaml"));
   const auto measured = demand_api(api::plan(cell, {.count = kTrainingPoses}));
-  const auto batch = demand_api(api::simulate(cell, source + "/models/truth/chapter-5.yaml", measured.csv));
+  const auto batch =
+      demand_api(api::simulate(cell, source + "/models/truth/chapter-5.yaml", measured.csv));
   const std::vector<api::Batch> batches = {batch};
-  const auto model = demand_api(api::train(cell, batches, {.level = "M2", .bias = bias, .progress = {}}));
+  const auto model =
+      demand_api(api::train(cell, batches, {.level = "M2", .bias = bias, .progress = {}}));
   const test::TemporaryFolder folder;
   TRAMMEL_CHECK(model.save(folder.file("a.model")).has_value());
   const auto asked = demand_api(api::plan(cell, {.count = kPredictions, .seed = 2}));
@@ -118,11 +123,13 @@ void compare(const char* bias) {
     by_python = std::min(by_python, s);
     TRAMMEL_CHECK(std::abs(same - sum) <= 1e-9 * sum && std::abs(errors - sum) <= 1e-9 * sum);
   }
-  std::printf("10000 predictions, bias %s, processor ms: rooms %.1f, libtrammel %.1f, Python %.1f\n", bias,
-              1e3 * by_rooms.s, 1e3 * by_library.s, 1e3 * by_python);
-  std::printf("figure 10000 predictions in Python over C++, bias %s: %.3f\n", bias, by_python / by_library.s);
-  std::printf("figure 10000 predictions of libtrammel over the program's rooms, bias %s: %.3f\n", bias,
-              by_library.s / by_rooms.s);
+  std::printf(
+      "10000 predictions, bias %s, processor ms: rooms %.1f, libtrammel %.1f, Python %.1f\n", bias,
+      1e3 * by_rooms.s, 1e3 * by_library.s, 1e3 * by_python);
+  std::printf("figure 10000 predictions in Python over C++, bias %s: %.3f\n", bias,
+              by_python / by_library.s);
+  std::printf("figure 10000 predictions of libtrammel over the program's rooms, bias %s: %.3f\n",
+              bias, by_library.s / by_rooms.s);
 }
 
 }  // namespace

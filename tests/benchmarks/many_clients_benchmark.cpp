@@ -1,7 +1,9 @@
-// What many clients cost a server and the line to it: participants of DDS on another host (a network namespace), each
-// with a session that has been answered once and then only stays. Measured on the line while they come and while
-// nobody asks, in the server's memory, and after they have gone.
-// --clients N..., --cells N, --seconds N (of quiet, each). The clients are this program again, --stay.
+// What many clients cost a server and the line to it: participants of DDS on another host (a
+// network namespace), each with a session that has been answered once and then only stays. Measured
+// on the line while they come and while nobody asks, in the server's memory, and after they have
+// gone.
+// --clients N..., --cells N, --seconds N (of quiet, each). The clients are this program again,
+// --stay.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -67,9 +69,10 @@ class Service {
       write(folder / (name + ".yaml"), with_name(cell, name));
       names += (names.empty() ? "" : ", ") + name + ".yaml";
     }
-    write(daemon_.config_path(), fmt::format("version: 1\nserver: plant\ncells: [{}]\nstore: trammel.db\n"
-                                             "dds: {{address: {}, allow_network: true, without_security: true}}\n",
-                                             names, hosts.address(0)));
+    write(daemon_.config_path(),
+          fmt::format("version: 1\nserver: plant\ncells: [{}]\nstore: trammel.db\n"
+                      "dds: {{address: {}, allow_network: true, without_security: true}}\n",
+                      names, hosts.address(0)));
     process_ = std::make_unique<test::Process>(hosts.on(0, daemon_.command_line()));
     if (!process_->wait_for_line("ready", kLimit)) fail(process_->standard_error());
   }
@@ -164,9 +167,12 @@ void tell_clients(const Service& service, const Settings& settings, int count) {
   test::tell_figure(name + "until all were answered, s", took);
   test::tell_figure(name + "on the line until then, MB",
                     1e-6 * (joined.first + joined.second - before.first - before.second));
-  test::tell_figure(name + "to the server where nobody asks, kB/s", 1e-3 * (after.first - joined.first) / quiet);
-  test::tell_figure(name + "from the server where nobody asks, kB/s", 1e-3 * (after.second - joined.second) / quiet);
-  test::tell_figure(name + "processor where nobody asks, %", 100 * (service.processor_s() - processor) / quiet);
+  test::tell_figure(name + "to the server where nobody asks, kB/s",
+                    1e-3 * (after.first - joined.first) / quiet);
+  test::tell_figure(name + "from the server where nobody asks, kB/s",
+                    1e-3 * (after.second - joined.second) / quiet);
+  test::tell_figure(name + "processor where nobody asks, %",
+                    100 * (service.processor_s() - processor) / quiet);
   test::tell_figure(name + "memory of the server more, MB", service.memory_mb() - memory_before);
   for (const auto& process : clients) process->signal(SIGTERM);
   for (const auto& process : clients) static_cast<void>(process->wait(kLimit));

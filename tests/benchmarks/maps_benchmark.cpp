@@ -1,6 +1,6 @@
-// Maps of the joints whose spectra nobody tells, on arms of the second simulation whose masses nobody tells either,
-// and on the measured UR10.
-// `maps_benchmark [--only falling|flat|single|none|ur10] [--seeds N] [--poses N]`.
+// Maps of the joints whose spectra nobody tells, on arms of the second simulation whose masses
+// nobody tells either, and on the measured UR10. `maps_benchmark [--only
+// falling|flat|single|none|ur10] [--seeds N] [--poses N]`.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -39,7 +39,9 @@ double seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 /// Standard deviation of sine and cosine of a harmonic, rad.
 using Spectrum = double (*)(int joint, int harmonic);
 
-double falling(int joint, int harmonic) { return harmonic > kFinest ? 0 : (joint < 3 ? 1e-4 : 6e-5) / harmonic; }
+double falling(int joint, int harmonic) {
+  return harmonic > kFinest ? 0 : (joint < 3 ? 1e-4 : 6e-5) / harmonic;
+}
 double flat(int joint, int harmonic) { return harmonic > kFinest ? 0 : (joint < 3 ? 1e-5 : 6e-6); }
 double single(int /*joint*/, int harmonic) { return harmonic == kFinest + 1 ? 6e-5 : 0; }
 double none(int /*joint*/, int /*harmonic*/) { return 0; }
@@ -56,7 +58,8 @@ hidden::Effect maps(Spectrum spectrum, std::uint64_t seed) {
   }
   hidden::Effect effect;
   effect.cause.cause = "joint_map";
-  effect.act = [series](const hidden::MeasuringPose& pose, const Eigen::VectorXd&, hidden::Moment& moment) {
+  effect.act = [series](const hidden::MeasuringPose& pose, const Eigen::VectorXd&,
+                        hidden::Moment& moment) {
     for (Eigen::Index j = 0; j < moment.q.size(); ++j) {
       const std::vector<double>& one = series[static_cast<std::size_t>(j)];
       for (std::size_t k = 0; k < one.size(); k += 2) {
@@ -84,7 +87,8 @@ Missed missed(const Result<CalibrationResult>& result, const MeasurementBatch& b
     square += off.squaredNorm();
     const Eigen::MatrixXd along = J.topRows<3>();
     const Vector3 variance = (along * found.covariance).cwiseProduct(along).rowwise().sum();
-    for (Eigen::Index k = 0; k < 3; ++k) inside += std::abs(off(k)) < 1.96 * std::sqrt(variance(k) + noise * noise);
+    for (Eigen::Index k = 0; k < 3; ++k)
+      inside += std::abs(off(k)) < 1.96 * std::sqrt(variance(k) + noise * noise);
   }
   const auto count = static_cast<double>(here.measurements.size());
   return {to_mm(std::sqrt(square / count)), 100 * inside / (3 * count), 0};
@@ -92,7 +96,8 @@ Missed missed(const Result<CalibrationResult>& result, const MeasurementBatch& b
 
 std::vector<std::string> with_maps(const std::string& behind) {
   std::vector<std::string> sources = {"base", "geometry", "compliance"};
-  for (int joint = 1; joint <= 6; ++joint) sources.push_back(fmt::format("joint_map:{}{}", joint, behind));
+  for (int joint = 1; joint <= 6; ++joint)
+    sources.push_back(fmt::format("joint_map:{}{}", joint, behind));
   return sources;
 }
 
@@ -102,10 +107,11 @@ std::vector<std::string> told(Spectrum spectrum) {
   constexpr double kLow = 0.01;  // a knee from which all harmonics fall
   for (int j = 0; j < 6; ++j) {
     if (spectrum == &falling)
-      sources.push_back(
-          spelled_map(j, {.harmonics = kFinest, .amplitude = falling(j, 1) / kLow, .knee = kLow, .power = 1}));
+      sources.push_back(spelled_map(
+          j, {.harmonics = kFinest, .amplitude = falling(j, 1) / kLow, .knee = kLow, .power = 1}));
     if (spectrum == &flat)
-      sources.push_back(spelled_map(j, {.harmonics = kFinest, .amplitude = flat(j, 1), .knee = 9999, .power = 1}));
+      sources.push_back(spelled_map(
+          j, {.harmonics = kFinest, .amplitude = flat(j, 1), .knee = 9999, .power = 1}));
   }
   return sources;
 }
@@ -124,7 +130,8 @@ void drawn_arms(const Options& options, const std::string& name, Spectrum spectr
     arm.world.effects = {maps(spectrum, static_cast<std::uint64_t>(seed))};
     const MeasurementBatch batch = test::measured(arm, options.poses, 1);
     const MeasurementBatch fresh = test::measured(arm, 1000, 2);
-    const auto tell = [&](const std::string& which, const Result<CalibrationResult>& found, double begin) {
+    const auto tell = [&](const std::string& which, const Result<CalibrationResult>& found,
+                          double begin) {
       Missed by = missed(found, fresh);
       by.seconds = seconds() - begin;
       report(fmt::format("{} {} #{}", name, options.poses, seed), which, by);
@@ -145,9 +152,12 @@ void drawn_arms(const Options& options, const std::string& name, Spectrum spectr
 const std::string kData = std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_";
 
 /// The rows whose ids end in 7, 8 and 9, or the first `most` of the others.
-MeasurementBatch series(const Cell& cell, const std::string& name, bool held_out, std::size_t most = 1 << 30) {
-  MeasurementBatch batch = demand(check_against_cell(demand(read_batch_csv(kData + name + ".csv")), cell)).rows();
-  std::erase_if(batch.measurements, [&](const Measurement& m) { return (std::stoi(m.pose_id) % 10 >= 7) != held_out; });
+MeasurementBatch series(const Cell& cell, const std::string& name, bool held_out,
+                        std::size_t most = 1 << 30) {
+  MeasurementBatch batch =
+      demand(check_against_cell(demand(read_batch_csv(kData + name + ".csv")), cell)).rows();
+  std::erase_if(batch.measurements,
+                [&](const Measurement& m) { return (std::stoi(m.pose_id) % 10 >= 7) != held_out; });
   if (batch.measurements.size() > most) batch.measurements.resize(most);
   return batch;
 }
@@ -155,17 +165,20 @@ MeasurementBatch series(const Cell& cell, const std::string& name, bool held_out
 void measured_ur10(const Options& options) {
   if (!options.only.empty() && !options.only.starts_with("ur10")) return;
   if (!std::filesystem::exists(kData + "c.csv")) return;
-  const auto cell =
-      std::make_shared<const Cell>(demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
+  const auto cell = std::make_shared<const Cell>(
+      demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
   const auto ask = [&](const std::string& name, std::size_t most) {
     const double begin = seconds();
-    const auto found =
-        calibrate_with_maps(cell, with_maps(""), series(*cell, name, false, most), {.held = {}, .weigh_links = true});
+    const auto found = calibrate_with_maps(cell, with_maps(""), series(*cell, name, false, most),
+                                           {.held = {}, .weigh_links = true});
     Missed by = missed(found, series(*cell, name, true));
     by.seconds = seconds() - begin;
-    std::printf("  discrepancy %.5f mm %.6f mrad\n", 1e3 * found->discrepancy, 1e3 * found->discrepancy_rotation);
-    report(fmt::format("UR10 {}{}", name, most < 1000 ? fmt::format(" {} poses", most) : ""), "learned", by);
-    for (const ErrorSourcePtr& source : found->model.sources) std::printf("  %s\n", source->name().c_str());
+    std::printf("  discrepancy %.5f mm %.6f mrad\n", 1e3 * found->discrepancy,
+                1e3 * found->discrepancy_rotation);
+    report(fmt::format("UR10 {}{}", name, most < 1000 ? fmt::format(" {} poses", most) : ""),
+           "learned", by);
+    for (const ErrorSourcePtr& source : found->model.sources)
+      std::printf("  %s\n", source->name().c_str());
   };
   if (options.only != "ur10 d" && options.only != "ur10 c") ask("c", 200);
   if (options.only != "ur10 200" && options.only != "ur10 c") ask("d", 1 << 30);

@@ -1,6 +1,6 @@
-// Whether the first batch of a cell is looked at before anything is learned: mistakes of reading, each with 10 seeds,
-// and good batches of robots as they are delivered. --seeds N, --kind TEXT, --good N: less of it; --verbose: every
-// miss.
+// Whether the first batch of a cell is looked at before anything is learned: mistakes of reading,
+// each with 10 seeds, and good batches of robots as they are delivered. --seeds N, --kind TEXT,
+// --good N: less of it; --verbose: every miss.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <iostream>
@@ -22,10 +22,10 @@ struct Arguments {
 
 std::string described(const FirstBatch& f) {
   return fmt::format(
-      "seed {} {} base {} tool {} oriented {} poses {} spread {:.2f} length {:.4f} zero {:.3f} outliers {:.2f} tracker "
-      "{}",
-      f.seed, f.robot, f.base_known, f.tool_known, f.orientation, f.poses, f.spread, f.length, f.zero, f.outliers,
-      f.tracker);
+      "seed {} {} base {} tool {} oriented {} poses {} spread {:.2f} length {:.4f} zero {:.3f} "
+      "outliers {:.2f} tracker {}",
+      f.seed, f.robot, f.base_known, f.tool_known, f.orientation, f.poses, f.spread, f.length,
+      f.zero, f.outliers, f.tracker);
 }
 
 void run_mistakes(const Arguments& arguments) {
@@ -34,7 +34,8 @@ void run_mistakes(const Arguments& arguments) {
     if (mistake.kind.find(arguments.kind) == std::string::npos) continue;
     int here = 0, named_here = 0;
     for (int seed = 1; seed <= arguments.seeds; ++seed) {
-      FirstBatch first = test::first_batch(static_cast<std::uint64_t>(seed), test::Robots::kOfSixJoints);
+      FirstBatch first =
+          test::first_batch(static_cast<std::uint64_t>(seed), test::Robots::kOfSixJoints);
       first.poses = std::max(first.poses, arguments.least_poses);
       first.spread = std::max(first.spread, arguments.least_spread);
       if (mistake.needs_orientation) first.orientation = true;
@@ -50,10 +51,11 @@ void run_mistakes(const Arguments& arguments) {
       named_here += is_named ? 1 : 0;
       first_named += said && said->text.find(expected) != std::string::npos ? 1 : 0;
       if (arguments.verbose && !is_named)
-        std::cout << "  " << mistake.kind << ": " << described(first) << "\n    expected '" << expected
-                  << "': " << (said ? sentence(*said) : "nothing") << "\n";
+        std::cout << "  " << mistake.kind << ": " << described(first) << "\n    expected '"
+                  << expected << "': " << (said ? sentence(*said) : "nothing") << "\n";
     }
-    std::cout << fmt::format("{:30} refused {} named {} of {}\n", mistake.kind, here, named_here, arguments.seeds)
+    std::cout << fmt::format("{:30} refused {} named {} of {}\n", mistake.kind, here, named_here,
+                             arguments.seeds)
               << std::flush;
     caught += here;
     named += named_here;
@@ -69,17 +71,19 @@ void run_good(const Arguments& arguments) {
   int refused = 0;
   double seconds = 0;
   for (int seed = 1; seed <= arguments.good; ++seed) {
-    const FirstBatch first = test::first_batch(1000 + static_cast<std::uint64_t>(seed), test::Robots::kAll);
+    const FirstBatch first =
+        test::first_batch(1000 + static_cast<std::uint64_t>(seed), test::Robots::kAll);
     const auto cell = test::new_cell(first);
     MeasurementBatch batch = test::measured_first(first, *cell);
     const auto begin = std::chrono::steady_clock::now();
     const auto said = test::said_of(std::move(batch), *cell);
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     refused += said ? 1 : 0;
-    if (said && arguments.verbose) std::cout << "  " << described(first) << "\n    " << sentence(*said) << "\n";
+    if (said && arguments.verbose)
+      std::cout << "  " << described(first) << "\n    " << sentence(*said) << "\n";
   }
-  std::cout << fmt::format("figure good first batches refused of {}: {}\nmean look: {:.3f} s\n", arguments.good,
-                           refused, seconds / std::max(1, arguments.good));
+  std::cout << fmt::format("figure good first batches refused of {}: {}\nmean look: {:.3f} s\n",
+                           arguments.good, refused, seconds / std::max(1, arguments.good));
 }
 
 }  // namespace
@@ -92,7 +96,8 @@ int main(int argc, char** argv) {
   app.add_option("--kind", arguments.kind, "mistakes whose name has this in it");
   app.add_option("--good", arguments.good, "good batches");
   app.add_option("--least-poses", arguments.least_poses, "of a batch with a mistake");
-  app.add_option("--least-spread", arguments.least_spread, "of its joints, as a share of their ranges");
+  app.add_option("--least-spread", arguments.least_spread,
+                 "of its joints, as a share of their ranges");
   app.add_flag("--verbose", arguments.verbose, "say every miss");
   CLI11_PARSE(app, argc, argv);
   trammel::run_mistakes(arguments);

@@ -1,6 +1,7 @@
-// What a bad line and certificates cost: a client on another host asks for one target after the other. How long it
-// waits behind a line that loses, holds back and shuffles frames, or is cut; and beside a plain server, what security
-// adds. --only line|cut|security, --seconds N, --cuts N. The client is this program again, --ask.
+// What a bad line and certificates cost: a client on another host asks for one target after the
+// other. How long it waits behind a line that loses, holds back and shuffles frames, or is cut; and
+// beside a plain server, what security adds. --only line|cut|security, --seconds N, --cuts N. The
+// client is this program again, --ask.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -35,10 +36,12 @@ struct Asked {
 
 bool same(const client::CorrectedTarget& a, const client::CorrectedTarget& b) {
   return a.status == b.status && a.q_rad == b.q_rad && a.commanded.x_mm == b.commanded.x_mm &&
-         a.commanded.y_mm == b.commanded.y_mm && a.commanded.z_mm == b.commanded.z_mm && a.sigma_mm == b.sigma_mm;
+         a.commanded.y_mm == b.commanded.y_mm && a.commanded.z_mm == b.commanded.z_mm &&
+         a.sigma_mm == b.sigma_mm;
 }
 
-/// A line of output for each answer: when it was asked and answered, ns of the steady clock, and what it was.
+/// A line of output for each answer: when it was asked and answered, ns of the steady clock, and
+/// what it was.
 int ask(const Asked& asked) {
   client::SessionOptions options;
   options.domain = asked.domain;
@@ -59,7 +62,8 @@ int ask(const Asked& asked) {
     const auto ended = Clock::now();
     if (answer && !first) first = answer->items[0];
     const char* what = !answer ? "none" : same(answer->items[0], *first) ? "right" : "wrong";
-    std::cout << began.time_since_epoch().count() << ' ' << ended.time_since_epoch().count() << ' ' << what << '\n';
+    std::cout << began.time_since_epoch().count() << ' ' << ended.time_since_epoch().count() << ' '
+              << what << '\n';
   }
   return 0;
 }
@@ -84,29 +88,36 @@ double share_of_times(const std::vector<Call>& calls, double share) {
   }
   if (times.empty()) return std::nan("");
   std::sort(times.begin(), times.end());
-  return times[std::min(times.size() - 1, static_cast<std::size_t>(share * static_cast<double>(times.size())))];
+  return times[std::min(times.size() - 1,
+                        static_cast<std::size_t>(share * static_cast<double>(times.size())))];
 }
 
 double count_of(const std::vector<Call>& calls, const std::string& what) {
-  return static_cast<double>(std::count_if(calls.begin(), calls.end(), [&](const Call& c) { return c.what == what; }));
+  return static_cast<double>(
+      std::count_if(calls.begin(), calls.end(), [&](const Call& c) { return c.what == what; }));
 }
 
 /// A daemon, on the first of `hosts` or on this one.
 class Service {
  public:
-  Service(const test::TwoHosts* hosts, const std::string& security) : hosts_(hosts), security_(security) {
-    std::string dds = security.empty() ? "without_security: true" : "security: " + security + "/line-3";
+  Service(const test::TwoHosts* hosts, const std::string& security)
+      : hosts_(hosts), security_(security) {
+    std::string dds =
+        security.empty() ? "without_security: true" : "security: " + security + "/line-3";
     if (hosts != nullptr) dds += fmt::format(", address: {}, allow_network: true", host());
     const std::string text = test::read_file(daemon_.config_path());
     static_cast<void>(test::demand(
-        write_text_file(daemon_.config_path(), fmt::format("{}dds: {{{}}}\n", text, dds)).map([] { return true; })));
+        write_text_file(daemon_.config_path(), fmt::format("{}dds: {{{}}}\n", text, dds)).map([] {
+          return true;
+        })));
     service_ = std::make_unique<test::Process>(on(0, daemon_.command_line()));
     if (!service_->wait_for_line("ready", kLimit)) fail(service_->standard_error());
   }
 
   [[nodiscard]] std::string place() const { return fmt::format("{}:{}", host(), daemon_.port()); }
   void learn(std::uint64_t seed = 3) const {
-    const std::string batch = folder_.write(fmt::format("batch{}.csv", seed), test::virtual_batch_csv(150, seed));
+    const std::string batch =
+        folder_.write(fmt::format("batch{}.csv", seed), test::virtual_batch_csv(150, seed));
     tell({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
   }
 
@@ -137,7 +148,9 @@ class Service {
     fmt::print(stderr, "{}\n", why);
     std::exit(1);
   }
-  [[nodiscard]] std::string host() const { return hosts_ != nullptr ? hosts_->address(0) : "127.0.0.1"; }
+  [[nodiscard]] std::string host() const {
+    return hosts_ != nullptr ? hosts_->address(0) : "127.0.0.1";
+  }
   [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const {
     return hosts_ != nullptr ? hosts_->on(host, std::move(argv)) : argv;
   }
@@ -170,8 +183,10 @@ void tell_line(int most_seconds) {
   const Service service(&hosts, "");
   service.learn();
   const std::vector<Call> calls = service.asked(most_seconds, 0);
-  fmt::print("{} requests over a line that loses 5 % and takes 50 to 60 ms each way: p50 {:.0f}, p99 {:.0f} ms\n",
-             calls.size(), share_of_times(calls, 0.5), share_of_times(calls, 0.99));
+  fmt::print(
+      "{} requests over a line that loses 5 % and takes 50 to 60 ms each way: p50 {:.0f}, p99 "
+      "{:.0f} ms\n",
+      calls.size(), share_of_times(calls, 0.5), share_of_times(calls, 0.99));
   test::tell_figure("bad line: wrong answers", count_of(calls, "wrong"));
   test::tell_figure("bad line: requests without an answer", count_of(calls, "none"));
   test::tell_figure("bad line: p50 of one target, ms", share_of_times(calls, 0.5));
@@ -195,7 +210,9 @@ void tell_cuts(int cuts) {
       return call.what == "right" && call.ended > until.time_since_epoch().count();
     });
     const double took =
-        next == calls.end() ? 99 : 1e-9 * static_cast<double>(next->ended - until.time_since_epoch().count());
+        next == calls.end()
+            ? 99
+            : 1e-9 * static_cast<double>(next->ended - until.time_since_epoch().count());
     fmt::print("cut {}: answered again {:.2f} s after it\n", i + 1, took);
     longest = std::max(longest, took);
     wrong += count_of(calls, "wrong");
@@ -208,7 +225,8 @@ void tell_security(int requests) {
   const test::TemporaryFolder folder;
   const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder.file("plant");
   bool issued = test::run({keys, "init", plant}).exit_code == 0;
-  for (const auto& [role, name] : {std::pair("server", "line-3"), {"cam", "office"}, {"engineer", "measuring"}})
+  for (const auto& [role, name] :
+       {std::pair("server", "line-3"), {"cam", "office"}, {"engineer", "measuring"}})
     issued = issued && test::run({keys, "issue", plant, role, name}).exit_code == 0;
   if (!issued) return static_cast<void>(fmt::print("skipped: no certificates can be made here\n"));
   std::vector<double> ratios;

@@ -1,8 +1,9 @@
-// Our own loops beside Eigen and OpenBLAS on the same numbers in one run, one thread each: the inverse of a covariance
-// with its solutions, the inverse of a Cholesky factor, AᵀB of tall matrices, and a tile of a kernel.
-// `numerics_benchmark` and the options of Google Benchmark. OpenBLAS (package libopenblas0-pthread) is looked for when
-// the program starts; without it its rows are left out. Eigen is compiled for the processors that the package must run
-// on. The program first checks that all agree.
+// Our own loops beside Eigen and OpenBLAS on the same numbers in one run, one thread each: the
+// inverse of a covariance with its solutions, the inverse of a Cholesky factor, AᵀB of tall
+// matrices, and a tile of a kernel. `numerics_benchmark` and the options of Google Benchmark.
+// OpenBLAS (package libopenblas0-pthread) is looked for when the program starts; without it its
+// rows are left out. Eigen is compiled for the processors that the package must run on. The program
+// first checks that all agree.
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 
@@ -25,11 +26,13 @@ using Eigen::VectorXd;
 
 /// What of OpenBLAS is measured, by its Fortran names.
 struct OpenBlas {
-  void (*factorise)(const char*, const int*, double*, const int*, int*) = nullptr;                     // dpotrf
-  void (*invert)(const char*, const int*, double*, const int*, int*) = nullptr;                        // dpotri
-  void (*invert_triangle)(const char*, const char*, const int*, double*, const int*, int*) = nullptr;  // dtrtri
-  void (*multiply)(const char*, const char*, const int*, const int*, const int*, const double*, const double*,
-                   const int*, const double*, const int*, const double*, double*, const int*) = nullptr;  // dgemm
+  void (*factorise)(const char*, const int*, double*, const int*, int*) = nullptr;  // dpotrf
+  void (*invert)(const char*, const int*, double*, const int*, int*) = nullptr;     // dpotri
+  void (*invert_triangle)(const char*, const char*, const int*, double*, const int*,
+                          int*) = nullptr;  // dtrtri
+  void (*multiply)(const char*, const char*, const int*, const int*, const int*, const double*,
+                   const double*, const int*, const double*, const int*, const double*, double*,
+                   const int*) = nullptr;  // dgemm
 
   static const OpenBlas* find() {
     static const OpenBlas found = load();
@@ -66,7 +69,8 @@ MatrixXd covariance(Index n) {
   return m;
 }
 
-// ---- M⁻¹ and M⁻¹ Y: what a likelihood with its gradient takes ----------------------------------------------------
+// ---- M⁻¹ and M⁻¹ Y: what a likelihood with its gradient takes
+// ----------------------------------------------------
 
 constexpr Index kOutputs = 3;
 
@@ -89,7 +93,8 @@ struct Augmented {
   void inverse_root() {
     matrix.map() = start.map();
     double log_det = 0;
-    TRAMMEL_CHECK(numerics().inverse_root(n, kOutputs, matrix.data(), padded, work.data(), &log_det));
+    TRAMMEL_CHECK(
+        numerics().inverse_root(n, kOutputs, matrix.data(), padded, work.data(), &log_det));
   }
   Index n, padded;
   AlignedMatrix start, matrix, work;
@@ -135,11 +140,13 @@ MatrixXd product_by_openblas(const OpenBlas& blas, const MatrixXd& a, const Matr
 
 /// Flops per second, so that the sizes can be told from each other.
 void count(benchmark::State& state, double flops) {
-  state.counters["Gflop/s"] =
-      benchmark::Counter(flops * 1e-9, benchmark::Counter::kIsIterationInvariantRate, benchmark::Counter::kIs1000);
+  state.counters["Gflop/s"] = benchmark::Counter(
+      flops * 1e-9, benchmark::Counter::kIsIterationInvariantRate, benchmark::Counter::kIs1000);
 }
 
-double cube(const benchmark::State& state) { return std::pow(static_cast<double>(state.range(0)), 3); }
+double cube(const benchmark::State& state) {
+  return std::pow(static_cast<double>(state.range(0)), 3);
+}
 
 void inverse_ours(benchmark::State& state) {
   const Index n = state.range(0);
@@ -201,13 +208,17 @@ void root_openblas(benchmark::State& state) {
   count(state, 2.0 / 3.0 * cube(state));
 }
 
-// ---- AᵀB of tall matrices: what a scan of candidates takes -------------------------------------------------------
+// ---- AᵀB of tall matrices: what a scan of candidates takes
+// -------------------------------------------------------
 
 /// As diagnosis has them: three rows a pose, some tens of columns.
 struct Tall {
   explicit Tall(const benchmark::State& state)
-      : a(random_joints(state.range(0), 3, state.range(1))), b(random_joints(state.range(0), 4, state.range(2))) {}
-  [[nodiscard]] double flops() const { return 2.0 * static_cast<double>(a.rows() * a.cols() * b.cols()); }
+      : a(random_joints(state.range(0), 3, state.range(1))),
+        b(random_joints(state.range(0), 4, state.range(2))) {}
+  [[nodiscard]] double flops() const {
+    return 2.0 * static_cast<double>(a.rows() * a.cols() * b.cols());
+  }
   MatrixXd a, b;
 };
 
@@ -225,11 +236,13 @@ void product_eigen(benchmark::State& state) {
 
 void product_openblas(benchmark::State& state) {
   const Tall tall(state);
-  for (auto _ : state) benchmark::DoNotOptimize(product_by_openblas(*OpenBlas::find(), tall.a, tall.b).data());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(product_by_openblas(*OpenBlas::find(), tall.a, tall.b).data());
   count(state, tall.flops());
 }
 
-// ---- a tile of a kernel ------------------------------------------------------------------------------------------
+// ---- a tile of a kernel
+// ------------------------------------------------------------------------------------------
 
 constexpr Index kTileRows = 240;
 constexpr Index kTileColumns = 64;
@@ -243,8 +256,8 @@ MatrixXd features(Index rows, std::uint64_t seed) {
 }
 
 void tile_by_numerics(const MatrixXd& a, const MatrixXd& b, MatrixXd* k) {
-  numerics().radial_tile(RadialShape::kSquaredExponential, 6, kTileRows, a.data(), a.rows(), kTileColumns, b.data(),
-                         b.rows(), k->data(), k->rows());
+  numerics().radial_tile(RadialShape::kSquaredExponential, 6, kTileRows, a.data(), a.rows(),
+                         kTileColumns, b.data(), b.rows(), k->data(), k->rows());
 }
 
 void tile_by_eigen(const MatrixXd& a, const MatrixXd& b, MatrixXd* k) {
@@ -275,7 +288,9 @@ void check_agreement() {
   const MatrixXd m = covariance(n);
   Augmented augmented(m, random_joints(n, 2, kOutputs));
   augmented.sweep();
-  const auto lower = [&](const MatrixXd& full) -> MatrixXd { return full.triangularView<Eigen::Lower>(); };
+  const auto lower = [&](const MatrixXd& full) -> MatrixXd {
+    return full.triangularView<Eigen::Lower>();
+  };
   const MatrixXd inverse = lower(-augmented.matrix.map().topLeftCorner(n, n));
   augmented.inverse_root();
   const MatrixXd root = lower(augmented.matrix.map().topLeftCorner(n, n));
@@ -299,14 +314,16 @@ void check_agreement() {
   TRAMMEL_CHECK(farthest(transposed_product(a, b), product_by_openblas(*blas, a, b)) < 1e-10);
 }
 
-void add(const char* name, void (*run)(benchmark::State&), const std::vector<std::vector<std::int64_t>>& sizes) {
+void add(const char* name, void (*run)(benchmark::State&),
+         const std::vector<std::vector<std::int64_t>>& sizes) {
   auto* one = benchmark::RegisterBenchmark(name, run)->Unit(benchmark::kMillisecond);
   for (const auto& size : sizes) one->Args(size);
 }
 
 void add_all() {
   const std::vector<std::vector<std::int64_t>> squares = {{150}, {450}, {1000}, {2500}};
-  const std::vector<std::vector<std::int64_t>> tall = {{600, 30, 6}, {3000, 60, 60}, {3000, 100, 4}};
+  const std::vector<std::vector<std::int64_t>> tall = {
+      {600, 30, 6}, {3000, 60, 60}, {3000, 100, 4}};
   const bool blas = OpenBlas::find() != nullptr;
   add("inverse/ours", inverse_ours, squares);
   add("inverse/eigen", inverse_eigen, squares);
@@ -328,7 +345,9 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   trammel::check_agreement();
   std::printf("numerics: build %s%s\n", trammel::numerics().name,
-              trammel::OpenBlas::find() == nullptr ? "; OpenBLAS is not installed, its rows are left out" : "");
+              trammel::OpenBlas::find() == nullptr
+                  ? "; OpenBLAS is not installed, its rows are left out"
+                  : "");
   trammel::add_all();
   benchmark::RunSpecifiedBenchmarks();
 }

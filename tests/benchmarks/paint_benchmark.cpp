@@ -1,6 +1,6 @@
-// How soon a browser shows the page of a model: Debian's chromium without a window, the page as a file, each time in a
-// window of its own. The page is that of a model of 300 poses with a learned bias and a batch beside it, which is the
-// heaviest kind.
+// How soon a browser shows the page of a model: Debian's chromium without a window, the page as a
+// file, each time in a window of its own. The page is that of a model of 300 poses with a learned
+// bias and a batch beside it, which is the heaviest kind.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -19,9 +19,11 @@ std::string page_of_a_model() {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   TrainOptions options;
   options.bias = "se";
-  const CompensatedModel model = test::demand(
-      train(cell, test::demand(check_against_cell(test::measured(robot, 300, 1), *cell, drawn(0.2, 1))), options));
-  return model_page(model, test::demand(check_against_cell(test::measured(robot, 100, 2), *cell)).rows());
+  const CompensatedModel model = test::demand(train(
+      cell, test::demand(check_against_cell(test::measured(robot, 300, 1), *cell, drawn(0.2, 1))),
+      options));
+  return model_page(model,
+                    test::demand(check_against_cell(test::measured(robot, 100, 2), *cell)).rows());
 }
 
 /// ms from the request to the first thing that is seen.
@@ -30,8 +32,9 @@ double painted(const std::string& address) {
   browser.resize(1400, 900);
   browser.open(address);
   const auto when = browser.run(
-      "return new Promise(done => { const look = () => { const all = performance.getEntriesByType('paint');"
-      "all.length ? done(all[all.length - 1].startTime) : setTimeout(look, 20); }; look(); });");
+      "return new Promise(done => { const look = () => { const all = "
+      "performance.getEntriesByType('paint');all.length ? done(all[all.length - 1].startTime) : "
+      "setTimeout(look, 20); }; look(); });");
   return when.is_number() ? when.get<double>() : 1e9;
 }
 
@@ -45,7 +48,8 @@ void figures(int times) {
   fmt::print("figure model page: first paint, median of {}, ms: {:.0f} (aim at most 1000)\n", times,
              all[all.size() / 2]);
   fmt::print("figure model page: first paint, slowest of {}, ms: {:.0f}\n", times, all.back());
-  fmt::print("figure model page: weight, kB: {:.0f} (aim at most 1500)\n", static_cast<double>(page.size()) / 1000);
+  fmt::print("figure model page: weight, kB: {:.0f} (aim at most 1500)\n",
+             static_cast<double>(page.size()) / 1000);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Programs in, programs out, on the shipped virtual robot: what share of motions is corrected, where the tool then
-// really goes, how often it is where it was said to be, and what 100,000 targets cost beside the evaluation alone.
-// And how smooth corrections are along a circle and a spiral. --models N, --targets N, --only errors|cost|share|smooth.
+// Programs in, programs out, on the shipped virtual robot: what share of motions is corrected,
+// where the tool then really goes, how often it is where it was said to be, and what 100,000
+// targets cost beside the evaluation alone. And how smooth corrections are along a circle and a
+// spiral. --models N, --targets N, --only errors|cost|share|smooth.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -32,9 +33,12 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::string kTool =
-    "  PERS tooldata tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\n";
+    "  PERS tooldata "
+    "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];"
+    "\n";
 
-CompensatedModel trained(const VirtualRobot& robot, std::uint64_t seed, const std::string& bias = "se") {
+CompensatedModel trained(const VirtualRobot& robot, std::uint64_t seed,
+                         const std::string& bias = "se") {
   TrainOptions options;
   options.level = "M3";
   options.bias = bias;
@@ -44,7 +48,8 @@ CompensatedModel trained(const VirtualRobot& robot, std::uint64_t seed, const st
 std::string motion(const Vector3& p_mm) {
   return fmt::format(
       "    MoveL "
-      "[[{:.2f},{:.2f},{:.2f}],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tSpindle;\n",
+      "[[{:.2f},{:.2f},{:.2f}],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,"
+      "z1,tSpindle;\n",
       p_mm.x(), p_mm.y(), p_mm.z());
 }
 
@@ -70,8 +75,9 @@ std::string contour(int targets) {
 Target target_of(const client::TargetMm& wanted) {
   Target target;
   const client::PoseMm& pose = wanted.pose;
-  target.X_BT = make_pose(Eigen::Quaterniond(pose.qw, pose.qx, pose.qy, pose.qz).normalized().toRotationMatrix(),
-                          Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
+  target.X_BT = make_pose(
+      Eigen::Quaterniond(pose.qw, pose.qx, pose.qy, pose.qz).normalized().toRotationMatrix(),
+      Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
   target.joint_target = wanted.joint_target;
   target.conf = wanted.conf;
   if (!wanted.conf) target.seed = Eigen::Map<const Eigen::VectorXd>(wanted.seed_rad.data(), 6);
@@ -80,11 +86,12 @@ Target target_of(const client::TargetMm& wanted) {
 
 cam::AskCorrections by(const CompensatedModel& model) {
   return [&](const std::string& tool, const std::string& payload,
-             const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {
+             const std::vector<client::TargetMm>& targets)
+             -> Result<client::Answer<client::CorrectedTarget>> {
     client::Answer<client::CorrectedTarget> answer{cli::info_of(model), {}};
     for (const client::TargetMm& target : targets)
-      answer.items.push_back(
-          cli::to_wire(model.correct(target_of(target), tool, payload), joint_types(model.cell().robot)));
+      answer.items.push_back(cli::to_wire(model.correct(target_of(target), tool, payload),
+                                          joint_types(model.cell().robot)));
     return answer;
   };
 }
@@ -102,14 +109,15 @@ struct Errors {
   int count = 0, inside = 0;
 };
 
-void add_errors(const VirtualRobot& robot, const CompensatedModel& model, const cam::CorrectedProgram& made,
-                Errors& errors) {
+void add_errors(const VirtualRobot& robot, const CompensatedModel& model,
+                const cam::CorrectedProgram& made, Errors& errors) {
   const Pose X_TF = model.parts().physics.tools.at("spindle").inverse();
   const Chain& arm = model.cell().robot;
   for (const cam::ReceiptRow& row : made.rows) {
     if (row.status != "ok") continue;
     JointVector seed(6);
-    for (Eigen::Index j = 0; j < 6; ++j) seed(j) = from_deg(row.joints[static_cast<std::size_t>(j)]);
+    for (Eigen::Index j = 0; j < 6; ++j)
+      seed(j) = from_deg(row.joints[static_cast<std::size_t>(j)]);
     const auto joints = [&](const std::vector<double>& numbers) {
       return inverse_kinematics(arm, cam::pose_of(row.coordinates, numbers) * X_TF, seed).q;
     };
@@ -120,7 +128,8 @@ void add_errors(const VirtualRobot& robot, const CompensatedModel& model, const 
     errors.most_before = std::max(errors.most_before, before.norm());
     errors.most = std::max(errors.most, after.norm());
     ++errors.count;
-    for (Eigen::Index k = 0; k < 3; ++k) errors.inside += std::abs(to_mm(after(k))) <= 1.96 * row.sigma_mm ? 1 : 0;
+    for (Eigen::Index k = 0; k < 3; ++k)
+      errors.inside += std::abs(to_mm(after(k))) <= 1.96 * row.sigma_mm ? 1 : 0;
   }
 }
 
@@ -132,50 +141,58 @@ void tell_errors(int models, int targets, const std::string& bias) {
     const CompensatedModel model = trained(robot, 100 + static_cast<std::uint64_t>(m), bias);
     const cam::Program program = cam::read_program(cam::Dialect::kRapid, {{"m.mod", text}}, {});
     add_errors(robot, model,
-               test::demand(cam::correct_program(program, model.cell().robot, cli::tools_of(model), by(model), {})),
+               test::demand(cam::correct_program(program, model.cell().robot, cli::tools_of(model),
+                                                 by(model), {})),
                all);
   }
   const double n = all.count;
   const std::string as = bias == "se" ? "" : fmt::format(", bias {}", bias);
   if (bias == "se") {
-    test::tell_figure("programs: true error before, rms, mm", to_mm(std::sqrt(all.squares_before / n)));
+    test::tell_figure("programs: true error before, rms, mm",
+                      to_mm(std::sqrt(all.squares_before / n)));
     test::tell_figure("programs: true error before, max, mm", to_mm(all.most_before));
   }
   test::tell_figure("programs: true error after, rms, mm" + as, to_mm(std::sqrt(all.squares / n)));
   test::tell_figure("programs: true error after, max, mm" + as, to_mm(all.most));
-  test::tell_figure("programs: true error inside the stated 95 %, %" + as, 100.0 * all.inside / (3 * n));
+  test::tell_figure("programs: true error inside the stated 95 %, %" + as,
+                    100.0 * all.inside / (3 * n));
 }
 
-/// A KRL program along these places with the tool turned as in R; no configuration is said, so that each target has
-/// the joints next to those before. `begin`: the joints to begin at.
+/// A KRL program along these places with the tool turned as in R; no configuration is said, so that
+/// each target has the joints next to those before. `begin`: the joints to begin at.
 std::string krl_along(const std::vector<Vector3>& p, const Matrix3& R, const JointVector& begin) {
-  const std::vector<double> abc =
-      cam::numbers_of(cam::Coordinates::kAnglesZyx, make_pose(R, Vector3::Zero()), std::vector<double>(6, 0.0));
-  std::string text = "DEF P( )\n$TOOL={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\n$BASE=$NULLFRAME\nPTP {";
-  for (Eigen::Index j = 0; j < 6; ++j) text += fmt::format("{}A{} {:.9f}", j > 0 ? "," : "", j + 1, to_deg(begin(j)));
+  const std::vector<double> abc = cam::numbers_of(
+      cam::Coordinates::kAnglesZyx, make_pose(R, Vector3::Zero()), std::vector<double>(6, 0.0));
+  std::string text =
+      "DEF P( )\n$TOOL={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\n$BASE=$NULLFRAME\nPTP {";
+  for (Eigen::Index j = 0; j < 6; ++j)
+    text += fmt::format("{}A{} {:.9f}", j > 0 ? "," : "", j + 1, to_deg(begin(j)));
   text += "}\n";
   for (const Vector3& at : p) {
-    text += fmt::format("LIN {{X {:.6f},Y {:.6f},Z {:.6f},A {:.9f},B {:.9f},C {:.9f}}} C_DIS\n", to_mm(at.x()),
-                        to_mm(at.y()), to_mm(at.z()), abc[3], abc[4], abc[5]);
+    text += fmt::format("LIN {{X {:.6f},Y {:.6f},Z {:.6f},A {:.9f},B {:.9f},C {:.9f}}} C_DIS\n",
+                        to_mm(at.x()), to_mm(at.y()), to_mm(at.z()), abc[3], abc[4], abc[5]);
   }
   return text + "END\n";
 }
 
 constexpr double kSpacing = 0.2e-3;  // m, of neighbours
 
-/// Largest change of the correction and of the true error from a target to the next, m; and what is left.
+/// Largest change of the correction and of the true error from a target to the next, m; and what is
+/// left.
 struct Steps {
   double correction = 0, truth = 0;
   int left = 0, outside = 0, count = 0;
 };
 
-Steps steps_along(const VirtualRobot& robot, const CompensatedModel& model, const std::vector<Vector3>& p,
-                  const Matrix3& R, const JointVector& begin) {
-  const cam::Program program = cam::read_program(cam::Dialect::kKrl, {{"p.src", krl_along(p, R, begin)}}, {});
-  cam::CorrectedProgram made =
-      test::demand(cam::correct_program(program, model.cell().robot, cli::tools_of(model), by(model), {}));
-  std::stable_sort(made.rows.begin(), made.rows.end(),
-                   [](const cam::ReceiptRow& a, const cam::ReceiptRow& b) { return a.order < b.order; });
+Steps steps_along(const VirtualRobot& robot, const CompensatedModel& model,
+                  const std::vector<Vector3>& p, const Matrix3& R, const JointVector& begin) {
+  const cam::Program program =
+      cam::read_program(cam::Dialect::kKrl, {{"p.src", krl_along(p, R, begin)}}, {});
+  cam::CorrectedProgram made = test::demand(
+      cam::correct_program(program, model.cell().robot, cli::tools_of(model), by(model), {}));
+  std::stable_sort(
+      made.rows.begin(), made.rows.end(),
+      [](const cam::ReceiptRow& a, const cam::ReceiptRow& b) { return a.order < b.order; });
   const Pose X_TF = model.parts().physics.tools.at("spindle").inverse();
   Steps steps;
   std::optional<Vector3> last_correction, last_error;
@@ -188,7 +205,8 @@ Steps steps_along(const VirtualRobot& robot, const CompensatedModel& model, cons
     q = inverse_kinematics(model.cell().robot, make_pose(R, row.p_B) * X_TF, q).q;
     const Vector3 error = truth_at(robot, q).translation() - row.p_B;
     if (last_error) steps.truth = std::max(steps.truth, (error - *last_error).norm());
-    if (last_correction) steps.correction = std::max(steps.correction, (row.correction_B - *last_correction).norm());
+    if (last_correction)
+      steps.correction = std::max(steps.correction, (row.correction_B - *last_correction).norm());
     last_error = error;
     last_correction = row.correction_B;
   }
@@ -197,10 +215,13 @@ Steps steps_along(const VirtualRobot& robot, const CompensatedModel& model, cons
 
 void tell_steps(const std::string& name, const Steps& steps) {
   constexpr double kAllowed = 1e-6;  // m, beside the share
-  fmt::print("{}: {} targets, {} out of domain, {} left; largest step {:.6f} mm, of the true error {:.6f} mm\n", name,
-             steps.count, steps.outside, steps.left, to_mm(steps.correction), to_mm(steps.truth));
-  test::tell_figure(fmt::format("programs: {}: largest step less 1 µm over that of the true error", name),
-                    std::max(0.0, steps.correction - kAllowed) / steps.truth);
+  fmt::print(
+      "{}: {} targets, {} out of domain, {} left; largest step {:.6f} mm, of the true error {:.6f} "
+      "mm\n",
+      name, steps.count, steps.outside, steps.left, to_mm(steps.correction), to_mm(steps.truth));
+  test::tell_figure(
+      fmt::format("programs: {}: largest step less 1 µm over that of the true error", name),
+      std::max(0.0, steps.correction - kAllowed) / steps.truth);
   test::tell_figure(fmt::format("programs: {}: targets left", name), steps.left);
 }
 
@@ -246,18 +267,22 @@ void tell_smoothness() {
     a += kSpacing / along;
     r = 0.03 * a;
   }
-  tell_steps("spiral across the edge of the domain", steps_along(robot, model, spiral, X_bent.linear(), bent));
+  tell_steps("spiral across the edge of the domain",
+             steps_along(robot, model, spiral, X_bent.linear(), bent));
 }
 
-/// Of the RAPID programs that tests correct; and of tools that differ from the cell's, how many are refused.
+/// Of the RAPID programs that tests correct; and of tools that differ from the cell's, how many are
+/// refused.
 void tell_share() {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   const CompensatedModel model = trained(robot, 1);
   std::size_t moves = 0, corrected = 0, reasons = 0, left = 0, refused = 0, programs = 0;
-  for (const auto& folder : fs::directory_iterator(TRAMMEL_SOURCE_DIR "/tests/clients/programs/rapid")) {
+  for (const auto& folder :
+       fs::directory_iterator(TRAMMEL_SOURCE_DIR "/tests/clients/programs/rapid")) {
     std::vector<cam::SourceFile> files;
     for (const auto& file : fs::directory_iterator(folder.path()))
-      files.push_back({file.path().filename().string(), read_text_file(file.path().string()).value()});
+      files.push_back(
+          {file.path().filename().string(), read_text_file(file.path().string()).value()});
     const auto run = [&] {
       const cam::Program program = cam::read_program(cam::Dialect::kRapid, files, {});
       return cam::correct_program(program, model.cell().robot, cli::tools_of(model), by(model), {});
@@ -279,8 +304,9 @@ void tell_share() {
   }
   test::tell_figure("programs: RAPID motions corrected, %",
                     100.0 * static_cast<double>(corrected) / static_cast<double>(moves));
-  test::tell_figure("programs: what is left has a reason, %",
-                    left == 0 ? 100.0 : 100.0 * static_cast<double>(reasons) / static_cast<double>(left));
+  test::tell_figure(
+      "programs: what is left has a reason, %",
+      left == 0 ? 100.0 : 100.0 * static_cast<double>(reasons) / static_cast<double>(left));
   test::tell_figure("programs: tool data of another tool refused, %",
                     100.0 * static_cast<double>(refused) / static_cast<double>(programs));
 }
@@ -303,10 +329,11 @@ Cost cost_of(const std::function<int()>& work) {
   if (child == 0) ::_exit(work());
   int status = 0;
   rusage used{};
-  if (child < 0 || ::wait4(child, &status, 0, &used) != child || !WIFEXITED(status) || WEXITSTATUS(status) > 1)
+  if (child < 0 || ::wait4(child, &status, 0, &used) != child || !WIFEXITED(status) ||
+      WEXITSTATUS(status) > 1)
     std::abort();
-  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(), processor_seconds(used),
-          static_cast<double>(used.ru_maxrss) / 1024};
+  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(),
+          processor_seconds(used), static_cast<double>(used.ru_maxrss) / 1024};
 }
 
 void tell_cost(int targets) {
@@ -322,15 +349,17 @@ void tell_cost(int targets) {
   program = folder.file("m.mod");
   const Cost alone = cost_of([&] {
     const CompensatedModel loaded = load_model(model).value();
-    const cam::Program read = cam::read_program(cam::Dialect::kRapid, {{"m.mod", read_text_file(program).value()}}, {});
+    const cam::Program read =
+        cam::read_program(cam::Dialect::kRapid, {{"m.mod", read_text_file(program).value()}}, {});
     std::vector<client::TargetMm> asked;
-    const cam::AskCorrections note =
-        [&](const std::string&, const std::string&,
-            const std::vector<client::TargetMm>& all) -> Result<client::Answer<client::CorrectedTarget>> {
+    const cam::AskCorrections note = [&](const std::string&, const std::string&,
+                                         const std::vector<client::TargetMm>& all)
+        -> Result<client::Answer<client::CorrectedTarget>> {
       asked = all;
       return refused("only asked");
     };
-    static_cast<void>(cam::correct_program(read, loaded.cell().robot, cli::tools_of(loaded), note, {}));
+    static_cast<void>(
+        cam::correct_program(read, loaded.cell().robot, cli::tools_of(loaded), note, {}));
     rusage before{}, after{};
     ::getrusage(RUSAGE_SELF, &before);
     for (const client::TargetMm& one : asked) {
@@ -344,16 +373,19 @@ void tell_cost(int targets) {
   const double evaluation = std::stod(read_text_file(folder.file("took")).value());
   const Cost all = cost_of([&] {
     const std::string out = folder.file("out.mod"), receipt = folder.file("r.csv");
-    const std::vector<const char*> argv = {"trammel", "correct",   "--model",   model.c_str(),  program.c_str(),
-                                           "-o",      out.c_str(), "--receipt", receipt.c_str()};
+    const std::vector<const char*> argv = {"trammel",     "correct",       "--model",
+                                           model.c_str(), program.c_str(), "-o",
+                                           out.c_str(),   "--receipt",     receipt.c_str()};
     return cli::run_command_line(static_cast<int>(argv.size()), argv.data());
   });
-  fmt::print("{} targets: {:.2f} s, {:.2f} s of processors, {:.2f} s of them the evaluation alone takes\n", targets,
-             all.seconds, all.processor_seconds, evaluation);
+  fmt::print(
+      "{} targets: {:.2f} s, {:.2f} s of processors, {:.2f} s of them the evaluation alone takes\n",
+      targets, all.seconds, all.processor_seconds, evaluation);
   test::tell_figure("programs: 100,000 targets, processor time over that of the evaluation alone",
                     all.processor_seconds / evaluation);
-  test::tell_figure("programs: 100,000 targets, time over the processor time of the evaluation alone",
-                    all.seconds / evaluation);
+  test::tell_figure(
+      "programs: 100,000 targets, time over the processor time of the evaluation alone",
+      all.seconds / evaluation);
   test::tell_figure("programs: 100,000 targets, memory, MB", all.megabytes);
 }
 

@@ -1,5 +1,5 @@
-// What recording costs those who ask: two servers of the same model, one records what it answers. One client asks both
-// in turn, for one target and for many; and how much disk a request takes.
+// What recording costs those who ask: two servers of the same model, one records what it answers.
+// One client asks both in turn, for one target and for many; and how much disk a request takes.
 // --requests N (of one target, a round), --rounds N.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -27,10 +27,12 @@ struct Served {
   explicit Served(int number, bool records) : daemon(number) {
     const std::string text = test::read_file(daemon.config_path());
     const std::string more = records ? "record: {folder: records, max_mb: 1000}\n" : "";
-    static_cast<void>(test::demand(write_text_file(daemon.config_path(), text + more).map([] { return true; })));
+    static_cast<void>(
+        test::demand(write_text_file(daemon.config_path(), text + more).map([] { return true; })));
     daemon.start();
     session = test::demand(client::Session::open(daemon.session_options()));
-    const auto job = test::demand(session->submit_measurements("cell-7", "first", test::virtual_batch_csv(150, 3)));
+    const auto job = test::demand(
+        session->submit_measurements("cell-7", "first", test::virtual_batch_csv(150, 3)));
     static_cast<void>(test::demand(session->wait_for_job(job, kLimit, nullptr)));
   }
 
@@ -40,7 +42,9 @@ struct Served {
 
 client::TargetMm hole(std::size_t i) {
   client::TargetMm target;
-  target.pose = {1800, 125 - 0.02 * static_cast<double>(i), 1200, 0.7071067811865476, 0, 0.7071067811865476, 0};
+  target.pose = {
+      1800, 125 - 0.02 * static_cast<double>(i), 1200, 0.7071067811865476, 0, 0.7071067811865476,
+      0};
   target.conf = 0;
   return target;
 }
@@ -69,11 +73,12 @@ void tell_one(std::array<Served*, 2> servers, int requests, int rounds) {
     std::array<std::vector<double>, 2> times;
     for (int i = 0; i < requests; ++i)
       for (std::size_t k = 0; k < 2; ++k)
-        times.at(k).push_back(milliseconds_of(*servers.at(k)->session, {hole(static_cast<std::size_t>(i) % kMany)}));
+        times.at(k).push_back(
+            milliseconds_of(*servers.at(k)->session, {hole(static_cast<std::size_t>(i) % kMany)}));
     p50.push_back(ratio(times, 0.5));
     p99.push_back(ratio(times, 0.99));
-    fmt::print("one target: p50 {:.3f}, p99 {:.3f} ms; recorded: p50 {:.3f}, p99 {:.3f} ms\n", at(times[0], 0.5),
-               at(times[0], 0.99), at(times[1], 0.5), at(times[1], 0.99));
+    fmt::print("one target: p50 {:.3f}, p99 {:.3f} ms; recorded: p50 {:.3f}, p99 {:.3f} ms\n",
+               at(times[0], 0.5), at(times[0], 0.99), at(times[1], 0.5), at(times[1], 0.99));
   }
   test::tell_figure("recording: p50 of one target over that without", at(p50, 0.5));
   test::tell_figure("recording: p99 of one target over that without", at(p99, 0.5));
@@ -84,24 +89,30 @@ void tell_many(std::array<Served*, 2> servers, int rounds) {
   for (std::size_t i = 0; i < kMany; ++i) targets.push_back(hole(i));
   std::array<std::vector<double>, 2> times;
   for (int i = 0; i < 3 * rounds; ++i)
-    for (std::size_t k = 0; k < 2; ++k) times.at(k).push_back(milliseconds_of(*servers.at(k)->session, targets));
-  fmt::print("{} targets: p50 {:.0f} ms; recorded: p50 {:.0f} ms\n", kMany, at(times[0], 0.5), at(times[1], 0.5));
+    for (std::size_t k = 0; k < 2; ++k)
+      times.at(k).push_back(milliseconds_of(*servers.at(k)->session, targets));
+  fmt::print("{} targets: p50 {:.0f} ms; recorded: p50 {:.0f} ms\n", kMany, at(times[0], 0.5),
+             at(times[1], 0.5));
   test::tell_figure("recording: p50 of 5000 targets over that without", ratio(times, 0.5));
 }
 
 /// Bytes of a target on the disk, and how many requests of one target are in no record.
 void tell_disk(Served& recorded, double asked) {
-  const auto folder = std::filesystem::path(recorded.daemon.config_path()).parent_path() / "records";
+  const auto folder =
+      std::filesystem::path(recorded.daemon.config_path()).parent_path() / "records";
   recorded.session.reset();
   static_cast<void>(recorded.daemon.stop());  // what waits is written first
   std::vector<double> bytes;
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
     std::ifstream in(file.path());
-    for (std::string line; std::getline(in, line);) bytes.push_back(static_cast<double>(line.size()));
+    for (std::string line; std::getline(in, line);)
+      bytes.push_back(static_cast<double>(line.size()));
   }
   const double one = at(bytes, 0);
-  const auto lines = std::count_if(bytes.begin(), bytes.end(), [&](double size) { return size < 2 * one; });
-  test::tell_figure("recording: requests of one target in no record", asked - static_cast<double>(lines));
+  const auto lines =
+      std::count_if(bytes.begin(), bytes.end(), [&](double size) { return size < 2 * one; });
+  test::tell_figure("recording: requests of one target in no record",
+                    asked - static_cast<double>(lines));
   test::tell_figure("recording: bytes of one target", one);
 }
 

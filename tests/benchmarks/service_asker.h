@@ -24,7 +24,8 @@ namespace trammel::test {
 
 using Millis = std::chrono::duration<double, std::milli>;
 
-/// Asks a server for one operation. One thread asks and waits, or one asks and the listener notes what comes.
+/// Asks a server for one operation. One thread asks and waits, or one asks and the listener notes
+/// what comes.
 template <typename Operation>
 class Asker final : private wire::dds::DataWriterListener, private wire::dds::DataReaderListener {
  public:
@@ -32,11 +33,13 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
   using Reply = typename Operation::Reply::type;
   using Clock = std::chrono::steady_clock;
 
-  Asker(std::uint32_t domain, std::uint16_t port, std::string partition) : partition_(std::move(partition)) {
+  Asker(std::uint32_t domain, std::uint16_t port, std::string partition)
+      : partition_(std::move(partition)) {
     participant_ = wire::make_participant({"asker", domain, "127.0.0.1", 0, {port}}).value();
     auto* requests = wire::make_request_topic<Operation>(*participant_).value();
     auto* replies = wire::make_reply_topic<Operation>(*participant_).value();
-    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched();
+    const auto heard = wire::dds::StatusMask::data_available()
+                       << wire::dds::StatusMask::subscription_matched();
     participant_->create_subscriber(wire::subscriber_qos(partition_))
         ->create_datareader(replies, wire::call_reader_qos(wire::kReplyDepth), this, heard);
     writer_ = participant_->create_publisher(wire::publisher_qos({}))
@@ -49,7 +52,8 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
 
   [[nodiscard]] bool wait_until_matched() {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return reads_ > 0 && writes_ > 0; });
+    return changed_.wait_for(lock, std::chrono::seconds(20),
+                             [this] { return reads_ > 0 && writes_ > 0; });
   }
 
   /// Sends the request under the next number.
@@ -66,17 +70,20 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
     writer_->write(&request);
   }
   /// Sends the request and waits for its reply: how long that took. Empty: no good reply in time.
-  [[nodiscard]] std::optional<Millis> ask(Request& request, std::chrono::seconds limit = std::chrono::seconds(60)) {
+  [[nodiscard]] std::optional<Millis> ask(Request& request,
+                                          std::chrono::seconds limit = std::chrono::seconds(60)) {
     send(request);
     const std::int64_t number = request.header().request_id().sequence_number();
     std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, limit, [&] { return times_.contains(number); })) return std::nullopt;
+    if (!changed_.wait_for(lock, limit, [&] { return times_.contains(number); }))
+      return std::nullopt;
     return times_.at(number);
   }
   /// Until as many have been answered as were sent, or `limit` is over.
   void wait_for_all(std::chrono::seconds limit) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, limit, [&] { return times_.size() + busy_ >= static_cast<std::size_t>(sent_); });
+    changed_.wait_for(lock, limit,
+                      [&] { return times_.size() + busy_ >= static_cast<std::size_t>(sent_); });
   }
 
   struct Tally {
@@ -85,21 +92,28 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
   };
   [[nodiscard]] Tally tally() {
     const std::lock_guard lock(mutex_);
-    Tally all{sent_, static_cast<std::int64_t>(times_.size()), static_cast<std::int64_t>(busy_), twice_, {}};
+    Tally all{sent_,
+              static_cast<std::int64_t>(times_.size()),
+              static_cast<std::int64_t>(busy_),
+              twice_,
+              {}};
     for (const auto& [number, time] : times_) all.times_ms.push_back(time.count());
     return all;
   }
 
  private:
-  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
+  void on_publication_matched(wire::dds::DataWriter*,
+                              const wire::dds::PublicationMatchedStatus& status) override {
     note([&] { reads_ = status.current_count; });
   }
-  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
+  void on_subscription_matched(wire::dds::DataReader*,
+                               const wire::dds::SubscriptionMatchedStatus& status) override {
     note([&] { writes_ = status.current_count; });
   }
   void on_data_available(wire::dds::DataReader* reader) override {
     wire::dds::SampleInfo info;
-    while (reader->take_next_sample(&reply_, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    while (reader->take_next_sample(&reply_, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       const auto now = Clock::now();
       if (info.valid_data) note([&] { take(now); });
     }
@@ -140,7 +154,8 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
   std::map<std::int64_t, Millis> times_;             // of good replies
 };
 
-/// A server on raw Fast DDS: a listener that wakes workers, workers that take a request and reply with as many items.
+/// A server on raw Fast DDS: a listener that wakes workers, workers that take a request and reply
+/// with as many items.
 template <typename Operation>
 class Echo final : private wire::dds::DataReaderListener {
  public:
@@ -149,13 +164,15 @@ class Echo final : private wire::dds::DataReaderListener {
   /// Fills in as many items as were asked for.
   using Fill = void (*)(const Request&, Reply&);
 
-  Echo(wire::dds::DomainParticipant& participant, Fill fill, int workers) : participant_(participant), fill_(fill) {
+  Echo(wire::dds::DomainParticipant& participant, Fill fill, int workers)
+      : participant_(participant), fill_(fill) {
     reply_topic_ = wire::make_reply_topic<Operation>(participant).value();
     reader_ = participant.create_subscriber(wire::subscriber_qos({}))
                   ->create_datareader(wire::make_request_topic<Operation>(participant).value(),
                                       wire::call_reader_qos(wire::kRequestDepth), this,
                                       wire::dds::StatusMask::data_available());
-    for (int i = 0; i < workers; ++i) workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+    for (int i = 0; i < workers; ++i)
+      workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
   }
   ~Echo() override { workers_.clear(); }
 
@@ -187,7 +204,8 @@ class Echo final : private wire::dds::DataReaderListener {
       std::unique_lock lock(mutex_);
       const std::uint64_t seen = arrivals_;
       lock.unlock();
-      while (reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      while (reader_->take_next_sample(&request, &info) ==
+             eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
         if (info.valid_data) answer(request);
       }
       lock.lock();

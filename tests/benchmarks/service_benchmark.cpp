@@ -1,6 +1,7 @@
-// What the service costs beside a raw Fast DDS echo of the same payload with the same threads, interleaved in one run:
-// only the ratios count. `service_benchmark [--quick] [overhead] [load] [training] [flood]`; none named: all but
-// training. Models are trained once and kept in the build folder.
+// What the service costs beside a raw Fast DDS echo of the same payload with the same threads,
+// interleaved in one run: only the ratios count. `service_benchmark [--quick] [overhead] [load]
+// [training] [flood]`; none named: all but training. Models are trained once and kept in the build
+// folder.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -36,7 +37,8 @@ double percentile(std::vector<double> values, double share) {
   return values[at];
 }
 
-// ---- payloads ------------------------------------------------------------------------------------------------------
+// ---- payloads
+// ------------------------------------------------------------------------------------------------------
 
 wire::Approach unknown_approach() {
   wire::Approach approach;
@@ -80,11 +82,13 @@ void fill(const wire::PredictErrorRequest& request, wire::PredictErrorReply& rep
   reply.predictions().resize(request.poses().size());
 }
 
-// ---- the echo, a process of its own as the daemon is ----------------------------------------------------------------
+// ---- the echo, a process of its own as the daemon is
+// ----------------------------------------------------------------
 
 int serve_echo(std::uint32_t domain, std::uint16_t port) {
   ServiceEvents events;
-  const auto participant = wire::make_participant({"echo", domain, "127.0.0.1", port, {}}, &events).value();
+  const auto participant =
+      wire::make_participant({"echo", domain, "127.0.0.1", port, {}}, &events).value();
   test::Echo<wire::CorrectTarget> corrections(*participant, fill, kWorkers);
   test::Echo<wire::PredictError> predictions(*participant, fill, kWorkers);
   std::puts("ready");
@@ -109,8 +113,9 @@ int serve_echo(std::uint32_t domain, std::uint16_t port) {
 struct ModelSpec {
   std::string name, level, bias;
 };
-const std::vector<ModelSpec> kModels = {
-    {"none", "M3", "none"}, {"se", "M3", "se"}, {"coupled", "M3", "matern52 + joint_map + parameters"}};
+const std::vector<ModelSpec> kModels = {{"none", "M3", "none"},
+                                        {"se", "M3", "se"},
+                                        {"coupled", "M3", "matern52 + joint_map + parameters"}};
 
 CompensatedModel model_of(const ModelSpec& spec, int poses) {
   const std::string folder = TRAMMEL_BINARY_DIR "/benchmark_models";
@@ -137,20 +142,23 @@ class Bench {
       static_cast<void>(test::demand(store->add_model("cell-7", model, 0, true, "benchmark")));
     }
     daemon_.start();
-    echo_ = std::make_unique<test::Process>(std::vector<std::string>{std::filesystem::read_symlink("/proc/self/exe"),
-                                                                     "--echo", std::to_string(daemon_.domain()),
-                                                                     std::to_string(echo_port())});
+    echo_ = std::make_unique<test::Process>(
+        std::vector<std::string>{std::filesystem::read_symlink("/proc/self/exe"), "--echo",
+                                 std::to_string(daemon_.domain()), std::to_string(echo_port())});
     if (!echo_->wait_for_line("ready", std::chrono::seconds(30))) std::abort();
   }
-  [[nodiscard]] std::uint16_t echo_port() const { return static_cast<std::uint16_t>(daemon_.port() + 2); }
+  [[nodiscard]] std::uint16_t echo_port() const {
+    return static_cast<std::uint16_t>(daemon_.port() + 2);
+  }
   [[nodiscard]] test::Daemon& daemon() { return daemon_; }
 
   /// Of the daemon or the echo.
   template <typename Operation>
-  [[nodiscard]] std::unique_ptr<test::Asker<Operation>> asker(bool of_echo, const std::string& name) {
+  [[nodiscard]] std::unique_ptr<test::Asker<Operation>> asker(bool of_echo,
+                                                              const std::string& name) {
     const std::uint16_t port = of_echo ? echo_port() : daemon_.port();
-    auto asker = std::make_unique<test::Asker<Operation>>(daemon_.domain(), port,
-                                                          fmt::format("{}-{}", name, of_echo ? "echo" : "service"));
+    auto asker = std::make_unique<test::Asker<Operation>>(
+        daemon_.domain(), port, fmt::format("{}-{}", name, of_echo ? "echo" : "service"));
     if (!asker->wait_until_matched()) std::abort();
     return asker;
   }
@@ -207,8 +215,8 @@ void tell(const std::string& what, const Times& times) {
   const double echo = percentile(times.echo, 0.5), compute = percentile(times.compute, 0.5);
   const double echo_99 = percentile(times.echo, 0.99), compute_99 = percentile(times.compute, 0.99);
   const double total = percentile(times.service, 0.5), total_99 = percentile(times.service, 0.99);
-  std::printf("%s: echo %.3f / %.3f ms (p50 / p99), service %.3f / %.3f, compute %.3f / %.3f\n", what.c_str(), echo,
-              echo_99, total, total_99, compute, compute_99);
+  std::printf("%s: echo %.3f / %.3f ms (p50 / p99), service %.3f / %.3f, compute %.3f / %.3f\n",
+              what.c_str(), echo, echo_99, total, total_99, compute, compute_99);
   test::tell_figure(what + ", over the echo, p50", total / echo);
   test::tell_figure(what + ", over the echo, p99", total_99 / echo_99);
   test::tell_figure(what + ", over the echo and computing, p50", total / (echo + compute));
@@ -234,7 +242,9 @@ void overhead(bool quick) {
         target.seed = q[i];
         static_cast<void>(model.correct(target, tool, payload));
       };
-      const auto predict = [&](std::size_t i) { static_cast<void>(model.predict(q[i], tool, payload)); };
+      const auto predict = [&](std::size_t i) {
+        static_cast<void>(model.predict(q[i], tool, payload));
+      };
       tell(fmt::format("CorrectTarget of {}, {}", items, spec.name),
            interleaved<wire::CorrectTarget>(bench, corrections_of(joints), items, correct, rounds));
       tell(fmt::format("PredictError of {}, {}", items, spec.name),
@@ -263,7 +273,8 @@ class Pace {
 };
 
 /// Each client sends so many a second, whether it is answered or not.
-void send_at_rate(Correctors& clients, const wire::CorrectTargetRequest& request, int per_second, double seconds) {
+void send_at_rate(Correctors& clients, const wire::CorrectTargetRequest& request, int per_second,
+                  double seconds) {
   std::vector<std::jthread> threads;
   for (auto& client : clients) {
     threads.emplace_back([&, at = client.get()] {
@@ -272,7 +283,8 @@ void send_at_rate(Correctors& clients, const wire::CorrectTargetRequest& request
       const auto begun = Clock::now();
       const int count = static_cast<int>(per_second * seconds);
       for (int i = 0; i < count; ++i) {
-        pace.until(begun + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(i) / per_second));
+        pace.until(begun + std::chrono::duration_cast<Clock::duration>(
+                               std::chrono::duration<double>(i) / per_second));
         at->send(mine);
       }
     });
@@ -314,18 +326,23 @@ void eight_clients(bool quick, bool with_training) {
     const auto csv = test::virtual_batch_csv(quick ? 600 : 1200, 3);
     static_cast<void>(test::demand(session->submit_measurements("cell-7", "background", csv)));
   }
-  Correctors echo = correctors(bench, true, 8, "load"), service = correctors(bench, false, 8, "load");
+  Correctors echo = correctors(bench, true, 8, "load"),
+             service = correctors(bench, false, 8, "load");
   const auto request = corrections_of(test::virtual_joints(1, 5));
   for (int round = 0; round < (quick ? 2 : 5); ++round) {
     send_at_rate(echo, request, 250, 1);
     send_at_rate(service, request, 250, 1);
   }
   const LoadFigures of_echo = tally(echo), of_service = tally(service);
-  const std::string what = with_training ? "8 x 250 a second beside a training" : "8 x 250 a second";
-  std::printf("%s: %lld sent, echo %.3f / %.3f ms (p50 / p99.9), service %.3f / %.3f, %lld busy; echo lost %lld\n",
-              what.c_str(), static_cast<long long>(of_service.sent), percentile(of_echo.times, 0.5),
-              percentile(of_echo.times, 0.999), percentile(of_service.times, 0.5), percentile(of_service.times, 0.999),
-              static_cast<long long>(of_service.busy), static_cast<long long>(of_echo.lost));
+  const std::string what =
+      with_training ? "8 x 250 a second beside a training" : "8 x 250 a second";
+  std::printf(
+      "%s: %lld sent, echo %.3f / %.3f ms (p50 / p99.9), service %.3f / %.3f, %lld busy; echo lost "
+      "%lld\n",
+      what.c_str(), static_cast<long long>(of_service.sent), percentile(of_echo.times, 0.5),
+      percentile(of_echo.times, 0.999), percentile(of_service.times, 0.5),
+      percentile(of_service.times, 0.999), static_cast<long long>(of_service.busy),
+      static_cast<long long>(of_echo.lost));
   test::tell_figure(what + ", lost", static_cast<double>(of_service.lost));
   test::tell_figure(what + ", answered twice", static_cast<double>(of_service.twice));
   test::tell_figure(what + ", busy", static_cast<double>(of_service.busy));
@@ -360,12 +377,18 @@ void flood(bool quick) {
     times = honest_times(*honest, count);
   }
   const LoadFigures of_flooders = tally(flooders);
-  std::printf("16 flooders: %lld sent, %lld busy; one honest client %.3f / %.3f ms (p50 / p99), idle %.3f / %.3f\n",
-              static_cast<long long>(of_flooders.sent), static_cast<long long>(of_flooders.busy),
-              percentile(times, 0.5), percentile(times, 0.99), percentile(idle, 0.5), percentile(idle, 0.99));
-  test::tell_figure("16 flooders, neither answered nor told so", static_cast<double>(of_flooders.lost));
-  test::tell_figure("16 flooders, an honest client over idle, p50", percentile(times, 0.5) / percentile(idle, 0.5));
-  test::tell_figure("16 flooders, an honest client over idle, p99", percentile(times, 0.99) / percentile(idle, 0.99));
+  std::printf(
+      "16 flooders: %lld sent, %lld busy; one honest client %.3f / %.3f ms (p50 / p99), idle %.3f "
+      "/ %.3f\n",
+      static_cast<long long>(of_flooders.sent), static_cast<long long>(of_flooders.busy),
+      percentile(times, 0.5), percentile(times, 0.99), percentile(idle, 0.5),
+      percentile(idle, 0.99));
+  test::tell_figure("16 flooders, neither answered nor told so",
+                    static_cast<double>(of_flooders.lost));
+  test::tell_figure("16 flooders, an honest client over idle, p50",
+                    percentile(times, 0.5) / percentile(idle, 0.5));
+  test::tell_figure("16 flooders, an honest client over idle, p99",
+                    percentile(times, 0.99) / percentile(idle, 0.99));
 }
 
 int run(const std::vector<std::string>& words) {

@@ -1,5 +1,6 @@
-// What several set-ups of the tracker are worth: five sessions of 60 poses against 300 of one, a zero lost between two
-// of them, and what fifty sessions cost. The trainer never sees the virtual robot's truth. --seeds N, --only a: less.
+// What several set-ups of the tracker are worth: five sessions of 60 poses against 300 of one, a
+// zero lost between two of them, and what fifty sessions cost. The trainer never sees the virtual
+// robot's truth. --seeds N, --only a: less.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -27,7 +28,8 @@ CheckedBatch checked(MeasurementBatch batch, const std::string& id, const Cell& 
   return test::demand(check_against_cell(std::move(batch), cell));
 }
 
-/// An arm of the shipped type whose errors are drawn anew: twice to half those of the shipped one, signs too.
+/// An arm of the shipped type whose errors are drawn anew: twice to half those of the shipped one,
+/// signs too.
 VirtualRobot drawn_robot(const std::shared_ptr<const Cell>& cell, std::uint64_t seed) {
   VirtualRobot robot = test::chapter_5_robot(cell);
   std::mt19937_64 random(seed * 2654435761u + 1);
@@ -40,13 +42,14 @@ VirtualRobot drawn_robot(const std::shared_ptr<const Cell>& cell, std::uint64_t 
   return robot;
 }
 
-CheckedBatch sessions_of(const VirtualRobot& before, const VirtualRobot& after, int count, int changed, int poses,
-                         std::uint64_t seed) {
+CheckedBatch sessions_of(const VirtualRobot& before, const VirtualRobot& after, int count,
+                         int changed, int poses, std::uint64_t seed) {
   std::vector<CheckedBatch> batches;
   for (int s = 0; s < count; ++s) {
-    const test::Day day{.poses = poses, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
-    batches.push_back(
-        checked(measured_on(s < changed ? before : after, day), fmt::format("s{}", s + 1), *before.truth.cell));
+    const test::Day day{
+        .poses = poses, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+    batches.push_back(checked(measured_on(s < changed ? before : after, day),
+                              fmt::format("s{}", s + 1), *before.truth.cell));
   }
   return joined(std::move(batches));
 }
@@ -76,13 +79,14 @@ void five_sessions(int seeds, const std::string& bias) {
     const CompensatedModel joint =
         test::demand(train(cell, sessions_of(robot, robot, 5, 5, 60, first), options_of(bias)));
     false_changes += static_cast<int>(joint.parts().changes.size());
-    const CheckedBatch alone =
-        checked(measured_on(robot, {.poses = 300, .seed = first + 7, .set_up_anew = true}), "one", *cell);
+    const CheckedBatch alone = checked(
+        measured_on(robot, {.poses = 300, .seed = first + 7, .set_up_anew = true}), "one", *cell);
     several.push_back(true_error(joint, robot));
     one.push_back(true_error(test::demand(train(cell, alone, options_of(bias))), robot));
   }
-  fmt::print("five sessions of 60 poses, bias {}, {} seeds: {:.5f} mm, 300 of one set-up {:.5f} mm\n", bias, seeds,
-             to_mm(mean(several)), to_mm(mean(one)));
+  fmt::print(
+      "five sessions of 60 poses, bias {}, {} seeds: {:.5f} mm, 300 of one set-up {:.5f} mm\n",
+      bias, seeds, to_mm(mean(several)), to_mm(mean(one)));
   fmt::print("figure five sessions over one set-up, bias {}: {:.3f} (aim at most 1.10)\n", bias,
              mean(several) / mean(one));
   fmt::print("figure changes named where nothing changed: {} of {}\n", false_changes, seeds);
@@ -108,15 +112,18 @@ void lost_zero(int seeds) {
     found += right && changes.size() == 1 && changes.front().could_also_be.empty() ? 1 : 0;
     more += changes.size() > 1 ? 1 : 0;
     if (!right)
-      fmt::print("  seed {}: {} was {}\n", seed, truth, changes.empty() ? "not found" : changes.front().source);
+      fmt::print("  seed {}: {} was {}\n", seed, truth,
+                 changes.empty() ? "not found" : changes.front().source);
     const CompensatedModel told = test::demand(train(cell, batch, options_of("none", {truth})));
     ratio.push_back(true_error(model, after) / true_error(told, after));
   }
   std::sort(ratio.begin(), ratio.end());
-  fmt::print("figure zero of 0.2 mrad found and dated: {} of {} (aim 95 %); more than one change named in {}\n", found,
-             seeds, more);
-  fmt::print("figure model over one that is told, mean: {:.4f}, worst {:.4f} (aim at most 1.05)\n", mean(ratio),
-             ratio.back());
+  fmt::print(
+      "figure zero of 0.2 mrad found and dated: {} of {} (aim 95 %); more than one change named in "
+      "{}\n",
+      found, seeds, more);
+  fmt::print("figure model over one that is told, mean: {:.4f}, worst {:.4f} (aim at most 1.05)\n",
+             mean(ratio), ratio.back());
 }
 
 double seconds_of(const std::function<void()>& work) {
@@ -130,18 +137,23 @@ void cost(const std::string& bias) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch fifty = sessions_of(robot, robot, 50, 50, 100, 5);
   const CheckedBatch one = checked(measured_on(robot, {.poses = 5000, .seed = 6}), "one", *cell);
-  const double t_one = seconds_of([&] { static_cast<void>(test::demand(train(cell, one, options_of(bias)))); });
-  const double t_fifty = seconds_of([&] { static_cast<void>(test::demand(train(cell, fifty, options_of(bias)))); });
-  fmt::print("bias {}: 50 sessions of 100 poses {:.2f} s, one batch of 5000 {:.2f} s of processor time\n", bias,
-             t_fifty, t_one);
-  fmt::print("figure 50 sessions over one batch, bias {}: {:.2f} (aim at most 2)\n", bias, t_fifty / t_one);
+  const double t_one =
+      seconds_of([&] { static_cast<void>(test::demand(train(cell, one, options_of(bias)))); });
+  const double t_fifty =
+      seconds_of([&] { static_cast<void>(test::demand(train(cell, fifty, options_of(bias)))); });
+  fmt::print(
+      "bias {}: 50 sessions of 100 poses {:.2f} s, one batch of 5000 {:.2f} s of processor time\n",
+      bias, t_fifty, t_one);
+  fmt::print("figure 50 sessions over one batch, bias {}: {:.2f} (aim at most 2)\n", bias,
+             t_fifty / t_one);
 }
 
 /// Rows held out of both, and how the models of C, of D and of both do on them.
 void real_robot(const std::string& bias) {
   const std::string folder = TRAMMEL_SOURCE_DIR "/../shared/data/";
   if (!std::filesystem::exists(folder + "ur10_series_c.csv")) return;
-  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
   std::vector<CheckedBatch> series;
   for (const char* name : {"ur10_series_c", "ur10_series_d"}) {
     MeasurementBatch batch = test::demand(read_batch(folder + name + ".csv"));
@@ -154,8 +166,10 @@ void real_robot(const std::string& bias) {
   const CompensatedModel both = test::demand(train(cell, joined(series), options));
   for (const Change& change : both.parts().changes) {
     const SessionSetting& since = both.parts().sessions[change.session];
-    fmt::print("UR10: {} since {} (strength {:.0f}, p {:.1g}{})\n", change.source, since.id, change.gain,
-               change.p_value, change.could_also_be.empty() ? "" : "; could also be " + change.could_also_be.front());
+    fmt::print(
+        "UR10: {} since {} (strength {:.0f}, p {:.1g}{})\n", change.source, since.id, change.gain,
+        change.p_value,
+        change.could_also_be.empty() ? "" : "; could also be " + change.could_also_be.front());
   }
   for (const CheckedBatch& one : series) {
     const CompensatedModel alone = test::demand(train(cell, one, options));
@@ -163,7 +177,8 @@ void real_robot(const std::string& bias) {
       MeasurementBatch rows = one.held_out();
       const MeasurementBatch known = one.training();
       Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(known.measurements.size()));
-      for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = known.measurements[static_cast<std::size_t>(i)].p_W;
+      for (Eigen::Index i = 0; i < p_W.cols(); ++i)
+        p_W.col(i) = known.measurements[static_cast<std::size_t>(i)].p_W;
       const Pose X_WB = model.parts().physics.X_WB;
       const Eigen::Matrix3Xd p_B = X_WB.inverse() * p_W - model.errors_B(known).compensated;
       const Pose X_WS = X_WB * test::demand(fit_transform(p_W, p_B)).inverse();
@@ -173,8 +188,8 @@ void real_robot(const std::string& bias) {
       }
       return to_mm(model.evaluate(rows).compensated.rms);
     };
-    fmt::print("figure UR10 {} held out, bias {}: alone {:.4f} mm, both together {:.4f} mm\n", one.id(), bias,
-               left(alone), left(both));
+    fmt::print("figure UR10 {} held out, bias {}: alone {:.4f} mm, both together {:.4f} mm\n",
+               one.id(), bias, left(alone), left(both));
     std::cout.flush();
   }
 }

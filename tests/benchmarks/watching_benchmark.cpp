@@ -1,4 +1,5 @@
-// What it costs to be watched: a scrape of a server of many cells over HTTP, and what counting costs each request.
+// What it costs to be watched: a scrape of a server of many cells over HTTP, and what counting
+// costs each request.
 #include <time.h>
 #include <unistd.h>
 
@@ -63,12 +64,13 @@ void scrape() {
   const ServedCells served = cells();
   Trainer trainer(served, *store, registry, {});
   for (const auto& [name, cell] : served)
-    registry.publish(std::make_shared<const ServedModel>(ServedModel{name, 1, test::nominal_model(cell, 40)}));
+    registry.publish(
+        std::make_shared<const ServedModel>(ServedModel{name, 1, test::nominal_model(cell, 40)}));
   const auto port = test::own_ports();
-  HttpServer http({"127.0.0.1", port},
-                  {"server-a", "0.1.0", folder.file("t.db"), trainer, *store, registry, figures, [] {
-                     return Movement{true, {}};
-                   }});
+  HttpServer http({"127.0.0.1", port}, {"server-a", "0.1.0", folder.file("t.db"), trainer, *store,
+                                        registry, figures, [] {
+                                          return Movement{true, {}};
+                                        }});
   static_cast<void>(demand(http.start().map([] { return true; })));
   http.set_phase(ServerPhase::kServing);
   for (const char* path : {"/metrics", "/readyz", "/healthz"}) {

@@ -1,8 +1,10 @@
-// A year of a plant in an hour: arms of seven types, one service over DDS, and a truth that nobody sees but the score.
-// Every week each arm is checked with twelve poses; what a check calls changed is measured, trained from and diagnosed;
-// programs are drilled. Tools are exchanged, payloads change, joints lose their zeros and wear, the hall warms up and
-// cools down, trackers are set up anew, batches are sent that never should have been, and the server is killed. Beside
-// it an oracle that measures a fresh batch whenever the arm is another one, and a Gaussian process without physics.
+// A year of a plant in an hour: arms of seven types, one service over DDS, and a truth that nobody
+// sees but the score. Every week each arm is checked with twelve poses; what a check calls changed
+// is measured, trained from and diagnosed; programs are drilled. Tools are exchanged, payloads
+// change, joints lose their zeros and wear, the hall warms up and cools down, trackers are set up
+// anew, batches are sent that never should have been, and the server is killed. Beside it an oracle
+// that measures a fresh batch whenever the arm is another one, and a Gaussian process without
+// physics.
 // --weeks N, --cells N, --seed N, --page FILE, --talk.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -49,7 +51,9 @@ class Service {
       cells += (cells.empty() ? "" : ", ") + arm.cell()->name + ".yaml";
     }
     write(daemon_.config_path(),
-          fmt::format("version: 1\nserver: year\ncells: [{}]\nstore: trammel.db\nlog: {{level: info}}\n", cells));
+          fmt::format(
+              "version: 1\nserver: year\ncells: [{}]\nstore: trammel.db\nlog: {{level: info}}\n",
+              cells));
     daemon_.start();
   }
   [[nodiscard]] std::unique_ptr<client::Session> open() const {
@@ -68,7 +72,8 @@ class Service {
 class Asker {
  public:
   Asker(std::unique_ptr<client::Session> session, const Arm& arm)
-      : session_(std::move(session)), thread_([this, &arm](const std::stop_token& stop) { ask(stop, arm); }) {}
+      : session_(std::move(session)),
+        thread_([this, &arm](const std::stop_token& stop) { ask(stop, arm); }) {}
   void count(YearScore& score) {
     thread_.request_stop();
     thread_.join();
@@ -101,7 +106,8 @@ void kill_in_a_training(Service& service, CellYear& cell, int week, YearScore& s
   const auto seed = static_cast<std::uint64_t>(9000 + week);
   const MeasurementBatch batch = cell.arm().measured(cell.arm().poses(40, seed), week, seed, false);
   const auto session = service.open();
-  const auto job = session->submit_measurements(cell.arm().cell()->name, fmt::format("kill-{}", week), to_csv(batch));
+  const auto job = session->submit_measurements(cell.arm().cell()->name,
+                                                fmt::format("kill-{}", week), to_csv(batch));
   service.kill_and_start();
   ++score.kills;
   if (!job || cell.metrologist().follow(*job).verdict.starts_with("no ")) ++score.jobs_lost;
@@ -112,7 +118,8 @@ YearScore year(const Settings& settings) {
   Service service(arms);
   const auto session = service.open();
   std::vector<std::unique_ptr<CellYear>> cells;
-  for (const Arm& arm : arms) cells.push_back(std::make_unique<CellYear>(arm, *session, settings.talk));
+  for (const Arm& arm : arms)
+    cells.push_back(std::make_unique<CellYear>(arm, *session, settings.talk));
   for (const auto& cell : cells) cell->begin();
   Asker asker(service.open(), arms.front());
   YearScore score;
@@ -121,12 +128,14 @@ YearScore year(const Settings& settings) {
       cells[i]->live(week, score);
       const int turn = week + static_cast<int>(i);
       if (turn % (kBadEvery * settings.cells) == 0)
-        cells[i]->take(bad_batch(arms[i], week, turn / (kBadEvery * settings.cells) + static_cast<int>(i),
-                                 static_cast<std::uint64_t>(7000 + week)),
-                       week, score);
+        cells[i]->take(
+            bad_batch(arms[i], week, turn / (kBadEvery * settings.cells) + static_cast<int>(i),
+                      static_cast<std::uint64_t>(7000 + week)),
+            week, score);
     }
     if (week % kKilledEvery == 0)
-      kill_in_a_training(service, *cells[static_cast<std::size_t>(week) % cells.size()], week, score);
+      kill_in_a_training(service, *cells[static_cast<std::size_t>(week) % cells.size()], week,
+                         score);
   }
   asker.count(score);
   for (const auto& cell : cells) cell->finish(score);
@@ -151,18 +160,21 @@ void tell(const YearScore& score) {
   }
   std::sort(ratios.begin(), ratios.end());
   const auto told = [&](Told how) {
-    return static_cast<int>(std::count_if(score.events.begin(), score.events.end(),
-                                          [&](const EventOfYear& event) { return event.told == how; }));
+    return static_cast<int>(
+        std::count_if(score.events.begin(), score.events.end(),
+                      [&](const EventOfYear& event) { return event.told == how; }));
   };
   const auto events = static_cast<int>(score.events.size());
   tell_figure("year_hole_error_over_oracle_median", ratios[ratios.size() / 2]);
-  tell_figure("year_hole_error_over_oracle", rms(relied_on, &WeekOfArm::holes) / rms(relied_on, &WeekOfArm::oracle));
+  tell_figure("year_hole_error_over_oracle",
+              rms(relied_on, &WeekOfArm::holes) / rms(relied_on, &WeekOfArm::oracle));
   tell_figure("year_hole_error_over_oracle_with_warned_weeks",
               rms(score.weeks, &WeekOfArm::holes) / rms(score.weeks, &WeekOfArm::oracle));
   tell_figure("year_without_physics_over_oracle",
               rms(score.weeks, &WeekOfArm::without_physics) / rms(score.weeks, &WeekOfArm::oracle));
   tell_figure("year_holes_warned_percent", percent(score.holes_warned, score.holes));
-  tell_figure("year_holes_out_without_warning_percent", percent(score.out_without_warning, score.holes));
+  tell_figure("year_holes_out_without_warning_percent",
+              percent(score.out_without_warning, score.holes));
   tell_figure("year_events", events);
   tell_figure("year_events_named_percent", percent(told(Told::kNamed), events));
   tell_figure("year_events_open_percent", percent(told(Told::kOpen), events));

@@ -10,9 +10,12 @@
 namespace trammel {
 
 /// The kernel that is spelled so; null where none is.
-inline KernelPtr make_kernel(std::string_view spelling) { return spelled_kernel(spelling).value_or(nullptr); }
+inline KernelPtr make_kernel(std::string_view spelling) {
+  return spelled_kernel(spelling).value_or(nullptr);
+}
 
-inline Eigen::MatrixXd random_joints(Eigen::Index count, std::uint64_t seed, Eigen::Index joints = 6) {
+inline Eigen::MatrixXd random_joints(Eigen::Index count, std::uint64_t seed,
+                                     Eigen::Index joints = 6) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> angle(-1.2, 1.2);
   Eigen::MatrixXd q(count, joints);
@@ -22,13 +25,16 @@ inline Eigen::MatrixXd random_joints(Eigen::Index count, std::uint64_t seed, Eig
   return q;
 }
 
-inline double normal(std::mt19937_64* random) { return std::normal_distribution<double>()(*random); }
+inline double normal(std::mt19937_64* random) {
+  return std::normal_distribution<double>()(*random);
+}
 
 /// A smooth error of some tenths of a millimetre, m.
 inline Vector3 smooth_error_B(const JointVector& q) {
-  return 1e-3 * Vector3(0.2 * std::sin(q[0] + 0.5 * q[1]) + 0.1 * std::cos(1.5 * q[2] - q[3]) * q[1],
-                        0.15 * std::cos(q[1] + q[2]) * std::sin(0.7 * q[4]) + 0.05 * q[0] * q[3],
-                        0.25 * std::sin(q[1]) * std::cos(q[2]) + 0.05 * std::sin(2.0 * q[3] + q[5]));
+  return 1e-3 *
+         Vector3(0.2 * std::sin(q[0] + 0.5 * q[1]) + 0.1 * std::cos(1.5 * q[2] - q[3]) * q[1],
+                 0.15 * std::cos(q[1] + q[2]) * std::sin(0.7 * q[4]) + 0.05 * q[0] * q[3],
+                 0.25 * std::sin(q[1]) * std::cos(q[2]) + 0.05 * std::sin(2.0 * q[3] + q[5]));
 }
 
 /// `noise` in m, of each coordinate.

@@ -23,7 +23,8 @@ BiasModel fit(const BiasProblem& problem, const BiasOptions& options = {}) {
 
 BiasProblem without(const BiasProblem& problem, Index row) {
   const Index last = problem.q.rows() - 1;
-  BiasProblem rest{problem.q.topRows(last), problem.residual_B.topRows(last), problem.sigma.head(last)};
+  BiasProblem rest{problem.q.topRows(last), problem.residual_B.topRows(last),
+                   problem.sigma.head(last)};
   for (Index i = row; i < last; ++i) {
     rest.q.row(i) = problem.q.row(i + 1);
     rest.residual_B.row(i) = problem.residual_B.row(i + 1);
@@ -48,8 +49,10 @@ TEST(BiasModel, LearnsASmoothFunctionToTheNoise) {
   const BiasModel model = fit(smooth_problem(400, 1));
   const Eigen::MatrixXd q = random_joints(300, 2);
   double total = 0;
-  for (Index i = 0; i < q.rows(); ++i) total += (model.mean_B(q.row(i)) - smooth_error_B(q.row(i))).squaredNorm();
-  EXPECT_LT(std::sqrt(total / 300), 12e-6) << "m, of errors of some 0.2 mm, learned with 10 µm of noise per axis";
+  for (Index i = 0; i < q.rows(); ++i)
+    total += (model.mean_B(q.row(i)) - smooth_error_B(q.row(i))).squaredNorm();
+  EXPECT_LT(std::sqrt(total / 300), 12e-6)
+      << "m, of errors of some 0.2 mm, learned with 10 µm of noise per axis";
   EXPECT_LT(model.report().leave_one_out_rms, 1.25 * std::sqrt(3.0) * 10e-6);
   for (int d = 0; d < 3; ++d) EXPECT_NEAR(model.report().noise_stddev[d], 10e-6, 2e-6);
   EXPECT_GE(model.report().starts_at_best, 1);
@@ -96,7 +99,8 @@ TEST(BiasModel, IntervalsCoverFreshMeasurementsAsOftenAsTheySay) {
   for (Index i = 0; i < fresh.q.rows(); ++i) {
     const BiasPrediction& prediction = predictions[static_cast<std::size_t>(i)];
     for (int d = 0; d < 3; ++d)
-      inside += std::abs(fresh.residual_B(i, d) - prediction.mean_B[d]) < 1.96 * prediction.measured_stddev_B[d];
+      inside += std::abs(fresh.residual_B(i, d) - prediction.mean_B[d]) <
+                1.96 * prediction.measured_stddev_B[d];
   }
   EXPECT_NEAR(inside / 4500.0, 0.95, 0.02);
 }
@@ -122,7 +126,8 @@ TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
   }
 }
 
-/// `poses` joint vectors of `smooth`, each measured by three reflectors that share an error of the arm of 5 sigma.
+/// `poses` joint vectors of `smooth`, each measured by three reflectors that share an error of the
+/// arm of 5 sigma.
 BiasProblem three_reflectors(Index poses, std::uint64_t seed, double smooth) {
   BiasProblem problem = smooth_problem(3 * poses, seed, 30e-6);
   std::mt19937_64 random(seed + 500);
@@ -167,8 +172,10 @@ TEST(BiasModel, LeavesAllReflectorsOfAPoseOutTogether) {
 
 TEST(BiasModel, GrowsAndShrinksAsIfConditionedAnew) {
   const BiasProblem all = smooth_problem(230, 30);
-  const BiasModel model = fit({all.q.topRows(200), all.residual_B.topRows(200), all.sigma.head(200)});
-  const auto grown = model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
+  const BiasModel model =
+      fit({all.q.topRows(200), all.residual_B.topRows(200), all.sigma.head(200)});
+  const auto grown =
+      model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
   ASSERT_TRUE(grown.has_value());
   const auto anew = BiasModel::restore(grown->state());
   ASSERT_TRUE(anew.has_value());
@@ -179,7 +186,8 @@ TEST(BiasModel, GrowsAndShrinksAsIfConditionedAnew) {
   const Eigen::MatrixXd q = random_joints(20, 31);
   EXPECT_LT((grown->mean_all_B(q) - anew->mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-13);
   EXPECT_LT((shrunk->mean_all_B(q) - model.mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-13);
-  EXPECT_LT((grown->leave_one_out_mean_B() - anew->leave_one_out_mean_B()).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((grown->leave_one_out_mean_B() - anew->leave_one_out_mean_B()).cwiseAbs().maxCoeff(),
+            1e-13);
   EXPECT_GT((grown->mean_all_B(q) - model.mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-7)
       << "the new poses teach something";
 }
@@ -188,7 +196,8 @@ TEST(BiasModel, GrowsToRoundingWhereTheMedianSigmaMoves) {
   BiasProblem all = smooth_problem(90, 32);
   for (Index i = 0; i < 90; ++i) all.sigma[i] = 10e-6 * (1.0 + 0.01 * static_cast<double>(i));
   const BiasModel model = fit({all.q.topRows(80), all.residual_B.topRows(80), all.sigma.head(80)});
-  const auto grown = model.with({all.q.bottomRows(10), all.residual_B.bottomRows(10), all.sigma.tail(10)});
+  const auto grown =
+      model.with({all.q.bottomRows(10), all.residual_B.bottomRows(10), all.sigma.tail(10)});
   ASSERT_TRUE(grown.has_value());
   expect_same_predictions(*grown, *BiasModel::restore(grown->state()));
 }
@@ -196,7 +205,8 @@ TEST(BiasModel, GrowsToRoundingWhereTheMedianSigmaMoves) {
 TEST(BiasModel, RefusesToGrowOrShrinkIntoWhatItCannotLearnFrom) {
   const BiasModel model = fit(smooth_problem(12, 33));
   EXPECT_EQ(refusal_of(model.without({0, 1, 2})), Refusal("bias data").beyond(9, 10));
-  EXPECT_EQ(refusal_of(model.without({12})), Refusal("bias data", {}, "observation").beyond(12, 12));
+  EXPECT_EQ(refusal_of(model.without({12})),
+            Refusal("bias data", {}, "observation").beyond(12, 12));
   BiasProblem bad = smooth_problem(2, 34);
   bad.q(1, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal_of(model.with(bad)),
@@ -205,13 +215,17 @@ TEST(BiasModel, RefusesToGrowOrShrinkIntoWhatItCannotLearnFrom) {
 
 TEST(BiasModel, RefitsFromWhereItWasInAFewEvaluations) {
   const BiasProblem all = smooth_problem(330, 35);
-  const BiasModel model = fit({all.q.topRows(300), all.residual_B.topRows(300), all.sigma.head(300)});
-  const auto grown = model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
+  const BiasModel model =
+      fit({all.q.topRows(300), all.residual_B.topRows(300), all.sigma.head(300)});
+  const auto grown =
+      model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
   ASSERT_TRUE(grown.has_value());
   const auto refitted = grown->refit({});
   ASSERT_TRUE(refitted.has_value());
   const BiasModel from_scratch = fit(all);
-  EXPECT_NEAR(refitted->report().log_likelihood.sum(), from_scratch.report().log_likelihood.sum(), 0.5) << "nat";
+  EXPECT_NEAR(refitted->report().log_likelihood.sum(), from_scratch.report().log_likelihood.sum(),
+              0.5)
+      << "nat";
   EXPECT_LE(refitted->report().evaluations, 15) << "five an output";
 }
 
@@ -267,7 +281,8 @@ TEST(BiasModel, AMeasurementIsAsNoisyAsTheMeanOfThoseItLearnedFrom) {
   const BiasModel model = fit(problem);
   const BiasPrediction at = model.predict(JointVector::Zero(6));
   const double noise = std::pow(at.measured_stddev_B[1], 2) - std::pow(at.stddev_B[1], 2);
-  EXPECT_NEAR(noise, (0.8 * 1 + 0.2 * 4) * std::pow(model.report().noise_stddev[1], 2), 1e-6 * noise);
+  EXPECT_NEAR(noise, (0.8 * 1 + 0.2 * 4) * std::pow(model.report().noise_stddev[1], 2),
+              1e-6 * noise);
 }
 
 TEST(BiasModel, SurvivesAJointThatNeverMovesAndAnOutputThatIsZero) {
@@ -293,7 +308,8 @@ TEST(BiasModel, WithoutAKernelSaysZeroAndTheSpreadOfTheResidual) {
   const BiasModel model = fit(problem, options);
   const BiasPrediction prediction = model.predict(problem.q.row(0));
   EXPECT_EQ(prediction.mean_B, Vector3::Zero());
-  EXPECT_NEAR(prediction.stddev_B[1], std::sqrt(problem.residual_B.col(1).squaredNorm() / 50), 1e-15);
+  EXPECT_NEAR(prediction.stddev_B[1], std::sqrt(problem.residual_B.col(1).squaredNorm() / 50),
+              1e-15);
   EXPECT_EQ(prediction.prior_share, 1.0);
   EXPECT_EQ(model.leave_one_out_mean_B(), Eigen::MatrixXd::Zero(50, 3));
   EXPECT_EQ(model.leave_one_out_stddev_B().row(49), prediction.stddev_B.transpose());
@@ -311,7 +327,8 @@ TEST(BiasModel, WhatABlockLeftOutMissesIsWhatAModelOfTheRestMisses) {
   part.q = problem.q(rest, Eigen::all);
   part.residual_B = residual_B(rest, Eigen::all);
   part.sigma = problem.sigma(rest);
-  const Eigen::MatrixXd known = BiasModel::restore(part).value().mean_all_B(problem.q(block, Eigen::all));
+  const Eigen::MatrixXd known =
+      BiasModel::restore(part).value().mean_all_B(problem.q(block, Eigen::all));
   const Eigen::MatrixXd error = model.left_out_error_B(residual_B, block).value();
   EXPECT_LT((error - (residual_B(block, Eigen::all) - known)).norm(), 1e-9 * residual_B.norm());
 }
@@ -336,7 +353,8 @@ TEST(BiasModel, ReportsProgressAndStopsWhenToldTo) {
 
 TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
   const BiasProblem good = smooth_problem(20, 18);
-  EXPECT_EQ(refusal_of(BiasModel::fit(smooth_problem(9, 18), BiasOptions{})), Refusal("bias data").beyond(9, 10));
+  EXPECT_EQ(refusal_of(BiasModel::fit(smooth_problem(9, 18), BiasOptions{})),
+            Refusal("bias data").beyond(9, 10));
 
   BiasProblem bad = good;
   bad.q(3, 1) = std::numeric_limits<double>::quiet_NaN();
@@ -350,11 +368,13 @@ TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
 
   bad = good;
   bad.sigma[6] = -0.001;
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("bias data", 7, "sigma").beyond(-1, 0));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})),
+            Refusal("bias data", 7, "sigma").beyond(-1, 0));
 
   bad = good;
   bad.sigma.conservativeResize(19);
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("bias data", {}, "sigma").beyond(19, 20));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})),
+            Refusal("bias data", {}, "sigma").beyond(19, 20));
 
   BiasOptions options;
   options.kernel = "sea";

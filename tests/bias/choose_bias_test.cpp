@@ -22,10 +22,12 @@ TEST(ChooseBias, TakesNoneOfNoise) {
   for (const Index count : {40, 150, 400}) {
     for (const std::uint64_t seed : {1, 2, 3}) {
       const ChosenBias chosen = choose_bias(noise_alone(count, seed), {}).value();
-      EXPECT_EQ(chosen.choice.kernel, "none") << count << " " << seed << ": " << chosen.choice.sentence;
+      EXPECT_EQ(chosen.choice.kernel, "none")
+          << count << " " << seed << ": " << chosen.choice.sentence;
       EXPECT_FALSE(chosen.model);
       EXPECT_EQ(chosen.choice.candidates.front().verdict, "taken");
-      EXPECT_TRUE(chosen.choice.sentence.starts_with("no bias helps: the residual is ")) << chosen.choice.sentence;
+      EXPECT_TRUE(chosen.choice.sentence.starts_with("no bias helps: the residual is "))
+          << chosen.choice.sentence;
       EXPECT_TRUE(chosen.choice.sentence.ends_with("; left out")) << chosen.choice.sentence;
     }
   }
@@ -65,16 +67,20 @@ TEST(ChooseBias, WhatNeighboursInTimeShareIsNoReasonForABias) {
   for (Index visit = 0; visit < 8; ++visit) {
     Eigen::RowVectorXd q = problem.q.row(visit);
     const Eigen::RowVector3d drift =
-        20 * problem.sigma[0] * Eigen::RowVector3d(normal(&random), normal(&random), normal(&random));
+        20 * problem.sigma[0] *
+        Eigen::RowVector3d(normal(&random), normal(&random), normal(&random));
     for (Index i = 20 * visit; i < 20 * (visit + 1); ++i) {
       for (Index j = 0; j < q.size(); ++j) problem.q(i, j) = q(j) + 0.01 * normal(&random);
-      for (Index d = 0; d < 3; ++d) problem.residual_B(i, d) = drift(d) + problem.sigma[0] * normal(&random);
+      for (Index d = 0; d < 3; ++d)
+        problem.residual_B(i, d) = drift(d) + problem.sigma[0] * normal(&random);
     }
   }
   const ChosenBias chosen = choose_bias(problem, {}).value();
   EXPECT_EQ(chosen.choice.kernel, "none") << chosen.choice.sentence;
-  EXPECT_LT(chosen.choice.candidates[1].leave_one_out_rms, 0.8 * chosen.choice.candidates[0].leave_one_out_rms);
-  EXPECT_NE(chosen.choice.sentence.find("neighbours in time"), std::string::npos) << chosen.choice.sentence;
+  EXPECT_LT(chosen.choice.candidates[1].leave_one_out_rms,
+            0.8 * chosen.choice.candidates[0].leave_one_out_rms);
+  EXPECT_NE(chosen.choice.sentence.find("neighbours in time"), std::string::npos)
+      << chosen.choice.sentence;
 }
 
 TEST(ChooseBias, WhatOnlyTheReflectorsOfAPoseShareIsNoReasonForABias) {
@@ -82,7 +88,8 @@ TEST(ChooseBias, WhatOnlyTheReflectorsOfAPoseShareIsNoReasonForABias) {
   for (Index i = 0; i < 180; ++i) {
     if (i % 3 == 0) continue;
     problem.q.row(i) = problem.q.row(i - i % 3);
-    problem.residual_B.row(i) = 5 * problem.residual_B.row(i - i % 3) + 0.5 * problem.residual_B.row(i);
+    problem.residual_B.row(i) =
+        5 * problem.residual_B.row(i - i % 3) + 0.5 * problem.residual_B.row(i);
   }
   for (Index i = 0; i < 180; i += 3) problem.residual_B.row(i) *= 5;
   const ChosenBias chosen = choose_bias(problem, {}).value();
@@ -96,7 +103,8 @@ TEST(ChooseBias, CountsPosesAndNotTheirReflectors) {
   BiasProblem problem = smooth_problem(60, 1);
   for (Index i = 0; i < 60; ++i) problem.q.row(i) = problem.q.row(i - i % 3);
   const ChosenBias chosen = choose_bias(problem, {}).value();
-  EXPECT_NE(chosen.choice.sentence.find("20 poses are too few"), std::string::npos) << chosen.choice.sentence;
+  EXPECT_NE(chosen.choice.sentence.find("20 poses are too few"), std::string::npos)
+      << chosen.choice.sentence;
 }
 
 /// Each of the poses of a smooth residual is seen by three reflectors.
@@ -122,7 +130,8 @@ TEST(ChooseBias, SomeOfManyRowsChooseByWholePosesAndAllAreLearned) {
   };
   const ChosenBias chosen = choose_bias(problem, {}, without).value();
   EXPECT_EQ(chosen.choice.kernel, "se") << chosen.choice.sentence;
-  EXPECT_TRUE(chosen.choice.sentence.ends_with("; chosen by 900 of 1500 rows")) << chosen.choice.sentence;
+  EXPECT_TRUE(chosen.choice.sentence.ends_with("; chosen by 900 of 1500 rows"))
+      << chosen.choice.sentence;
   EXPECT_LE(largest, 120u);
   ASSERT_TRUE(chosen.model);
   EXPECT_EQ(chosen.model->state().q.rows(), 1500);
@@ -135,12 +144,13 @@ TEST(ChooseBias, SomeOfManyRowsChooseByWholePosesAndAllAreLearned) {
 TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
   const BiasProblem problem = smooth_problem(80, 5);
   std::vector<std::size_t> asked;
-  const ChosenBias chosen = choose_bias(problem, {}, [&](const std::vector<Index>& block) -> MatrixXd {
-                              asked.push_back(block.size());
-                              MatrixXd residual = problem.residual_B;
-                              residual(block, 0).array() += 1.0;  // m: without them nothing is known of them
-                              return residual;
-                            }).value();
+  const ChosenBias chosen =
+      choose_bias(problem, {}, [&](const std::vector<Index>& block) -> MatrixXd {
+        asked.push_back(block.size());
+        MatrixXd residual = problem.residual_B;
+        residual(block, 0).array() += 1.0;  // m: without them nothing is known of them
+        return residual;
+      }).value();
   EXPECT_EQ(asked, std::vector<std::size_t>(16, 10));  // eight blocks in time, eight in joint space
   EXPECT_GT(chosen.choice.candidates[0].time_block_rms, 0.9);
   EXPECT_EQ(chosen.choice.kernel, "none");
@@ -162,13 +172,16 @@ TEST(ChooseBias, ABlockThatThePhysicsCannotSpareDoesNotJudgeAndTheSentenceSaysSo
         .choice;
   };
   const BiasChoice some = choice_where_fail(3);
-  EXPECT_NEAR(some.candidates.front().time_block_rms, std::sqrt(3 * 0.25), 1e-12) << "of the other five blocks alone";
-  EXPECT_TRUE(some.sentence.ends_with("; 3 of 16 blocks do not judge: without them the physics cannot be identified"))
+  EXPECT_NEAR(some.candidates.front().time_block_rms, std::sqrt(3 * 0.25), 1e-12)
+      << "of the other five blocks alone";
+  EXPECT_TRUE(some.sentence.ends_with(
+      "; 3 of 16 blocks do not judge: without them the physics cannot be identified"))
       << some.sentence;
   const BiasChoice few = choice_where_fail(5);
   EXPECT_EQ(few.kernel, "none");
   EXPECT_TRUE(few.candidates.empty());
-  EXPECT_NE(few.sentence.find("too little is left to identify the physics"), std::string::npos) << few.sentence;
+  EXPECT_NE(few.sentence.find("too little is left to identify the physics"), std::string::npos)
+      << few.sentence;
 }
 
 TEST(ChooseBias, SaysHowFarItIsAndStopsWhenToldToWhileBlocksAreLeftOut) {
@@ -181,8 +194,11 @@ TEST(ChooseBias, SaysHowFarItIsAndStopsWhenToldToWhileBlocksAreLeftOut) {
   const BiasProblem problem = noise_alone(60, 7);
   ASSERT_TRUE(choose_bias(problem, options));
   EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-  // Of five kernels the first: fitted at a tenth of the whole, each of its sixteen blocks left out by a fifth.
-  EXPECT_EQ(std::count_if(shares.begin(), shares.end(), [](double share) { return share > 0.1 && share <= 0.2; }), 16);
+  // Of five kernels the first: fitted at a tenth of the whole, each of its sixteen blocks left out
+  // by a fifth.
+  EXPECT_EQ(std::count_if(shares.begin(), shares.end(),
+                          [](double share) { return share > 0.1 && share <= 0.2; }),
+            16);
   options.progress = [](double share) { return share < 0.15; };
   const auto stopped = choose_bias(problem, options);
   ASSERT_FALSE(stopped);
@@ -213,7 +229,8 @@ TEST(ChooseBias, KernelsWithBlocksAreSkippedWhereThereAreMoreObservationsThanThe
   EXPECT_TRUE(skipped.skipped);
   EXPECT_EQ(skipped.verdict, "more than 39 poses");
   const ChosenBias chosen = choose_bias(problem, {}, {}, 39).value();
-  EXPECT_EQ(chosen.choice.sentence.find("se + parameters"), std::string::npos) << chosen.choice.sentence;
+  EXPECT_EQ(chosen.choice.sentence.find("se + parameters"), std::string::npos)
+      << chosen.choice.sentence;
 }
 
 TEST(ChooseBias, TooFewObservationsAreNotJudged) {

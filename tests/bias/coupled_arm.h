@@ -7,7 +7,8 @@
 #include "server/bias/coupled/coupled_posterior.h"
 #include "tests/bias/bias_data.h"
 
-/// An arm of three joints (one turns it, two bend it) with 0.5 m and 0.4 m links, for the tests of coupled processes.
+/// An arm of three joints (one turns it, two bend it) with 0.5 m and 0.4 m links, for the tests of
+/// coupled processes.
 namespace trammel {
 
 struct Arm {
@@ -39,7 +40,8 @@ inline BiasFeatures arm_features(const JointVector& q) {
   const Arm arm = arm_at(q);
   BiasFeatures features{Eigen::MatrixXd(6, 3), Eigen::MatrixXd::Zero(6, 2)};
   for (std::size_t j = 0; j < 3; ++j)
-    features.by_joint.col(static_cast<Eigen::Index>(j)) << arm.axis_B[j].cross(arm.p_B - arm.origin_B[j]),
+    features.by_joint.col(static_cast<Eigen::Index>(j))
+        << arm.axis_B[j].cross(arm.p_B - arm.origin_B[j]),
         arm.axis_B[j];
   features.by_parameter.col(0).head(3) = 2e-4 * arm.upper_B;
   features.by_parameter.col(1).head(3) = 2e-4 * arm.lower_B;
@@ -55,13 +57,15 @@ inline Eigen::MatrixXd arm_columns(const LinearBlocks& blocks, const JointVector
   return blocks.columns(q, arm_features(q)).topRows(3);
 }
 
-inline CoupledData arm_data(const LinearBlocks& blocks, const Eigen::MatrixXd& q, const Eigen::MatrixXd& y,
-                            const Eigen::VectorXd& noise_shape) {
-  CoupledData data{q, y, noise_shape,
-                   std::vector<Eigen::MatrixXd>(3, Eigen::MatrixXd(q.rows(), blocks.column_count()))};
+inline CoupledData arm_data(const LinearBlocks& blocks, const Eigen::MatrixXd& q,
+                            const Eigen::MatrixXd& y, const Eigen::VectorXd& noise_shape) {
+  CoupledData data{
+      q, y, noise_shape,
+      std::vector<Eigen::MatrixXd>(3, Eigen::MatrixXd(q.rows(), blocks.column_count()))};
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const Eigen::MatrixXd H = arm_columns(blocks, q.row(i));
-    for (std::size_t d = 0; d < 3; ++d) data.columns[d].row(i) = H.row(static_cast<Eigen::Index>(d));
+    for (std::size_t d = 0; d < 3; ++d)
+      data.columns[d].row(i) = H.row(static_cast<Eigen::Index>(d));
   }
   return data;
 }
@@ -76,7 +80,8 @@ inline CoupledPrediction predict_one(const CoupledPosterior& posterior, const Jo
 
 /// Gear errors of the three joints, rad: each of a slow and a fast harmonic.
 inline Vector3 gear_errors(const JointVector& q) {
-  return 1e-4 * Vector3(std::sin(q[0]) + 0.8 * std::cos(9 * q[0]), std::cos(2 * q[1]) + 0.8 * std::sin(11 * q[1]),
+  return 1e-4 * Vector3(std::sin(q[0]) + 0.8 * std::cos(9 * q[0]),
+                        std::cos(2 * q[1]) + 0.8 * std::sin(11 * q[1]),
                         std::sin(2 * q[2]) + 0.8 * std::cos(7 * q[2]));
 }
 

@@ -87,7 +87,8 @@ TEST(CoupledModel, LearnsTheJointsErrorsThatAPlainKernelCannotAndItsIntervalsCov
     EXPECT_EQ(at.covariance_B, Matrix3(at.covariance_B.transpose()));
   }
   EXPECT_NEAR(inside / 1200.0, 0.95, 0.03);
-  EXPECT_GT(std::abs(predictions[0].covariance_B(0, 1)), 1e-3 * predictions[0].covariance_B.trace());
+  EXPECT_GT(std::abs(predictions[0].covariance_B(0, 1)),
+            1e-3 * predictions[0].covariance_B.trace());
 }
 
 TEST(CoupledModel, ManyTargetsSayWhatOneSays) {
@@ -106,7 +107,8 @@ TEST(CoupledModel, WhatRestsOnPosesNearbyIsTheSameWhoeverAsksAndEndsFarFromThem)
   const BiasProblem targets = gear_problem(20, 5);
   const MatrixXd alone_B = fitted().nearby_mean_all_B(targets.q);
   for (Index i = 0; i < 20; ++i) {
-    const BiasPrediction at = fitted().predict(targets.q.row(i), targets.features[static_cast<std::size_t>(i)]);
+    const BiasPrediction at =
+        fitted().predict(targets.q.row(i), targets.features[static_cast<std::size_t>(i)]);
     EXPECT_LT((at.nearby_B - alone_B.row(i).transpose()).norm(), 1e-14);
     EXPECT_GT(at.nearby_B.norm(), 1e-6);
   }
@@ -129,9 +131,11 @@ TEST(CoupledModel, LeaveOneOutEqualsRestoringWithoutThePose) {
   ASSERT_TRUE(rest.has_value()) << rest.error().message;
   const BiasState& all = fitted().state();
   const BiasPrediction expected = rest->predict(all.q.row(40).transpose(), all.features[40]);
-  EXPECT_LT((fitted().leave_one_out_mean_B().row(40).transpose() - expected.mean_B).norm(), 1e-6 * kNoise);
+  EXPECT_LT((fitted().leave_one_out_mean_B().row(40).transpose() - expected.mean_B).norm(),
+            1e-6 * kNoise);
   // One factor widens all stddevs, learned from 150 poses here and from 149 there.
-  const Vector3 ratio = fitted().leave_one_out_stddev_B().row(40).transpose().cwiseQuotient(expected.measured_stddev_B);
+  const Vector3 ratio = fitted().leave_one_out_stddev_B().row(40).transpose().cwiseQuotient(
+      expected.measured_stddev_B);
   EXPECT_NEAR(ratio[0], 1, 0.02);
   EXPECT_NEAR(ratio[1], ratio[0], 1e-4);
   EXPECT_NEAR(ratio[2], ratio[0], 1e-4);
@@ -151,7 +155,8 @@ TEST(CoupledModel, GrowsAsIfConditionedAnewAndRefitsFromWhereItWas) {
 }
 
 // Hyperparameters of a joint were two: amplitude and knee.
-TEST(CoupledModel, AStateFromBeforeThePowerWasLearnedPredictsAsOneWithPowerTwoAndFortyEightHarmonics) {
+TEST(CoupledModel,
+     AStateFromBeforeThePowerWasLearnedPredictsAsOneWithPowerTwoAndFortyEightHarmonics) {
   const Index joints = fitted().state().features.front().by_joint.cols();
   const BiasState state = fitted().state();
   ASSERT_EQ(state.block_hyperparameters.size(), 3 * joints + 1);
@@ -171,7 +176,8 @@ TEST(CoupledModel, AStateFromBeforeThePowerWasLearnedPredictsAsOneWithPowerTwoAn
     EXPECT_LT((said_before[i].mean_B - said_now[i].mean_B).norm(), 1e-12);
     EXPECT_LT((said_before[i].stddev_B - said_now[i].stddev_B).norm(), 1e-12);
   }
-  EXPECT_EQ(of_before.refit({})->state().block_hyperparameters.size(), 2 * joints) << "it stays what it is";
+  EXPECT_EQ(of_before.refit({})->state().block_hyperparameters.size(), 2 * joints)
+      << "it stays what it is";
   now.block_hyperparameters[3 * joints] = std::log(1e6);
   EXPECT_FALSE(BiasModel::restore(now)) << "nobody has a million harmonics";
 }
@@ -181,7 +187,8 @@ TEST(CoupledModel, MoreObservationsTellMoreHarmonics) {
   EXPECT_EQ(harmonics_for(1200), 75);
   EXPECT_EQ(harmonics_for(4000), 112);
   const Index last = fitted().state().block_hyperparameters.size() - 1;
-  EXPECT_DOUBLE_EQ(fitted().state().block_hyperparameters[last], std::log(48.0)) << "no search moves it";
+  EXPECT_DOUBLE_EQ(fitted().state().block_hyperparameters[last], std::log(48.0))
+      << "no search moves it";
 }
 
 TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
@@ -191,7 +198,8 @@ TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
   };
   BiasProblem problem = gear_problem(20, 5);
   problem.features.pop_back();
-  EXPECT_EQ(refusal(problem, "se + joint_map"), Refusal("bias data", {}, "features").beyond(19, 20));
+  EXPECT_EQ(refusal(problem, "se + joint_map"),
+            Refusal("bias data", {}, "features").beyond(19, 20));
   problem = gear_problem(20, 5);
   problem.features[7].by_parameter.resize(6, 1);
   EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
@@ -200,11 +208,13 @@ TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
   EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
   EXPECT_EQ(refusal(gear_problem(4001, 5), "se + joint_map"),
             Refusal("", {}, "bias").beyond(4001, 4000).text("se + joint_map"));
-  EXPECT_EQ(refusal(gear_problem(20, 5), "se * joint_map"), Refusal("", {}, "bias").text("se * joint_map"));
+  EXPECT_EQ(refusal(gear_problem(20, 5), "se * joint_map"),
+            Refusal("", {}, "bias").text("se * joint_map"));
 
   BiasState state = fitted().state();
   state.block_hyperparameters.conservativeResize(4);
-  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("", {}, "block_hyperparameters").beyond(4, 6));
+  EXPECT_EQ(refusal_of(BiasModel::restore(state)),
+            Refusal("", {}, "block_hyperparameters").beyond(4, 6));
 }
 
 TEST(CoupledModel, StopsWhenTold) {

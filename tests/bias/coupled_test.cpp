@@ -17,7 +17,9 @@ using Eigen::VectorXd;
 constexpr double kSignal = 3e-5;  // m, of the first output; the others differ
 constexpr double kNoise = 2e-5;   // m, likewise
 
-MatrixXd turns(Index count, std::uint64_t seed) { return random_joints(count, seed, 3) * (std::numbers::pi / 1.2); }
+MatrixXd turns(Index count, std::uint64_t seed) {
+  return random_joints(count, seed, 3) * (std::numbers::pi / 1.2);
+}
 
 VectorXd uneven_noise(Index count) {
   VectorXd shape(count);
@@ -40,8 +42,10 @@ enum class Blocks { kNone, kParameters, kJointMap, kBoth };
 
 LinearBlocks made(Blocks which) {
   std::vector<LinearBlockPtr> blocks;
-  if (which == Blocks::kJointMap || which == Blocks::kBoth) blocks.push_back(make_joint_map_block());
-  if (which == Blocks::kParameters || which == Blocks::kBoth) blocks.push_back(make_parameter_block());
+  if (which == Blocks::kJointMap || which == Blocks::kBoth)
+    blocks.push_back(make_joint_map_block());
+  if (which == Blocks::kParameters || which == Blocks::kBoth)
+    blocks.push_back(make_parameter_block());
   return arm_blocks(std::move(blocks));
 }
 
@@ -52,7 +56,8 @@ CoupledHyperparameters some_hyperparameters(const LinearBlocks& blocks) {
     at.outputs.push_back({scales, std::log(kSignal) + 0.3 * d, std::log(kNoise) - 0.2 * d});
   }
   at.blocks = blocks.start();
-  for (Index k = 0; k < at.blocks.size(); ++k) at.blocks[k] += 0.2 * static_cast<double>(k % 3) - 0.1;
+  for (Index k = 0; k < at.blocks.size(); ++k)
+    at.blocks[k] += 0.2 * static_cast<double>(k % 3) - 0.1;
   return at;
 }
 
@@ -60,7 +65,8 @@ double squared_exponential(const VectorXd& log_scales, const VectorXd& a, const 
   return std::exp(-0.5 * ((a - b).array() * (-log_scales.array()).exp()).square().sum());
 }
 
-/// Σ_h s_h cos(h (a - b)) / Σ_h s_h, s_h = (1 + (h/knee)²)⁻², 48 harmonics: the joint map's kernel, by its definition.
+/// Σ_h s_h cos(h (a - b)) / Σ_h s_h, s_h = (1 + (h/knee)²)⁻², 48 harmonics: the joint map's kernel,
+/// by its definition.
 double on_the_circle(double knee, double a, double b) {
   double sum = 0;
   double total = 0;
@@ -73,16 +79,19 @@ double on_the_circle(double knee, double a, double b) {
 }
 
 /// 3 x 3 covariance of the functions at two joint vectors, by their kernels and no weights.
-Matrix3 reference_covariance(Blocks which, const CoupledHyperparameters& at, const VectorXd& a, const VectorXd& b) {
+Matrix3 reference_covariance(Blocks which, const CoupledHyperparameters& at, const VectorXd& a,
+                             const VectorXd& b) {
   Matrix3 covariance = Matrix3::Zero();
   for (Index d = 0; d < 3; ++d) {
     const GpHyperparameters& output = at.outputs[static_cast<std::size_t>(d)];
-    covariance(d, d) = std::exp(2 * output.log_signal_stddev) * squared_exponential(output.kernel, a, b);
+    covariance(d, d) =
+        std::exp(2 * output.log_signal_stddev) * squared_exponential(output.kernel, a, b);
   }
   const BiasFeatures at_a = arm_features(a);
   const BiasFeatures at_b = arm_features(b);
   for (Index j = 0; j < 3 && (which == Blocks::kJointMap || which == Blocks::kBoth); ++j) {
-    const double k = std::exp(2 * at.blocks[2 * j]) * on_the_circle(std::exp(at.blocks[2 * j + 1]), a[j], b[j]);
+    const double k =
+        std::exp(2 * at.blocks[2 * j]) * on_the_circle(std::exp(at.blocks[2 * j + 1]), a[j], b[j]);
     covariance += k * at_a.by_joint.col(j).head(3) * at_b.by_joint.col(j).head(3).transpose();
   }
   if (which == Blocks::kParameters || which == Blocks::kBoth)
@@ -93,24 +102,30 @@ Matrix3 reference_covariance(Blocks which, const CoupledHyperparameters& at, con
 /// The whole 3N x 3N covariance, pose after pose, and what follows from it.
 class Dense {
  public:
-  Dense(Blocks which, const CoupledData& data, const CoupledHyperparameters& at) : which_(which), at_(at), q_(data.q) {
+  Dense(Blocks which, const CoupledData& data, const CoupledHyperparameters& at)
+      : which_(which), at_(at), q_(data.q) {
     const Index n = data.q.rows();
     MatrixXd covariance(3 * n, 3 * n);
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j < n; ++j)
-        covariance.block(3 * i, 3 * j, 3, 3) = reference_covariance(which, at, q_.row(i), q_.row(j));
-      for (Index d = 0; d < 3; ++d) covariance(3 * i + d, 3 * i + d) += noise(d) * data.noise_shape[i];
+        covariance.block(3 * i, 3 * j, 3, 3) =
+            reference_covariance(which, at, q_.row(i), q_.row(j));
+      for (Index d = 0; d < 3; ++d)
+        covariance(3 * i + d, 3 * i + d) += noise(d) * data.noise_shape[i];
     }
     factor_.compute(covariance);
     const MatrixXd transposed = data.y.transpose();
     const VectorXd y = transposed.reshaped();
     alpha_ = factor_.solve(y);
     const double log_det = 2 * MatrixXd(factor_.matrixL()).diagonal().array().log().sum();
-    log_likelihood_ = -0.5 * (y.dot(alpha_) + log_det + static_cast<double>(3 * n) * std::log(2 * std::numbers::pi));
+    log_likelihood_ = -0.5 * (y.dot(alpha_) + log_det +
+                              static_cast<double>(3 * n) * std::log(2 * std::numbers::pi));
   }
 
   double log_likelihood() const { return log_likelihood_; }
-  double noise(Index d) const { return std::exp(2 * at_.outputs[static_cast<std::size_t>(d)].log_noise_stddev); }
+  double noise(Index d) const {
+    return std::exp(2 * at_.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+  }
   Vector3 mean(const VectorXd& q) const { return cross(q).transpose() * alpha_; }
   Matrix3 prior(const VectorXd& q) const { return reference_covariance(which_, at_, q, q); }
   Matrix3 covariance(const VectorXd& q) const {
@@ -121,7 +136,8 @@ class Dense {
  private:
   MatrixXd cross(const VectorXd& q) const {
     MatrixXd k(3 * q_.rows(), 3);
-    for (Index i = 0; i < q_.rows(); ++i) k.middleRows(3 * i, 3) = reference_covariance(which_, at_, q_.row(i), q);
+    for (Index i = 0; i < q_.rows(); ++i)
+      k.middleRows(3 * i, 3) = reference_covariance(which_, at_, q_.row(i), q);
     return k;
   }
 
@@ -162,10 +178,12 @@ TEST_P(EveryBlock, MeanAndJointCovarianceOfTheAxesEqualTheDenseFormula) {
   const LinearBlocks blocks = this->blocks();
   const CoupledData data = this->data();
   const CoupledHyperparameters at = some_hyperparameters(blocks);
-  const auto posterior = CoupledPosterior::condition(make_kernel("se"), blocks, data, at, VarianceForm::kExact);
+  const auto posterior =
+      CoupledPosterior::condition(make_kernel("se"), blocks, data, at, VarianceForm::kExact);
   ASSERT_TRUE(posterior.has_value());
   const Dense dense(GetParam().which, data, at);
-  EXPECT_NEAR(posterior->log_likelihood(), dense.log_likelihood(), 1e-9 * std::abs(dense.log_likelihood()));
+  EXPECT_NEAR(posterior->log_likelihood(), dense.log_likelihood(),
+              1e-9 * std::abs(dense.log_likelihood()));
   const MatrixXd targets = turns(9, 43);
   for (Index i = 0; i < targets.rows(); ++i) {
     const JointVector q = targets.row(i);
@@ -189,16 +207,18 @@ TEST_P(EveryBlock, LeavingAPoseOutEqualsFittingWithoutIt) {
     for (Index i = 0; i < GetParam().count; ++i) {
       if (i != out) kept.push_back(i);
     }
-    const CoupledData rest =
-        arm_data(blocks, data.q(kept, Eigen::all), data.y(kept, Eigen::all), data.noise_shape(kept));
-    const auto without = CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
+    const CoupledData rest = arm_data(blocks, data.q(kept, Eigen::all), data.y(kept, Eigen::all),
+                                      data.noise_shape(kept));
+    const auto without =
+        CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
     ASSERT_TRUE(without.has_value());
     const JointVector q = data.q.row(out);
     const CoupledPrediction expected = predict_one(*without, q, arm_columns(blocks, q));
     for (Index d = 0; d < 3; ++d) {
       const double noise = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
       const double variance = expected.covariance(d, d) + noise * data.noise_shape[out];
-      EXPECT_NEAR(posterior->leave_one_out_mean()(out, d), expected.mean[d], 1e-8 * std::sqrt(variance));
+      EXPECT_NEAR(posterior->leave_one_out_mean()(out, d), expected.mean[d],
+                  1e-8 * std::sqrt(variance));
       EXPECT_NEAR(posterior->leave_one_out_variance()(out, d), variance, 1e-8 * variance);
     }
   }
@@ -217,9 +237,10 @@ TEST_P(EveryBlock, CrossValidationSurprisesAsFittingWithoutARunOfPosesSays) {
     for (Index i = 0; i < GetParam().count; ++i) {
       if (!is_out(i)) kept.push_back(i);
     }
-    const CoupledData rest =
-        arm_data(blocks, data.q(kept, Eigen::all), data.y(kept, Eigen::all), data.noise_shape(kept));
-    const auto without = CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
+    const CoupledData rest = arm_data(blocks, data.q(kept, Eigen::all), data.y(kept, Eigen::all),
+                                      data.noise_shape(kept));
+    const auto without =
+        CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
     ASSERT_TRUE(without.has_value());
     for (Index i = 0; i < GetParam().count; ++i) {
       if (!is_out(i)) continue;
@@ -227,8 +248,8 @@ TEST_P(EveryBlock, CrossValidationSurprisesAsFittingWithoutARunOfPosesSays) {
       const CoupledPrediction expected = predict_one(*without, q, arm_columns(blocks, q));
       for (Index d = 0; d < 3; ++d) {
         const double noise = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
-        surprise +=
-            std::pow(data.y(i, d) - expected.mean[d], 2) / (expected.covariance(d, d) + noise * data.noise_shape[i]);
+        surprise += std::pow(data.y(i, d) - expected.mean[d], 2) /
+                    (expected.covariance(d, d) + noise * data.noise_shape[i]);
       }
     }
   }
@@ -286,9 +307,11 @@ TEST(CoupledPosterior, PassesOverPosesThatAreTooFarAwayToMatterAndNoOthers) {
     output.kernel.array() += std::log(0.1);
     output.log_signal_stddev = std::log(5 * kSignal);
   }
-  const CoupledData data = arm_data(blocks, q, gear_residual(q, kNoise, 54), uneven_noise(q.rows()));
+  const CoupledData data =
+      arm_data(blocks, q, gear_residual(q, kNoise, 54), uneven_noise(q.rows()));
   const auto fast = CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at);
-  const auto exact = CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at, VarianceForm::kExact);
+  const auto exact =
+      CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at, VarianceForm::kExact);
   ASSERT_TRUE(fast && exact);
   double moved = 0;
   const MatrixXd targets = turns(30, 55) * 0.5;
@@ -298,7 +321,8 @@ TEST(CoupledPosterior, PassesOverPosesThatAreTooFarAwayToMatterAndNoOthers) {
     const CoupledPrediction b = predict_one(*exact, target, H);
     EXPECT_EQ(a.mean, b.mean);
     for (Index d = 0; d < 3; ++d) {
-      const double noise = 0.5 * std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+      const double noise =
+          0.5 * std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
       EXPECT_NEAR(a.covariance(d, d), b.covariance(d, d), 0.003 * noise);
       moved = std::max(moved, std::abs(a.covariance(d, d) - b.covariance(d, d)) / noise);
     }
@@ -334,7 +358,8 @@ TEST(CoupledPosterior, ServesFromNearPosesWhatAllSay) {
       const CoupledPrediction b = predict_one(all, target, H);
       EXPECT_EQ(a.mean, b.mean);
       for (Index d = 0; d < 3; ++d) {
-        const double noise = std::exp(2 * served.at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+        const double noise =
+            std::exp(2 * served.at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
         const double measured = b.covariance(d, d) + noise;
         EXPECT_GE(a.covariance(d, d), b.covariance(d, d) - 0.01 * measured) << signal_over_noise;
         EXPECT_LE(a.covariance(d, d), b.covariance(d, d) + 0.05 * measured) << signal_over_noise;
@@ -345,7 +370,8 @@ TEST(CoupledPosterior, ServesFromNearPosesWhatAllSay) {
 
 TEST(CoupledPosterior, NearPosesTakeFromTheColumnsWhatAllTakeOfThem) {
   struct Limit {
-    double signal_over_noise, share;  // of the functions' own variance, far below that of a measurement
+    double signal_over_noise,
+        share;  // of the functions' own variance, far below that of a measurement
   };
   for (const Limit& limit : {Limit{0.1, 0.04}, Limit{0.3, 0.1}}) {
     const ServedCase served(limit.signal_over_noise);
@@ -375,10 +401,12 @@ TEST(CoupledPosterior, SaysThatAnErrorOfTheFirstJointIsAcrossTheArmAndNotAlongIt
   for (GpHyperparameters& output : at.outputs) output.log_signal_stddev = std::log(1e-7);
   at.blocks[2] = at.blocks[4] = std::log(1e-8);  // the other two joints are true
   const auto posterior = CoupledPosterior::condition(
-      make_kernel("se"), blocks, arm_data(blocks, q, gear_residual(q, kNoise, 52), VectorXd::Ones(40)), at);
+      make_kernel("se"), blocks,
+      arm_data(blocks, q, gear_residual(q, kNoise, 52), VectorXd::Ones(40)), at);
   ASSERT_TRUE(posterior.has_value());
   const JointVector target = Eigen::Vector3d(0.7, 0.4, -0.9);
-  const Matrix3 covariance = predict_one(*posterior, target, arm_columns(blocks, target)).covariance;
+  const Matrix3 covariance =
+      predict_one(*posterior, target, arm_columns(blocks, target)).covariance;
   const Vector3 along_B(std::cos(target[0]), std::sin(target[0]), 0);
   const Vector3 across_B = Vector3::UnitZ().cross(along_B);
   EXPECT_LT(std::sqrt(along_B.dot(covariance * along_B)), 2e-7);
@@ -403,12 +431,13 @@ SearchOptions starting(int starts) {
 
 double plain_error(const MapTask& task) {
   const MatrixXd centred = task.y.rowwise() - task.y.colwise().mean();
-  const auto found =
-      search_hyperparameters(make_kernel("se"), {task.q, centred, VectorXd::Ones(150)}, task.noise, starting(10));
+  const auto found = search_hyperparameters(
+      make_kernel("se"), {task.q, centred, VectorXd::Ones(150)}, task.noise, starting(10));
   MatrixXd error = (-task.truth).rowwise() + task.y.colwise().mean();
   for (Index d = 0; d < 3; ++d) {
-    const auto process = GaussianProcess::condition(make_kernel("se"), task.q, centred.col(d), VectorXd::Ones(150),
-                                                    found->outputs[static_cast<std::size_t>(d)]);
+    const auto process =
+        GaussianProcess::condition(make_kernel("se"), task.q, centred.col(d), VectorXd::Ones(150),
+                                   found->outputs[static_cast<std::size_t>(d)]);
     VectorXd mean(task.targets.rows());
     process->mean(task.targets, mean.data());
     error.col(d) += mean;
@@ -425,7 +454,8 @@ TEST(CoupledSearch, LearnsGearErrorsThatAPlainProcessCannot) {
   const MapTask task;
   const auto found = coupled_search(task);
   ASSERT_TRUE(found.has_value());
-  const auto posterior = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, found->found);
+  const auto posterior =
+      CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, found->found);
   ASSERT_TRUE(posterior.has_value());
   double total = 0;
   double normalised = 0;
@@ -451,7 +481,8 @@ TEST(CoupledSearch, FindsEachJointsOwnMap) {
   const MapTask task;
   const auto found = coupled_search(task);
   ASSERT_TRUE(found.has_value());
-  const auto posterior = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, found->found);
+  const auto posterior =
+      CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, found->found);
   ASSERT_TRUE(posterior.has_value());
   const Index each = task.blocks.column_count() / 3;
   for (Index j = 0; j < 3; ++j) {
@@ -482,18 +513,22 @@ TEST(CoupledSearch, GivesTheSameModelBitForBitFromTheSameSeed) {
   }
   const JointVector q = task.targets.row(0);
   const MatrixXd columns = arm_columns(task.blocks, q);
-  const auto before = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, first->found);
-  const auto restored = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, second->found);
+  const auto before =
+      CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, first->found);
+  const auto restored =
+      CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, second->found);
   EXPECT_EQ(predict_one(*before, q, columns).mean, predict_one(*restored, q, columns).mean);
-  EXPECT_EQ(predict_one(*before, q, columns).covariance, predict_one(*restored, q, columns).covariance);
+  EXPECT_EQ(predict_one(*before, q, columns).covariance,
+            predict_one(*restored, q, columns).covariance);
 }
 
 TEST(CoupledSearch, StopsWhenTold) {
   const MapTask task;
   SearchOptions options;
   options.progress = [](double) { return false; };
-  const auto found = search_coupled(make_kernel("se"), {task.blocks, task.data}, {task.blocks, task.data},
-                                    VectorXd::Constant(3, task.noise), true, options);
+  const auto found =
+      search_coupled(make_kernel("se"), {task.blocks, task.data}, {task.blocks, task.data},
+                     VectorXd::Constant(3, task.noise), true, options);
   ASSERT_TRUE(found.has_value());
   EXPECT_TRUE(found->given_up);
 }

@@ -18,7 +18,8 @@ inline Vector3 smooth_turn_B(const JointVector& q) {
 }
 
 inline Matrix3 flange_stands(const JointVector& q) {
-  return (Eigen::AngleAxisd(q[0] + q[3], Vector3::UnitZ()) * Eigen::AngleAxisd(q[1] + q[4], Vector3::UnitY()) *
+  return (Eigen::AngleAxisd(q[0] + q[3], Vector3::UnitZ()) *
+          Eigen::AngleAxisd(q[1] + q[4], Vector3::UnitY()) *
           Eigen::AngleAxisd(q[5], Vector3::UnitX()))
       .toRotationMatrix();
 }
@@ -33,8 +34,8 @@ inline Vector3 error_at_lever_B(const JointVector& q, const Vector3& lever_F) {
 }
 
 /// At every joint vector all `levers` are measured, one after the other.
-inline BiasProblem seen_problem(const Eigen::MatrixXd& q, const std::vector<Vector3>& levers, std::uint64_t seed,
-                                double noise = 10e-6) {
+inline BiasProblem seen_problem(const Eigen::MatrixXd& q, const std::vector<Vector3>& levers,
+                                std::uint64_t seed, double noise = 10e-6) {
   const auto each = static_cast<Eigen::Index>(levers.size());
   BiasProblem problem;
   problem.q.resize(each * q.rows(), q.cols());

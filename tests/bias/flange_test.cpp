@@ -40,16 +40,20 @@ BiasProblem mixed_problem() {
   for (Index i = 0; i < problem.q.rows(); ++i) {
     if (i % 3 <= (i / 3) % 3) kept.push_back(i);
   }
-  BiasProblem some{problem.q(kept, Eigen::all), problem.residual_B(kept, Eigen::all), problem.sigma(kept), {}};
+  BiasProblem some{
+      problem.q(kept, Eigen::all), problem.residual_B(kept, Eigen::all), problem.sigma(kept), {}};
   for (const Index i : kept) some.features.push_back(problem.features[static_cast<std::size_t>(i)]);
-  for (Index i = 0; i < some.sigma.size(); ++i) some.sigma[i] *= 1 + 0.1 * static_cast<double>(i % 4);
+  for (Index i = 0; i < some.sigma.size(); ++i)
+    some.sigma[i] *= 1 + 0.1 * static_cast<double>(i % 4);
   return some;
 }
 
 BiasState state_of(const BiasProblem& problem) {
-  BiasState state{"se + flange", problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(3), MatrixXd(8, 3)};
+  BiasState state{"se + flange", problem.q,         problem.residual_B,
+                  problem.sigma, VectorXd::Zero(3), MatrixXd(8, 3)};
   for (Index d = 0; d < 3; ++d) {
-    for (Index j = 0; j < 6; ++j) state.hyperparameters(j, d) = 0.2 + 0.05 * static_cast<double>(d + j);
+    for (Index j = 0; j < 6; ++j)
+      state.hyperparameters(j, d) = 0.2 + 0.05 * static_cast<double>(d + j);
     state.hyperparameters(6, d) = std::log(2e-4) + 0.1 * static_cast<double>(d);
     state.hyperparameters(7, d) = std::log(1.5e-5);
   }
@@ -64,7 +68,8 @@ BiasState state_of(const BiasProblem& problem) {
 class Plain {
  public:
   explicit Plain(const BiasState& state) : state_(state), n_(state.q.rows()) {
-    for (const BiasFeatures& one : state.features) reference_F_ += one.lever_F / static_cast<double>(n_);
+    for (const BiasFeatures& one : state.features)
+      reference_F_ += one.lever_F / static_cast<double>(n_);
     std::vector<double> sigma(state.sigma.data(), state.sigma.data() + n_);
     std::nth_element(sigma.begin(), sigma.begin() + n_ / 2, sigma.end());
     noise_ = MatrixXd::Zero(3 * n_, 3 * n_);
@@ -77,7 +82,8 @@ class Plain {
     }
     K_.resize(3 * n_, 3 * n_);
     for (Index i = 0; i < n_; ++i) {
-      for (Index j = 0; j < n_; ++j) K_.block<3, 3>(3 * i, 3 * j) = covariance(row(i), at(i), row(j), at(j));
+      for (Index j = 0; j < n_; ++j)
+        K_.block<3, 3>(3 * i, 3 * j) = covariance(row(i), at(i), row(j), at(j));
     }
   }
 
@@ -88,8 +94,10 @@ class Plain {
     };
     Matrix3 k = Matrix3::Zero();
     for (Index d = 0; d < 3; ++d)
-      k(d, d) = std::exp(2 * state_.hyperparameters(6, d)) * se(state_.hyperparameters.col(d).head(6));
-    const double turn = std::exp(2 * state_.block_hyperparameters[6]) * se(state_.block_hyperparameters.head(6));
+      k(d, d) =
+          std::exp(2 * state_.hyperparameters(6, d)) * se(state_.hyperparameters.col(d).head(6));
+    const double turn =
+        std::exp(2 * state_.block_hyperparameters[6]) * se(state_.block_hyperparameters.head(6));
     return k + turn * skew(arm(of_a)) * skew(arm(of_b)).transpose();
   }
 
@@ -104,7 +112,8 @@ class Plain {
     MatrixXd covariance;
   };
   /// Of the function at a pose, from these rows.
-  At predict(const JointVector& q, const BiasFeatures& features, const std::vector<Index>& from) const {
+  At predict(const JointVector& q, const BiasFeatures& features,
+             const std::vector<Index>& from) const {
     const auto m = static_cast<Index>(from.size());
     MatrixXd cross(3 * m, 3);
     std::vector<Index> numbers;
@@ -118,7 +127,9 @@ class Plain {
     return {cross.transpose() * root.solve(VectorXd(y_(numbers))) + state_.offset,
             covariance(q, features, q, features) - cross.transpose() * root.solve(cross)};
   }
-  At predict_row(Index i, const std::vector<Index>& from) const { return predict(row(i), at(i), from); }
+  At predict_row(Index i, const std::vector<Index>& from) const {
+    return predict(row(i), at(i), from);
+  }
   Matrix3 noise_of(Index i) const { return noise_.block<3, 3>(3 * i, 3 * i); }
   std::vector<Index> all_but(const std::vector<Index>& rows) const {
     std::vector<Index> rest;
@@ -138,7 +149,9 @@ class Plain {
  private:
   JointVector row(Index i) const { return state_.q.row(i).transpose(); }
   const BiasFeatures& at(Index i) const { return state_.features[static_cast<std::size_t>(i)]; }
-  Vector3 arm(const BiasFeatures& features) const { return features.R_BF * (features.lever_F - reference_F_); }
+  Vector3 arm(const BiasFeatures& features) const {
+    return features.R_BF * (features.lever_F - reference_F_);
+  }
 
   const BiasState& state_;
   Index n_;
@@ -153,7 +166,8 @@ TEST(Flange, IsTheGaussianProcessOfAllItsRowsByTheBook) {
   const auto model = BiasModel::restore(state);
   ASSERT_TRUE(model.has_value()) << model.error().message;
   const Plain plain(state);
-  EXPECT_NEAR(model->report().log_likelihood[0], plain.log_likelihood(), 1e-7 * std::abs(plain.log_likelihood()));
+  EXPECT_NEAR(model->report().log_likelihood[0], plain.log_likelihood(),
+              1e-7 * std::abs(plain.log_likelihood()));
   const MatrixXd targets = random_joints(5, 77);
   for (Index i = 0; i < targets.rows(); ++i) {
     const BiasFeatures features = at_lever(targets.row(i), kNew);
@@ -180,7 +194,9 @@ TEST(Flange, LeavesAllRowsOfAJointVectorOutAsIfTheyHadNeverBeenMeasured) {
     const Vector3 measured = (at.covariance + plain.noise_of(i)).diagonal().cwiseSqrt();
     EXPECT_LT((stddev.row(i).transpose() - measured).norm(), 1e-6 * measured.norm()) << i;
     const Plain::At unknown = plain.predict_row(i, {});
-    EXPECT_NEAR(share[i], at.covariance.diagonal().cwiseQuotient(unknown.covariance.diagonal()).maxCoeff(), 1e-6);
+    EXPECT_NEAR(share[i],
+                at.covariance.diagonal().cwiseQuotient(unknown.covariance.diagonal()).maxCoeff(),
+                1e-6);
   }
 }
 
@@ -230,7 +246,9 @@ TEST(Flange, TheGradientOfItsLikelihoodIsThatOfDifferences) {
     ASSERT_TRUE(likelihood.evaluate(moved, &more));
     moved[k] -= 2 * step;
     ASSERT_TRUE(likelihood.evaluate(moved, &less));
-    EXPECT_NEAR(at.gradient[k], (more.value - less.value) / (2 * step), 1e-4 * (1 + std::abs(at.gradient[k]))) << k;
+    EXPECT_NEAR(at.gradient[k], (more.value - less.value) / (2 * step),
+                1e-4 * (1 + std::abs(at.gradient[k])))
+        << k;
   }
 }
 
@@ -238,7 +256,8 @@ double rms_at(const BiasModel& model, const MatrixXd& q, const Vector3& lever_F)
   double squares = 0;
   for (Index i = 0; i < q.rows(); ++i) {
     const JointVector at = q.row(i);
-    squares += (model.mean_B(at, at_lever(at, lever_F)) - error_at_lever_B(at, lever_F)).squaredNorm();
+    squares +=
+        (model.mean_B(at, at_lever(at, lever_F)) - error_at_lever_B(at, lever_F)).squaredNorm();
   }
   return std::sqrt(squares / static_cast<double>(q.rows()));
 }
@@ -251,7 +270,8 @@ TEST(Flange, ThreeReflectorsTeachRotationSoThatAFourthIsPredictedAsWellAsByItsOw
   double by_own = 0;
   for (Index i = 0; i < fresh.rows(); ++i) {
     const JointVector at = fresh.row(i);
-    by_own += (own.mean_B(at) - error_at_lever_B(at, kNew)).squaredNorm() / static_cast<double>(fresh.rows());
+    by_own += (own.mean_B(at) - error_at_lever_B(at, kNew)).squaredNorm() /
+              static_cast<double>(fresh.rows());
   }
   EXPECT_LT(rms_at(three, fresh, kNew), 1.1 * std::sqrt(by_own));
 }
@@ -273,7 +293,8 @@ TEST(Flange, ItsIntervalsCoverALeverThatWasNeverMeasuredAsAPlainKernelCoversItsO
   const MatrixXd fresh = random_joints(400, 22);
   const double plain = inside_at(fit(seen_problem(q, {kNew}, 21), "se"), fresh, kNew);
   EXPECT_GT(inside_at(fit(seen_problem(q, {kA}, 21), "se + flange"), fresh, kNew), plain - 0.03);
-  EXPECT_GT(inside_at(fit(seen_problem(q, {kA, kB, kC}, 21), "se + flange"), fresh, kNew), plain - 0.03);
+  EXPECT_GT(inside_at(fit(seen_problem(q, {kA, kB, kC}, 21), "se + flange"), fresh, kNew),
+            plain - 0.03);
 }
 
 TEST(Flange, OfOneLeverItIsAsGoodAsAKernelWithoutLeversAndAnotherLeverIsLessSure) {
@@ -285,7 +306,8 @@ TEST(Flange, OfOneLeverItIsAsGoodAsAKernelWithoutLeversAndAnotherLeverIsLessSure
   double by_plain = 0;
   for (Index i = 0; i < fresh.rows(); ++i) {
     const JointVector at = fresh.row(i);
-    by_plain += (plain.mean_B(at) - error_at_lever_B(at, kA)).squaredNorm() / static_cast<double>(fresh.rows());
+    by_plain += (plain.mean_B(at) - error_at_lever_B(at, kA)).squaredNorm() /
+                static_cast<double>(fresh.rows());
     const double seen = flange.predict(at, at_lever(at, kA)).stddev_B.norm();
     const double far = flange.predict(at, at_lever(at, kA + Vector3(0.3, 0, 0))).stddev_B.norm();
     EXPECT_GT(far, 1.5 * seen);
@@ -329,7 +351,8 @@ TEST(Flange, IsChosenWhereThereAreSeveralLeversAndNotAskedWhereThereIsOne) {
 }
 
 TEST(Flange, ARestoredModelAnswersBitForBit) {
-  const BiasModel model = fit(seen_problem(random_joints(40, 61), {kA, kB}, 61), "matern52 + flange");
+  const BiasModel model =
+      fit(seen_problem(random_joints(40, 61), {kA, kB}, 61), "matern52 + flange");
   const auto restored = BiasModel::restore(model.state());
   ASSERT_TRUE(restored.has_value()) << restored.error().message;
   const JointVector at = random_joints(1, 62).row(0);
@@ -346,9 +369,10 @@ TEST(Flange, IsSpelledBesideAKernelAndNotBesideABlock) {
   EXPECT_TRUE(bias->flange);
   EXPECT_EQ(without_flange("matern52 + flange + white"), "matern52 + white");
   EXPECT_EQ(without_flange("flange+se * (linear + white)"), "se * (linear + white)");
-  for (const std::string spelling :
-       {"flange", "se + flange + flange", "se * flange", "(se + flange)", "se + flange + joint_map"}) {
-    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").text(spelling)) << spelling;
+  for (const std::string spelling : {"flange", "se + flange + flange", "se * flange",
+                                     "(se + flange)", "se + flange + joint_map"}) {
+    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").text(spelling))
+        << spelling;
   }
 }
 

@@ -10,8 +10,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-const GpHyperparameters kSmooth = {(VectorXd(6) << 0.7, 0.8, 0.3, 0.5, 2.0, 2.0).finished(), std::log(2e-4),
-                                   std::log(1e-5)};
+const GpHyperparameters kSmooth = {(VectorXd(6) << 0.7, 0.8, 0.3, 0.5, 2.0, 2.0).finished(),
+                                   std::log(2e-4), std::log(1e-5)};
 
 struct Data {
   MatrixXd q;
@@ -29,10 +29,12 @@ Data rows(const Data& data, const std::vector<Index>& which) {
   return {data.q(which, Eigen::all), data.y(which), data.noise_shape(which)};
 }
 
-GaussianProcess conditioned(const Data& data, VarianceForm form = VarianceForm::kExact, double stretch = 0.0) {
+GaussianProcess conditioned(const Data& data, VarianceForm form = VarianceForm::kExact,
+                            double stretch = 0.0) {
   GpHyperparameters at = kSmooth;
   at.kernel.array() += stretch;
-  auto gp = GaussianProcess::condition(make_kernel("se"), data.q, data.y, data.noise_shape, at, form);
+  auto gp =
+      GaussianProcess::condition(make_kernel("se"), data.q, data.y, data.noise_shape, at, form);
   if (!gp) throw std::runtime_error("not positive definite");
   return *std::move(gp);
 }
@@ -64,7 +66,8 @@ void expect_same(const GaussianProcess& a, const GaussianProcess& b) {
 TEST(GrowingProcess, WithMorePointsEqualsConditioningOnAllOfThem) {
   for (const Index count : {1, 23, 24, 25, 150}) {
     const Data data = some_data(count + 30);
-    const std::vector<Index> fresh = all_but(count + 30, all_but(count + 30, {count, count + 7, count + 29}));
+    const std::vector<Index> fresh =
+        all_but(count + 30, all_but(count + 30, {count, count + 7, count + 29}));
     std::vector<Index> first(static_cast<std::size_t>(count));
     for (Index i = 0; i < count; ++i) first[static_cast<std::size_t>(i)] = i;
     std::vector<Index> both = first;
@@ -102,7 +105,8 @@ TEST(GrowingProcess, ComesBackToItselfAfterAHundredExchanges) {
 
 TEST(GrowingProcess, RefusesAPointThatRepeatsAnotherWithoutNoise) {
   const Data data = some_data(30);
-  const auto grown = conditioned(data).with(data.q.topRows(1), data.y.head(1), VectorXd::Constant(1, -1.0));
+  const auto grown =
+      conditioned(data).with(data.q.topRows(1), data.y.head(1), VectorXd::Constant(1, -1.0));
   EXPECT_FALSE(grown.has_value());
 }
 
@@ -135,7 +139,8 @@ TEST(CompressedVariance, IsExactWhereFewPointsDoNotStandForAll) {
   const Data data = some_data(300);
   GpHyperparameters rough = kSmooth;
   rough.kernel.setConstant(-1.0);
-  const auto gp = GaussianProcess::condition(make_kernel("matern32"), data.q, data.y, data.noise_shape, rough);
+  const auto gp =
+      GaussianProcess::condition(make_kernel("matern32"), data.q, data.y, data.noise_shape, rough);
   ASSERT_TRUE(gp.has_value());
   EXPECT_EQ(gp->variance_points(), 300);
 }

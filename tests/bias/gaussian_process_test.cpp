@@ -14,18 +14,20 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double reference_kernel(const std::string& name, const VectorXd& log_scales, const VectorXd& a, const VectorXd& b) {
+double reference_kernel(const std::string& name, const VectorXd& log_scales, const VectorXd& a,
+                        const VectorXd& b) {
   const double r = ((a - b).array() * (-log_scales.array()).exp()).matrix().norm();
   if (name == "se") return std::exp(-0.5 * r * r);
   if (name == "matern32") return (1 + std::sqrt(3.0) * r) * std::exp(-std::sqrt(3.0) * r);
   return (1 + std::sqrt(5.0) * r + 5.0 / 3.0 * r * r) * std::exp(-std::sqrt(5.0) * r);
 }
 
-MatrixXd reference_covariance(const std::string& name, const VectorXd& log_scales, const MatrixXd& a,
-                              const MatrixXd& b) {
+MatrixXd reference_covariance(const std::string& name, const VectorXd& log_scales,
+                              const MatrixXd& a, const MatrixXd& b) {
   MatrixXd k(a.rows(), b.rows());
   for (Index i = 0; i < a.rows(); ++i) {
-    for (Index j = 0; j < b.rows(); ++j) k(i, j) = reference_kernel(name, log_scales, a.row(i), b.row(j));
+    for (Index j = 0; j < b.rows(); ++j)
+      k(i, j) = reference_kernel(name, log_scales, a.row(i), b.row(j));
   }
   return k;
 }
@@ -82,7 +84,8 @@ TEST_P(EveryKernel, LikelihoodAndPredictionEqualTheDenseFormula) {
   const Eigen::LLT<MatrixXd> factor(covariance);
   const VectorXd alpha = factor.solve(y);
   const double log_det = 2.0 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
-  const double expected = -0.5 * (y.dot(alpha) + log_det + static_cast<double>(count) * std::log(2 * std::numbers::pi));
+  const double expected =
+      -0.5 * (y.dot(alpha) + log_det + static_cast<double>(count) * std::log(2 * std::numbers::pi));
   EXPECT_NEAR(gp->log_likelihood(), expected, 1e-8 * std::abs(expected));
 
   const MatrixXd targets = random_joints(11, 23, joints);
@@ -95,7 +98,8 @@ TEST_P(EveryKernel, LikelihoodAndPredictionEqualTheDenseFormula) {
   for (Index j = 0; j < targets.rows(); ++j) {
     EXPECT_NEAR(mean[j], expected_mean[j], 1e-12);
     const double posterior = signal * signal - cross.col(j).dot(solved.col(j));
-    EXPECT_NEAR(variance[static_cast<std::size_t>(j)].posterior, posterior, 1e-10 * signal * signal);
+    EXPECT_NEAR(variance[static_cast<std::size_t>(j)].posterior, posterior,
+                1e-10 * signal * signal);
     EXPECT_NEAR(variance[static_cast<std::size_t>(j)].prior, signal * signal, 1e-20);
   }
 }
@@ -111,9 +115,9 @@ TEST_P(EveryKernel, ProfiledLikelihoodEqualsTheLikelihoodAtItsSignalVariance) {
   double total = 0;
   for (Index output = 0; output < 3; ++output) {
     const double log_signal = 0.5 * std::log(likelihood.signal_variance()[output]);
-    const auto gp =
-        GaussianProcess::condition(make_kernel(name), d.q, d.y.col(output), d.noise_shape,
-                                   {parameters.head(joints), log_signal, log_signal + 0.5 * parameters[joints]});
+    const auto gp = GaussianProcess::condition(
+        make_kernel(name), d.q, d.y.col(output), d.noise_shape,
+        {parameters.head(joints), log_signal, log_signal + 0.5 * parameters[joints]});
     ASSERT_TRUE(gp.has_value());
     total -= gp->log_likelihood();
   }
@@ -145,10 +149,12 @@ TEST_P(EveryKernel, GradientEqualsCentralDifferences) {
   }
 }
 
-// Sizes on both sides of the blocks of the factorisation and of the tiles; six and seven joints, and neither.
+// Sizes on both sides of the blocks of the factorisation and of the tiles; six and seven joints,
+// and neither.
 INSTANTIATE_TEST_SUITE_P(Sizes, EveryKernel,
-                         testing::Values(Case{"se", 13, 6}, Case{"se", 64, 3}, Case{"se", 150, 7}, Case{"se", 411, 6},
-                                         Case{"matern32", 97, 6}, Case{"matern32", 40, 2}, Case{"matern52", 130, 6},
+                         testing::Values(Case{"se", 13, 6}, Case{"se", 64, 3}, Case{"se", 150, 7},
+                                         Case{"se", 411, 6}, Case{"matern32", 97, 6},
+                                         Case{"matern32", 40, 2}, Case{"matern52", 130, 6},
                                          Case{"matern52", 30, 9}),
                          [](const auto& test) {
                            return test.param.kernel + "_" + std::to_string(test.param.count) + "_" +
@@ -157,8 +163,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, EveryKernel,
 
 TEST(GaussianProcess, RefusesACovarianceThatIsNotPositiveDefinite) {
   const MatrixXd q = MatrixXd::Zero(20, 6);
-  const auto gp = GaussianProcess::condition(make_kernel("se"), q, VectorXd::Ones(20), VectorXd::Ones(20),
-                                             {VectorXd::Zero(6), 0.0, -40.0});
+  const auto gp = GaussianProcess::condition(make_kernel("se"), q, VectorXd::Ones(20),
+                                             VectorXd::Ones(20), {VectorXd::Zero(6), 0.0, -40.0});
   EXPECT_FALSE(gp.has_value());
 }
 
@@ -181,10 +187,12 @@ TEST(HyperparameterSearch, RecoversTheProcessThatTheDataWereDrawnFrom) {
     for (Index i = 0; i < count; ++i) y(i, d) += noise * normal(&random);
   }
   SearchOptions options;
-  const auto found = search_hyperparameters(make_kernel("se"), {q, y, VectorXd::Ones(count)}, noise, options);
+  const auto found =
+      search_hyperparameters(make_kernel("se"), {q, y, VectorXd::Ones(count)}, noise, options);
   ASSERT_TRUE(found.has_value());
   for (const GpHyperparameters& output : found->outputs) {
-    for (Index k = 0; k < joints; ++k) EXPECT_NEAR(output.kernel[k], log_scales[k], 0.2) << "joint " << k;
+    for (Index k = 0; k < joints; ++k)
+      EXPECT_NEAR(output.kernel[k], log_scales[k], 0.2) << "joint " << k;
     EXPECT_NEAR(output.log_signal_stddev, std::log(signal), 0.4);
     EXPECT_NEAR(output.log_noise_stddev, std::log(noise), 0.1);
   }

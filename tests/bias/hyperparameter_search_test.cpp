@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Index;
 
-/// What geometry alone leaves over of the virtual robot: its compliance, in all joints' full ranges.
+/// What geometry alone leaves over of the virtual robot: its compliance, in all joints' full
+/// ranges.
 GpData sag_of_the_virtual_robot(int poses) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
@@ -29,7 +30,8 @@ GpData sag_of_the_virtual_robot(int poses) {
   return data;
 }
 
-// 300 poses cannot tell the fine influence of joint 4 on the height from 0.7 mm of noise; 700 can, by 90 nats.
+// 300 poses cannot tell the fine influence of joint 4 on the height from 0.7 mm of noise; 700 can,
+// by 90 nats.
 TEST(HyperparameterSearch, FindsAFineInfluenceThatFewPosesTakeForNoise) {
   const GpData data = sag_of_the_virtual_robot(700);
   for (const std::uint64_t seed : {1, 2}) {
@@ -42,7 +44,8 @@ TEST(HyperparameterSearch, FindsAFineInfluenceThatFewPosesTakeForNoise) {
   }
 }
 
-// 0.3 mm that repeats within half a rad of two joints: fewer points than all cannot tell it from noise.
+// 0.3 mm that repeats within half a rad of two joints: fewer points than all cannot tell it from
+// noise.
 GpData fine_function_of_two_joints(int poses) {
   const Index n = poses;
   GpData data{random_joints(n, 3, 3), Eigen::MatrixXd(n, 1), Eigen::VectorXd::Ones(n)};
@@ -77,7 +80,8 @@ TEST(HyperparameterSearch, LooksAroundOnAllPosesWhereMuchNoiseIsLeft) {
 TEST(HyperparameterSearch, GivesUpWhileItLooksAround) {
   SearchOptions options;
   options.progress = [](double share) { return share < 0.7; };
-  const auto found = search_hyperparameters(make_kernel("se"), fine_function_of_two_joints(1100), 13e-6, options);
+  const auto found =
+      search_hyperparameters(make_kernel("se"), fine_function_of_two_joints(1100), 13e-6, options);
   ASSERT_TRUE(found.has_value());
   EXPECT_TRUE(found->given_up);
 }

@@ -26,7 +26,8 @@ constexpr Index kJoints = 3;
 // Different everywhere, so that parameters cannot be mistaken for each other.
 VectorXd some_parameters(const Kernel& kernel) {
   VectorXd parameters(kernel.parameter_count(kJoints));
-  for (Index p = 0; p < parameters.size(); ++p) parameters[p] = 0.3 - 0.11 * static_cast<double>(p % 7);
+  for (Index p = 0; p < parameters.size(); ++p)
+    parameters[p] = 0.3 - 0.11 * static_cast<double>(p % 7);
   return parameters;
 }
 
@@ -43,11 +44,13 @@ AlignedMatrix features_of(const Kernel& kernel, const VectorXd& parameters, cons
   return table;
 }
 
-MatrixXd covariance(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q, const MatrixXd& other) {
+MatrixXd covariance(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q,
+                    const MatrixXd& other) {
   const AlignedMatrix a = features_of(kernel, parameters, q);
   const AlignedMatrix b = features_of(kernel, parameters, other);
   AlignedMatrix k(padded_rows(q.rows()), other.rows());
-  kernel.tile(parameters, {a.data(), q.rows(), a.rows()}, {b.data(), other.rows(), b.rows()}, k.data(), k.rows());
+  kernel.tile(parameters, {a.data(), q.rows(), a.rows()}, {b.data(), other.rows(), b.rows()},
+              k.data(), k.rows());
   return k.map().topRows(q.rows());
 }
 
@@ -58,7 +61,8 @@ KernelPtr spelled(const std::string& spelling) {
 }
 
 // At `parameters` of three joints.
-double entry(const std::string& spelling, const VectorXd& parameters, const VectorXd& a, const VectorXd& b) {
+double entry(const std::string& spelling, const VectorXd& parameters, const VectorXd& a,
+             const VectorXd& b) {
   return covariance(*spelled(spelling), parameters, a.transpose(), b.transpose())(0, 0);
 }
 
@@ -86,13 +90,13 @@ TEST_P(EverySpelling, WeightedSumEqualsTheTileTimesTheWeights) {
   targets.topRows(3) = q_.topRows(3);
   AlignedMatrix weights(padded_rows(q_.rows()), 1);
   for (Index i = 0; i < q_.rows(); ++i) weights(i, 0) = std::sin(static_cast<double>(7 * i));
-  const VectorXd expected =
-      covariance(*kernel_, parameters_, q_, targets).transpose() * weights.map().col(0).head(q_.rows());
+  const VectorXd expected = covariance(*kernel_, parameters_, q_, targets).transpose() *
+                            weights.map().col(0).head(q_.rows());
   const AlignedMatrix a = features_of(*kernel_, parameters_, q_);
   const AlignedMatrix b = features_of(*kernel_, parameters_, targets);
   VectorXd sum(targets.rows());
-  kernel_->weighted_sum(parameters_, {a.data(), q_.rows(), a.rows()}, {b.data(), targets.rows(), b.rows()},
-                        weights.data(), sum.data());
+  kernel_->weighted_sum(parameters_, {a.data(), q_.rows(), a.rows()},
+                        {b.data(), targets.rows(), b.rows()}, weights.data(), sum.data());
   EXPECT_LT((sum - expected).cwiseAbs().maxCoeff(), 1e-11);
 }
 
@@ -100,7 +104,8 @@ TEST_P(EverySpelling, GradientOfTheLikelihoodEqualsCentralDifferences) {
   GpPrior prior;
   prior.parameter_centre = VectorXd::Zero(parameters_.size());
   const BiasProblem problem = smooth_problem(q_.rows(), 43, 20e-6);
-  ProfiledLikelihood likelihood(kernel_, {q_, problem.residual_B, VectorXd::Ones(q_.rows())}, prior);
+  ProfiledLikelihood likelihood(kernel_, {q_, problem.residual_B, VectorXd::Ones(q_.rows())},
+                                prior);
   VectorXd at(parameters_.size() + 1);
   at << parameters_, std::log(0.05);
   ObjectiveValue here;
@@ -115,7 +120,8 @@ TEST_P(EverySpelling, GradientOfTheLikelihoodEqualsCentralDifferences) {
     };
     const double h = 1e-4;
     const double numeric = (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
-    EXPECT_NEAR(here.gradient[p], numeric, 1e-6 * here.gradient.cwiseAbs().maxCoeff()) << "parameter " << p;
+    EXPECT_NEAR(here.gradient[p], numeric, 1e-6 * here.gradient.cwiseAbs().maxCoeff())
+        << "parameter " << p;
   }
 }
 
@@ -135,7 +141,8 @@ TEST_P(EverySpelling, PredictsAsTheDenseFormulaDoesAfterGrowingToo) {
   const Eigen::LLT<MatrixXd> factor(dense);
   const MatrixXd targets = random_joints(9, 45, kJoints);
   const MatrixXd cross = signal * signal * covariance(*kernel_, parameters_, q_, targets);
-  const VectorXd prior = signal * signal * covariance(*kernel_, parameters_, targets, targets).diagonal();
+  const VectorXd prior =
+      signal * signal * covariance(*kernel_, parameters_, targets, targets).diagonal();
   const VectorXd expected = cross.transpose() * factor.solve(y);
   VectorXd mean(targets.rows());
   gp->mean(targets, mean.data());
@@ -150,11 +157,13 @@ TEST_P(EverySpelling, PredictsAsTheDenseFormulaDoesAfterGrowingToo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, EverySpelling,
-                         testing::Values("se", "matern32", "matern52", "periodic", "rational_quadratic", "linear",
-                                         "white", "se(sincos)", "rational_quadratic(sincos)", "linear(sincos)",
+                         testing::Values("se", "matern32", "matern52", "periodic",
+                                         "rational_quadratic", "linear", "white", "se(sincos)",
+                                         "rational_quadratic(sincos)", "linear(sincos)",
                                          "periodic(sincos)", "white(sincos)", "matern52 + periodic",
-                                         "se * linear + white", "white + white", "white * white + se",
-                                         "(se + linear) * (periodic + white)", "se * matern32(sincos) * linear",
+                                         "se * linear + white", "white + white",
+                                         "white * white + se", "(se + linear) * (periodic + white)",
+                                         "se * matern32(sincos) * linear",
                                          "linear + (se + white) + rational_quadratic"));
 
 TEST(Kernel, PeriodicEqualsItsFormula) {
@@ -165,8 +174,10 @@ TEST(Kernel, PeriodicEqualsItsFormula) {
   VectorXd parameters(6);
   parameters << scale.array().log(), period.array().log();
   const Eigen::Array3d sine = (std::numbers::pi * (a - b).array() / period.array()).sin();
-  EXPECT_NEAR(entry("periodic", parameters, a, b), std::exp(-2.0 * (sine / scale.array()).square().sum()), 1e-14);
-  EXPECT_NEAR(entry("periodic", parameters, a, b + 3.0 * period), entry("periodic", parameters, a, b), 1e-12);
+  EXPECT_NEAR(entry("periodic", parameters, a, b),
+              std::exp(-2.0 * (sine / scale.array()).square().sum()), 1e-14);
+  EXPECT_NEAR(entry("periodic", parameters, a, b + 3.0 * period),
+              entry("periodic", parameters, a, b), 1e-12);
 }
 
 TEST(Kernel, RationalQuadraticAndLinearEqualTheirFormulas) {
@@ -176,7 +187,8 @@ TEST(Kernel, RationalQuadraticAndLinearEqualTheirFormulas) {
   VectorXd parameters(4);
   parameters << scale.array().log(), std::log(1.6);
   const double half_square = 0.5 * ((a - b).array() / scale.array()).square().sum();
-  EXPECT_NEAR(entry("rational_quadratic", parameters, a, b), std::pow(1.0 + half_square / 1.6, -1.6), 1e-14);
+  EXPECT_NEAR(entry("rational_quadratic", parameters, a, b),
+              std::pow(1.0 + half_square / 1.6, -1.6), 1e-14);
   const double dot = (a.array() * b.array() / scale.array().square()).sum();
   EXPECT_NEAR(entry("linear", parameters.head(3), a, b), 1.0 + dot, 1e-14);
 }
@@ -186,7 +198,8 @@ TEST(Kernel, WhiteIsOneForARepeatedPoseOnly) {
   EXPECT_EQ(entry("white", VectorXd(0), q, q), 1.0);
   EXPECT_EQ(entry("white", VectorXd(0), q, Eigen::Vector3d(0.3, -0.0, 0.9)), 1.0);
   EXPECT_EQ(entry("white", VectorXd(0), q, Eigen::Vector3d(0.9, 0.0, 0.3)), 0.0);
-  EXPECT_EQ(entry("white", VectorXd(0), q, Eigen::Vector3d(0.3, 0.0, std::nextafter(0.9, 1.0))), 0.0);
+  EXPECT_EQ(entry("white", VectorXd(0), q, Eigen::Vector3d(0.3, 0.0, std::nextafter(0.9, 1.0))),
+            0.0);
 }
 
 TEST(Kernel, OnSinesAndCosinesAWholeTurnIsNoDistance) {
@@ -206,8 +219,10 @@ TEST(Kernel, ProductsBindBeforeSumsAndLaterPartsHaveAnAmplitude) {
   const double amplitude = -0.7;
   VectorXd parameters(10);
   parameters << scale, amplitude, scale, scale;  // se; a; linear, matern52
-  EXPECT_NEAR(entry("se + linear * matern52", parameters, a, b), se + std::exp(2 * amplitude) * linear * matern, 1e-13);
-  EXPECT_NEAR(entry("(se+linear)*matern52", parameters, a, b), (se + std::exp(2 * amplitude) * linear) * matern, 1e-13);
+  EXPECT_NEAR(entry("se + linear * matern52", parameters, a, b),
+              se + std::exp(2 * amplitude) * linear * matern, 1e-13);
+  EXPECT_NEAR(entry("(se+linear)*matern52", parameters, a, b),
+              (se + std::exp(2 * amplitude) * linear) * matern, 1e-13);
 }
 
 TEST(Kernel, ALoneWordIsThatKernelItself) {
@@ -223,7 +238,8 @@ TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
   const std::vector<std::pair<std::string, int>> cases = {
       {"", 1}, {"se +", 5}, {"se se", 4}, {"(se + white", 12}, {"se(tan)", 7}, {"se)", 3}};
   for (const auto& [spelling, character] : cases) {
-    EXPECT_EQ(refusal_of(spelled_kernel(spelling)), Refusal("", {}, "bias").value(character).text(spelling))
+    EXPECT_EQ(refusal_of(spelled_kernel(spelling)),
+              Refusal("", {}, "bias").value(character).text(spelling))
         << spelling;
   }
   const std::vector<std::pair<std::string, std::string>> unknown_words = {{"se + gauss", "gauss"},
@@ -251,25 +267,31 @@ TEST(Kernel, ABiasIsSpelledAsAKernelAndTheBlocksAddedToIt) {
 }
 
 TEST(Kernel, ABlockThatIsNotASummandOfTheWholeBiasIsRefused) {
-  for (const std::string spelling : {"se * joint_map", "joint_map * se", "(se + parameters)", "se + joint_map(sincos)",
-                                     "joint_map", "parameters + joint_map", "se + joint_map + joint_map"}) {
-    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").text(spelling)) << spelling;
+  for (const std::string spelling :
+       {"se * joint_map", "joint_map * se", "(se + parameters)", "se + joint_map(sincos)",
+        "joint_map", "parameters + joint_map", "se + joint_map + joint_map"}) {
+    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").text(spelling))
+        << spelling;
   }
-  const std::vector<std::pair<std::string, int>> cases = {{"se + joint_map white", 16}, {"se + joint_map +", 17}};
+  const std::vector<std::pair<std::string, int>> cases = {{"se + joint_map white", 16},
+                                                          {"se + joint_map +", 17}};
   for (const auto& [spelling, character] : cases) {
-    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").value(character).text(spelling));
+    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)),
+              Refusal("", {}, "bias").value(character).text(spelling));
   }
   EXPECT_FALSE(spelled_kernel("se + joint_map").has_value()) << "a kernel has no blocks";
 }
 
 // A gear's error: 60 µm, some five periods within the range of two joints, 5 µm of noise.
 BiasProblem rippled_problem(Index count, std::uint64_t seed) {
-  BiasProblem problem{random_joints(count, seed, 2), MatrixXd(count, 3), VectorXd::Constant(count, 5e-6)};
+  BiasProblem problem{random_joints(count, seed, 2), MatrixXd(count, 3),
+                      VectorXd::Constant(count, 5e-6)};
   std::mt19937_64 random(seed + 1000);
   for (Index i = 0; i < count; ++i) {
     const double ripple = std::sin(2.0 * std::numbers::pi * problem.q(i, 0) / 0.5) *
                           (1.0 + 0.5 * std::cos(2.0 * std::numbers::pi * problem.q(i, 1) / 0.8));
-    for (int d = 0; d < 3; ++d) problem.residual_B(i, d) = 60e-6 * (1.0 - 0.3 * d) * ripple + 5e-6 * normal(&random);
+    for (int d = 0; d < 3; ++d)
+      problem.residual_B(i, d) = 60e-6 * (1.0 - 0.3 * d) * ripple + 5e-6 * normal(&random);
   }
   return problem;
 }
@@ -309,7 +331,8 @@ TEST(Kernel, ARestoredCompositeModelPredictsTheSameBits) {
     EXPECT_EQ(from_fit[i].mean_B, from_state[i].mean_B);
     EXPECT_EQ(from_fit[i].stddev_B, from_state[i].stddev_B);
     EXPECT_EQ(from_fit[i].prior_share, from_state[i].prior_share);
-    EXPECT_EQ(from_fit[i].mean_B, model.predict(q.row(static_cast<Index>(i))).mean_B) << "alone as among others";
+    EXPECT_EQ(from_fit[i].mean_B, model.predict(q.row(static_cast<Index>(i))).mean_B)
+        << "alone as among others";
   }
 }
 
@@ -326,7 +349,8 @@ TEST(Kernel, TheCompressedVarianceOfACompositeIsTheExactOneOrClose) {
     const KernelPtr kernel = spelled(spelling);
     const GpHyperparameters at = {some_parameters(*kernel), std::log(2e-4), std::log(2e-5)};
     const VectorXd shape = VectorXd::Ones(400);
-    const auto compressed = GaussianProcess::condition(kernel, q, y, shape, at, VarianceForm::kCompressed);
+    const auto compressed =
+        GaussianProcess::condition(kernel, q, y, shape, at, VarianceForm::kCompressed);
     const auto exact = GaussianProcess::condition(kernel, q, y, shape, at, VarianceForm::kExact);
     ASSERT_TRUE(compressed.has_value() && exact.has_value());
     const auto few = compressed->variance(targets);

@@ -13,12 +13,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-const GpHyperparameters kSmooth = {(VectorXd(6) << 0.7, 0.8, 0.3, 0.5, 2.0, 2.0).finished(), std::log(2e-4),
-                                   std::log(10e-6)};
+const GpHyperparameters kSmooth = {(VectorXd(6) << 0.7, 0.8, 0.3, 0.5, 2.0, 2.0).finished(),
+                                   std::log(2e-4), std::log(10e-6)};
 
-LocalExperts conditioned(const BiasProblem& problem, Index count, const GpHyperparameters& at = kSmooth) {
-  auto local = LocalExperts::condition(make_kernel("se"), problem.q.topRows(count),
-                                       problem.residual_B.col(2).head(count), VectorXd::Ones(count), at);
+LocalExperts conditioned(const BiasProblem& problem, Index count,
+                         const GpHyperparameters& at = kSmooth) {
+  auto local =
+      LocalExperts::condition(make_kernel("se"), problem.q.topRows(count),
+                              problem.residual_B.col(2).head(count), VectorXd::Ones(count), at);
   if (!local) throw std::runtime_error("not positive definite");
   return *std::move(local);
 }
@@ -27,8 +29,8 @@ TEST(LocalExperts, AreOneExactProcessUpTo5000Points) {
   const BiasProblem problem = smooth_problem(300, 71);
   const LocalExperts local = conditioned(problem, 300);
   EXPECT_EQ(local.experts(), 1U);
-  const auto exact =
-      GaussianProcess::condition(make_kernel("se"), problem.q, problem.residual_B.col(2), VectorXd::Ones(300), kSmooth);
+  const auto exact = GaussianProcess::condition(
+      make_kernel("se"), problem.q, problem.residual_B.col(2), VectorXd::Ones(300), kSmooth);
   const MatrixXd q = random_joints(20, 72);
   VectorXd mean(20);
   VectorXd expected(20);
@@ -59,7 +61,8 @@ TEST(LocalExperts, NoneIsGivenAPartOfAPose) {
 }
 
 TEST(LocalExperts, LeaveAllReflectorsOfAPoseOutTogether) {
-  // An error of each pose that no other pose shares: whoever is left out with the others of its pose is predicted as 0.
+  // An error of each pose that no other pose shares: whoever is left out with the others of its
+  // pose is predicted as 0.
   constexpr Index kPoses = 1700;
   const MatrixXd at = random_joints(kPoses, 75);
   const MatrixXd q = at.replicate(3, 1);
@@ -68,8 +71,8 @@ TEST(LocalExperts, LeaveAllReflectorsOfAPoseOutTogether) {
   for (double& value : y) value = 1e-4 * normal(&random);
   GpHyperparameters rough = kSmooth;
   rough.kernel = VectorXd::Constant(6, std::log(1e-2));
-  const auto local =
-      LocalExperts::condition(make_kernel("se"), q, y.replicate(3, 1), VectorXd::Ones(3 * kPoses), rough);
+  const auto local = LocalExperts::condition(make_kernel("se"), q, y.replicate(3, 1),
+                                             VectorXd::Ones(3 * kPoses), rough);
   ASSERT_TRUE(local);
   ASSERT_GT(local->experts(), 1U);
   EXPECT_LT(local->leave_one_out_mean().cwiseAbs().maxCoeff(), 1e-9);
@@ -89,7 +92,8 @@ std::unique_ptr<LocalExperts> ManyPoints::local_;
 
 TEST_F(ManyPoints, AreLearnedToTheNoiseWithIntervalsThatHold) {
   EXPECT_GT(local_->experts(), 4U);
-  const GpData part{problem_->q.topRows(800), problem_->residual_B.col(2).head(800), VectorXd::Ones(800)};
+  const GpData part{problem_->q.topRows(800), problem_->residual_B.col(2).head(800),
+                    VectorXd::Ones(800)};
   const auto found = search_hyperparameters(make_kernel("se"), part, 10e-6, {});
   const LocalExperts local = conditioned(*problem_, 6000, found->outputs.front());
   const BiasProblem fresh = smooth_problem(3000, 74);
@@ -100,7 +104,8 @@ TEST_F(ManyPoints, AreLearnedToTheNoiseWithIntervalsThatHold) {
   int inside = 0;
   for (Index i = 0; i < 3000; ++i) {
     const double error = mean[i] - smooth_error_B(fresh.q.row(i))[2];
-    const double sigma = std::sqrt(variance[static_cast<std::size_t>(i)].posterior + local.noise_variance());
+    const double sigma =
+        std::sqrt(variance[static_cast<std::size_t>(i)].posterior + local.noise_variance());
     square += error * error;
     inside += std::abs(fresh.residual_B(i, 2) - mean[i]) < 1.96 * sigma;
   }
@@ -120,7 +125,9 @@ TEST_F(ManyPoints, ArePredictedWithoutAStepBetweenExperts) {
   // A step would stand out among second differences, which shrink with the square of the distance.
   for (Index i = 1; i < kSteps; ++i) {
     EXPECT_LT(std::abs(mean[i + 1] - 2 * mean[i] + mean[i - 1]), 1e-9);
-    const auto at = [&](Index j) { return std::sqrt(variance[static_cast<std::size_t>(j)].posterior); };
+    const auto at = [&](Index j) {
+      return std::sqrt(variance[static_cast<std::size_t>(j)].posterior);
+    };
     EXPECT_LT(std::abs(at(i + 1) - 2 * at(i) + at(i - 1)), 1e-9);
   }
 }
@@ -134,7 +141,8 @@ TEST_F(ManyPoints, AreThePriorFarFromAllOfThem) {
 }
 
 TEST_F(ManyPoints, TakeMorePointsAndGiveThemBack) {
-  const auto grown = local_->with(problem_->q.bottomRows(10), problem_->residual_B.col(2).tail(10), VectorXd::Ones(10));
+  const auto grown = local_->with(problem_->q.bottomRows(10), problem_->residual_B.col(2).tail(10),
+                                  VectorXd::Ones(10));
   ASSERT_TRUE(grown.has_value());
   EXPECT_EQ(grown->size(), 6010);
   const MatrixXd q = problem_->q.bottomRows(10);
@@ -146,7 +154,8 @@ TEST_F(ManyPoints, TakeMorePointsAndGiveThemBack) {
   for (Index i = 6000; i < 6010; ++i) fresh.push_back(i);
   const LocalExperts back = grown->without(fresh);
   EXPECT_EQ(back.size(), 6000);
-  EXPECT_LT((back.leave_one_out_mean() - local_->leave_one_out_mean()).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((back.leave_one_out_mean() - local_->leave_one_out_mean()).cwiseAbs().maxCoeff(),
+            1e-13);
 }
 
 TEST_F(ManyPoints, AreConditionedTheSameBitForBitEachTime) {

@@ -48,8 +48,9 @@ GaussianProcess process_of(const Case& of, VarianceForm form) {
   const auto kernel = make_kernel(of.kernel);
   VectorXd parameters = VectorXd::Constant(kernel->parameter_count(of.joints), std::log(of.length));
   parameters[5] += 2;  // a joint of little influence
-  auto gp = GaussianProcess::condition(kernel, q, q.col(0), shape,
-                                       {parameters, std::log(1e-4), std::log(1e-4) + 0.5 * std::log(of.noise)}, form);
+  auto gp = GaussianProcess::condition(
+      kernel, q, q.col(0), shape,
+      {parameters, std::log(1e-4), std::log(1e-4) + 0.5 * std::log(of.noise)}, form);
   if (!gp) throw std::runtime_error("not positive definite");
   return *std::move(gp);
 }
@@ -59,12 +60,14 @@ MatrixXd targets_of(const Case& of) {
   const MatrixXd q = poses_of(of);
   const Index n = std::min<Index>(120, of.poses);
   const Eigen::RowVectorXd middle = 0.5 * (q.colwise().maxCoeff() + q.colwise().minCoeff());
-  const Eigen::RowVectorXd half = (q.colwise().maxCoeff() - middle) / 1.2;  // random_joints() reach 1.2
+  const Eigen::RowVectorXd half =
+      (q.colwise().maxCoeff() - middle) / 1.2;  // random_joints() reach 1.2
   const auto in_range = [&](double stretch, std::uint64_t seed) -> MatrixXd {
     return (stretch * random_joints(n, seed, of.joints) * half.asDiagonal()).rowwise() + middle;
   };
   MatrixXd targets(5 * n, of.joints);
-  targets << q.topRows(n), q.topRows(n) + MatrixXd(0.02 * random_joints(n, 92, of.joints) * half.asDiagonal()),
+  targets << q.topRows(n),
+      q.topRows(n) + MatrixXd(0.02 * random_joints(n, 92, of.joints) * half.asDiagonal()),
       0.5 * (q.topRows(n) + q.bottomRows(n)), in_range(1, 93), in_range(1.5, 94);
   return targets;
 }
@@ -112,36 +115,44 @@ TEST_P(ServedVariance, IsTheSameAloneAndAmongOthersServedOrLearned) {
   const std::vector<PosteriorVariance> together = one.variance(targets);
   for (Index i = targets.rows() - 1; i >= 0; i -= 7) {
     const double alone = other.variance(targets.row(i)).front().posterior;
-    EXPECT_NEAR(alone, together[static_cast<std::size_t>(i)].posterior, 1e-9 * one.noise_variance()) << i;
+    EXPECT_NEAR(alone, together[static_cast<std::size_t>(i)].posterior, 1e-9 * one.noise_variance())
+        << i;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Kernels, ServedVariance,
-    testing::Values(Case{"se", 0.9, 0.07, 700, "scattered"}, Case{"se", 0.9, 0.005, 500, "scattered"},
-                    Case{"se", 0.05, 0.07, 400, "scattered"}, Case{"se", 8.0, 1e-6, 400, "scattered"},
-                    Case{"se", 0.5, 3.0, 400, "scattered"}, Case{"se", 0.6, 1e-7, 300, "scattered"},
-                    Case{"se", 0.7, 0.02, 500, "twice"}, Case{"se", 0.3, 0.02, 500, "clusters"},
-                    Case{"se", 1.5, 20.0, 500, "clusters"}, Case{"se", 0.7, 0.02, 400, "flat"},
-                    Case{"se", 0.4, 0.05, 400, "line"}, Case{"se", 0.3, 10.0, 1200, "scattered"},
-                    Case{"se", 1.5, 5.0, 600, "scattered"}, Case{"se", 0.6, 1e3, 500, "scattered"},
-                    Case{"se", 0.9, 0.07, 50, "scattered"}, Case{"se", 1.5, 0.02, 600, "rail", 7},
-                    Case{"matern52", 1.0, 0.05, 500, "scattered"}, Case{"matern32", 0.8, 0.3, 400, "twice"},
-                    Case{"rational_quadratic", 1.0, 0.05, 400, "scattered"},
-                    Case{"matern52", 3.0, 80.0, 500, "rail", 7}, Case{"se * matern32", 1.5, 0.1, 300, "scattered"}),
+    testing::Values(
+        Case{"se", 0.9, 0.07, 700, "scattered"}, Case{"se", 0.9, 0.005, 500, "scattered"},
+        Case{"se", 0.05, 0.07, 400, "scattered"}, Case{"se", 8.0, 1e-6, 400, "scattered"},
+        Case{"se", 0.5, 3.0, 400, "scattered"}, Case{"se", 0.6, 1e-7, 300, "scattered"},
+        Case{"se", 0.7, 0.02, 500, "twice"}, Case{"se", 0.3, 0.02, 500, "clusters"},
+        Case{"se", 1.5, 20.0, 500, "clusters"}, Case{"se", 0.7, 0.02, 400, "flat"},
+        Case{"se", 0.4, 0.05, 400, "line"}, Case{"se", 0.3, 10.0, 1200, "scattered"},
+        Case{"se", 1.5, 5.0, 600, "scattered"}, Case{"se", 0.6, 1e3, 500, "scattered"},
+        Case{"se", 0.9, 0.07, 50, "scattered"}, Case{"se", 1.5, 0.02, 600, "rail", 7},
+        Case{"matern52", 1.0, 0.05, 500, "scattered"}, Case{"matern32", 0.8, 0.3, 400, "twice"},
+        Case{"rational_quadratic", 1.0, 0.05, 400, "scattered"},
+        Case{"matern52", 3.0, 80.0, 500, "rail", 7},
+        Case{"se * matern32", 1.5, 0.1, 300, "scattered"}),
     name_of);
 
 TEST(ServedVarianceOfScatteredPoses, IsThePriorFarFromAllData) {
   for (const double noise : {0.05, 10.0}) {
-    const GaussianProcess gp = process_of({"se", 0.3, noise, 500, "scattered"}, VarianceForm::kServed);
+    const GaussianProcess gp =
+        process_of({"se", 0.3, noise, 500, "scattered"}, VarianceForm::kServed);
     const PosteriorVariance far = gp.variance(MatrixXd::Constant(1, 6, 1000.0)).front();
     EXPECT_EQ(far.posterior, far.prior);
   }
 }
 
 TEST(ServedVarianceOfScatteredPoses, ReadsFewPointsWhereTheseSayAsMuchAsAll) {
-  EXPECT_LE(process_of({"se", 0.3, 10.0, 1200, "scattered"}, VarianceForm::kServed).variance_points(), 48);
-  EXPECT_LE(process_of({"se", 8.0, 0.05, 1200, "scattered"}, VarianceForm::kServed).variance_points(), 400);
+  EXPECT_LE(
+      process_of({"se", 0.3, 10.0, 1200, "scattered"}, VarianceForm::kServed).variance_points(),
+      48);
+  EXPECT_LE(
+      process_of({"se", 8.0, 0.05, 1200, "scattered"}, VarianceForm::kServed).variance_points(),
+      400);
 }
 
 }  // namespace

@@ -18,14 +18,17 @@ namespace {
 
 const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
 
-std::optional<Agreement> agreement(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+std::optional<Agreement> agreement(const std::shared_ptr<const Cell>& cell,
+                                   const std::vector<std::string>& sources,
                                    const MeasurementBatch& batch) {
   return agreement_of(cell, sources, batch, calibrate(cell, sources, batch, {}));
 }
 
 MeasurementBatch positions(int poses, std::uint64_t seed) {
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed, false);
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].row = static_cast<int>(i) + 2;
+  MeasurementBatch batch =
+      test::measured(test::chapter_5_robot(test::cell_7()), poses, seed, false);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i)
+    batch.measurements[i].row = static_cast<int>(i) + 2;
   return batch;
 }
 
@@ -37,7 +40,8 @@ std::set<int> spoil(MeasurementBatch& batch, double share, double off, std::uint
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::shuffle(order.begin(), order.end(), random);
   std::set<int> rows;
-  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size()); ++k) {
+  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size());
+       ++k) {
     Measurement& m = batch.measurements[order[k]];
     Vector3 direction(normal(random), normal(random), normal(random));
     m.p_W += off * direction.normalized();
@@ -88,14 +92,16 @@ void see_from_elsewhere(MeasurementBatch& batch, double angle) {
 }
 
 TEST(Agreement, RowsThatAreFarOffLeadToNoArmWhereBaseOrToolAreUnknownAndAreNamedAllTheSame) {
-  for (const auto& [base, tool] : {std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
+  for (const auto& [base, tool] :
+       {std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
     const auto cell = cell_without(base, tool);
     for (const double share : {0.2, 0.4}) {
       MeasurementBatch batch = positions(60, 13);
       if (base) see_from_elsewhere(batch, 1.9);
       const std::set<int> bad = spoil(batch, share, 1, 7);
       EXPECT_FALSE(calibrate(cell, kM3, batch, {})) << "no fit on all rows leads anywhere";
-      EXPECT_EQ(named(cell, batch), bad) << "base unknown " << base << ", tool unknown " << tool << ", " << share;
+      EXPECT_EQ(named(cell, batch), bad)
+          << "base unknown " << base << ", tool unknown " << tool << ", " << share;
     }
   }
 }
@@ -111,9 +117,11 @@ TEST(Agreement, EachOfSeveralSessionsIsAskedByItself) {
     m.row += 1000;
   }
   for (Measurement& m : batch.measurements) m.session = 1;
-  batch.measurements.insert(batch.measurements.begin(), earlier.measurements.begin(), earlier.measurements.end());
+  batch.measurements.insert(batch.measurements.begin(), earlier.measurements.begin(),
+                            earlier.measurements.end());
   batch.sessions = {"earlier", "newest"};
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].context.index = static_cast<int>(i);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i)
+    batch.measurements[i].context.index = static_cast<int>(i);
   const auto found = agreement(cell, kM3, batch);
   ASSERT_TRUE(found);
   EXPECT_EQ(rows_of(found->others), bad);
@@ -144,7 +152,8 @@ TEST(Agreement, TwoReflectorsThatWereExchangedInAQuarterOfThePosesAreFound) {
       batch.measurements.push_back(std::move(m));
     }
   }
-  for (Measurement& m : batch.measurements) m.p_W += 20e-6 * Vector3(std::sin(m.row), std::cos(m.row), 0);
+  for (Measurement& m : batch.measurements)
+    m.p_W += 20e-6 * Vector3(std::sin(m.row), std::cos(m.row), 0);
   std::set<int> exchanged;
   for (std::size_t i = 0; i < 32; i += 4) {
     std::swap(batch.measurements[32 + i].p_W, batch.measurements[64 + i].p_W);
@@ -155,16 +164,20 @@ TEST(Agreement, TwoReflectorsThatWereExchangedInAQuarterOfThePosesAreFound) {
   EXPECT_EQ(rows_of(found->others), exchanged);
 }
 
-/// Draw wires from three corners, some of which told too much or too little by about `off_mm`; which.
-std::set<int> spoil(std::vector<test::GaugeRow>& rows, double share, double off_mm, std::uint64_t seed) {
+/// Draw wires from three corners, some of which told too much or too little by about `off_mm`;
+/// which.
+std::set<int> spoil(std::vector<test::GaugeRow>& rows, double share, double off_mm,
+                    std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   std::vector<std::size_t> order(rows.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::shuffle(order.begin(), order.end(), random);
   std::set<int> bad;
-  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size()); ++k) {
-    rows[order[k]].value_mm += (normal(random) > 0 ? 1 : -1) * off_mm * (1 + 0.3 * std::abs(normal(random)));
+  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size());
+       ++k) {
+    rows[order[k]].value_mm +=
+        (normal(random) > 0 ? 1 : -1) * off_mm * (1 + 0.3 * std::abs(normal(random)));
     bad.insert(static_cast<int>(order[k]) + 2);
   }
   return bad;
@@ -199,19 +212,23 @@ TEST(Agreement, DistancesThatAreFarOffAmongFewAreNamed) {
         }
       }
       const std::vector<test::GaugeRow> good = test::wire_rows(arm, 60, seed);
-      EXPECT_FALSE(agreement(arm.cell, kM3, test::gauge_batch(arm, good, 0.05, seed))) << "seed " << seed;
+      EXPECT_FALSE(agreement(arm.cell, kM3, test::gauge_batch(arm, good, 0.05, seed)))
+          << "seed " << seed;
     }
   }
 }
 
-TEST(Agreement, AGoodBatchIsNotAsked) { EXPECT_FALSE(agreement(test::cell_7(), kM3, positions(60, 21))); }
+TEST(Agreement, AGoodBatchIsNotAsked) {
+  EXPECT_FALSE(agreement(test::cell_7(), kM3, positions(60, 21)));
+}
 
 TEST(Agreement, AModelThatLacksSomethingHasNoBadRows) {
   const auto cell = test::cell_7();
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const std::vector<std::string>& sources :
          {std::vector<std::string>{}, {"base"}, {"base", "geometry"}, {"geometry"}})
-      EXPECT_FALSE(agreement(cell, sources, positions(80, seed))) << sources.size() << ", seed " << seed;
+      EXPECT_FALSE(agreement(cell, sources, positions(80, seed)))
+          << sources.size() << ", seed " << seed;
   }
 }
 

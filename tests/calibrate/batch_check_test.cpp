@@ -37,18 +37,20 @@ TEST_P(Misread, AFirstBatchIsRefusedWithTheReadingThatFits) {
     const auto said = test::said_of(std::move(batch), *cell);
     ASSERT_TRUE(said) << mistake.kind << ", seed " << seed << ": " << reading;
     EXPECT_EQ(said->code, ErrorCode::kRefused);
-    EXPECT_TRUE(test::names(*said, reading))
-        << mistake.kind << ", seed " << seed << ": expected '" << reading << "', not: " << sentence(*said);
+    EXPECT_TRUE(test::names(*said, reading)) << mistake.kind << ", seed " << seed << ": expected '"
+                                             << reading << "', not: " << sentence(*said);
   }
 }
 
 std::string kind_of(const testing::TestParamInfo<std::size_t>& mistake) {
   std::string name;
-  for (const char c : test::misreadings()[mistake.param].kind) name += std::isalnum(c) != 0 ? c : '_';
+  for (const char c : test::misreadings()[mistake.param].kind)
+    name += std::isalnum(c) != 0 ? c : '_';
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Misread, testing::Range<std::size_t>(0, test::misreadings().size()), kind_of);
+INSTANTIATE_TEST_SUITE_P(Kinds, Misread, testing::Range<std::size_t>(0, test::misreadings().size()),
+                         kind_of);
 
 TEST(BatchCheck, RobotsAsTheyAreDeliveredAreNotDoubtedHoweverBadlyTheyWereMastered) {
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
@@ -79,7 +81,8 @@ TEST(BatchCheck, AToolOfAnotherNameIsNamed) {
   cell->tools["probe"] = probe;
   MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
   const Pose spindle = *cell->tools.at("spindle");
-  const Vector3 apart = spindle.linear().transpose() * (probe.translation() - spindle.translation());  // in T
+  const Vector3 apart =
+      spindle.linear().transpose() * (probe.translation() - spindle.translation());  // in T
   for (Measurement& m : batch.measurements) m.p_W += *m.R_WT * apart;
   for (Measurement& m : batch.measurements) m.context.tool = "spindle";
   const auto said = test::said_of(std::move(batch), *cell);
@@ -92,7 +95,8 @@ TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
   Pose probe = *cell->tools.at("spindle");
   probe.translation() += Vector3(0.03, 0.05, 0.12);
   cell->tools["probe"] = probe;
-  const Vector3 apart = cell->tools.at("spindle")->linear().transpose() * Vector3(0.03, 0.05, 0.12);  // in T
+  const Vector3 apart =
+      cell->tools.at("spindle")->linear().transpose() * Vector3(0.03, 0.05, 0.12);  // in T
   const MeasurementBatch of_one = test::measured(test::chapter_5_robot(test::cell_7()), 160, 5);
   for (const std::size_t every : {2u, 3u, 5u, 80u, 159u}) {
     MeasurementBatch batch = of_one;
@@ -108,10 +112,13 @@ TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
 
 TEST(BatchCheck, OnePointSeenFromAllSidesWithAToolThatIsOffIsNotReadAsPositionsInUm) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const auto known = test::cell_of_one_point("{xyz_mm: [0, 0, 0]}", test::kToolOfOnePoint, "{error_sources: []}");
-    const auto unknown = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: []}");
+    const auto known = test::cell_of_one_point("{xyz_mm: [0, 0, 0]}", test::kToolOfOnePoint,
+                                               "{error_sources: []}");
+    const auto unknown =
+        test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: []}");
     const Vector3 off = 1e-3 * Vector3(4, -3, 6);
-    const auto said = test::said_of(test::one_point(*known, off, Pose::Identity(), 30, seed), *known);
+    const auto said =
+        test::said_of(test::one_point(*known, off, Pose::Identity(), 30, seed), *known);
     EXPECT_FALSE(said) << "seed " << seed << ": " << sentence(*said);
     const Pose X_WB = make_pose(rotation_exp({0.3, -1.1, 1.9}), {1.2, -0.5, 0.3});
     const auto elsewhere = test::said_of(test::one_point(*unknown, off, X_WB, 30, seed), *unknown);
@@ -137,7 +144,8 @@ TEST(BatchCheck, ARowInAnotherUnitThanTheOthersIsNamedWithIt) {
         cell->tools["spindle"].reset();
       }
       MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 60, 3, known);
-      for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].row = static_cast<int>(i) + 2;
+      for (std::size_t i = 0; i < batch.measurements.size(); ++i)
+        batch.measurements[i].row = static_cast<int>(i) + 2;
       batch.measurements[16].p_W *= factor;
       const auto one = test::said_of(batch, *cell);
       ASSERT_TRUE(one) << unit << (known ? "" : ", base and tool unknown");
@@ -153,12 +161,13 @@ TEST(BatchCheck, ARowInAnotherUnitThanTheOthersIsNamedWithIt) {
 
 TEST(BatchCheck, DistancesInAnotherUnitAreNamedAllOfThemAndSingleRows) {
   for (const bool known : {true, false}) {
-    const test::GaugedArm arm =
-        test::gauged_arm(3, test::three_corners(), known ? "" : test::unknown_places(test::three_corners()));
+    const test::GaugedArm arm = test::gauged_arm(
+        3, test::three_corners(), known ? "" : test::unknown_places(test::three_corners()));
     const MeasurementBatch good = test::gauge_batch(arm, test::wire_rows(arm, 80, 3), 0.05, 3);
     const auto nothing = batch_doubt(good, *arm.cell);
     EXPECT_FALSE(nothing) << sentence(*nothing);
-    for (const auto& [unit, factor] : {std::pair("in metres", 1e-3), std::pair("in inches", 1 / 25.4)}) {
+    for (const auto& [unit, factor] :
+         {std::pair("in metres", 1e-3), std::pair("in inches", 1 / 25.4)}) {
       MeasurementBatch all = good, one = good;
       for (Measurement& m : all.measurements) m.gauge->value *= factor;
       one.measurements[16].gauge->value *= factor;
@@ -172,7 +181,8 @@ TEST(BatchCheck, DistancesInAnotherUnitAreNamedAllOfThemAndSingleRows) {
 }
 
 TEST(BatchCheck, TouchesThatCountTheOtherWayOrInInchesAreNamed) {
-  const test::GaugedArm arm = test::gauged_arm(23, {}, "{table: {xyz_mm: [1200, 0, 300], plane_normal: [0, 0, 1]}}");
+  const test::GaugedArm arm =
+      test::gauged_arm(23, {}, "{table: {xyz_mm: [1200, 0, 300], plane_normal: [0, 0, 1]}}");
   std::vector<test::GaugeRow> rows = test::position_rows(arm, 120, 23);
   for (test::GaugeRow& row : rows) {
     row.column = "touch_mm";
@@ -182,7 +192,8 @@ TEST(BatchCheck, TouchesThatCountTheOtherWayOrInInchesAreNamed) {
   const MeasurementBatch good = test::gauge_batch(arm, rows, 0.05, 23);
   const auto nothing = batch_doubt(good, *arm.cell);
   EXPECT_FALSE(nothing) << sentence(*nothing);
-  for (const auto& [reading, factor] : {std::pair("with the other sign", -1.0), std::pair("in inches", 1 / 25.4)}) {
+  for (const auto& [reading, factor] :
+       {std::pair("with the other sign", -1.0), std::pair("in inches", 1 / 25.4)}) {
     MeasurementBatch misread = good;
     for (Measurement& m : misread.measurements) m.gauge->value *= factor;
     const auto said = batch_doubt(misread, *arm.cell);

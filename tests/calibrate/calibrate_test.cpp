@@ -36,8 +36,9 @@ double validation_rms_mm(const CalibrationResult& result, const MeasurementBatch
 }
 
 const IdentifiedParameter& parameter(const CalibrationResult& result, const std::string& name) {
-  const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                  [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
+  const auto found =
+      std::find_if(result.parameters.begin(), result.parameters.end(),
+                   [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
   EXPECT_NE(found, result.parameters.end()) << name;
   return *found;
 }
@@ -66,12 +67,14 @@ TEST(Calibrate, ThreePositionsAPoseAreEnough) {
   EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 4)), 0.0265);
 }
 
-// The poses are multiplied 64 at a time: a rank update of none of them divided by zero and ended the program.
+// The poses are multiplied 64 at a time: a rank update of none of them divided by zero and ended
+// the program.
 TEST(Calibrate, ManyParametersAndAWholeNumberOfBlocksOfPosesEndNoProgram) {
   const auto cell = cell_7();
   const std::vector<std::string> many = {"base", "geometry", "compliance", "joint_map:1@12"};
   for (const int poses : {64, 128}) {
-    const Result<CalibrationResult> result = calibrate(cell, many, measured(chapter_5_robot(cell), poses, 3), {});
+    const Result<CalibrationResult> result =
+        calibrate(cell, many, measured(chapter_5_robot(cell), poses, 3), {});
     ASSERT_TRUE(result) << result.error().message;
     EXPECT_GE(result->parameters.size(), 48U);
   }
@@ -85,18 +88,22 @@ TEST(Calibrate, FindsAnUnknownBaseAndTool) {
   std::vector<std::string> specs = kM3;
   specs.push_back("tool");
   for (const bool orientation : {true, false}) {
-    const Result<CalibrationResult> result = calibrate(cell, specs, measured(robot, 200, 5, orientation), {});
+    const Result<CalibrationResult> result =
+        calibrate(cell, specs, measured(robot, 200, 5, orientation), {});
     ASSERT_TRUE(result) << result.error().message;
-    EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 6)), 0.026) << "orientation " << orientation;
+    EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 6)), 0.026)
+        << "orientation " << orientation;
   }
 }
 
 TEST(Calibrate, OnePointSeenFromAllSidesTellsTheToolAndSaysThatItHardlyTellsHowTheBaseIsTurned) {
-  for (const Vector3& turn : {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
-    for (const std::vector<std::string>& specs : {std::vector<std::string>{}, {"base", "tool", "geometry"}}) {
+  for (const Vector3& turn :
+       {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
+    for (const std::vector<std::string>& specs :
+         {std::vector<std::string>{}, {"base", "tool", "geometry"}}) {
       const auto cell = test::cell_of_one_point("null", "null", "{error_sources: []}");
-      const MeasurementBatch batch =
-          test::one_point(*cell, 1e-3 * Vector3(4, -3, 6), make_pose(rotation_exp(turn), {1.2, -0.5, 0.3}), 30, 3);
+      const MeasurementBatch batch = test::one_point(
+          *cell, 1e-3 * Vector3(4, -3, 6), make_pose(rotation_exp(turn), {1.2, -0.5, 0.3}), 30, 3);
       const Result<CalibrationResult> result = calibrate(cell, specs, batch, {});
       ASSERT_TRUE(result) << result.error().message;
       EXPECT_LT(to_mm(result->rms), 0.04) << "0.02 mm of noise an axis";
@@ -106,14 +113,16 @@ TEST(Calibrate, OnePointSeenFromAllSidesTellsTheToolAndSaysThatItHardlyTellsHowT
       const Vector3 p_FT = result->model.state(anywhere).X_FT.translation();
       EXPECT_LT((p_FT - 1e-3 * Vector3(34, -3, 156)).norm(), specs.empty() ? 1e-4 : 2e-3);
       ASSERT_FALSE(result->unidentifiable.empty());
-      EXPECT_EQ(result->unidentifiable.front().parameters, (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
+      EXPECT_EQ(result->unidentifiable.front().parameters,
+                (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
     }
   }
 }
 
 TEST(Calibrate, OnePointSeenWithAToolThatIsOffTellsHowTheBaseIsTurnedByHowTheToolIsOff) {
   const auto cell = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: []}");
-  for (const Vector3& turn : {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
+  for (const Vector3& turn :
+       {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
     const Pose X_WB = make_pose(rotation_exp(turn), {1.2, -0.5, 0.3});
     const MeasurementBatch batch = test::one_point(*cell, 1e-3 * Vector3(4, -3, 6), X_WB, 30, 3);
     const Result<CalibrationResult> result = calibrate(cell, {}, batch, {});
@@ -123,16 +132,18 @@ TEST(Calibrate, OnePointSeenWithAToolThatIsOffTellsHowTheBaseIsTurnedByHowTheToo
 }
 
 TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
-  const Result<CalibrationResult> result = calibrate(cell_7(), kM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
+  const Result<CalibrationResult> result =
+      calibrate(cell_7(), kM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
   ASSERT_TRUE(result);
   EXPECT_EQ(result->rank, 33);
   ASSERT_EQ(result->unidentifiable.size(), 3u);
   const auto named = [&](std::vector<std::string> names) {
     std::sort(names.begin(), names.end());
-    return std::any_of(result->unidentifiable.begin(), result->unidentifiable.end(), [&](auto combination) {
-      std::sort(combination.parameters.begin(), combination.parameters.end());
-      return combination.parameters == names;
-    });
+    return std::any_of(result->unidentifiable.begin(), result->unidentifiable.end(),
+                       [&](auto combination) {
+                         std::sort(combination.parameters.begin(), combination.parameters.end());
+                         return combination.parameters == names;
+                       });
   };
   EXPECT_TRUE(named({"gamma0", "q1"}));
   EXPECT_TRUE(named({"d1", "z0"}));
@@ -143,11 +154,14 @@ TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
 }
 
 TEST(Calibrate, StatesUncertaintiesThatFitItsErrors) {
-  // d4, a2, alpha3 and C3 have known truths in Table 5.5; over many batches their errors must be as large as stated.
+  // d4, a2, alpha3 and C3 have known truths in Table 5.5; over many batches their errors must be as
+  // large as stated.
   const auto cell = cell_7();
   const VirtualRobot robot = chapter_5_robot(cell);
-  const std::vector<std::pair<std::string, double>> truths = {
-      {"d4", from_mm(-0.3)}, {"a2", from_mm(-0.3)}, {"alpha3", -2.6e-4}, {"C3", from_rad_per_nmm(4e-9)}};
+  const std::vector<std::pair<std::string, double>> truths = {{"d4", from_mm(-0.3)},
+                                                              {"a2", from_mm(-0.3)},
+                                                              {"alpha3", -2.6e-4},
+                                                              {"C3", from_rad_per_nmm(4e-9)}};
   double sum = 0;
   int count = 0;
   for (std::uint64_t seed = 100; seed < 125; ++seed) {
@@ -166,7 +180,8 @@ TEST(Calibrate, StatesUncertaintiesThatFitItsErrors) {
 TEST(Calibrate, NeverMakesAComplianceNegative) {
   const auto cell = cell_7();
   for (const std::uint64_t seed : {8, 9, 10}) {
-    const Result<CalibrationResult> result = calibrate(cell, kM3, measured(chapter_5_robot(cell), 60, seed), {});
+    const Result<CalibrationResult> result =
+        calibrate(cell, kM3, measured(chapter_5_robot(cell), 60, seed), {});
     ASSERT_TRUE(result);
     for (const IdentifiedParameter& p : result->parameters) {
       if (p.parameter.name.starts_with("C")) {
@@ -183,7 +198,8 @@ TEST(Calibrate, EstimatesWhatTheModelCannotExplain) {
       calibrate(cell, {"base", "geometry"}, measured(chapter_5_robot(cell), 200, 11), {});
   ASSERT_TRUE(result);
   EXPECT_NEAR(result->discrepancy, result->rms / std::sqrt(3), 0.1 * result->discrepancy);
-  const Result<CalibrationResult> complete = calibrate(cell, kM3, measured(chapter_5_robot(cell), 200, 11), {});
+  const Result<CalibrationResult> complete =
+      calibrate(cell, kM3, measured(chapter_5_robot(cell), 200, 11), {});
   EXPECT_LT(complete->discrepancy, 4e-6);
 }
 
@@ -197,14 +213,16 @@ TEST(Calibrate, FindsAToolThatNobodyKnowsThoughTheTrackerStandsCentimetresFromWh
     std::normal_distribution<double> normal;
     const auto draw = [&] { return Vector3(normal(random), normal(random), normal(random)); };
     // Its plumb line is right: W is level, and turned.
-    const Pose moved = make_pose(rotation_exp(0.05 * normal(random) * Vector3::UnitZ()), 0.04 * draw());
+    const Pose moved =
+        make_pose(rotation_exp(0.05 * normal(random) * Vector3::UnitZ()), 0.04 * draw());
     for (const bool oriented : {true, false}) {
       MeasurementBatch batch = measured(robot, 100, seed, oriented);
       for (Measurement& m : batch.measurements) {
         m.p_W = moved * m.p_W;
         if (m.R_WT) m.R_WT = (moved.linear() * *m.R_WT).eval();
       }
-      const Result<CalibrationResult> found = calibrate(cell, {"base", "geometry", "compliance", "tool"}, batch, {});
+      const Result<CalibrationResult> found =
+          calibrate(cell, {"base", "geometry", "compliance", "tool"}, batch, {});
       ASSERT_TRUE(found) << "seed " << seed << ": " << sentence(found.error());
       EXPECT_LT(to_mm(found->rms), 0.03) << "seed " << seed;
     }
@@ -212,8 +230,8 @@ TEST(Calibrate, FindsAToolThatNobodyKnowsThoughTheTrackerStandsCentimetresFromWh
 }
 
 TEST(Calibrate, FewPosesTellHowFarPositionsAreOffThatAreFittedCloserThanOrientations) {
-  // The model's own error is in the positions alone, which then decide little and the orientations much; or the other
-  // way round. By number, half of the parameters would be fitted to either.
+  // The model's own error is in the positions alone, which then decide little and the orientations
+  // much; or the other way round. By number, half of the parameters would be fitted to either.
   const auto cell = cell_7();
   double positions = 0, rotations = 0;
   constexpr int kSeeds = 20;
@@ -221,11 +239,15 @@ TEST(Calibrate, FewPosesTellHowFarPositionsAreOffThatAreFittedCloserThanOrientat
   for (int seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937_64 random(static_cast<std::uint64_t>(seed));
     std::normal_distribution<double> normal;
-    const MeasurementBatch batch = measured(chapter_5_robot(cell), 20, static_cast<std::uint64_t>(seed));
+    const MeasurementBatch batch =
+        measured(chapter_5_robot(cell), 20, static_cast<std::uint64_t>(seed));
     MeasurementBatch shifted = batch, turned = batch;
-    for (Measurement& m : shifted.measurements) m.p_W += kOff * Vector3(normal(random), normal(random), normal(random));
+    for (Measurement& m : shifted.measurements)
+      m.p_W += kOff * Vector3(normal(random), normal(random), normal(random));
     for (Measurement& m : turned.measurements)
-      m.R_WT = (rotation_exp(kOff * Vector3(normal(random), normal(random), normal(random))) * *m.R_WT).eval();
+      m.R_WT =
+          (rotation_exp(kOff * Vector3(normal(random), normal(random), normal(random))) * *m.R_WT)
+              .eval();
     positions += demand(calibrate(cell, kM3, shifted, {})).discrepancy / kOff / kSeeds;
     rotations += demand(calibrate(cell, kM3, turned, {})).discrepancy_rotation / kOff / kSeeds;
   }
@@ -240,7 +262,8 @@ TEST(Calibrate, WeighsAPointByItsOwnSigma) {
   for (std::size_t i = 0; i < batch.measurements.size(); i += 4) {  // a quarter is bad, and says so
     Measurement& m = batch.measurements[i];
     m.sigma = 1e-3;
-    m.p_W += 1e-3 * Vector3(std::sin(double(i)), std::cos(2.0 * double(i)), std::sin(3.0 * double(i)));
+    m.p_W +=
+        1e-3 * Vector3(std::sin(double(i)), std::cos(2.0 * double(i)), std::sin(3.0 * double(i)));
   }
   EXPECT_LE(validation_rms_mm(*calibrate(cell, kM3, batch, {}), measured(robot, 300, 13)), 0.0255);
 }
@@ -262,15 +285,16 @@ TEST(Calibrate, ListsABadPoseAndIsNotPulledByIt) {
 TEST(Calibrate, FindsTheOrdersOfGearsItWasNotTold) {
   const auto cell = cell_7();
   VirtualRobot robot = chapter_5_robot(cell);
-  PhysicalModel geared = *make_physical_model(
-      cell, {"base", "geometry", "compliance_linear", "gear_transmission:1@63.4", "gear_transmission:4@28.7"});
+  PhysicalModel geared =
+      *make_physical_model(cell, {"base", "geometry", "compliance_linear",
+                                  "gear_transmission:1@63.4", "gear_transmission:4@28.7"});
   geared.values.head(36 - 6) = robot.truth.values.head(36 - 6);
   geared.values.tail(6) = robot.truth.values.tail(6);
   geared.values.segment(30, 6) << 63.4, 3e-5, -2e-5, 28.7, 4e-5, 5e-5;
   robot.truth = geared;
-  const Result<CalibrationResult> result =
-      calibrate(cell, {"base", "geometry", "compliance_linear", "gear_transmission:1", "gear_transmission:4"},
-                measured(robot, 200, 17), {});
+  const Result<CalibrationResult> result = calibrate(
+      cell, {"base", "geometry", "compliance_linear", "gear_transmission:1", "gear_transmission:4"},
+      measured(robot, 200, 17), {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_NEAR(parameter(*result, "order1").value, 63.4, 0.1);
   EXPECT_NEAR(parameter(*result, "order4").value, 28.7, 0.1);
@@ -283,7 +307,8 @@ TEST(Calibrate, TellsTwoToolsAndTwoPayloadsApartInOneBatch) {
   cell->tools["probe"] = make_pose(rotation_exp({0.2, -0.4, 0.1}), {-0.05, 0.12, 0.22});
   cell->payloads["light"] = Payload{30, {0, 0.02, 0.05}};
   VirtualRobot robot = chapter_5_robot(cell);
-  robot.truth.tools["probe"].translation() += Vector3(0.8e-3, -0.5e-3, 0.3e-3);  // the probe was bent
+  robot.truth.tools["probe"].translation() +=
+      Vector3(0.8e-3, -0.5e-3, 0.3e-3);  // the probe was bent
   MeasurementBatch batch;
   batch.id = "two";
   const Eigen::MatrixXd q = latin_hypercube(*planning_ranges(*cell), 240, 19);
@@ -300,20 +325,26 @@ TEST(Calibrate, TellsTwoToolsAndTwoPayloadsApartInOneBatch) {
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LE(to_mm(result->rms), 0.0235);
   // What two tools share is the last link's; their difference is known.
-  EXPECT_NEAR(parameter(*result, "tx[probe]").value - parameter(*result, "tx[spindle]").value, 0.8e-3, 2e-5);
-  EXPECT_NEAR(parameter(*result, "ty[probe]").value - parameter(*result, "ty[spindle]").value, -0.5e-3, 2e-5);
+  EXPECT_NEAR(parameter(*result, "tx[probe]").value - parameter(*result, "tx[spindle]").value,
+              0.8e-3, 2e-5);
+  EXPECT_NEAR(parameter(*result, "ty[probe]").value - parameter(*result, "ty[spindle]").value,
+              -0.5e-3, 2e-5);
   // One mass scales the compliances; two masses leave their ratio known: neither may be off alone.
-  EXPECT_NEAR(parameter(*result, "mass[light]").value / 30, parameter(*result, "mass[spindle]").value / 100, 0.01);
+  EXPECT_NEAR(parameter(*result, "mass[light]").value / 30,
+              parameter(*result, "mass[spindle]").value / 100, 0.01);
 }
 
 TEST(Calibrate, RefitsTheToolAndLeavesTheRobotAlone) {
   const auto cell = cell_7();
   VirtualRobot robot = chapter_5_robot(cell);
-  const CalibrationResult first =
-      *calibrate(cell, {"base", "geometry", "compliance_linear", "tool"}, measured(robot, 200, 20), {});
-  robot.truth.tools["spindle"].translation() += Vector3(1e-3, -2e-3, 0.5e-3);  // another tool of the same kind
+  const CalibrationResult first = *calibrate(
+      cell, {"base", "geometry", "compliance_linear", "tool"}, measured(robot, 200, 20), {});
+  robot.truth.tools["spindle"].translation() +=
+      Vector3(1e-3, -2e-3, 0.5e-3);  // another tool of the same kind
   const Result<CalibrationResult> second =
-      refit(first, cell, measured(robot, 15, 21), {"tool"}).map([](const Refit& refit) { return refit.result; });
+      refit(first, cell, measured(robot, 15, 21), {"tool"}).map([](const Refit& refit) {
+        return refit.result;
+      });
   ASSERT_TRUE(second) << second.error().message;
   EXPECT_LE(validation_rms_mm(*second, measured(robot, 300, 22)), 0.030);
   for (const IdentifiedParameter& p : second->parameters) {
@@ -331,17 +362,18 @@ TEST(Calibrate, RefitsACauseThatTheModelDidNotHaveAndTheFormThatItHas) {
       *calibrate(cell, {"base", "geometry", "compliance_linear"}, measured(robot, 200, 24), {});
   robot.truth.tools["spindle"].translation() += Vector3(-1e-3, 1e-3, 1e-3);
   const Result<CalibrationResult> added =
-      refit(plain, cell, measured(robot, 40, 25), {"tool", "compliance"}).map([](const Refit& refit) {
-        return refit.result;
-      });
+      refit(plain, cell, measured(robot, 40, 25), {"tool", "compliance"})
+          .map([](const Refit& refit) { return refit.result; });
   ASSERT_TRUE(added) << added.error().message;
   EXPECT_LE(validation_rms_mm(*added, measured(robot, 300, 26)), 0.030);
   EXPECT_NEAR(parameter(*added, "tx").value, -1e-3, 5e-5);
   // What is held is known or was not known before: of it nothing new is said.
   for (const UnidentifiableCombination& combination : added->unidentifiable) {
-    const bool before = std::any_of(plain.unidentifiable.begin(), plain.unidentifiable.end(),
-                                    [&](const auto& known) { return known.sentence == combination.sentence; });
-    EXPECT_TRUE(before || combination.parameters.front()[0] == 't' || combination.parameters.front()[0] == 'C')
+    const bool before =
+        std::any_of(plain.unidentifiable.begin(), plain.unidentifiable.end(),
+                    [&](const auto& known) { return known.sentence == combination.sentence; });
+    EXPECT_TRUE(before || combination.parameters.front()[0] == 't' ||
+                combination.parameters.front()[0] == 'C')
         << combination.sentence;
   }
 }
@@ -360,7 +392,8 @@ CalibrationResult with_idle_maps(CalibrationResult known, int harmonics) {
   for (Eigen::Index k = 0; k < all; ++k) {
     const auto& p = parameters[static_cast<std::size_t>(k)];
     const bool map = p.name.starts_with("map");
-    identified.push_back(map ? IdentifiedParameter{p, 0, 0, true} : known.parameters[places.size()]);
+    identified.push_back(map ? IdentifiedParameter{p, 0, 0, true}
+                             : known.parameters[places.size()]);
     if (!map) places.push_back(k);
   }
   EXPECT_EQ(static_cast<Eigen::Index>(places.size()), own);
@@ -374,8 +407,8 @@ CalibrationResult with_idle_maps(CalibrationResult known, int harmonics) {
 TEST(Calibrate, WhatIsKeptHasNoPartInARefitHoweverMuchItIs) {
   const auto cell = cell_7();
   VirtualRobot robot = chapter_5_robot(cell);
-  const CalibrationResult few =
-      *calibrate(cell, {"base", "geometry", "compliance_linear", "tool"}, measured(robot, 200, 20), {});
+  const CalibrationResult few = *calibrate(cell, {"base", "geometry", "compliance_linear", "tool"},
+                                           measured(robot, 200, 20), {});
   const CalibrationResult many = with_idle_maps(few, 80);
   EXPECT_EQ(many.parameters.size(), few.parameters.size() + 960);
   robot.truth.tools["spindle"].translation() += Vector3(1e-3, -2e-3, 0.5e-3);
@@ -385,7 +418,8 @@ TEST(Calibrate, WhatIsKeptHasNoPartInARefitHoweverMuchItIs) {
   for (const Eigen::Index k : one.anew) {
     const IdentifiedParameter& p = one.result.parameters[static_cast<std::size_t>(k)];
     EXPECT_NEAR(parameter(other.result, p.parameter.name).value, p.value, 1e-9) << p.parameter.name;
-    EXPECT_NEAR(parameter(other.result, p.parameter.name).stddev, p.stddev, 1e-3 * p.stddev) << p.parameter.name;
+    EXPECT_NEAR(parameter(other.result, p.parameter.name).stddev, p.stddev, 1e-3 * p.stddev)
+        << p.parameter.name;
   }
   EXPECT_EQ(other.result.rank, one.result.rank + 960);
 }
@@ -393,8 +427,10 @@ TEST(Calibrate, WhatIsKeptHasNoPartInARefitHoweverMuchItIs) {
 TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {
   const auto cell = cell_7();
   const MeasurementBatch batch = measured(chapter_5_robot(cell), 30, 23);
-  const std::pair<const char*, const char*> lacking[] = {
-      {"thermal_growth", "temperature_c"}, {"tracker_drift", "time_s"}, {"backlash:2", "dir2"}, {"time_lag", "time_s"}};
+  const std::pair<const char*, const char*> lacking[] = {{"thermal_growth", "temperature_c"},
+                                                         {"tracker_drift", "time_s"},
+                                                         {"backlash:2", "dir2"},
+                                                         {"time_lag", "time_s"}};
   for (const auto& [spec, column] : lacking) {
     const Result<CalibrationResult> result = calibrate(cell, {"base", spec}, batch, {});
     EXPECT_EQ(refusal_of(result), Refusal("batch virtual", {}, column).text(spec)) << spec;
@@ -408,7 +444,8 @@ TEST(Calibrate, RefusesJointsThatDoNotLeadToThePositionsBesideThem) {
   for (Measurement& m : swapped.measurements) std::swap(m.context.q(1), m.context.q(2));
   MeasurementBatch moved = batch;
   for (std::size_t i = 0; i < moved.measurements.size(); ++i)
-    moved.measurements[i].context.q = batch.measurements[(i + 1) % batch.measurements.size()].context.q;
+    moved.measurements[i].context.q =
+        batch.measurements[(i + 1) % batch.measurements.size()].context.q;
   for (const MeasurementBatch& wrong : {swapped, moved}) {
     const auto result = calibrate(cell, {"base", "geometry"}, wrong, {});
     ASSERT_FALSE(result);

@@ -24,7 +24,8 @@ Chain shipped(const std::string& file) {
   return *chain;
 }
 
-/// The robot as a workshop made it: every length off by some tenths of a mm, every angle by some 0.02 deg.
+/// The robot as a workshop made it: every length off by some tenths of a mm, every angle by some
+/// 0.02 deg.
 Chain perturbed(const Chain& nominal, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> length(0, 0.3e-3);
@@ -43,7 +44,8 @@ Chain perturbed(const Chain& nominal, std::uint64_t seed) {
     }
     joints.push_back(joint);
     for (int j = 0; j < nominal.size(); ++j) {
-      if (i != j && nominal.transmission()(i, j) != 0) couplings.push_back({i, j, nominal.transmission()(i, j)});
+      if (i != j && nominal.transmission()(i, j) != 0)
+        couplings.push_back({i, j, nominal.transmission()(i, j)});
     }
   }
   return *Chain::make(nominal.name(), joints, couplings);
@@ -139,22 +141,26 @@ std::map<std::string, double> true_deviations(const Chain& nominal, const Chain&
   return out;
 }
 
-CirclePointResult analysed(const Chain& robot, const ArcList& arcs, const CirclePointOptions& options = {}) {
+CirclePointResult analysed(const Chain& robot, const ArcList& arcs,
+                           const CirclePointOptions& options = {}) {
   const Result<CirclePointResult> result = analyse_circle_points(robot, arcs, options);
   EXPECT_TRUE(result) << (result ? "" : result.error().message);
   return *result;
 }
 
 TEST(CirclePoint, RecoversTheLinksExactlyFromExactArcs) {
-  for (const char* file : {"abb_irb6640-205-275.yaml", "universal-robots_ur10.yaml", "kuka_kr210-r2700-extra.yaml",
-                           "fanuc_m-20ia.yaml", "staubli_tx2-90l.yaml", "kuka_lbr-iiwa-7-r800.yaml"}) {
+  for (const char* file :
+       {"abb_irb6640-205-275.yaml", "universal-robots_ur10.yaml", "kuka_kr210-r2700-extra.yaml",
+        "fanuc_m-20ia.yaml", "staubli_tx2-90l.yaml", "kuka_lbr-iiwa-7-r800.yaml"}) {
     const Chain nominal = shipped(file);
     const Chain truth = perturbed(nominal, 1);
-    const CirclePointResult result = analysed(nominal, measured(truth, wide(nominal), 1), {.sigma = 1e-9});
+    const CirclePointResult result =
+        analysed(nominal, measured(truth, wide(nominal), 1), {.sigma = 1e-9});
     const auto deviations = true_deviations(nominal, truth);
     for (const MeasuredParameter& parameter : result.parameters) {
       if (!parameter.measured) continue;
-      EXPECT_NEAR(parameter.deviation, deviations.at(parameter.name), 1e-9) << file << " " << parameter.name;
+      EXPECT_NEAR(parameter.deviation, deviations.at(parameter.name), 1e-9)
+          << file << " " << parameter.name;
     }
   }
 }
@@ -181,9 +187,11 @@ double share_within_u(const Campaign& campaign, const CirclePointOptions& option
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     const Chain truth = perturbed(nominal, seed);
     const auto deviations = true_deviations(nominal, truth);
-    for (const MeasuredParameter& parameter : analysed(nominal, measured(truth, campaign, seed), options).parameters) {
+    for (const MeasuredParameter& parameter :
+         analysed(nominal, measured(truth, campaign, seed), options).parameters) {
       if (!parameter.measured) continue;
-      within += std::abs(parameter.deviation - deviations.at(parameter.name)) <= parameter.u ? 1 : 0;
+      within +=
+          std::abs(parameter.deviation - deviations.at(parameter.name)) <= parameter.u ? 1 : 0;
       ++all;
     }
   }
@@ -196,7 +204,8 @@ TEST(CirclePoint, StatesUncertaintiesThatHold) {
   Campaign broad = wide(nominal);
   narrow.sigma = broad.sigma = 10e-6;
   for (const Campaign& campaign : {narrow, broad}) {
-    for (const CirclePointOptions& options : {CirclePointOptions{}, CirclePointOptions{.sigma = 10e-6}}) {
+    for (const CirclePointOptions& options :
+         {CirclePointOptions{}, CirclePointOptions{.sigma = 10e-6}}) {
       const double share = share_within_u(campaign, options);
       EXPECT_GT(share, 0.92) << options.sigma.value_or(0);
       EXPECT_LT(share, 0.997) << options.sigma.value_or(0);
@@ -210,7 +219,8 @@ TEST(CirclePoint, WiderArcsMeasureTheElbowBetter) {
   Campaign broad = wide(nominal);
   narrow.sigma = broad.sigma = 10e-6;
   const auto u_of = [&](const Campaign& campaign, const std::string& name) {
-    for (const auto& parameter : analysed(nominal, measured(nominal, campaign, 5), {.sigma = 10e-6}).parameters) {
+    for (const auto& parameter :
+         analysed(nominal, measured(nominal, campaign, 5), {.sigma = 10e-6}).parameters) {
       if (parameter.name == name) return parameter.u;
     }
     return 0.0;
@@ -248,7 +258,8 @@ TEST(CirclePoint, FitsSayHowFarThePointsAreFromPlaneAndCircle) {
 
 TEST(CirclePoint, SaysWhatArcsCannotShow) {
   const Chain nominal = shipped("abb_irb6640-205-275.yaml");
-  const CirclePointResult result = analysed(nominal, measured(perturbed(nominal, 1), wide(nominal), 1));
+  const CirclePointResult result =
+      analysed(nominal, measured(perturbed(nominal, 1), wide(nominal), 1));
   std::string missing;
   for (const MeasuredParameter& parameter : result.parameters) {
     EXPECT_EQ(parameter.measured, parameter.note.empty());
@@ -261,16 +272,19 @@ TEST(CirclePoint, TheMeasuredRobotAndBasePutReflectorsWhereTheyWereSeen) {
   const Chain nominal = shipped("fanuc_m-20ia.yaml");
   const ArcList arcs = measured(perturbed(nominal, 3), wide(nominal), 1);
   const CirclePointResult result = analysed(nominal, arcs, {.sigma = 1e-9});
-  // A point of link 3 as the first position of its arc shows it, carried along by the measured robot.
+  // A point of link 3 as the first position of its arc shows it, carried along by the measured
+  // robot.
   const Pose X_BW = result.X_WB.inverse();
   std::optional<Vector3> p_link;
   for (const ArcPoint& point : arcs.points) {
     if (point.joint != 2 || point.reflector != "A") continue;
     const Vector3 origin = point_of_link(result.robot, point.q, 2, Vector3::Zero());
     Matrix3 R;
-    for (int k = 0; k < 3; ++k) R.col(k) = point_of_link(result.robot, point.q, 2, Vector3::Unit(k)) - origin;
+    for (int k = 0; k < 3; ++k)
+      R.col(k) = point_of_link(result.robot, point.q, 2, Vector3::Unit(k)) - origin;
     if (!p_link) p_link = R.transpose() * (X_BW * point.p_W - origin);
-    EXPECT_LT((result.X_WB * point_of_link(result.robot, point.q, 2, *p_link) - point.p_W).norm(), 1e-8);
+    EXPECT_LT((result.X_WB * point_of_link(result.robot, point.q, 2, *p_link) - point.p_W).norm(),
+              1e-8);
   }
   EXPECT_TRUE(p_link);
 }
@@ -300,12 +314,15 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
     if (point.joint == 1) point.p_W = Vector3(point.q(1), 0, 0);
   }
   EXPECT_EQ(refusal(line, nominal), Refusal(good.where, 7, "joint").value(2));
-  EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")), Refusal(good.where, {}, "a1").beyond(320, 100));
-  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal(good.where, 2).beyond(6, 7));
+  EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")),
+            Refusal(good.where, {}, "a1").beyond(320, 100));
+  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")),
+            Refusal(good.where, 2).beyond(6, 7));
 }
 
 /// What a test expects of the numbers of `result` that are measured; the names of the others.
-std::string expect_measured(const CirclePointResult& result, const std::map<std::string, double>& deviations) {
+std::string expect_measured(const CirclePointResult& result,
+                            const std::map<std::string, double>& deviations) {
   std::string missing;
   for (const MeasuredParameter& parameter : result.parameters) {
     if (!parameter.measured) {
@@ -379,9 +396,11 @@ TEST(CirclePoint, PassesOverAJointThatSlidesAlongTheNextAxis) {
   const CirclePointResult result = analysed(scara(), arcs, {.sigma = 1e-9});
   EXPECT_EQ(expect_measured(result, true_deviations(rows, truth)), "q1 q4 d4 a4 alpha4 ");
   EXPECT_TRUE(says(result, "joint 3 slides"));
-  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), all, {})), Refusal(all.where, 50, "joint").value(3));
+  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), all, {})),
+            Refusal(all.where, 50, "joint").value(3));
   arcs.points[30].q(2) = 0.09;
-  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), arcs, {})), Refusal(arcs.where, 32, "q3_mm").beyond(90, 80));
+  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), arcs, {})),
+            Refusal(arcs.where, 32, "q3_mm").beyond(90, 80));
 }
 
 TEST(CirclePoint, TellsTheArmOnARailThatNoArcIsOf) {
@@ -420,11 +439,16 @@ TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {
   EXPECT_NEAR(point.q(0), from_deg(10), 1e-12);
   EXPECT_NEAR(point.q(1), from_deg(-45), 1e-12);  // the turning joint's own angle
   EXPECT_NEAR(point.p_W.z(), 0.3, 1e-12);
-  const auto refusal = [&](const std::string& text) { return refusal_of(parse_arcs_csv(text, "a.csv", robot)); };
+  const auto refusal = [&](const std::string& text) {
+    return refusal_of(parse_arcs_csv(text, "a.csv", robot));
+  };
   EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm\n"), Refusal("a.csv", {}, "z_mm"));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n"), Refusal("a.csv", 2, "joint").beyond(7, 6));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n"), Refusal("a.csv", 2, "y_mm").text("far"));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n"), Refusal("a.csv").beyond(1, 6));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n"),
+            Refusal("a.csv", 2, "joint").beyond(7, 6));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n"),
+            Refusal("a.csv", 2, "y_mm").text("far"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n"),
+            Refusal("a.csv").beyond(1, 6));
 }
 
 }  // namespace

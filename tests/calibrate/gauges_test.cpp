@@ -30,8 +30,9 @@ const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
 constexpr double kSigma = 0.05;  // mm, of a good draw wire
 
 const IdentifiedParameter* parameter(const CalibrationResult& result, const std::string& name) {
-  const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                  [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
+  const auto found =
+      std::find_if(result.parameters.begin(), result.parameters.end(),
+                   [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
   return found == result.parameters.end() ? nullptr : &*found;
 }
 
@@ -52,14 +53,16 @@ TEST(Gauges, DrawWiresToKnownAnchorsTellTheArmAsWellAsTheyCan) {
     const GaugedArm arm = gauged_arm(seed, three_corners());
     const std::vector<GaugeRow> rows = wire_rows(arm, 200, seed);
     ASSERT_EQ(rows.size(), 200U);
-    const Result<CalibrationResult> found = calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
+    const Result<CalibrationResult> found =
+        calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_TRUE(found->converged);
     EXPECT_FALSE(has_source(*found, kInstrumentZero)) << "nothing asks for a zero";
     missed += std::pow(test::volumetric_mm(arm, *found, false, 1000 + seed), 2);
     least += std::pow(test::least_volumetric_mm(arm, rows, kSigma, true, false, 1000 + seed), 2);
     const auto positions = gauge_batch(arm, test::position_rows(arm, 200, seed), kSigma, seed);
-    by_positions += std::pow(test::volumetric_mm(arm, *calibrate(arm.cell, kM3, positions, {}), false, 1000 + seed), 2);
+    by_positions += std::pow(
+        test::volumetric_mm(arm, *calibrate(arm.cell, kM3, positions, {}), false, 1000 + seed), 2);
   }
   test::tell_figure("200 distances over the bound", std::sqrt(missed / least));
   test::tell_figure("200 distances over 200 positions", std::sqrt(missed / by_positions));
@@ -72,12 +75,15 @@ TEST(Gauges, DrawWiresToAnchorsThatNobodyMeasuredTellTheArmButNotWhereItStands) 
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const GaugedArm arm = gauged_arm(seed, three_corners(), unknown_places(three_corners()));
     const std::vector<GaugeRow> rows = wire_rows(arm, 200, seed);
-    const Result<CalibrationResult> found = calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
+    const Result<CalibrationResult> found =
+        calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
     ASSERT_TRUE(found) << found.error().message;
     missed += std::pow(test::volumetric_mm(arm, *found, true, 1000 + seed), 2);
     least += std::pow(test::least_volumetric_mm(arm, rows, kSigma, false, true, 1000 + seed), 2);
-    EXPECT_NE(sentences(*found).find("do not tell where the base stands"), std::string::npos) << sentences(*found);
-    // Told in the base's frame, the anchors are where they are; in the world as uncertain as the base is.
+    EXPECT_NE(sentences(*found).find("do not tell where the base stands"), std::string::npos)
+        << sentences(*found);
+    // Told in the base's frame, the anchors are where they are; in the world as uncertain as the
+    // base is.
     ASSERT_NE(parameter(*found, "ax[a1]"), nullptr);
     EXPECT_GT(parameter(*found, "ax[a1]")->stddev, from_mm(0.5));
   }
@@ -86,12 +92,15 @@ TEST(Gauges, DrawWiresToAnchorsThatNobodyMeasuredTellTheArmButNotWhereItStands) 
 }
 
 TEST(Gauges, OneKnownAnchorLeavesTheTurnsAboutItAndTwoThatAboutTheirLine) {
-  const std::string one = "{a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: null}, a3: {xyz_mm: null}}";
-  const std::string two = "{a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: null}}";
+  const std::string one =
+      "{a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: null}, a3: {xyz_mm: null}}";
+  const std::string two =
+      "{a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: null}}";
   for (const auto& [yaml, said] :
        {std::pair(one, "how the base is turned about it"), std::pair(two, "about the line")}) {
     const GaugedArm arm = gauged_arm(4, three_corners(), yaml);
-    const auto found = calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 150, 4), kSigma, 4), {});
+    const auto found =
+        calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 150, 4), kSigma, 4), {});
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_NE(sentences(*found).find(said), std::string::npos) << sentences(*found);
   }
@@ -100,7 +109,8 @@ TEST(Gauges, OneKnownAnchorLeavesTheTurnsAboutItAndTwoThatAboutTheirLine) {
 TEST(Gauges, TheZeroOfAnInstrumentIsFoundWhereTheDistancesAskForIt) {
   for (const double zero : {0.7, 80.0}) {
     const GaugedArm arm = gauged_arm(5, three_corners());
-    const auto found = calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, zero), kSigma, 5), {});
+    const auto found =
+        calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, zero), kSigma, 5), {});
     ASSERT_TRUE(found) << found.error().message;
     ASSERT_TRUE(has_source(*found, kInstrumentZero)) << zero;
     for (const char* name : {"zero[a1]", "zero[a2]", "zero[a3]"}) {
@@ -117,7 +127,8 @@ TEST(Gauges, AZeroThatTheCellFileTellsIsTakenOff) {
       "{a1: {xyz_mm: [2300, -1500, 100], zero_mm: 0.7}, a2: {xyz_mm: [1900, 1700, 400], zero_mm: "
       "0.7}, a3: {xyz_mm: [2600, 200, 2600], zero_mm: 0.7}}";
   const GaugedArm arm = gauged_arm(5, three_corners(), yaml);
-  const auto found = calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, 0.7), kSigma, 5), {});
+  const auto found =
+      calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, 0.7), kSigma, 5), {});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_FALSE(has_source(*found, kInstrumentZero));
   EXPECT_LT(to_mm(found->rms), 1.1 * kSigma);
@@ -132,7 +143,8 @@ std::vector<GaugeRow> every_kind(const GaugedArm& arm, int each, std::uint64_t s
     rows.push_back(row);
     const Eigen::Vector3d& a1 = arm.anchors_mm.at("a1");
     if (k % 6 == 1) {
-      rows[k].anchor = "a1", rows[k].column = "distance_mm", rows[k].value_mm = (point(k) - a1).norm();
+      rows[k].anchor = "a1", rows[k].column = "distance_mm",
+      rows[k].value_mm = (point(k) - a1).norm();
     } else if (k % 6 == 2) {
       rows[k].anchor = "ball", rows[k].column = "touch_mm";
       rows[k].value_mm = (point(k) - arm.anchors_mm.at("ball")).norm() - 12.7;
@@ -141,9 +153,11 @@ std::vector<GaugeRow> every_kind(const GaugedArm& arm, int each, std::uint64_t s
       rows[k].value_mm = (point(k) - arm.anchors_mm.at("table")).dot(Eigen::Vector3d(0, 0.6, 0.8));
     } else if (k % 6 == 4) {
       const Eigen::Vector3d d = point(k) - arm.anchors_mm.at("bore");
-      rows[k].anchor = "bore", rows[k].column = "touch_mm", rows[k].value_mm = std::hypot(d.x(), d.z()) - 25;
+      rows[k].anchor = "bore", rows[k].column = "touch_mm",
+      rows[k].value_mm = std::hypot(d.x(), d.z()) - 25;
     } else if (k % 6 == 5) {
-      rows[k].anchor = "a1", rows[k].column = "distance_mm", rows[k].minus_pose = fmt::format("p{}", k);
+      rows[k].anchor = "a1", rows[k].column = "distance_mm",
+      rows[k].minus_pose = fmt::format("p{}", k);
       rows[k].value_mm = (point(k) - a1).norm() - (point(k - 1) - a1).norm();
     }
   }
@@ -153,17 +167,20 @@ std::vector<GaugeRow> every_kind(const GaugedArm& arm, int each, std::uint64_t s
 GaugedArm arm_with_every_kind(std::uint64_t seed) {
   return gauged_arm(
       seed,
-      {{"a1", {2300, -1500, 100}}, {"ball", {1500, 600, 500}}, {"table", {1500, 0, 200}}, {"bore", {1400, -500, 900}}},
-      "{a1: {xyz_mm: null, zero_mm: null}, ball: {xyz_mm: null, sphere_radius_mm: 12.7, zero_mm: 0}, table: "
-      "{xyz_mm: [1500, 0, 200], plane_normal: [0, 0.6, 0.8], zero_mm: 0}, bore: {xyz_mm: [1400, -500, "
-      "900], ring_axis: [0, 1, 0], ring_radius_mm: 25, zero_mm: 0}}");
+      {{"a1", {2300, -1500, 100}},
+       {"ball", {1500, 600, 500}},
+       {"table", {1500, 0, 200}},
+       {"bore", {1400, -500, 900}}},
+      "{a1: {xyz_mm: null, zero_mm: null}, ball: {xyz_mm: null, sphere_radius_mm: 12.7, zero_mm: "
+      "0}, table: {xyz_mm: [1500, 0, 200], plane_normal: [0, 0.6, 0.8], zero_mm: 0}, bore: "
+      "{xyz_mm: [1400, -500, 900], ring_axis: [0, 1, 0], ring_radius_mm: 25, zero_mm: 0}}");
 }
 
 TEST(Gauges, DerivativesAreExactForEveryKind) {
   const GaugedArm arm = arm_with_every_kind(6);
   const MeasurementBatch batch = gauge_batch(arm, every_kind(arm, 4, 6), kSigma, 6);
-  PhysicalModel model =
-      test::demand(make_physical_model(arm.cell, {"base", "geometry", "compliance", "anchors", "instrument_zero"}));
+  PhysicalModel model = test::demand(make_physical_model(
+      arm.cell, {"base", "geometry", "compliance", "anchors", "instrument_zero"}));
   for (const auto& [id, p] : arm.anchors_mm) {
     const Eigen::Index place = placed_anchor(model, id).place;
     if (place >= 0) model.values.segment<3>(place) = from_mm(1) * p;
@@ -185,7 +202,8 @@ TEST(Gauges, DerivativesAreExactForEveryKind) {
       Eigen::VectorXd up = x, down = x;
       up(k) += kStep, down(k) -= kStep;
       double above = 0, below = 0;
-      ASSERT_TRUE(pose.evaluate(up.data(), &above, nullptr) && pose.evaluate(down.data(), &below, nullptr));
+      ASSERT_TRUE(pose.evaluate(up.data(), &above, nullptr) &&
+                  pose.evaluate(down.data(), &below, nullptr));
       const double numeric = (above - below) / (2 * kStep);
       EXPECT_NEAR(J(k), numeric, 1e-4 * std::max(1.0, std::abs(numeric))) << m.pose_id << " " << k;
     }
@@ -231,9 +249,10 @@ TEST(Gauges, AWrongDistanceIsASuspectAndDoesNoHarm) {
             2 * test::least_volumetric_mm(arm, rows, kSigma, true, false, 60));
 }
 
-/// Poses of the second simulation whose tool is within the stroke of a ballbar about `centre`: the first three joints
-/// bring it there, the wrist is as drawn.
-std::vector<GaugeRow> ballbar_rows(const GaugedArm& arm, double length_mm, double stroke_mm, int count) {
+/// Poses of the second simulation whose tool is within the stroke of a ballbar about `centre`: the
+/// first three joints bring it there, the wrist is as drawn.
+std::vector<GaugeRow> ballbar_rows(const GaugedArm& arm, double length_mm, double stroke_mm,
+                                   int count) {
   const Eigen::Vector3d centre = arm.anchors_mm.at("c");
   hidden::Random random(17);
   std::vector<GaugeRow> rows;
@@ -245,9 +264,11 @@ std::vector<GaugeRow> ballbar_rows(const GaugedArm& arm, double length_mm, doubl
   };
   while (static_cast<int>(rows.size()) < count) {
     hidden::MeasuringPose pose;
-    const Eigen::Vector3d towards =
-        Eigen::Vector3d(hidden::normal(random), hidden::normal(random), std::abs(hidden::normal(random))).normalized();
-    const Eigen::Vector3d wanted = centre + (length_mm + hidden::uniform(random, -stroke_mm, stroke_mm)) * towards;
+    const Eigen::Vector3d towards = Eigen::Vector3d(hidden::normal(random), hidden::normal(random),
+                                                    std::abs(hidden::normal(random)))
+                                        .normalized();
+    const Eigen::Vector3d wanted =
+        centre + (length_mm + hidden::uniform(random, -stroke_mm, stroke_mm)) * towards;
     pose.q << 0.1, 0.2, 0.1, hidden::uniform(random, -1.5, 1.5), hidden::uniform(random, -1.0, 1.0),
         hidden::uniform(random, -2, 2);
     for (int k = 0; k < 30; ++k) {
@@ -280,13 +301,15 @@ TEST(Gauges, ATelescopingBallbarSaysWhatItsStrokeCannotKnow) {
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_FALSE(has_source(*found, kInstrumentZero)) << "no stroke of a ballbar asks for its zero";
   EXPECT_NE(sentences(*found).find("do not tell where the base stands"), std::string::npos);
-  EXPECT_NE(sentences(*found).find("all 100 distances are between 29"), std::string::npos) << sentences(*found);
+  EXPECT_NE(sentences(*found).find("all 100 distances are between 29"), std::string::npos)
+      << sentences(*found);
   EXPECT_NE(sentences(*found).find("taken as exact"), std::string::npos) << sentences(*found);
 
   const GaugedArm open = gauged_arm(11, centre, "{c: {xyz_mm: null, zero_mm: null}}");
   const auto unsure = calibrate(open.cell, kM3, gauge_batch(open, rows, 0.001, 11), {});
   ASSERT_TRUE(unsure) << unsure.error().message;
-  EXPECT_NE(sentences(*unsure).find("zero and the robot's size (all lengths alike) change the distances nearly alike"),
+  EXPECT_NE(sentences(*unsure).find(
+                "zero and the robot's size (all lengths alike) change the distances nearly alike"),
             std::string::npos)
       << sentences(*unsure);
   const IdentifiedParameter* zero = parameter(*unsure, "zero[c]");
@@ -306,28 +329,33 @@ TEST(Gauges, WhatDistancesDoNotTellIsRefusedWithWhatToDo) {
   nowhere->X_WB.reset();
   GaugedArm based = arm;
   based.cell = nowhere;
-  EXPECT_NE(refusal(based, wire_rows(arm, 60, 12)).find("distances alone do not tell where the base is"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal(based, wire_rows(arm, 60, 12)).find("distances alone do not tell where the base is"),
+      std::string::npos);
 
   std::vector<GaugeRow> wrong = wire_rows(arm, 60, 12);
   for (std::size_t i = 0; i + 1 < wrong.size(); ++i) std::swap(wrong[i].pose, wrong[i + 1].pose);
-  EXPECT_NE(refusal(gauged_arm(12, three_corners()), wrong).find("do not lead to these distances"), std::string::npos);
+  EXPECT_NE(refusal(gauged_arm(12, three_corners()), wrong).find("do not lead to these distances"),
+            std::string::npos);
 
   MeasurementBatch two = gauge_batch(arm, wire_rows(arm, 60, 12), kSigma, 12);
   two.sessions = {"monday", "tuesday"};
   for (std::size_t i = 30; i < 60; ++i) two.measurements[i].session = 1;
   const auto found = calibrate(arm.cell, kM3, two, {});
   ASSERT_FALSE(found);
-  EXPECT_NE(found.error().message.find("set-ups of the instrument"), std::string::npos) << found.error().message;
+  EXPECT_NE(found.error().message.find("set-ups of the instrument"), std::string::npos)
+      << found.error().message;
 }
 
 /// A UR5 whose tool nobody knows; its tip touches a point.
 std::shared_ptr<const Cell> cell_of_touches() {
   const std::string text =
-      "version: 1\ncell: touches\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0]}\ntools: {tip: null}\n"
+      "version: 1\ncell: touches\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0]}\ntools: {tip: "
+      "null}\n"
       "anchors: {point: {xyz_mm: null, sphere_radius_mm: 0.001}}\ntracker: {sigma_mm: 0.02}\n";
   return std::make_shared<const Cell>(test::demand(parse_cell(
-      text, test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur5.yaml")), "cell.yaml")));
+      text, test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur5.yaml")),
+      "cell.yaml")));
 }
 
 Gauge touch(double value) {
@@ -352,14 +380,17 @@ TEST(Gauges, TouchesOfOnePointNameTheWayInWhichAnUnknownToolIsRead) {
     m.gauge.reset();
     m.p_W = Vector3::Zero();
   }
-  const auto found = calibrate(test::cell_of_one_point("null", "null", "{error_sources: []}"), {}, batch, {});
+  const auto found =
+      calibrate(test::cell_of_one_point("null", "null", "{error_sources: []}"), {}, batch, {});
   ASSERT_TRUE(found) << found.error().message;
   PoseContext anywhere;
   anywhere.q = JointVector::Zero(6);
   anywhere.tool = "tip";
-  EXPECT_LT((found->model.state(anywhere).X_FT.translation() - Vector3(0.03, 0, 0.15)).norm(), 1e-5);
+  EXPECT_LT((found->model.state(anywhere).X_FT.translation() - Vector3(0.03, 0, 0.15)).norm(),
+            1e-5);
   ASSERT_FALSE(found->unidentifiable.empty());
-  EXPECT_EQ(found->unidentifiable.front().parameters, (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
+  EXPECT_EQ(found->unidentifiable.front().parameters,
+            (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
 }
 
 TEST(Gauges, DistancesWithAnUnknownToolNameTouchesOfOnePointAmongTheWays) {
@@ -368,7 +399,8 @@ TEST(Gauges, DistancesWithAnUnknownToolNameTouchesOfOnePointAmongTheWays) {
   for (Measurement& m : batch.measurements) m.gauge = touch(0.2);
   const auto refusal = calibrate(cell, {}, batch, {});
   ASSERT_FALSE(refusal);
-  EXPECT_NE(refusal.error().next.find("measure some positions; or let its point touch one point"), std::string::npos)
+  EXPECT_NE(refusal.error().next.find("measure some positions; or let its point touch one point"),
+            std::string::npos)
       << refusal.error().next;
 }
 

@@ -12,7 +12,8 @@
 #include "tests/support/demand.h"
 #include "tests/support/heavy_arm.h"
 
-// What real joints, rails and instruments do, hidden in the second simulation, which computes it by other means.
+// What real joints, rails and instruments do, hidden in the second simulation, which computes it by
+// other means.
 namespace trammel {
 namespace {
 
@@ -26,10 +27,11 @@ const double kNoise_mm = 0.013 * std::sqrt(3.0);
 const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
 
 Effect hidden_effect(std::function<void(const MeasuringPose&, Moment&)> act) {
-  return {
-      {"unknown", 0, "", -1, {}, 0}, {}, Eigen::VectorXd(), {}, [act](const MeasuringPose& p, const auto&, Moment& m) {
-        act(p, m);
-      }};
+  return {{"unknown", 0, "", -1, {}, 0},
+          {},
+          Eigen::VectorXd(),
+          {},
+          [act](const MeasuringPose& p, const auto&, Moment& m) { act(p, m); }};
 }
 
 HeavyArm arm_with(std::uint64_t seed, std::function<void(const MeasuringPose&, Moment&)> act) {
@@ -53,17 +55,20 @@ double held_out_mm(const CalibrationResult& result, const MeasurementBatch& batc
 
 /// Trained on one batch, held out on another: the noise with `sources`, `times` as much without.
 CalibrationResult expect_to_explain(const HeavyArm& arm, const std::vector<std::string>& sources,
-                                    const MeasurementBatch& batch, const MeasurementBatch& fresh, double times) {
+                                    const MeasurementBatch& batch, const MeasurementBatch& fresh,
+                                    double times) {
   const CalibrationResult found = test::demand(calibrate(arm.cell, with(sources), batch, {}));
   EXPECT_LE(held_out_mm(found, fresh), 1.05 * kNoise_mm) << sources.front();
-  EXPECT_GE(held_out_mm(test::demand(calibrate(arm.cell, kM3, batch, {})), fresh), times * kNoise_mm)
+  EXPECT_GE(held_out_mm(test::demand(calibrate(arm.cell, kM3, batch, {})), fresh),
+            times * kNoise_mm)
       << sources.front();
   return found;
 }
 
 bool is_identified(const CalibrationResult& result, const std::string& name) {
-  return std::any_of(result.parameters.begin(), result.parameters.end(),
-                     [&](const IdentifiedParameter& p) { return p.parameter.name == name && p.identified; });
+  return std::any_of(
+      result.parameters.begin(), result.parameters.end(),
+      [&](const IdentifiedParameter& p) { return p.parameter.name == name && p.identified; });
 }
 
 /// How often what was found lies within U(k=2) of the truth.
@@ -71,8 +76,9 @@ struct Coverage {
   int within = 0, all = 0;
   void add(const CalibrationResult& result, const std::map<std::string, double>& truth) {
     for (const auto& [name, value] : truth) {
-      const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                      [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
+      const auto found =
+          std::find_if(result.parameters.begin(), result.parameters.end(),
+                       [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
       ASSERT_NE(found, result.parameters.end()) << name;
       EXPECT_NEAR(found->value, value, 4 * found->stddev) << name;
       within += std::abs(found->value - value) <= 2 * found->stddev ? 1 : 0;
@@ -87,12 +93,14 @@ TEST(JointPhysics, ABeltPastAnotherAxisIsFoundWithItsNumbers) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const double phase = static_cast<double>(seed);
     const HeavyArm arm = arm_with(seed, [phase](const MeasuringPose& p, Moment& m) {
-      const double pulley = p.q(1);          // the belt's pulley turns with joint 2, a little off its centre
+      const double pulley =
+          p.q(1);  // the belt's pulley turns with joint 2, a little off its centre
       const double motor = p.q(1) + p.q(2);  // and so does what drives it, which stands before both
       m.q(2) += 4e-4 * pulley + 3e-4 * std::sin(pulley + phase) + 2e-4 * std::sin(motor - phase);
     });
-    const CalibrationResult found = expect_to_explain(arm, {"joint_coupling:3"}, test::measured(arm, 400, seed),
-                                                      test::measured(arm, 400, 100 + seed), 3);
+    const CalibrationResult found =
+        expect_to_explain(arm, {"joint_coupling:3"}, test::measured(arm, 400, seed),
+                          test::measured(arm, 400, 100 + seed), 3);
     EXPECT_TRUE(is_identified(found, "couple_rate3.2"));
     EXPECT_TRUE(is_identified(found, "sum_sin3.2_1"));
     coverage.add(found, {{"couple_rate3.2", 4e-4},
@@ -104,14 +112,15 @@ TEST(JointPhysics, ABeltPastAnotherAxisIsFoundWithItsNumbers) {
   EXPECT_GE(coverage.share(), 0.88) << coverage.all;
 }
 
-/// The angle that the rocker of a four-bar linkage stands at for an angle of its crank. A parallelogram, if bars that
-/// face one another were as long.
+/// The angle that the rocker of a four-bar linkage stands at for an angle of its crank. A
+/// parallelogram, if bars that face one another were as long.
 double rocker_angle(double crank_angle) {
   const double ground = 1280, crank = 400, coupler = 1280.12, rocker = 399.93;  // mm
   const Eigen::Vector2d pin(crank * std::cos(crank_angle), crank * std::sin(crank_angle));
   const Eigen::Vector2d pivot(ground, 0);
   const Eigen::Vector2d line = pivot - pin;
-  const double along = (coupler * coupler - rocker * rocker + line.squaredNorm()) / (2 * line.norm());
+  const double along =
+      (coupler * coupler - rocker * rocker + line.squaredNorm()) / (2 * line.norm());
   const double across = std::sqrt(coupler * coupler - along * along);
   const Eigen::Vector2d unit = line.normalized();
   const Eigen::Vector2d joint = pin + along * unit + across * Eigen::Vector2d(-unit.y(), unit.x());
@@ -119,8 +128,9 @@ double rocker_angle(double crank_angle) {
 }
 
 TEST(JointPhysics, AParallelogramWithWrongBarsIsDescribed) {
-  // Joint 3 is commanded against the horizontal, as arms with a parallelogram are: it follows joint 2 backwards. Its
-  // gear turns the forearm against the base, so what the gear of joint 2 gives way leaves the forearm as it stands.
+  // Joint 3 is commanded against the horizontal, as arms with a parallelogram are: it follows joint
+  // 2 backwards. Its gear turns the forearm against the base, so what the gear of joint 2 gives way
+  // leaves the forearm as it stands.
   HeavyArm arm = arm_with(3, [](const MeasuringPose& p, Moment& m) {
     const double between = p.q(2) - p.q(1);
     const double crank = between + std::numbers::pi / 2;
@@ -134,13 +144,15 @@ TEST(JointPhysics, AParallelogramWithWrongBarsIsDescribed) {
   auto cell = std::make_shared<Cell>(*arm.cell);
   std::vector<Joint> joints;
   for (int j = 0; j < cell->robot.size(); ++j) joints.push_back(cell->robot.joint(j));
-  cell->robot = test::demand(Chain::make("with a parallelogram", joints, {{2, 1, -1.0, CouplingKind::kParallelogram}}));
+  cell->robot = test::demand(
+      Chain::make("with a parallelogram", joints, {{2, 1, -1.0, CouplingKind::kParallelogram}}));
   arm.cell = cell;
   const auto poses = [](std::uint64_t seed) {
     hidden::Random random(seed);
     std::vector<MeasuringPose> drawn = hidden::draw_poses({.count = 600, .loads = 2}, random);
     for (MeasuringPose& pose : drawn)
-      pose.q(2) = pose.q(1) + hidden::uniform(random, from_deg(-60), std::min(from_deg(60), from_deg(70) - pose.q(1)));
+      pose.q(2) = pose.q(1) + hidden::uniform(random, from_deg(-60),
+                                              std::min(from_deg(60), from_deg(70) - pose.q(1)));
     return drawn;
   };
   expect_to_explain(arm, {"joint_coupling:3@2"}, test::measured_at(arm, poses(1), 11),
@@ -148,18 +160,21 @@ TEST(JointPhysics, AParallelogramWithWrongBarsIsDescribed) {
 }
 
 TEST(JointPhysics, CablesThatTwoJointsWindUpPullAtBoth) {
-  for (const auto& [spec, first, second] : {std::tuple("cable_pull:2@3", 1, 2), std::tuple("cable_pull:4@6", 3, 5)}) {
-    const HeavyArm arm = arm_with(5, [first = first, second = second](const MeasuringPose& p, Moment& m) {
-      // A hose that winds around both axes: it stiffens as it runs out of slack.
-      const double wound = p.q(first) + p.q(second) - 0.4;
-      const double torque = -60e3 * std::tanh(wound / 3) - 4e3 * wound;  // Nmm
-      for (const int joint : {first, second}) m.q(joint) += m.arm.give(joint) * torque;
-    });
+  for (const auto& [spec, first, second] :
+       {std::tuple("cable_pull:2@3", 1, 2), std::tuple("cable_pull:4@6", 3, 5)}) {
+    const HeavyArm arm =
+        arm_with(5, [first = first, second = second](const MeasuringPose& p, Moment& m) {
+          // A hose that winds around both axes: it stiffens as it runs out of slack.
+          const double wound = p.q(first) + p.q(second) - 0.4;
+          const double torque = -60e3 * std::tanh(wound / 3) - 4e3 * wound;  // Nmm
+          for (const int joint : {first, second}) m.q(joint) += m.arm.give(joint) * torque;
+        });
     expect_to_explain(arm, {spec}, test::measured(arm, 400, 1), test::measured(arm, 400, 2), 1.1);
   }
 }
 
-/// Waves of a bearing as seen from the link before: of any harmonic up to the third, in both senses.
+/// Waves of a bearing as seen from the link before: of any harmonic up to the third, in both
+/// senses.
 struct Bearing {
   double shift_mm[3][6], tilt[2][6];
   Bearing(hidden::Random& random, double radial_mm, double tilt_rad) {
@@ -171,12 +186,13 @@ struct Bearing {
   }
   static double at(const double (&waves)[6], double q) {
     double sum = 0;
-    for (int h = 1; h <= 3; ++h) sum += waves[2 * h - 2] * std::sin(h * q) + waves[2 * h - 1] * std::cos(h * q);
+    for (int h = 1; h <= 3; ++h)
+      sum += waves[2 * h - 2] * std::sin(h * q) + waves[2 * h - 1] * std::cos(h * q);
     return sum;
   }
   [[nodiscard]] Eigen::Matrix4d motion(double q) const {
-    return hidden::motion({at(shift_mm[0], q), at(shift_mm[1], q), at(shift_mm[2], q)}, 0, at(tilt[1], q),
-                          at(tilt[0], q));
+    return hidden::motion({at(shift_mm[0], q), at(shift_mm[1], q), at(shift_mm[2], q)}, 0,
+                          at(tilt[1], q), at(tilt[0], q));
   }
 };
 
@@ -185,16 +201,19 @@ TEST(JointPhysics, AnAxisThatWobblesIsNoAngleError) {
   for (const int joint : {1, 2, 4, 5}) {
     hidden::Random random(static_cast<std::uint64_t>(joint));
     const Bearing bearing(random, 0.02, 4e-5);
-    const HeavyArm arm = arm_with(static_cast<std::uint64_t>(joint), [&](const MeasuringPose& p, Moment& m) {
-      m.arm.bearings[static_cast<std::size_t>(joint - 1)] = bearing.motion(p.q(joint - 1));
-    });
+    const HeavyArm arm =
+        arm_with(static_cast<std::uint64_t>(joint), [&](const MeasuringPose& p, Moment& m) {
+          m.arm.bearings[static_cast<std::size_t>(joint - 1)] = bearing.motion(p.q(joint - 1));
+        });
     const MeasurementBatch batch = test::measured(arm, 600, static_cast<std::uint64_t>(joint));
     const MeasurementBatch fresh = test::measured(arm, 400, 2);
-    const CalibrationResult found = expect_to_explain(arm, {fmt::format("axis_runout:{}", joint)}, batch, fresh, 1.5);
+    const CalibrationResult found =
+        expect_to_explain(arm, {fmt::format("axis_runout:{}", joint)}, batch, fresh, 1.5);
     const CalibrationResult map =
         test::demand(calibrate(arm.cell, with({fmt::format("joint_map:{}", joint)}), batch, {}));
     EXPECT_GE(held_out_mm(map, fresh), 1.15 * kNoise_mm) << joint;
-    EXPECT_EQ(is_identified(found, fmt::format("radial_x{}_-1", joint)), joint != 2) << "joint 2 turns half around";
+    EXPECT_EQ(is_identified(found, fmt::format("radial_x{}_-1", joint)), joint != 2)
+        << "joint 2 turns half around";
     EXPECT_TRUE(is_identified(found, fmt::format("tilt_x{}_-1", joint)));
     // What goes around once backwards, and the axial part.
     const auto& x = bearing.shift_mm[0];
@@ -215,13 +234,16 @@ TEST(JointPhysics, TeethThatGiveWayUnevenlyRippleWithTheTorque) {
   Coverage coverage;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const double phase = static_cast<double>(seed);
-    const HeavyArm arm = arm_with(
-        seed, [&](const MeasuringPose& p, Moment& m) { m.arm.give(2) *= 1 + 0.15 * std::sin(90 * p.q(2) + phase); });
+    const HeavyArm arm = arm_with(seed, [&](const MeasuringPose& p, Moment& m) {
+      m.arm.give(2) *= 1 + 0.15 * std::sin(90 * p.q(2) + phase);
+    });
     const double give = from_rad_per_nmm(arm.world.arm.give(2));
     const MeasurementBatch batch = test::measured(arm, 400, seed);
     const MeasurementBatch fresh = test::measured(arm, 400, 100 + seed);
-    const CalibrationResult found = expect_to_explain(arm, {"loaded_ripple:3@90.02"}, batch, fresh, 1.3);
-    const CalibrationResult plain = test::demand(calibrate(arm.cell, with({"gear_transmission:3@90.02"}), batch, {}));
+    const CalibrationResult found =
+        expect_to_explain(arm, {"loaded_ripple:3@90.02"}, batch, fresh, 1.3);
+    const CalibrationResult plain =
+        test::demand(calibrate(arm.cell, with({"gear_transmission:3@90.02"}), batch, {}));
     EXPECT_GE(held_out_mm(plain, fresh), 1.1 * kNoise_mm) << "a ripple that no torque changes";
     coverage.add(found, {{"loaded_sin3", give * 0.15 * std::cos(phase)},
                          {"loaded_cos3", give * 0.15 * std::sin(phase)},
@@ -233,7 +255,8 @@ TEST(JointPhysics, TeethThatGiveWayUnevenlyRippleWithTheTorque) {
 TEST(JointPhysics, TheInstrumentsBendAndTemperatureShowItsScaleDoesNot) {
   const Eigen::Vector3d stand(4200, -1800, 1300);  // mm
   HeavyArm arm = arm_with(2, [stand](const MeasuringPose& p, Moment& m) {
-    const Eigen::Vector3d away = (m.seen * hidden::tool_frame(m.arm, m.q)).block<3, 1>(0, 3) - stand;
+    const Eigen::Vector3d away =
+        (m.seen * hidden::tool_frame(m.arm, m.q)).block<3, 1>(0, 3) - stand;
     m.shift += (3e-6 + 8e-9 * away.norm() + 3e-6 * (p.temperature_c - 20)) * away;
   });
   auto cell = std::make_shared<Cell>(*arm.cell);
@@ -244,14 +267,16 @@ TEST(JointPhysics, TheInstrumentsBendAndTemperatureShowItsScaleDoesNot) {
     return test::measured_at(arm, hidden::draw_poses({.count = 400, .loads = 2}, random), seed);
   };
   const MeasurementBatch batch = measured(1);
-  const CalibrationResult found = expect_to_explain(arm, {"instrument_scale"}, batch, measured(2), 1.1);
+  const CalibrationResult found =
+      expect_to_explain(arm, {"instrument_scale"}, batch, measured(2), 1.1);
   Coverage coverage;
   coverage.add(found, {{"bend", 8e-6}, {"warm", 3e-6}});
   EXPECT_EQ(coverage.within, 2);
   EXPECT_TRUE(is_identified(found, "bend"));
   EXPECT_TRUE(is_identified(found, "warm"));
-  const auto scale = std::find_if(found.parameters.begin(), found.parameters.end(),
-                                  [](const IdentifiedParameter& p) { return p.parameter.name == "scale"; });
+  const auto scale =
+      std::find_if(found.parameters.begin(), found.parameters.end(),
+                   [](const IdentifiedParameter& p) { return p.parameter.name == "scale"; });
   EXPECT_FALSE(scale->identified);
   // Whoever asks where the robot will be gets none of it.
   PoseContext asked = batch.measurements.front().context;
@@ -259,17 +284,21 @@ TEST(JointPhysics, TheInstrumentsBendAndTemperatureShowItsScaleDoesNot) {
   PhysicalModel without = found.model;
   const Eigen::Index first = scale - found.parameters.begin();
   without.values.segment<3>(first).setZero();
-  EXPECT_EQ((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(), 0);
+  EXPECT_EQ((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(),
+            0);
   asked.served = false;
-  EXPECT_GT((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(), 1e-5);
+  EXPECT_GT((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(),
+            1e-5);
 }
 
 /// An arm that comes to every pose from the one before it, and knows which it was.
 struct Visiting {
-  std::shared_ptr<std::vector<MeasuringPose>> poses = std::make_shared<std::vector<MeasuringPose>>();
+  std::shared_ptr<std::vector<MeasuringPose>> poses =
+      std::make_shared<std::vector<MeasuringPose>>();
   HeavyArm arm;
-  explicit Visiting(std::uint64_t seed,
-                    const std::function<void(const MeasuringPose&, const MeasuringPose&, Moment&)>& act) {
+  explicit Visiting(
+      std::uint64_t seed,
+      const std::function<void(const MeasuringPose&, const MeasuringPose&, Moment&)>& act) {
     arm = arm_with(seed, [act, visited = poses](const MeasuringPose& p, Moment& m) {
       if (p.index > 0) act((*visited)[static_cast<std::size_t>(p.index) - 1], p, m);
     });
@@ -284,24 +313,32 @@ struct Visiting {
 TEST(JointPhysics, WhatIsMeasuredBeforeStandstillLacksAShareOfTheMove) {
   Coverage coverage;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    // Each servo settles exponentially; the instrument begins 2 s after the controller says that it has arrived.
-    const auto left = [](Eigen::Index joint) { return std::exp(-2 / (0.19 + 0.02 * static_cast<double>(joint))); };
-    const Visiting visiting(seed, [&](const MeasuringPose& before, const MeasuringPose& p, Moment& m) {
-      for (Eigen::Index j = 0; j < hidden::kJoints; ++j) m.q(j) -= left(j) * (p.q(j) - before.q(j));
-    });
+    // Each servo settles exponentially; the instrument begins 2 s after the controller says that it
+    // has arrived.
+    const auto left = [](Eigen::Index joint) {
+      return std::exp(-2 / (0.19 + 0.02 * static_cast<double>(joint)));
+    };
+    const Visiting visiting(seed,
+                            [&](const MeasuringPose& before, const MeasuringPose& p, Moment& m) {
+                              for (Eigen::Index j = 0; j < hidden::kJoints; ++j)
+                                m.q(j) -= left(j) * (p.q(j) - before.q(j));
+                            });
     const MeasurementBatch batch = visiting.measured(400, seed);
-    const CalibrationResult early = test::demand(calibrate(visiting.arm.cell, with({"early_reading"}), batch, {}));
+    const CalibrationResult early =
+        test::demand(calibrate(visiting.arm.cell, with({"early_reading"}), batch, {}));
     const CalibrationResult none = test::demand(calibrate(visiting.arm.cell, kM3, batch, {}));
     const MeasurementBatch fresh = visiting.measured(400, 100 + seed);
     EXPECT_LE(held_out_mm(early, fresh), 1.05 * kNoise_mm);
     EXPECT_GE(held_out_mm(none, fresh), 2 * kNoise_mm);
-    for (Eigen::Index j = 0; j < hidden::kJoints; ++j) coverage.add(early, {{fmt::format("early{}", j + 1), left(j)}});
+    for (Eigen::Index j = 0; j < hidden::kJoints; ++j)
+      coverage.add(early, {{fmt::format("early{}", j + 1), left(j)}});
   }
   EXPECT_GE(coverage.share(), 0.88) << coverage.all;
 }
 
 TEST(JointPhysics, FrictionHoldsAJointBackTowardsWhereItCameFrom) {
-  // A bristle model: the held-back angle decays along the way, and remembers more than the last pose.
+  // A bristle model: the held-back angle decays along the way, and remembers more than the last
+  // pose.
   const double half_width = 8e-5;
   const double way = 0.03;
   double held = 0;
@@ -313,7 +350,8 @@ TEST(JointPhysics, FrictionHoldsAJointBackTowardsWhereItCameFrom) {
   });
   const MeasurementBatch batch = visiting.measured(400, 1);
   const MeasurementBatch fresh = visiting.measured(400, 2);
-  const CalibrationResult found = expect_to_explain(visiting.arm, {"hysteresis:3"}, batch, fresh, 1.5);
+  const CalibrationResult found =
+      expect_to_explain(visiting.arm, {"hysteresis:3"}, batch, fresh, 1.5);
   Coverage coverage;
   coverage.add(found, {{"hyst3", half_width}});
   EXPECT_EQ(coverage.within, 1);
@@ -328,7 +366,8 @@ std::vector<double> temperatures_of_a_body(const std::vector<MeasuringPose>& pos
     const int steps = std::max(1, static_cast<int>(std::lround(whole)));
     for (int k = 0; k < steps; ++k) {
       const double share = (k + 0.5) / steps;
-      const double air = poses[i - 1].temperature_c + share * (poses[i].temperature_c - poses[i - 1].temperature_c);
+      const double air = poses[i - 1].temperature_c +
+                         share * (poses[i].temperature_c - poses[i - 1].temperature_c);
       body += (air - body) * whole / steps / lag_s;
     }
     all.push_back(body);
@@ -347,12 +386,14 @@ TEST(JointPhysics, AJointsZeroFollowsTheTemperatureWithALag) {
     });
     const auto measured = [&](std::uint64_t of) {
       hidden::Random random(of);
-      const std::vector<MeasuringPose> poses = hidden::draw_poses({.count = 600, .loads = 2}, random);
+      const std::vector<MeasuringPose> poses =
+          hidden::draw_poses({.count = 600, .loads = 2}, random);
       gearbox = temperatures_of_a_body(poses, lag_s);
       return test::measured_at(arm, poses, of + 50);
     };
     const MeasurementBatch batch = measured(seed);
-    const CalibrationResult found = expect_to_explain(arm, {"thermal_zero:2"}, batch, measured(100 + seed), 1.2);
+    const CalibrationResult found =
+        expect_to_explain(arm, {"thermal_zero:2"}, batch, measured(100 + seed), 1.2);
     coverage.add(found, {{"zero_rate2", rate}, {"heat_lag2", lag_s}});
   }
   EXPECT_GE(coverage.share(), 0.85) << coverage.all;
@@ -377,7 +418,8 @@ TEST(JointPhysics, LinksThatWarmUpLateGrowLate) {
   const MeasurementBatch batch = measured(1);
   const MeasurementBatch fresh = measured(2);
   const CalibrationResult found = expect_to_explain(arm, {"lagged_growth"}, batch, fresh, 1.5);
-  const CalibrationResult at_once = test::demand(calibrate(arm.cell, with({"thermal_growth"}), batch, {}));
+  const CalibrationResult at_once =
+      test::demand(calibrate(arm.cell, with({"thermal_growth"}), batch, {}));
   EXPECT_GE(held_out_mm(at_once, fresh), 1.1 * kNoise_mm);
   Coverage coverage;
   coverage.add(found, {{"growth", growth}, {"heat_lag", lag_s}});

@@ -15,7 +15,8 @@ using test::measured_on;
 constexpr std::size_t kHalf = 100;
 
 /// 200 poses; from the 101st on measured of another robot.
-MeasurementBatch changed_halfway(const VirtualRobot& before, const VirtualRobot& after, std::uint64_t seed) {
+MeasurementBatch changed_halfway(const VirtualRobot& before, const VirtualRobot& after,
+                                 std::uint64_t seed) {
   MeasurementBatch batch = measured_on(before, {.poses = 2 * kHalf, .seed = seed});
   const MeasurementBatch later = measured_on(after, {.poses = 2 * kHalf, .seed = seed});
   for (std::size_t i = kHalf; i < 2 * kHalf; ++i) {
@@ -29,15 +30,16 @@ TEST(Jump, AZeroLostHalfwayIsFoundWithItsPoseAndItsSize) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (int joint = 2; joint <= 5; ++joint) {
-    const MeasurementBatch batch =
-        changed_halfway(robot, test::with_zero_off(robot, joint, 3e-4), 40 + static_cast<std::uint64_t>(joint));
+    const MeasurementBatch batch = changed_halfway(robot, test::with_zero_off(robot, joint, 3e-4),
+                                                   40 + static_cast<std::uint64_t>(joint));
     const auto jump = jump_within(cell, batch);
     ASSERT_TRUE(jump) << "joint " << joint;
     EXPECT_EQ(jump->source.substr(0, 12), fmt::format("joint_slip:{}", joint));
     EXPECT_NEAR(jump->row, batch.measurements[kHalf].row, 2) << "joint " << joint;
     EXPECT_GT(jump->effect, 2e-5);
     EXPECT_LT(jump->effect, 1e-3);
-    EXPECT_NE(in_words(*jump).find(fmt::format("lost zero in joint {}", joint)), std::string::npos) << in_words(*jump);
+    EXPECT_NE(in_words(*jump).find(fmt::format("lost zero in joint {}", joint)), std::string::npos)
+        << in_words(*jump);
   }
 }
 
@@ -62,9 +64,11 @@ TEST(Jump, ATrackerThatWasBumpedAndAToolThatWasKnockedAreFound) {
   EXPECT_EQ(tool->source, "tool_changed@101");
 }
 
-/// `batch` with the share `course` (0 to 1) of the way to what was measured of another robot at the same poses.
+/// `batch` with the share `course` (0 to 1) of the way to what was measured of another robot at the
+/// same poses.
 template <typename Course>
-MeasurementBatch on_the_way(MeasurementBatch batch, const MeasurementBatch& other, const Course& course) {
+MeasurementBatch on_the_way(MeasurementBatch batch, const MeasurementBatch& other,
+                            const Course& course) {
   const auto n = static_cast<double>(batch.measurements.size());
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     Measurement& m = batch.measurements[i];
@@ -77,7 +81,8 @@ TEST(Jump, AReflectorThatWasPutOnAnewIsFoundHoweverFarOffItSits) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (const double mm : {0.1, 0.5, 1.0}) {
-    for (const Vector3& way : {Vector3(0.48, -0.6, 0.64), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, 1)}) {
+    for (const Vector3& way :
+         {Vector3(0.48, -0.6, 0.64), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, 1)}) {
       VirtualRobot other = robot;
       other.truth.tools.at("spindle").translation() += mm * 1e-3 * way;
       const auto jump = jump_within(cell, changed_halfway(robot, other, 71));
@@ -92,7 +97,8 @@ TEST(Jump, ATrackerThatWasMovedFarIsFoundWithItsPoseAndItsSize) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (const std::size_t poses : {40u, 80u}) {
     for (const double mm : {3.0, 10.0, 50.0}) {
-      MeasurementBatch batch = measured_on(robot, {.poses = static_cast<int>(poses), .seed = 90 + poses});
+      MeasurementBatch batch =
+          measured_on(robot, {.poses = static_cast<int>(poses), .seed = 90 + poses});
       const Matrix3 turn = rotation_exp(Vector3(0, 0, 2e-4 * mm));
       double square = 0;
       for (std::size_t i = poses / 2; i < poses; ++i) {
@@ -105,8 +111,10 @@ TEST(Jump, ATrackerThatWasMovedFarIsFoundWithItsPoseAndItsSize) {
       const auto jump = jump_within(cell, batch);
       ASSERT_TRUE(jump) << poses << " poses, " << mm << " mm";
       EXPECT_EQ(jump->source.substr(0, 13), "tracker_moved") << poses << " poses, " << mm << " mm";
-      EXPECT_EQ(jump->pose_id, batch.measurements[poses / 2].pose_id) << poses << " poses, " << mm << " mm";
-      EXPECT_NEAR(jump->effect, std::sqrt(square), 0.1 * std::sqrt(square)) << poses << " poses, " << mm << " mm";
+      EXPECT_EQ(jump->pose_id, batch.measurements[poses / 2].pose_id)
+          << poses << " poses, " << mm << " mm";
+      EXPECT_NEAR(jump->effect, std::sqrt(square), 0.1 * std::sqrt(square))
+          << poses << " poses, " << mm << " mm";
     }
   }
 }
@@ -115,10 +123,13 @@ TEST(Jump, WhatComesAndGoesOrSwaysIsNone) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const VirtualRobot hot = test::with_zero_off(test::with_zero_off(robot, 2, 3e-4), 3, -2e-4);
-  const auto heated_and_cooled = [](double x) { return x < 0.5 ? 1 - std::exp(-x / 0.1) : std::exp((0.5 - x) / 0.1); };
+  const auto heated_and_cooled = [](double x) {
+    return x < 0.5 ? 1 - std::exp(-x / 0.1) : std::exp((0.5 - x) / 0.1);
+  };
   for (std::uint64_t seed = 21; seed <= 25; ++seed) {
     const test::Day day{.poses = 2 * kHalf, .seed = seed};
-    const auto heat = jump_within(cell, on_the_way(measured_on(robot, day), measured_on(hot, day), heated_and_cooled));
+    const auto heat = jump_within(
+        cell, on_the_way(measured_on(robot, day), measured_on(hot, day), heated_and_cooled));
     EXPECT_FALSE(heat) << in_words(*heat);
     MeasurementBatch swayed = measured_on(robot, day);
     for (std::size_t i = 0; i < 2 * kHalf; ++i) {
@@ -145,7 +156,8 @@ TEST(Jump, WhatGrowsSlowlyIsNone) {
   for (const double lag : {0.1, 0.3, 10.0}) {
     MeasurementBatch batch = measured_on(robot, {.poses = 200, .seed = 11});
     for (std::size_t i = 0; i < 200; ++i) {
-      const double grown = (1 - std::exp(-static_cast<double>(i) / (200 * lag))) / (1 - std::exp(-1 / lag));
+      const double grown =
+          (1 - std::exp(-static_cast<double>(i) / (200 * lag))) / (1 - std::exp(-1 / lag));
       batch.measurements[i].p_W += Vector3(5e-5, 2e-5, 1e-4) * grown;
     }
     const auto jump = jump_within(cell, batch);

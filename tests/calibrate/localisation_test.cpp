@@ -32,7 +32,8 @@ TEST(Localisation, FindsBaseAndToolFromFullPosesExactly) {
 TEST(Localisation, FindsBaseAndToolPointFromPositionsAlone) {
   const std::vector<Pose> X_BF = random_flange_poses(30, 2);
   Eigen::Matrix3Xd p_W(3, 30);
-  for (int i = 0; i < 30; ++i) p_W.col(i) = (kBase * X_BF[static_cast<std::size_t>(i)] * kTool).translation();
+  for (int i = 0; i < 30; ++i)
+    p_W.col(i) = (kBase * X_BF[static_cast<std::size_t>(i)] * kTool).translation();
   const Result<BaseAndTool> found = locate_base_and_tool_point(p_W, X_BF);
   ASSERT_TRUE(found);
   EXPECT_LT(pose_difference(found->X_WB, kBase).norm(), 1e-6);
@@ -45,7 +46,8 @@ TEST(Localisation, RefusesOrientationsThatTurnAboutOneAxisOnly) {
   std::vector<Pose> X_BF;
   std::vector<Pose> X_WT;
   for (int i = 0; i < 20; ++i) {
-    X_BF.push_back(make_pose(rotation_exp({0, 0, normal(random)}), {normal(random), normal(random), normal(random)}));
+    X_BF.push_back(make_pose(rotation_exp({0, 0, normal(random)}),
+                             {normal(random), normal(random), normal(random)}));
     X_WT.push_back(kBase * X_BF.back() * kTool);
   }
   EXPECT_FALSE(locate_base_and_tool(X_WT, X_BF));

@@ -25,7 +25,8 @@ test::HeavyArm arm_with(const Shape& shape) {
   test::HeavyArm arm = test::draw_heavy_arm({.seed = 5});
   hidden::Effect effect;
   effect.cause.cause = "joint_map";
-  effect.act = [shape](const hidden::MeasuringPose& pose, const Eigen::VectorXd&, hidden::Moment& moment) {
+  effect.act = [shape](const hidden::MeasuringPose& pose, const Eigen::VectorXd&,
+                       hidden::Moment& moment) {
     for (Eigen::Index j = 0; j < moment.q.size(); ++j) moment.q(j) += shape(j, pose.q(j));
   };
   arm.world.effects = {effect};
@@ -48,7 +49,10 @@ double inside(const CalibrationResult& found, const MeasurementBatch& batch) {
     const Eigen::MatrixXd along = J.topRows<3>();
     const Vector3 variance = (along * found.covariance).cwiseProduct(along).rowwise().sum();
     for (Eigen::Index k = 0; k < 3; ++k)
-      within += std::abs(off(k)) < 1.96 * std::hypot(std::sqrt(variance(k)), 0.013e-3, found.discrepancy) ? 1 : 0;
+      within +=
+          std::abs(off(k)) < 1.96 * std::hypot(std::sqrt(variance(k)), 0.013e-3, found.discrepancy)
+              ? 1
+              : 0;
   }
   return 100 * within / (3 * static_cast<double>(batch.measurements.size()));
 }
@@ -68,15 +72,18 @@ TEST(Maps, AJointThatIsOffTwentySixTimesATurnGetsThatManyHarmonicsAndTheOthersFe
   });
   const MeasurementBatch batch = test::measured(arm, 200, 1);
   const MeasurementBatch fresh = test::measured(arm, 500, 2);
-  const std::vector<std::string> open = {"base", "geometry", "compliance", "joint_map:2", "joint_map:5"};
+  const std::vector<std::string> open = {"base", "geometry", "compliance", "joint_map:2",
+                                         "joint_map:5"};
   const CalibrationResult found = test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh));
   EXPECT_GE(harmonics(found, 2), 26);
   EXPECT_LE(harmonics(found, 5), 12);
   EXPECT_LE(held_out_mm(found, fresh), 1.2 * kNoise_mm);
   EXPECT_GT(inside(found, fresh), 93);
   EXPECT_LT(inside(found, fresh), 98);
-  const std::vector<std::string> told = {"base", "geometry", "compliance", "joint_map:2@48", "joint_map:5@48"};
-  EXPECT_LT(held_out_mm(found, fresh), held_out_mm(test::demand(calibrate(arm.cell, told, batch, kWeigh)), fresh));
+  const std::vector<std::string> told = {"base", "geometry", "compliance", "joint_map:2@48",
+                                         "joint_map:5@48"};
+  EXPECT_LT(held_out_mm(found, fresh),
+            held_out_mm(test::demand(calibrate(arm.cell, told, batch, kWeigh)), fresh));
 }
 
 TEST(Maps, AnArmWithoutMapsIsHardlyWorseForAskingAfterThem) {
@@ -86,8 +93,10 @@ TEST(Maps, AnArmWithoutMapsIsHardlyWorseForAskingAfterThem) {
   const std::vector<std::string> without = {"base", "geometry", "compliance"};
   std::vector<std::string> open = without;
   for (const char* map : {"joint_map:2", "joint_map:3", "joint_map:4"}) open.emplace_back(map);
-  const double plain = held_out_mm(test::demand(calibrate(arm.cell, without, batch, kWeigh)), fresh);
-  EXPECT_LE(held_out_mm(test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh)), fresh), 1.02 * plain);
+  const double plain =
+      held_out_mm(test::demand(calibrate(arm.cell, without, batch, kWeigh)), fresh);
+  EXPECT_LE(held_out_mm(test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh)), fresh),
+            1.02 * plain);
 }
 
 TEST(Maps, ASpectrumThatIsToldStays) {
@@ -120,7 +129,8 @@ TEST(Maps, TheSlopesOfTheEvidenceFitCentralDifferences) {
   const LinearArm arm = some_arm(&maps);
   const MapEvidence evidence(arm, maps);
   Eigen::VectorXd logs = evidence.start();
-  for (Eigen::Index k = 0; k < logs.size(); ++k) logs(k) += 0.1 * std::sin(static_cast<double>(k) + 1);
+  for (Eigen::Index k = 0; k < logs.size(); ++k)
+    logs(k) += 0.1 * std::sin(static_cast<double>(k) + 1);
   ObjectiveValue at, ahead, behind;
   ASSERT_TRUE(evidence(logs, &at));
   for (Eigen::Index k = 0; k < logs.size(); ++k) {
@@ -129,7 +139,9 @@ TEST(Maps, TheSlopesOfTheEvidenceFitCentralDifferences) {
     ASSERT_TRUE(evidence(moved, &ahead));
     moved(k) -= 2e-4;
     ASSERT_TRUE(evidence(moved, &behind));
-    EXPECT_NEAR(at.gradient(k), (ahead.value - behind.value) / 2e-4, 1e-4 * (1 + std::abs(at.gradient(k)))) << k;
+    EXPECT_NEAR(at.gradient(k), (ahead.value - behind.value) / 2e-4,
+                1e-4 * (1 + std::abs(at.gradient(k))))
+        << k;
   }
 }
 
@@ -144,7 +156,8 @@ TEST(Maps, TheEvidenceIsThatOfTheWholeCovarianceOfTheMeasurements) {
     for (std::size_t k = 0; k < maps.size(); ++k) {
       const MapSpectrum spectrum = evidence.spectrum(logs, k);
       for (Eigen::Index i = maps[k].first; i < maps[k].first + 2 * maps[k].harmonics; ++i) {
-        variance(i) = std::pow(spectrum.stddev(static_cast<int>(i - maps[k].first) / 2 + 1) / arm.scaled.scale(i), 2);
+        variance(i) = std::pow(
+            spectrum.stddev(static_cast<int>(i - maps[k].first) / 2 + 1) / arm.scaled.scale(i), 2);
         mean(i) = -arm.scaled.prior(i);
       }
     }
@@ -156,11 +169,13 @@ TEST(Maps, TheEvidenceIsThatOfTheWholeCovarianceOfTheMeasurements) {
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(arm.kinds[k].information);
       const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
       const auto rows = static_cast<Eigen::Index>(k) * P;
-      J.middleRows(rows, P) = std::sqrt(factor) * (root.asDiagonal() * eigen.eigenvectors().transpose());
-      r.segment(rows, P) = -std::sqrt(factor) * (root.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() *
-                                                 arm.kinds[k].downhill);
-      sum += 0.5 *
-             (factor * arm.kinds[k].square - r.segment(rows, P).squaredNorm() - arm.kinds[k].count * std::log(factor));
+      J.middleRows(rows, P) =
+          std::sqrt(factor) * (root.asDiagonal() * eigen.eigenvectors().transpose());
+      r.segment(rows, P) =
+          -std::sqrt(factor) * (root.cwiseInverse().asDiagonal() *
+                                eigen.eigenvectors().transpose() * arm.kinds[k].downhill);
+      sum += 0.5 * (factor * arm.kinds[k].square - r.segment(rows, P).squaredNorm() -
+                    arm.kinds[k].count * std::log(factor));
     }
     const Eigen::MatrixXd covariance =
         Eigen::MatrixXd::Identity(2 * P, 2 * P) + J * variance.asDiagonal() * J.transpose();

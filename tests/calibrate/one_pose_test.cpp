@@ -29,17 +29,20 @@ double less_sure(const CalibrationResult& one, const CalibrationResult& other) {
 
 TEST(ReflectorsOfOnePose, AreOnePoseWhereTheyShareWhatTheModelLeaves) {
   const MeasurementBatch three = test::seen_by_three(60, 60e-6, 0, 3);
-  const CalibrationResult together = identified(three), alone = identified(test::seen_by_one(three));
+  const CalibrationResult together = identified(three),
+                          alone = identified(test::seen_by_one(three));
   EXPECT_NEAR(to_mm(together.discrepancy_of_pose), 0.06, 0.012);
   EXPECT_NEAR(together.discrepancy, together.discrepancy_of_pose, 0.25 * together.discrepancy);
-  // They tell how the flange is turned, too, and each has noise of its own; as three poses they were at 0.55.
+  // They tell how the flange is turned, too, and each has noise of its own; as three poses they
+  // were at 0.55.
   EXPECT_GT(less_sure(together, alone), 0.75);
   EXPECT_LT(less_sure(together, alone), 1.1);
 }
 
 TEST(ReflectorsOfOnePose, AreThreePosesWhereEachErrsByItself) {
   const MeasurementBatch three = test::seen_by_three(60, 0, 60e-6, 4);
-  const CalibrationResult together = identified(three), alone = identified(test::seen_by_one(three));
+  const CalibrationResult together = identified(three),
+                          alone = identified(test::seen_by_one(three));
   EXPECT_NEAR(to_mm(together.discrepancy), 0.06, 0.012);
   EXPECT_LT(to_mm(together.discrepancy_of_pose), 0.045) << "a mean of three is off by that";
   EXPECT_LT(less_sure(together, alone), 0.68);

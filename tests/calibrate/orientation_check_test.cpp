@@ -29,7 +29,9 @@ void change(MeasurementBatch& batch, Change change, std::size_t every = 1) {
 }
 
 MeasurementBatch measured(const std::shared_ptr<const Cell>& cell, int poses, std::uint64_t seed) {
-  return test::demand(check_against_cell(test::measured(test::chapter_5_robot(test::cell_7()), poses, seed), *cell))
+  return test::demand(
+             check_against_cell(test::measured(test::chapter_5_robot(test::cell_7()), poses, seed),
+                                *cell))
       .rows();
 }
 
@@ -80,7 +82,9 @@ TEST(OrientationCheck, OrientationsOfTheJointsAreNotDoubted) {
 
 TEST(OrientationCheck, OrientationsOfAnotherOrderAreRefusedWithTheFigureOfTheReadingThatFits) {
   const std::pair<Change, const char*> kinds[] = {
-      {in_xyzw_order, "as xyzw"}, {inverse, "as the inverse"}, {inverse_in_xyzw_order, "as xyzw and the inverse"}};
+      {in_xyzw_order, "as xyzw"},
+      {inverse, "as the inverse"},
+      {inverse_in_xyzw_order, "as xyzw and the inverse"}};
   for (const auto& cell : cells()) {
     for (const auto& [kind, reading] : kinds) {
       for (const int poses : {12, 150}) {
@@ -122,7 +126,8 @@ TEST(OrientationCheck, SomeRowsOfAnotherOrderAreCountedAndTheFirstIsNamed) {
     for (const std::size_t every : {2u, 3u, 10u}) {
       MeasurementBatch batch = measured(cell, 120, 7);
       batch.measurements.erase(batch.measurements.begin());
-      std::rotate(batch.measurements.begin(), batch.measurements.begin() + 1, batch.measurements.end());
+      std::rotate(batch.measurements.begin(), batch.measurements.begin() + 1,
+                  batch.measurements.end());
       change(batch, in_xyzw_order, every);
       const auto doubt = orientation_doubt(batch, *cell);
       ASSERT_TRUE(doubt) << every;
@@ -203,7 +208,8 @@ TEST(OrientationCheck, AJointThatPositionsHardlyShowIsSuspectedToo) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   cell->tools["spindle"]->translation() = Vector3(0, 0, 0.15);
   VirtualRobot robot = test::chapter_5_robot(cell);
-  MeasurementBatch batch = test::demand(check_against_cell(test::measured(robot, 80, 12), *cell)).rows();
+  MeasurementBatch batch =
+      test::demand(check_against_cell(test::measured(robot, 80, 12), *cell)).rows();
   for (Measurement& m : batch.measurements) m.context.q(5) = -m.context.q(5);
   const auto doubt = orientation_doubt(batch, *cell);
   ASSERT_TRUE(doubt);

@@ -11,7 +11,8 @@
 #include "tests/support/hidden_files.h"
 #include "tests/support/hidden_world.h"
 
-// The arm of the second simulation on a rail that this file simulates: a curve in space, and a rack beside it.
+// The arm of the second simulation on a rail that this file simulates: a curve in space, and a rack
+// beside it.
 namespace trammel {
 namespace {
 
@@ -36,12 +37,14 @@ Eigen::Matrix4d rail_frame() {
 
 /// Where the arm's foot stands when the controller says `said_mm`.
 Eigen::Matrix4d foot(double said_mm) {
-  const double s = said_mm * (1 + kScale) + kRack_mm * std::sin(kTurn * said_mm / kPitch_mm + kRackPhase);
+  const double s =
+      said_mm * (1 + kScale) + kRack_mm * std::sin(kTurn * said_mm / kPitch_mm + kRackPhase);
   const double step = 1;
   const double aside_slope = (aside_mm(s + step) - aside_mm(s - step)) / (2 * step);
   const double up_slope = (up_mm(s + step) - up_mm(s - step)) / (2 * step);
   // Along the curve's tangent: about y as it goes aside, about x as it falls.
-  const Eigen::Matrix4d on_rail = hidden::motion({aside_mm(s), up_mm(s), s}, 0, aside_slope, -up_slope);
+  const Eigen::Matrix4d on_rail =
+      hidden::motion({aside_mm(s), up_mm(s), s}, 0, aside_slope, -up_slope);
   return rail_frame() * on_rail * hidden::motion({0, 0, 0}, roll(s), 0, 0) *
          hidden::motion({0, 0, 0}, 0, 0, -std::numbers::pi / 2);
 }
@@ -59,13 +62,15 @@ ArmOnRail arm_on_rail() {
   world.arm.links[3].theta += 4e-4;
   world.arm.give = hidden::Joints::Constant(1e-9);
   world.sources = {"base"};
-  const hidden::Belief belief{{hidden::motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0)}, {{60, {40, -25, 140}}}};
+  const hidden::Belief belief{{hidden::motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0)},
+                              {{60, {40, -25, 140}}}};
   world.tools = belief.tools;
   world.loads = belief.loads;
   std::string robot = hidden::robot_text();
   const std::string joints = "joints:\n";
   robot.insert(robot.find(joints) + joints.size(),
-               "  - {type: prismatic, theta_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: -90, limits_mm: [0, 4000]}\n");
+               "  - {type: prismatic, theta_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: -90, limits_mm: "
+               "[0, 4000]}\n");
   std::string cell = hidden::cell_text(world, belief, "1dim");
   const std::string upright = "q_wxyz: [1, 0, 0, 0]";
   cell.replace(cell.find(upright), upright.size(), "q_wxyz: [0.5, 0.5, 0.5, 0.5]");
@@ -116,19 +121,22 @@ TEST(Rail, ScaleRackAndStraightnessAreTakenForWhatTheyAre) {
   const ArmOnRail arm = arm_on_rail();
   const MeasurementBatch batch = measured(arm, 600, 1);
   const MeasurementBatch fresh = measured(arm, 400, 2);
-  const std::vector<std::string> all = {"base",         "geometry",           "compliance",
-                                        "rail_scale:1", "rack_pitch:1@31.45", "rail_straightness:1"};
+  const std::vector<std::string> all = {
+      "base",         "geometry",           "compliance",
+      "rail_scale:1", "rack_pitch:1@31.45", "rail_straightness:1"};
   const CalibrationResult found = test::demand(calibrate(arm.cell, all, batch, {}));
   EXPECT_LE(held_out(found, fresh), 1.05);
   for (std::size_t k = 3; k < all.size(); ++k) {
     std::vector<std::string> fewer = all;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
-    EXPECT_GE(held_out(test::demand(calibrate(arm.cell, fewer, batch, {})), fresh), 1.15) << "without " << all[k];
+    EXPECT_GE(held_out(test::demand(calibrate(arm.cell, fewer, batch, {})), fresh), 1.15)
+        << "without " << all[k];
   }
-  const std::pair<const char*, double> truth[] = {{"rail_scale1", kScale},
-                                                  {"pitch1", from_mm(kPitch_mm)},
-                                                  {"rack_sin1", from_mm(kRack_mm * std::cos(kRackPhase))},
-                                                  {"rack_cos1", from_mm(kRack_mm * std::sin(kRackPhase))}};
+  const std::pair<const char*, double> truth[] = {
+      {"rail_scale1", kScale},
+      {"pitch1", from_mm(kPitch_mm)},
+      {"rack_sin1", from_mm(kRack_mm * std::cos(kRackPhase))},
+      {"rack_cos1", from_mm(kRack_mm * std::sin(kRackPhase))}};
   for (const auto& [name, value] : truth) {
     const IdentifiedParameter& one = parameter(found, name);
     EXPECT_TRUE(one.identified) << name;

@@ -25,10 +25,10 @@ double held_out_mm(const CalibrationResult& result, const MeasurementBatch& batc
   return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
 }
 
-CalibrationResult calibrated(const HeavyArm& arm, const std::vector<std::string>& sources, int poses,
-                             bool weigh_links = true) {
-  return test::demand(
-      calibrate(arm.cell, sources, test::measured(arm, poses, 1), {.held = {}, .weigh_links = weigh_links}));
+CalibrationResult calibrated(const HeavyArm& arm, const std::vector<std::string>& sources,
+                             int poses, bool weigh_links = true) {
+  return test::demand(calibrate(arm.cell, sources, test::measured(arm, poses, 1),
+                                {.held = {}, .weigh_links = weigh_links}));
 }
 
 bool has(const CalibrationResult& result, const std::string& source) {
@@ -43,14 +43,16 @@ TEST(LinkWeights, ComplianceFindsTheWeightsThatNoDataSheetTold) {
     const CalibrationResult found = calibrated(arm, kM3, 600);
     EXPECT_TRUE(has(found, "self_weight")) << payloads << " payloads";
     EXPECT_LE(held_out_mm(found, fresh), 1.05 * kNoise_mm) << payloads << " payloads";
-    EXPECT_GE(held_out_mm(calibrated(arm, kM3, 600, false), fresh), 2 * kNoise_mm) << payloads << " payloads";
+    EXPECT_GE(held_out_mm(calibrated(arm, kM3, 600, false), fresh), 2 * kNoise_mm)
+        << payloads << " payloads";
   }
 }
 
 TEST(LinkWeights, AreNotAddedWhereTheControllerCompensatesThem) {
   const auto cell = test::cell_7();
-  const CalibrationResult found = test::demand(
-      calibrate(cell, kM3, test::measured(test::chapter_5_robot(cell), 200, 1), {.held = {}, .weigh_links = true}));
+  const CalibrationResult found =
+      test::demand(calibrate(cell, kM3, test::measured(test::chapter_5_robot(cell), 200, 1),
+                             {.held = {}, .weigh_links = true}));
   EXPECT_FALSE(has(found, "self_weight"));
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const HeavyArm light = draw_heavy_arm({.seed = seed, .links_weigh = false});
@@ -59,12 +61,12 @@ TEST(LinkWeights, AreNotAddedWhereTheControllerCompensatesThem) {
 }
 
 TEST(LinkWeights, BesideUnknownCompliancesAreFoundInFewStepsThoughOnlyTheirProductIsSeen) {
-  // The controller compensates the links' weights and the cell does not say so: only the priors tell the weights from
-  // the compliances, and the way to what they like best is bent.
+  // The controller compensates the links' weights and the cell does not say so: only the priors
+  // tell the weights from the compliances, and the way to what they like best is bent.
   const auto cell = test::cell_7();
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 1500, 1, false);
-  const CalibrationResult found =
-      test::demand(calibrate(cell, {"base", "geometry", "self_weight", "compliance_linear"}, batch, {}));
+  const CalibrationResult found = test::demand(
+      calibrate(cell, {"base", "geometry", "self_weight", "compliance_linear"}, batch, {}));
   EXPECT_TRUE(found.converged);
   EXPECT_LE(found.iterations, 30);
 }
@@ -121,7 +123,9 @@ TEST(LinkWeights, TradeAFactorWithTheCompliancesUntilAKnownPayloadChanges) {
     EXPECT_NEAR(other.value, truth, 3 * other.stddev) << joint;
   }
   // Together they are known: the more weight, the less compliance.
-  const auto index = [&](const std::string& name) { return &parameter(open, name) - open.parameters.data(); };
+  const auto index = [&](const std::string& name) {
+    return &parameter(open, name) - open.parameters.data();
+  };
   EXPECT_LT(open.correlation()(index("C2"), index("wx2")), -0.9);
 }
 

@@ -34,10 +34,11 @@ client::CorrectedTarget corrected(const std::string& status) {
 const std::vector<JointType> kTypes = {JointType::kRevolute, JointType::kPrismatic};
 
 TEST(Answers, CorrectionsAreWrittenWithRowStatusPoseJointsAndErrors) {
-  EXPECT_EQ(corrections_csv(targets(1), {"abc", kTypes, {corrected("ok")}}),
-            "row,status,x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg,q2_mm,error_before_mm,error_after_mm,sigma_mm,iterations,"
-            "model_id,message,sigma_measured_mm,turn_before_deg,turn_after_deg\n"
-            "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,,0.05,90,0\n");
+  EXPECT_EQ(
+      corrections_csv(targets(1), {"abc", kTypes, {corrected("ok")}}),
+      "row,status,x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg,q2_mm,error_before_mm,error_after_mm,sigma_mm,"
+      "iterations,model_id,message,sigma_measured_mm,turn_before_deg,turn_after_deg\n"
+      "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,,0.05,90,0\n");
 }
 
 /// The table that corrections of these targets are written as.
@@ -50,12 +51,15 @@ std::string field(const CsvTable& table, const std::string& column) {
 }
 
 TEST(Answers, ATargetWithoutACorrectionHasNoNumbersThatCouldBeCommanded) {
-  for (const char* status : {"unreachable", "joint_limit", "singular", "not_converged", "refused"}) {
+  for (const char* status :
+       {"unreachable", "joint_limit", "singular", "not_converged", "refused"}) {
     const CsvTable table = written(targets(1), {"abc", kTypes, {corrected(status)}});
-    for (std::size_t column = 2; column <= 10; ++column) EXPECT_EQ(table.field(0, column), "") << status;
+    for (std::size_t column = 2; column <= 10; ++column)
+      EXPECT_EQ(table.field(0, column), "") << status;
     EXPECT_EQ(field(table, "message"), "because, so");
     EXPECT_FALSE(
-        corrections_json(targets(1), {"abc", kTypes, {corrected(status)}})["targets"][0].contains("commanded"));
+        corrections_json(targets(1), {"abc", kTypes, {corrected(status)}})["targets"][0].contains(
+            "commanded"));
   }
 }
 
@@ -64,9 +68,11 @@ TEST(Answers, ATargetLeftAloneSaysWhatErrorToExpectWhereSomethingCanBeSaid) {
   left.error_after_mm = left.error_before_mm;
   EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_before_mm"), "1.5");
   EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_after_mm"), "1.5");
-  left.error_before_mm = left.error_after_mm = left.sigma_mm = std::numeric_limits<double>::quiet_NaN();
+  left.error_before_mm = left.error_after_mm = left.sigma_mm =
+      std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_after_mm"), "");
-  EXPECT_TRUE(corrections_json(targets(1), {"abc", kTypes, {left}})["targets"][0]["error_after_mm"].is_null());
+  EXPECT_TRUE(corrections_json(targets(1), {"abc", kTypes, {left}})["targets"][0]["error_after_mm"]
+                  .is_null());
 }
 
 TEST(Answers, TheUsersColumnsComeFirstAsTheyWereAndNoneIsNamedTwice) {
@@ -76,9 +82,10 @@ TEST(Answers, TheUsersColumnsComeFirstAsTheyWereAndNoneIsNamedTwice) {
   const TargetFile file = parse_targets_csv(text, "t.csv").value();
   const CsvTable table = written(file, {"abc", kTypes, {corrected("ok")}});
   EXPECT_EQ(std::vector<std::string>(table.columns().begin(), table.columns().begin() + 15),
-            (std::vector<std::string>{"hole", "name, long", "input_input_status", "input_X_mm", "input_status", "conf",
-                                      "input_input_x_mm", "input_y_mm", "input_z_mm", "input_qw", "input_qx",
-                                      "input_qy", "input_qz", "row", "status"}));
+            (std::vector<std::string>{"hole", "name, long", "input_input_status", "input_X_mm",
+                                      "input_status", "conf", "input_input_x_mm", "input_y_mm",
+                                      "input_z_mm", "input_qw", "input_qx", "input_qy", "input_qz",
+                                      "row", "status"}));
   EXPECT_EQ(field(table, "hole"), "#1");
   EXPECT_EQ(field(table, "name, long"), "a \"b\"\nc");
   EXPECT_EQ(field(table, "input_input_status"), "old");
@@ -93,22 +100,28 @@ TEST(Answers, TheUsersColumnsComeFirstAsTheyWereAndNoneIsNamedTwice) {
 }
 
 TEST(Answers, WhatIsLeftAloneIsNamedByFileRowAndReason) {
-  EXPECT_EQ(left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("out_of_domain")}}), "");
-  EXPECT_EQ(left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("joint_limit")}}),
-            "1 of 2 targets are left as they were:\n  t.csv row 3: joint_limit: because, so\n");
-  const Corrections many{"abc", kTypes, std::vector<client::CorrectedTarget>(12, corrected("unreachable"))};
+  EXPECT_EQ(
+      left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("out_of_domain")}}),
+      "");
+  EXPECT_EQ(
+      left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("joint_limit")}}),
+      "1 of 2 targets are left as they were:\n  t.csv row 3: joint_limit: because, so\n");
+  const Corrections many{"abc", kTypes,
+                         std::vector<client::CorrectedTarget>(12, corrected("unreachable"))};
   EXPECT_NE(left_alone_text(targets(12), many).find("  and 2 more\n"), std::string::npos);
 }
 
 TEST(Answers, OutOfDomainIsACorrectionAndSaysSo) {
-  const std::string text = corrections_csv(targets(1), {"abc", kTypes, {corrected("out_of_domain")}});
+  const std::string text =
+      corrections_csv(targets(1), {"abc", kTypes, {corrected("out_of_domain")}});
   const CsvTable table = CsvTable::parse(text, "c.csv").value();
   EXPECT_EQ(table.field(0, 1), "out_of_domain");
   EXPECT_EQ(table.field(0, 2), "1");
 }
 
 TEST(Answers, TheSummaryCountsStatuses) {
-  EXPECT_EQ(corrections_summary({"abc", kTypes, {corrected("ok"), corrected("unreachable"), corrected("ok")}}),
+  EXPECT_EQ(corrections_summary(
+                {"abc", kTypes, {corrected("ok"), corrected("unreachable"), corrected("ok")}}),
             "3 targets: 2 ok, 1 unreachable\n");
 }
 
@@ -121,10 +134,10 @@ TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
   item.sx_mm = .25;
   item.slx_mm = .125;
   item.in_domain = true;
-  EXPECT_EQ(
-      predictions_csv(list, {"abc", {item}}),
-      "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id,slx_mm,sly_mm,slz_mm\n"
-      "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc,0.125,0,0\n");
+  EXPECT_EQ(predictions_csv(list, {"abc", {item}}),
+            "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,"
+            "model_id,slx_mm,sly_mm,slz_mm\n"
+            "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc,0.125,0,0\n");
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["slx_mm"], .125);
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["dx_mm"], .5);
 }
@@ -139,7 +152,9 @@ TEST(Answers, CovariancesAreAppendedWhereAskedForAndTheTrueErrorsStddevAlways) {
   const CsvTable table = CsvTable::parse(predictions_csv(list, with), "p.csv").value();
   const std::string without = predictions_csv(list, {"abc", {client::PredictedError{}}});
   EXPECT_EQ(without.find("cxy_mm2"), std::string::npos);
-  const auto number = [&](const char* column) { return std::stod(table.field(0, table.require(column).value())); };
+  const auto number = [&](const char* column) {
+    return std::stod(table.field(0, table.require(column).value()));
+  };
   EXPECT_NEAR(number("cxy_mm2"), 0.01, 1e-12);
   EXPECT_NEAR(number("cxz_mm2"), -0.02, 1e-12);
   EXPECT_NEAR(number("cyz_mm2"), 0.03, 1e-12);

@@ -25,7 +25,9 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 class ImportBackup : public testing::Test {
  protected:
-  void SetUp() override { std::filesystem::copy(kBackup, file("backup"), std::filesystem::copy_options::recursive); }
+  void SetUp() override {
+    std::filesystem::copy(kBackup, file("backup"), std::filesystem::copy_options::recursive);
+  }
   int run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"trammel", "import-backup", file("backup")});
     std::vector<const char*> argv;
@@ -47,7 +49,9 @@ class ImportBackup : public testing::Test {
 };
 
 TEST_F(ImportBackup, MakesACellOfWhatTheControllerHas) {
-  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "cell-7", "--robot", kRobot, "--frames", file("frames.csv")}), 0);
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "cell-7", "--robot", kRobot, "--frames",
+                 file("frames.csv")}),
+            0);
   const Cell cell = read_cell(file("cell.yaml")).value();
   EXPECT_EQ(cell.name, "cell-7");
   ASSERT_TRUE(cell.tools.at("spindle"));
@@ -57,7 +61,8 @@ TEST_F(ImportBackup, MakesACellOfWhatTheControllerHas) {
   ASSERT_EQ(cell.joint_ranges.size(), 6u);
   EXPECT_NEAR(to_deg(cell.joint_ranges[2].second), 70, 1e-3);
   EXPECT_FALSE(rules_of(cell)->controller_compensates);
-  EXPECT_NE(text("frames.csv").find("wPanel,1800,-250,800,1,0,0,0"), std::string::npos) << text("frames.csv");
+  EXPECT_NE(text("frames.csv").find("wPanel,1800,-250,800,1,0,0,0"), std::string::npos)
+      << text("frames.csv");
   EXPECT_TRUE(differing(file("cell.yaml")).empty());
 }
 
@@ -95,37 +100,47 @@ TEST_F(ImportBackup, RefusesWhatDoesNotMakeACell) {
   folder_.write(moc, good + "#\nROBOT:\n\n  -name \"ROB_2\"\n");
   EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3) << "which of two?";
   EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1"}), 0);
-  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1", "--task", "T"}), 3);
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1",
+                 "--task", "T"}),
+            3);
   std::filesystem::create_directories(file("backup/RAPID/TASK2/SYSMOD"));
-  folder_.write("backup/RAPID/TASK2/SYSMOD/user.sys", replaced(text(user), "[100,0,150]", "[1,0,150]"));
-  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1"}), 3) << "two spindles";
-  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1", "--task", "task1"}), 0);
+  folder_.write("backup/RAPID/TASK2/SYSMOD/user.sys",
+                replaced(text(user), "[100,0,150]", "[1,0,150]"));
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1"}), 3)
+      << "two spindles";
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1",
+                 "--task", "task1"}),
+            0);
 }
 
 TEST_F(ImportBackup, AWorkObjectWithTwoValuesIsLeftOutAndNamedWithBoth) {
   const std::string belt =
-      "MODULE {}\n  TASK PERS wobjdata wBelt:=[FALSE,TRUE,\"\",[[{},0,500],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n"
+      "MODULE {}\n  TASK PERS wobjdata "
+      "wBelt:=[FALSE,TRUE,\"\",[[{},0,500],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n"
       "  PERS loaddata lBelt:=[{},[0,0,50],[1,0,0,0],0,0,0];\nENDMODULE\n";
   folder_.write("backup/RAPID/TASK1/PROGMOD/a.mod", fmt::format(fmt::runtime(belt), "A", 1500, 4));
   folder_.write("backup/RAPID/TASK1/PROGMOD/b.mod", fmt::format(fmt::runtime(belt), "B", 700, 5));
-  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--frames", file("frames.csv"), "--json",
-                 file("j.json")}),
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--frames",
+                 file("frames.csv"), "--json", file("j.json")}),
             0);
   EXPECT_NE(text("frames.csv").find("wPanel,"), std::string::npos);
   EXPECT_EQ(text("frames.csv").find("wBelt"), std::string::npos);
   EXPECT_EQ(text("cell.yaml").find("lBelt"), std::string::npos);
   const std::string notes = nlohmann::json::parse(text("j.json"))["notes"].dump();
-  for (const char* part :
-       {"wBelt", "a.mod line 2", "[1500.000, ", "b.mod line 2", "[700.000, ", "lBelt", "a.mod line 3"})
+  for (const char* part : {"wBelt", "a.mod line 2", "[1500.000, ", "b.mod line 2", "[700.000, ",
+                           "lBelt", "a.mod line 3"})
     EXPECT_NE(notes.find(part), std::string::npos) << part << ": " << notes;
 }
 
 TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItIsNotAbbs) {
   const std::vector<std::pair<std::string, std::string>> others = {
-      {"KRC/R1/Mada/$machine.dat", "KUKA"}, {"MD/sysframe.va", "FANUC"}, {"JOBS/TRIM1.JBI", "Yaskawa"}};
+      {"KRC/R1/Mada/$machine.dat", "KUKA"},
+      {"MD/sysframe.va", "FANUC"},
+      {"JOBS/TRIM1.JBI", "Yaskawa"}};
   for (const auto& [name, maker] : others) {
     std::filesystem::remove_all(file("backup"));
-    std::filesystem::create_directories(std::filesystem::path(file("backup/" + name)).parent_path());
+    std::filesystem::create_directories(
+        std::filesystem::path(file("backup/" + name)).parent_path());
     folder_.write("backup/" + name, "x\n");
     testing::internal::CaptureStderr();
     EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
@@ -156,7 +171,8 @@ TEST_F(ImportBackup, TextInUtf16IsRefusedAsSuch) {
   const auto parameters = cam::read_backup(in_utf16(text(moc)), "MOC.cfg", {}, "");
   ASSERT_FALSE(parameters);
   EXPECT_NE(sentence(parameters.error()).find("MOC.cfg: text in UTF-16"), std::string::npos);
-  const auto modules = cam::read_backup(text(moc), "MOC.cfg", {{"user.sys", in_utf16(text(user))}}, "");
+  const auto modules =
+      cam::read_backup(text(moc), "MOC.cfg", {{"user.sys", in_utf16(text(user))}}, "");
   ASSERT_FALSE(modules);
   EXPECT_NE(sentence(modules.error()).find("user.sys: text in UTF-16"), std::string::npos);
 }
@@ -165,8 +181,8 @@ TEST_F(ImportBackup, AnythingMayStandInTheParameters) {
   const std::string good = text(moc);
   for (std::size_t cut = 0; cut < good.size(); cut += 7)
     static_cast<void>(cam::read_backup(good.substr(0, cut), "MOC.cfg", {}, ""));
-  for (const char* odd :
-       {"", "\\", "ROBOT:", "ROBOT:\n-", "ROBOT:\n-name \"", "ROBOT:\n-name\\", ":\n-a b", "\n\n\\\n"})
+  for (const char* odd : {"", "\\", "ROBOT:", "ROBOT:\n-", "ROBOT:\n-name \"", "ROBOT:\n-name\\",
+                          ":\n-a b", "\n\n\\\n"})
     EXPECT_FALSE(cam::read_backup(odd, "MOC.cfg", {}, "ROB_1")) << odd;
 }
 

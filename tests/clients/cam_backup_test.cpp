@@ -9,22 +9,26 @@
 #include "tests/support/shifting_model.h"
 #include "tests/support/temporary_folder.h"
 
-// The backup of an ABB controller as a program: its modules are corrected for the robot that its parameters describe.
+// The backup of an ABB controller as a program: its modules are corrected for the robot that its
+// parameters describe.
 namespace trammel::cli {
 namespace {
 
 std::string module_of(const std::string& name) {
   return "MODULE " + name +
          "\n  PERS tooldata "
-         "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];"
-         "\n  CONST robtarget p10:=[[1800,-250,800],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+         "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,"
+         "0,0]];\n  CONST robtarget "
+         "p10:=[[1800,-250,800],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
          "  PROC main()\n    MoveL p10,v100,fine,tSpindle;\n  ENDPROC\nENDMODULE\n";
 }
 
-std::string robot(const std::string& number, const std::string& more, const std::string& type = "6640_2.75_205",
-                  int axes = 6) {
-  std::string text = "      -name \"ROB_" + number + "\" -use_robot_type \"ROB" + number + "_" + type + "\" " + more;
-  for (int k = 0; k < axes; ++k) text += fmt::format(" -use_joint_{} \"rob{}_{}\"", k, number, k + 1);
+std::string robot(const std::string& number, const std::string& more,
+                  const std::string& type = "6640_2.75_205", int axes = 6) {
+  std::string text = "      -name \"ROB_" + number + "\" -use_robot_type \"ROB" + number + "_" +
+                     type + "\" " + more;
+  for (int k = 0; k < axes; ++k)
+    text += fmt::format(" -use_joint_{} \"rob{}_{}\"", k, number, k + 1);
   return text + "\n\n";
 }
 
@@ -35,7 +39,9 @@ class BackupAsProgram : public testing::Test {
     std::filesystem::create_directories(folder_.file("backup/SYSPAR"));
     folder_.write("backup/RAPID/TASK1/PROGMOD/a.mod", module_of("A"));
   }
-  std::string path(const std::string& task) const { return folder_.file("backup/RAPID/" + task + "/PROGMOD"); }
+  std::string path(const std::string& task) const {
+    return folder_.file("backup/RAPID/" + task + "/PROGMOD");
+  }
   void write_parameters(const std::string& robots) {
     folder_.write("backup/SYSPAR/MOC.cfg", "MOC:CFG_1.0:6:0::\n#\nROBOT:\n\n" + robots);
   }
@@ -46,12 +52,14 @@ class BackupAsProgram : public testing::Test {
     const auto program = understood_program(*files, {}, frames);
     if (!program) return {{}, sentence(program.error())};
     cam::CorrectProgramOptions options;
-    auto done =
-        cam::correct_program(*program, test::small_cell("cam")->robot, test::spindle_only(), test::shift, options);
+    auto done = cam::correct_program(*program, test::small_cell("cam")->robot, test::spindle_only(),
+                                     test::shift, options);
     if (!done) return {{}, sentence(done.error())};
     return {std::move(*done), ""};
   }
-  static Vector3 wanted(const test::Corrected& made) { return test::row_of(made.program, "p10").p_B; }
+  static Vector3 wanted(const test::Corrected& made) {
+    return test::row_of(made.program, "p10").p_B;
+  }
 
   test::TemporaryFolder folder_;
 };
@@ -62,7 +70,8 @@ TEST_F(BackupAsProgram, TheRobotStandsWhereTheSystemParametersSay) {
   ASSERT_EQ(made.refusal, "");
   EXPECT_LT((wanted(made) - Vector3(1.8, -.35, .5)).norm(), 1e-12) << wanted(made).transpose();
   ASSERT_FALSE(made.program.notes.empty());
-  EXPECT_NE(made.program.notes[0].find("SYSPAR/MOC.cfg line"), std::string::npos) << made.program.notes[0];
+  EXPECT_NE(made.program.notes[0].find("SYSPAR/MOC.cfg line"), std::string::npos)
+      << made.program.notes[0];
   write_parameters(robot("1", ""));
   EXPECT_LT((wanted(corrected()) - Vector3(1.8, -.25, .8)).norm(), 1e-12);
 }
@@ -74,7 +83,8 @@ TEST_F(BackupAsProgram, ARowThatStandsTheRobotElsewhereIsRefusedWithBothPlaces) 
   folder_.write("other.csv", head + "600,1,0,0,0\n");
   EXPECT_EQ(corrected("", folder_.file("same.csv")).refusal, "");
   const std::string refusal = corrected("", folder_.file("other.csv")).refusal;
-  for (const char* part : {"robot_base of --frames", "SYSPAR/MOC.cfg", "300.000 mm and 0.0000 deg apart"})
+  for (const char* part :
+       {"robot_base of --frames", "SYSPAR/MOC.cfg", "300.000 mm and 0.0000 deg apart"})
     EXPECT_NE(refusal.find(part), std::string::npos) << refusal;
 }
 
@@ -104,7 +114,9 @@ TEST_F(BackupAsProgram, WhatAnotherTaskSetsOfASharedPersistentCountsThoughItIsNo
   sets.insert(sets.find("    MoveL"), "    tSpindle.tframe.trans.z:=nWear;\n");
   folder_.write("backup/RAPID/TASK2/PROGMOD/b.mod", sets);
   const std::string why = test::row_of(corrected("TASK1").program, "p10").message;
-  EXPECT_NE(why.find("tSpindle is set at run time (RAPID/TASK2/PROGMOD/b.mod line 5)"), std::string::npos) << why;
+  EXPECT_NE(why.find("tSpindle is set at run time (RAPID/TASK2/PROGMOD/b.mod line 5)"),
+            std::string::npos)
+      << why;
 }
 
 TEST_F(BackupAsProgram, AnotherRobotThanTheCellsIsRefusedByTypeAndByAxes) {
@@ -115,19 +127,22 @@ TEST_F(BackupAsProgram, AnotherRobotThanTheCellsIsRefusedByTypeAndByAxes) {
   write_parameters(robot("1", "", "360_1_1130", 4));
   EXPECT_NE(corrected().refusal.find("ROB1_360_1_1130"), std::string::npos);
   write_parameters(robot("1", "", "4400_60_1.96"));
-  EXPECT_NE(corrected().refusal.find("ROB1_4400_60_1.96"), std::string::npos) << "six axes, a parallel arm";
+  EXPECT_NE(corrected().refusal.find("ROB1_4400_60_1.96"), std::string::npos)
+      << "six axes, a parallel arm";
 }
 
 TEST_F(BackupAsProgram, CoupledAxesAndAnotherReachThanTheRobotFilesAreRefusedWithBothValues) {
   write_parameters(robot("1", "", "6640_2.55_180"));
   const std::string reach = corrected().refusal;
-  EXPECT_NE(reach.find("says ROB1_6640_2.55_180, the robot file is of ABB IRB 6640-205/2.75"), std::string::npos)
+  EXPECT_NE(reach.find("says ROB1_6640_2.55_180, the robot file is of ABB IRB 6640-205/2.75"),
+            std::string::npos)
       << reach;
   const std::string arm = "#\nARM:\n\n      -name \"rob1_3\" -coupled_upper_joint_bound ";
   write_parameters(robot("1", "") + arm + "1.2\n");
   const std::string coupled = corrected().refusal;
-  for (const char* part : {"coupled_upper_joint_bound 1.2 says that axis 3 follows another one",
-                           "SYSPAR/MOC.cfg row 10", "the robot file of ABB IRB 6640-205/2.75 has no coupling of it"})
+  for (const char* part :
+       {"coupled_upper_joint_bound 1.2 says that axis 3 follows another one",
+        "SYSPAR/MOC.cfg row 10", "the robot file of ABB IRB 6640-205/2.75 has no coupling of it"})
     EXPECT_NE(coupled.find(part), std::string::npos) << coupled;
   write_parameters(robot("1", "") + arm + "0\n");
   EXPECT_EQ(corrected().refusal, "");
@@ -154,7 +169,8 @@ TEST_F(BackupAsProgram, WhereAnotherUnitCarriesTheRobotItsBaseIsNotTakenAndANote
   const test::Corrected made = corrected();
   EXPECT_LT((wanted(made) - Vector3(1.8, -.25, .8)).norm(), 1e-12);
   ASSERT_FALSE(made.program.notes.empty());
-  EXPECT_NE(made.program.notes[0].find("TRACK carries ROB_1"), std::string::npos) << made.program.notes[0];
+  EXPECT_NE(made.program.notes[0].find("TRACK carries ROB_1"), std::string::npos)
+      << made.program.notes[0];
 }
 
 }  // namespace

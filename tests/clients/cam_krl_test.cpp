@@ -12,34 +12,45 @@ using test::row_of;
 
 // The tool of the shipped cell: turned by -45 deg about y.
 const std::string kConfig =
-    "DEFDAT $CONFIG\r\nDECL FRAME TOOL_DATA[16]\r\nTOOL_DATA[1]={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\r\n"
+    "DEFDAT $CONFIG\r\nDECL FRAME TOOL_DATA[16]\r\nTOOL_DATA[1]={X 100.0,Y 0.0,Z 150.0,A 0.0,B "
+    "-45.0,C 0.0}\r\n"
     "BASE_DATA[2]={X 1500.0,Y 0.0,Z 500.0,A 0.0,B 0.0,C 0.0}\r\n"
-    "LOAD_DATA[1]={M 100.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}\r\nENDDAT\r\n";
+    "LOAD_DATA[1]={M 100.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z "
+    "0.0}}\r\nENDDAT\r\n";
 const std::string kSet = "$TOOL=TOOL_DATA[1]\n$BASE=BASE_DATA[2]\n";
 
-test::Corrected krl(const std::string& src, const std::string& dat = "", const ReadOptions& read = {}) {
+test::Corrected krl(const std::string& src, const std::string& dat = "",
+                    const ReadOptions& read = {}) {
   std::vector<SourceFile> files = {{"p.src", src}, {"$config.dat", kConfig}};
   if (!dat.empty()) files.push_back({"p.dat", dat});
   return corrected_by_shift(Dialect::kKrl, files, read);
 }
-std::string program(const std::string& lines) { return "&ACCESS RVP\nDEF p( )\nINI\n" + kSet + lines + "END\n"; }
-std::string why(const test::Corrected& made, const std::string& name) { return row_of(made.program, name).message; }
+std::string program(const std::string& lines) {
+  return "&ACCESS RVP\nDEF p( )\nINI\n" + kSet + lines + "END\n";
+}
+std::string why(const test::Corrected& made, const std::string& name) {
+  return row_of(made.program, name).message;
+}
 
 TEST(Krl, PositionsOfTheDataListAreCorrectedWhereTheyStand) {
   const std::string dat =
       "DEFDAT p PUBLIC\r\n; Bohrung gr\xFC"
       "n: XP9={X 1,Y 2}\r\n"
       "DECL E6POS XP1={X 300.0,Y\t-250.00,Z 300,A 0.0,B 60.0,C 0.0,S 2,T 2,E1 0.0,E2 0.0}\r\n"
-      "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE FALSE}\r\nENDDAT\r\n";
+      "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE "
+      "FALSE}\r\nENDDAT\r\n";
   const std::string src =
-      "DEF p( )\n;FOLD PTP P1 Vel=100 % PDAT1 Tool[1]:spindle Base[2]:panel;%{PE}%R 8.3,%MKUKATPBASIS\nFDAT_ACT=FP1\n"
+      "DEF p( )\n;FOLD PTP P1 Vel=100 % PDAT1 Tool[1]:spindle Base[2]:panel;%{PE}%R "
+      "8.3,%MKUKATPBASIS\nFDAT_ACT=FP1\n"
       "PTP XP1\n;ENDFOLD\n;LIN XP1\nEND\n";
   const test::Corrected made = krl(src, dat);
   ASSERT_EQ(made.refusal, "");
   EXPECT_EQ(made.program.left_alone(), 0u);
   EXPECT_EQ(made.program.files[0].text, src);
-  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program, 2)), test::without_numbers(dat));
-  EXPECT_NE(made.program.files[2].text.find("{X 300.123,Y\t-250.235,Z 300.346,A 0.0000,B 60.0000,C 0.0000,S 2,T 2,"),
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program, 2)),
+            test::without_numbers(dat));
+  EXPECT_NE(made.program.files[2].text.find(
+                "{X 300.123,Y\t-250.235,Z 300.346,A 0.0000,B 60.0000,C 0.0000,S 2,T 2,"),
             std::string::npos)
       << made.program.files[2].text;
 }
@@ -50,33 +61,38 @@ TEST(Krl, FramesInMotionsSplinesAxesAndAssignmentsAreFound) {
                   "LIN {X 300,Y 0,Z 500,A 0,B 60,C 0} C_DIS\n"
                   "P1={X 300,Y 10,Z 500,A 0,B 60,C 0}\nLIN P1 C_VEL\n"
                   "CIRC {X 300,Y 20,Z 510,A 0,B 60,C 0},{X 300,Y 40,Z 500,A 0,B 60,C 0},CA 180\n"
-                  "SPLINE\nSPL {X 300,Y 50,Z 500,A 0,B 60,C 0}\nSLIN {E6POS: X 300,Y 60,Z 500,A 0,B 60,C 0} WITH "
-                  "$VEL.CP=0.1\nENDSPLINE\n"
+                  "SPLINE\nSPL {X 300,Y 50,Z 500,A 0,B 60,C 0}\nSLIN {E6POS: X 300,Y 60,Z 500,A "
+                  "0,B 60,C 0} WITH $VEL.CP=0.1\nENDSPLINE\n"
                   "SPTP {X 300,Y 70,Z 500,A 0,B 60,C 0,S 'B010',T 'B000010'}\n"));
-  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  for (const ReceiptRow& row : made.program.rows)
+    EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
   EXPECT_EQ(made.program.rows.size(), 8u);
   EXPECT_EQ(made.program.moves_corrected, 7u);
 }
 
 TEST(Krl, ConstantFramesOfTheGeometricOperatorAreFolded) {
-  const test::Corrected made =
-      krl(program("P1={X 300,Y 10,Z 500,A 0,B 90,C 0}\nLIN P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN P1\n"));
+  const test::Corrected made = krl(
+      program("P1={X 300,Y 10,Z 500,A 0,B 90,C 0}\nLIN P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN P1\n"));
   const ReceiptRow row = row_of(made.program, "P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}");
   ASSERT_TRUE(row.corrected()) << row.message;
   EXPECT_NEAR(row.after[0], 250.123, 1e-3);
   EXPECT_NEAR(row.after[1], 9.765, 1e-3);
   EXPECT_NEAR(row.after[2], 495.346, 1e-3);
-  EXPECT_NE(made.program.files[0].text.find("; trammel: was P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN {X 250.123,Y 9.765,"),
+  EXPECT_NE(made.program.files[0].text.find(
+                "; trammel: was P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN {X 250.123,Y 9.765,"),
             std::string::npos)
       << made.program.files[0].text;
 }
 
 TEST(Krl, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
   const test::Corrected made =
-      krl(program("P1={X 300,Y 10,Z 500,A 0,B 60,C 0}\nLIN P1\nP1.X=P1.X+5\nP2={X 300,Y 10,Z H,A 0,B 60,C 0}\nLIN P2\n"
-                  "LIN_REL {X 10}\nLIN {Z 400}\nLIN $POS_ACT\nPTP XELSEWHERE\nLIN P1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"
+      krl(program("P1={X 300,Y 10,Z 500,A 0,B 60,C 0}\nLIN P1\nP1.X=P1.X+5\nP2={X 300,Y 10,Z H,A "
+                  "0,B 60,C 0}\nLIN P2\n"
+                  "LIN_REL {X 10}\nLIN {Z 400}\nLIN $POS_ACT\nPTP XELSEWHERE\nLIN P1:{X DX,Y 0,Z "
+                  "0,A 0,B 0,C 0}\n"
                   "BAS(#BASE,n)\nLIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n"));
-  EXPECT_NE(why(made, "P1").find("P1 is set at run time (p.src line"), std::string::npos) << why(made, "P1");
+  EXPECT_NE(why(made, "P1").find("P1 is set at run time (p.src line"), std::string::npos)
+      << why(made, "P1");
   EXPECT_NE(why(made, "P2").find("Z is not a constant number"), std::string::npos);
   EXPECT_NE(why(made, "{X 10}").find("relative"), std::string::npos);
   EXPECT_NE(why(made, "{Z 400}").find("does not say X"), std::string::npos);
@@ -87,9 +103,10 @@ TEST(Krl, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
 }
 
 TEST(Krl, ToolAndBaseAreFollowedThroughCallsAndBranches) {
-  const test::Corrected made =
-      krl(program("up( )\nIF $IN[1] THEN\n$BASE=$NULLFRAME\nENDIF\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n") +
-          "DEF up( )\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
+  const test::Corrected made = krl(
+      program(
+          "up( )\nIF $IN[1] THEN\n$BASE=$NULLFRAME\nENDIF\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n") +
+      "DEF up( )\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
   EXPECT_TRUE(row_of(made.program, "{X 300,Y 0,Z 500,A 0,B 60,C 0}").corrected());
   EXPECT_NE(why(made, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("branch"), std::string::npos);
 }
@@ -97,9 +114,10 @@ TEST(Krl, ToolAndBaseAreFollowedThroughCallsAndBranches) {
 TEST(Krl, WithoutAToolOrABaseNothingIsGuessed) {
   const test::Corrected made = krl("DEF p()\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
   EXPECT_NE(made.program.rows[0].message.find("no $TOOL is set"), std::string::npos);
-  const test::Corrected other =
-      krl("DEF p()\n$TOOL=TOOL_DATA[1]\n$BASE=BASE_DATA[7]\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
-  EXPECT_NE(other.program.rows[0].message.find("BASE_DATA[7] is not in the files"), std::string::npos);
+  const test::Corrected other = krl(
+      "DEF p()\n$TOOL=TOOL_DATA[1]\n$BASE=BASE_DATA[7]\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
+  EXPECT_NE(other.program.rows[0].message.find("BASE_DATA[7] is not in the files"),
+            std::string::npos);
 }
 
 TEST(Krl, AToolThatIsNotTheCellsIsRefusedWithBothValues) {
@@ -141,22 +159,28 @@ const std::string kPoint = "{X 300,Y 0,Z 500,A 0,B 60,C 0}";
 
 TEST(Krl, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   const std::vector<std::pair<std::string, std::string>> loops = {
-      {"LOOP\n", "ENDLOOP\n"},        {"WHILE $IN[1]\n", "ENDWHILE\n"}, {"FOR I=1 TO 2\n", "ENDFOR\n"},
-      {"REPEAT\n", "UNTIL $IN[1]\n"}, {"M1:\n", "GOTO M1\n"},           {"M1:\n", "IF $IN[1] THEN\nGOTO M1\nENDIF\n"}};
+      {"LOOP\n", "ENDLOOP\n"},        {"WHILE $IN[1]\n", "ENDWHILE\n"},
+      {"FOR I=1 TO 2\n", "ENDFOR\n"}, {"REPEAT\n", "UNTIL $IN[1]\n"},
+      {"M1:\n", "GOTO M1\n"},         {"M1:\n", "IF $IN[1] THEN\nGOTO M1\nENDIF\n"}};
   for (const auto& [head, end] : loops) {
-    const test::Corrected frame = krl(program(head + "LIN " + kPoint + "\n$BASE=$NULLFRAME\n" + end));
-    EXPECT_NE(why(frame, kPoint).find("$BASE: a branch or a loop"), std::string::npos) << head << why(frame, kPoint);
-    const test::Corrected tool = krl(program(head + "LIN " + kPoint + "\n$TOOL=$NULLFRAME\n" + end));
-    EXPECT_NE(why(tool, kPoint).find("$TOOL: a branch or a loop"), std::string::npos) << head << why(tool, kPoint);
-    const test::Corrected called =
-        krl(program(head + "LIN " + kPoint + "\nnull( )\n" + end) + "DEF null( )\n$BASE=$NULLFRAME\nEND\n");
+    const test::Corrected frame =
+        krl(program(head + "LIN " + kPoint + "\n$BASE=$NULLFRAME\n" + end));
+    EXPECT_NE(why(frame, kPoint).find("$BASE: a branch or a loop"), std::string::npos)
+        << head << why(frame, kPoint);
+    const test::Corrected tool =
+        krl(program(head + "LIN " + kPoint + "\n$TOOL=$NULLFRAME\n" + end));
+    EXPECT_NE(why(tool, kPoint).find("$TOOL: a branch or a loop"), std::string::npos)
+        << head << why(tool, kPoint);
+    const test::Corrected called = krl(program(head + "LIN " + kPoint + "\nnull( )\n" + end) +
+                                       "DEF null( )\n$BASE=$NULLFRAME\nEND\n");
     EXPECT_FALSE(row_of(called.program, kPoint).corrected()) << head;
   }
 }
 
 TEST(Krl, ALoopThatSetsWhatItNeedsIsCorrected) {
-  const test::Corrected made = krl(
-      program("LOOP\n" + kSet + "LIN " + kPoint + "\n$BASE=$NULLFRAME\nIF $IN[1] THEN\nEXIT\n" + "ENDIF\nENDLOOP\n"));
+  const test::Corrected made =
+      krl(program("LOOP\n" + kSet + "LIN " + kPoint + "\n$BASE=$NULLFRAME\nIF $IN[1] THEN\nEXIT\n" +
+                  "ENDIF\nENDLOOP\n"));
   EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
 }
 
@@ -164,18 +188,23 @@ const std::string kMore = "{X 310,Y 0,Z 500,A 0,B 60,C 0}";
 
 TEST(Krl, WhatAnInterruptRoutineSetsHoldsAnywhereBehindItsDeclaration) {
   const auto with = [](const std::string& handler) {
-    return krl(program("LIN " + kMore + "\nINTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nINTERRUPT ON 3\nLIN " +
+    return krl(program("LIN " + kMore +
+                       "\nINTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nINTERRUPT ON 3\nLIN " +
                        kPoint + "\n") +
                "DEF stopped( )\n" + handler + "END\n");
   };
-  for (const char* set : {"$BASE=$NULLFRAME\n", "BAS(#BASE,0)\n", "null( )\nEND\nDEF null( )\n$BASE=$NULLFRAME\n"}) {
+  for (const char* set :
+       {"$BASE=$NULLFRAME\n", "BAS(#BASE,0)\n", "null( )\nEND\nDEF null( )\n$BASE=$NULLFRAME\n"}) {
     const test::Corrected made = with(set);
     EXPECT_TRUE(row_of(made.program, kMore).corrected()) << why(made, kMore);
-    EXPECT_NE(why(made, kPoint).find("$BASE: the interrupt routine STOPPED may change it"), std::string::npos)
+    EXPECT_NE(why(made, kPoint).find("$BASE: the interrupt routine STOPPED may change it"),
+              std::string::npos)
         << set << why(made, kPoint);
   }
-  for (const char* harmless : {"$OUT[1]=TRUE\n", "$BASE=$NULLFRAME\n$BASE=BASE_DATA[2]\n", "BRAKE F\nRESUME\n"})
-    EXPECT_TRUE(row_of(with(harmless).program, kPoint).corrected()) << harmless << why(with(harmless), kPoint);
+  for (const char* harmless :
+       {"$OUT[1]=TRUE\n", "$BASE=$NULLFRAME\n$BASE=BASE_DATA[2]\n", "BRAKE F\nRESUME\n"})
+    EXPECT_TRUE(row_of(with(harmless).program, kPoint).corrected())
+        << harmless << why(with(harmless), kPoint);
 }
 
 TEST(Krl, AMotionOfAnInterruptRoutineHasTheToolAndBaseOfWhatItComesInto) {
@@ -189,8 +218,10 @@ TEST(Krl, AMotionOfAnInterruptRoutineHasTheToolAndBaseOfWhatItComesInto) {
 
 TEST(Krl, ResumeEndsWhatWasInterruptedWhereverItWas) {
   const auto with = [](const std::string& last) {
-    return krl(program("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nsearching( )\nLIN " + kPoint + "\n") +
-               "DEF searching( )\n$BASE=$NULLFRAME\nLIN {X 1800,Y 0,Z 1000,A 0,B 60,C 0}\n$BASE=BASE_DATA[2]\nEND\n" +
+    return krl(program("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nsearching( )\nLIN " +
+                       kPoint + "\n") +
+               "DEF searching( )\n$BASE=$NULLFRAME\nLIN {X 1800,Y 0,Z 1000,A 0,B 60,C "
+               "0}\n$BASE=BASE_DATA[2]\nEND\n" +
                "DEF stopped( )\nBRAKE\n" + last + "END\n");
   };
   EXPECT_TRUE(row_of(with("").program, kPoint).corrected()) << why(with(""), kPoint);
@@ -198,41 +229,48 @@ TEST(Krl, ResumeEndsWhatWasInterruptedWhereverItWas) {
 }
 
 TEST(Krl, WhatATriggerOrAnotherFileSetsIsNoConstant) {
-  const std::string dat = "DEFDAT p\nDECL GLOBAL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
-  const test::Corrected trigger = krl(program("TRIGGER WHEN DISTANCE=0 DELAY=0 DO XP1.X=305\nLIN XP1\n"), dat);
-  EXPECT_NE(why(trigger, "XP1").find("XP1 is set at run time (p.src line"), std::string::npos) << why(trigger, "XP1");
+  const std::string dat =
+      "DEFDAT p\nDECL GLOBAL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const test::Corrected trigger =
+      krl(program("TRIGGER WHEN DISTANCE=0 DELAY=0 DO XP1.X=305\nLIN XP1\n"), dat);
+  EXPECT_NE(why(trigger, "XP1").find("XP1 is set at run time (p.src line"), std::string::npos)
+      << why(trigger, "XP1");
   const auto beside = [&](const std::string& line) {
-    return corrected_by_shift(Dialect::kKrl, {{"p.src", program("LIN XP1\nBAS(#BASE,2)\nLIN " + kPoint + "\n")},
-                                              {"p.dat", dat},
-                                              {"$config.dat", kConfig},
-                                              {"q.src", "DEF q( )\n" + line + "\nEND\n"}});
+    return corrected_by_shift(Dialect::kKrl,
+                              {{"p.src", program("LIN XP1\nBAS(#BASE,2)\nLIN " + kPoint + "\n")},
+                               {"p.dat", dat},
+                               {"$config.dat", kConfig},
+                               {"q.src", "DEF q( )\n" + line + "\nEND\n"}});
   };
   EXPECT_TRUE(row_of(beside("").program, "XP1").corrected());
   EXPECT_NE(why(beside("XP1.Z=400"), "XP1").find("(q.src line 2)"), std::string::npos)
       << why(beside("XP1.Z=400"), "XP1");
   const test::Corrected base = beside("BASE_DATA[2]={X 1501,Y 0,Z 500,A 0,B 0,C 0}");
-  EXPECT_NE(why(base, kPoint).find("BASE_DATA[2] is set at run time (q.src line 2)"), std::string::npos)
+  EXPECT_NE(why(base, kPoint).find("BASE_DATA[2] is set at run time (q.src line 2)"),
+            std::string::npos)
       << why(base, kPoint);
-  EXPECT_TRUE(row_of(beside("BASE_DATA[2]={X 1500,Y 0,Z 500,A 0,B 0,C 0}").program, kPoint).corrected());
+  EXPECT_TRUE(
+      row_of(beside("BASE_DATA[2]={X 1500,Y 0,Z 500,A 0,B 0,C 0}").program, kPoint).corrected());
 }
 
 TEST(Krl, AFunctionInAnExpressionSetsWhatItSets) {
-  const test::Corrected made =
-      krl(program("H=null(1)\nLIN " + kPoint + "\n") + "DEFFCT INT null(n:IN)\n$BASE=$NULLFRAME\nRETURN 1\nENDFCT\n");
-  ASSERT_TRUE(row_of(made.program, kPoint).frame == "$NULLFRAME" || !row_of(made.program, kPoint).corrected())
+  const test::Corrected made = krl(program("H=null(1)\nLIN " + kPoint + "\n") +
+                                   "DEFFCT INT null(n:IN)\n$BASE=$NULLFRAME\nRETURN 1\nENDFCT\n");
+  ASSERT_TRUE(row_of(made.program, kPoint).frame == "$NULLFRAME" ||
+              !row_of(made.program, kPoint).corrected())
       << row_of(made.program, kPoint).frame;
 }
 
 TEST(Krl, ALoadThatMotionsSetIsComparedWithTheCells) {
-  const test::Corrected all =
-      krl(program("$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nLIN " + kPoint + "\n"));
+  const test::Corrected all = krl(program(
+      "$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nLIN " + kPoint + "\n"));
   EXPECT_NE(all.refusal.find("40.000 kg"), std::string::npos) << all.refusal;
   EXPECT_NE(all.refusal.find("60.000 kg and 0.0 mm apart"), std::string::npos) << all.refusal;
-  const test::Corrected some =
-      krl(program("LIN " + kPoint +
-                  "\n$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\n"
-                  "LIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n$LOAD.M=W\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n"
-                  "$LOAD=LOAD_DATA[1]\nLIN {X 303,Y 0,Z 500,A 0,B 60,C 0}\n"));
+  const test::Corrected some = krl(
+      program("LIN " + kPoint +
+              "\n$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\n"
+              "LIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n$LOAD.M=W\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n"
+              "$LOAD=LOAD_DATA[1]\nLIN {X 303,Y 0,Z 500,A 0,B 60,C 0}\n"));
   EXPECT_TRUE(row_of(some.program, kPoint).corrected()) << why(some, kPoint);
   EXPECT_NE(why(some, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("60.000 kg"), std::string::npos);
   EXPECT_NE(why(some, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("a part of $LOAD"), std::string::npos);
@@ -242,24 +280,32 @@ TEST(Krl, ALoadThatMotionsSetIsComparedWithTheCells) {
 TEST(Krl, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
   const std::string dat =
       "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\n"
-      "DECL E6POS XP2={X 310,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nDECL E6POS Xq={X 1,Y 0,Z 0,A 0,B 0,C 0,S 0,T 0}\n"
+      "DECL E6POS XP2={X 310,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nDECL E6POS Xq={X 1,Y 0,Z 0,A 0,B 0,C "
+      "0,S 0,T 0}\n"
       "ENDDAT\n";
-  const test::Corrected made = krl(program("DECL E6POS XX\nXX=XP1\nXX.Z=XX.Z+50\nLIN XX\nLIN XP1\nH=XP2.Z\nLIN "
-                                           "XP2\nLIN XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"),
-                                   dat);
+  const test::Corrected made =
+      krl(program("DECL E6POS XX\nXX=XP1\nXX.Z=XX.Z+50\nLIN XX\nLIN XP1\nH=XP2.Z\nLIN XP2\nLIN "
+                  "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"),
+          dat);
   EXPECT_TRUE(row_of(made.program, "XP1").corrected());
-  EXPECT_NE(why(made, "XX").find("it moves with XP1, which is corrected"), std::string::npos) << why(made, "XX");
-  EXPECT_NE(why(made, "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}").find("it moves with XP1"), std::string::npos);
-  EXPECT_NE(why(made, "XP2").find("its numbers are read elsewhere too"), std::string::npos) << why(made, "XP2");
-  EXPECT_NE(fmt::format("{}", fmt::join(made.program.notes, "\n")).find("no motion in these files goes to Xq ("),
+  EXPECT_NE(why(made, "XX").find("it moves with XP1, which is corrected"), std::string::npos)
+      << why(made, "XX");
+  EXPECT_NE(why(made, "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}").find("it moves with XP1"),
+            std::string::npos);
+  EXPECT_NE(why(made, "XP2").find("its numbers are read elsewhere too"), std::string::npos)
+      << why(made, "XP2");
+  EXPECT_NE(fmt::format("{}", fmt::join(made.program.notes, "\n"))
+                .find("no motion in these files goes to Xq ("),
             std::string::npos);
 }
 
 TEST(Krl, AnArcIsCorrectedWithBothPointsOrWithNone) {
-  const std::string dat = "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const std::string dat =
+      "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
   const test::Corrected made = krl(program("CIRC {X 300,Y 20,Z 510},XP1\n"), dat);
   EXPECT_FALSE(row_of(made.program, "{X 300,Y 20,Z 510}").corrected());
-  EXPECT_NE(why(made, "XP1").find("the other point of its arc (p.src line"), std::string::npos) << why(made, "XP1");
+  EXPECT_NE(why(made, "XP1").find("the other point of its arc (p.src line"), std::string::npos)
+      << why(made, "XP1");
   EXPECT_EQ(made.program.moves_corrected, 0u);
 }
 
@@ -271,20 +317,23 @@ const std::string kFdat =
 TEST(Krl, WhatASplineSetsAtItsHeadHoldsForEachOfItsMotions) {
   const std::string far = "{X 1800,Y 0,Z 1000,A 0,B 60,C 0}";
   for (const char* head :
-       {"SPLINE WITH $BASE=BASE_DATA[2]\n", "SPLINE WITH $VEL={CP 0.2,ORI1 200,ORI2 200}, $BASE=SBASE(FP1.BASE_NO)\n",
-        "SPLINE WITH $VEL=SVEL_CP( 0.2, , L1), $TOOL=STOOL2( FP1), $BASE= SBASE( FP1.BASE_NO),$IPO_MODE=SIPO_MODE( "
-        "FP1.IPO_FRAME), $LOAD=SLOAD( FP1.TOOL_NO)\n",
+       {"SPLINE WITH $BASE=BASE_DATA[2]\n",
+        "SPLINE WITH $VEL={CP 0.2,ORI1 200,ORI2 200}, $BASE=SBASE(FP1.BASE_NO)\n",
+        "SPLINE WITH $VEL=SVEL_CP( 0.2, , L1), $TOOL=STOOL2( FP1), $BASE= SBASE( "
+        "FP1.BASE_NO),$IPO_MODE=SIPO_MODE( FP1.IPO_FRAME), $LOAD=SLOAD( FP1.TOOL_NO)\n",
         "PTP_SPLINE WITH $BASE=BASE_DATA[2]\n"}) {
-    const test::Corrected made = krl(program("$BASE=$NULLFRAME\n" + std::string(head) + "SPL " + kPoint + "\nSLIN " +
-                                             kMore + "\nENDSPLINE\nSLIN " + far + "\n"),
-                                     kFdat);
+    const test::Corrected made =
+        krl(program("$BASE=$NULLFRAME\n" + std::string(head) + "SPL " + kPoint + "\nSLIN " + kMore +
+                    "\nENDSPLINE\nSLIN " + far + "\n"),
+            kFdat);
     ASSERT_EQ(made.refusal, "") << head;
     EXPECT_NEAR(row_of(made.program, kPoint).p_B.x(), 1.8, 1e-9) << head << why(made, kPoint);
     EXPECT_NEAR(row_of(made.program, kMore).p_B.x(), 1.81, 1e-9) << head << why(made, kMore);
-    EXPECT_NEAR(row_of(made.program, far).p_B.x(), 1.8, 1e-9) << head << "behind the block, what held before it";
+    EXPECT_NEAR(row_of(made.program, far).p_B.x(), 1.8, 1e-9)
+        << head << "behind the block, what held before it";
   }
-  const test::Corrected tool =
-      krl(program("SPLINE WITH $TOOL={X 100,Y 0,Z 152.5,A 0,B -45,C 0}\nSPL " + kPoint + "\nENDSPLINE\n"));
+  const test::Corrected tool = krl(program(
+      "SPLINE WITH $TOOL={X 100,Y 0,Z 152.5,A 0,B -45,C 0}\nSPL " + kPoint + "\nENDSPLINE\n"));
   EXPECT_NE(tool.refusal.find("2.500 mm"), std::string::npos) << tool.refusal;
 }
 
@@ -293,53 +342,66 @@ TEST(Krl, WhatWithSetsAndNobodyCanTellLeavesTheMotion) {
            {"$BASE.X=5", "a part of $BASE is set"},
            {"$TOOL.Z=5", "a part of $TOOL is set"},
            {"$BASE=MY_BASE(FP1)", "not constant"},
-           {"$BASE=EK(K_ROOT(FP1.BASE_NO),K_TYPE(FP1.BASE_NO),K_OFFS(FP1.BASE_NO))", "external kinematics"},
+           {"$BASE=EK(K_ROOT(FP1.BASE_NO),K_TYPE(FP1.BASE_NO),K_OFFS(FP1.BASE_NO))",
+            "external kinematics"},
            {"$LOAD=MY_LOAD(1)", "$LOAD is not constant"},
            {"$IPO_MODE=MODE", "$IPO_MODE is not constant"}}) {
-    const test::Corrected made = krl(program("SLIN " + kPoint + " WITH $VEL.CP=0.1, " + with + "\n"), kFdat);
-    EXPECT_NE(why(made, kPoint).find(reason), std::string::npos) << with << ": " << why(made, kPoint) << made.refusal;
+    const test::Corrected made =
+        krl(program("SLIN " + kPoint + " WITH $VEL.CP=0.1, " + with + "\n"), kFdat);
+    EXPECT_NE(why(made, kPoint).find(reason), std::string::npos)
+        << with << ": " << why(made, kPoint) << made.refusal;
   }
 }
 
 TEST(Krl, AToolThatStandsIsSaidInEveryForm) {
   for (const char* with : {"$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)", "$IPO_MODE=#TCP",
-                           "$TOOL= STOOL2( FTCP), $BASE= SBASE( FTCP.BASE_NO),$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)"}) {
-    const test::Corrected made = krl(program("SPTP XP1 WITH $VEL_AXIS[1]= SVEL_JOINT( 100.0), " + std::string(with) +
-                                             "\nPTP {A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}\nSLIN " + kPoint +
-                                             " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
-                                     kFdat);
-    EXPECT_NE(why(made, "XP1").find("the tool stands"), std::string::npos) << with << why(made, "XP1");
+                           "$TOOL= STOOL2( FTCP), $BASE= SBASE( FTCP.BASE_NO),$IPO_MODE= "
+                           "SIPO_MODE( FTCP.IPO_FRAME)"}) {
+    const test::Corrected made =
+        krl(program("SPTP XP1 WITH $VEL_AXIS[1]= SVEL_JOINT( 100.0), " + std::string(with) +
+                    "\nPTP {A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}\nSLIN " + kPoint +
+                    " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
+            kFdat);
+    EXPECT_NE(why(made, "XP1").find("the tool stands"), std::string::npos)
+        << with << why(made, "XP1");
     EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << with << why(made, kPoint);
-    const test::Corrected spline = krl(program("SPLINE WITH " + std::string(with) + "\nSPL XP1\nENDSPLINE\n"), kFdat);
-    EXPECT_NE(why(spline, "XP1").find("the tool stands"), std::string::npos) << with << why(spline, "XP1");
+    const test::Corrected spline =
+        krl(program("SPLINE WITH " + std::string(with) + "\nSPL XP1\nENDSPLINE\n"), kFdat);
+    EXPECT_NE(why(spline, "XP1").find("the tool stands"), std::string::npos)
+        << with << why(spline, "XP1");
   }
 }
 
 TEST(Krl, ABaseThatExternalKinematicsCarryIsLeft) {
   const test::Corrected made = krl(program("LIN " + kPoint + "\nBAS(#EX_BASE,2)\nLIN " + kMore +
-                                           "\nBAS(#BASE,2)\nLIN {X 320,Y 0,Z 500,A 0,B "
-                                           "60,C 0}\n"));
+                                           "\nBAS(#BASE,2)\nLIN {X 320,Y 0,Z 500,A 0,B 60,C 0}\n"));
   EXPECT_TRUE(row_of(made.program, kPoint).corrected());
-  EXPECT_NE(why(made, kMore).find("external kinematics carry the base (p.src line"), std::string::npos)
+  EXPECT_NE(why(made, kMore).find("external kinematics carry the base (p.src line"),
+            std::string::npos)
       << why(made, kMore);
   EXPECT_TRUE(row_of(made.program, "{X 320,Y 0,Z 500,A 0,B 60,C 0}").corrected());
-  for (const auto& [index, carried] : {std::pair("3", true), std::pair("0", false), std::pair("-1", false)}) {
-    const test::Corrected unit = krl(program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
-                                     "DEFDAT p\nMACH_DEF_INDEX[2]=" + std::string(index) + "\nENDDAT\n");
+  for (const auto& [index, carried] :
+       {std::pair("3", true), std::pair("0", false), std::pair("-1", false)}) {
+    const test::Corrected unit =
+        krl(program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
+            "DEFDAT p\nMACH_DEF_INDEX[2]=" + std::string(index) + "\nENDDAT\n");
     EXPECT_EQ(row_of(unit.program, kPoint).corrected(), !carried) << index << why(unit, kPoint);
   }
 }
 
 TEST(Krl, ALoadThatNobodyToldIsTheControllersDefault) {
-  for (const char* load : {"{M -1}", "{M -1.00000,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}"}) {
+  for (const char* load :
+       {"{M -1}", "{M -1.00000,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}"}) {
     std::string config = kConfig;
     const std::size_t at = config.find("LOAD_DATA[1]=") + 13;
     config.replace(at, config.find("\r\n", at) - at, load);
     const test::Corrected made = corrected_by_shift(
-        Dialect::kKrl, {{"p.src", program("$LOAD=LOAD_DATA[1]\nLIN " + kPoint + "\n")}, {"$config.dat", config}});
+        Dialect::kKrl,
+        {{"p.src", program("$LOAD=LOAD_DATA[1]\nLIN " + kPoint + "\n")}, {"$config.dat", config}});
     EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint) << made.refusal;
     ASSERT_EQ(made.program.notes.size(), 2u) << load << ": the other one is of the posture";
-    EXPECT_NE(made.program.notes[0].find("a load of -1 kg ($config.dat line 5): the controller takes its default load"),
+    EXPECT_NE(made.program.notes[0].find(
+                  "a load of -1 kg ($config.dat line 5): the controller takes its default load"),
               std::string::npos)
         << made.program.notes[0];
   }
@@ -347,24 +409,28 @@ TEST(Krl, ALoadThatNobodyToldIsTheControllersDefault) {
 
 TEST(Krl, TheControllersOwnBasIsKnown) {
   const std::string bas =
-      "&ACCESS RO\nGLOBAL DEF BAS(CMD :IN, VAL :IN)\nDECL BAS_COMMAND CMD\nSWITCH CMD\nCASE #BASE\nTAKE( )\nENDSWITCH\n"
-      "END\nDEF TAKE( )\nIF FDAT_ACT.BASE_NO==0 THEN\n$BASE=$WORLD\nELSE\n$BASE=BASE_DATA[FDAT_ACT.BASE_NO]\nENDIF\n"
+      "&ACCESS RO\nGLOBAL DEF BAS(CMD :IN, VAL :IN)\nDECL BAS_COMMAND CMD\nSWITCH CMD\nCASE "
+      "#BASE\nTAKE( )\nENDSWITCH\n"
+      "END\nDEF TAKE( )\nIF FDAT_ACT.BASE_NO==0 "
+      "THEN\n$BASE=$WORLD\nELSE\n$BASE=BASE_DATA[FDAT_ACT.BASE_NO]\nENDIF\n"
       "END\n";
   const auto with = [&](const std::string& name, const std::string& text) {
     return corrected_by_shift(
-        Dialect::kKrl,
-        {{"R1/p.src", "DEF p( )\nBAS(#INITMOV,0)\nBAS(#TOOL,1)\nBAS(#BASE,2)\nLIN " + kPoint + "\nEND\n"},
-         {"R1/$config.dat", kConfig},
-         {name, text}});
+        Dialect::kKrl, {{"R1/p.src", "DEF p( )\nBAS(#INITMOV,0)\nBAS(#TOOL,1)\nBAS(#BASE,2)\nLIN " +
+                                         kPoint + "\nEND\n"},
+                        {"R1/$config.dat", kConfig},
+                        {name, text}});
   };
   const test::Corrected made = with("R1/System/bas.src", bas);
   EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
   EXPECT_EQ(made.program.files[2].text, bas);
-  EXPECT_FALSE(row_of(with("R1/own.src", bas).program, kPoint).corrected()) << "a routine of the user's own";
+  EXPECT_FALSE(row_of(with("R1/own.src", bas).program, kPoint).corrected())
+      << "a routine of the user's own";
 }
 
 TEST(Krl, AMotionToWhereTheAxesAreHasNoTarget) {
-  const test::Corrected made = krl(program("PTP $AXIS_ACT\nPTP $AXIS_ACT C_PTP\nLIN " + kPoint + "\n"));
+  const test::Corrected made =
+      krl(program("PTP $AXIS_ACT\nPTP $AXIS_ACT C_PTP\nLIN " + kPoint + "\n"));
   EXPECT_EQ(made.program.left_alone(), 0u);
   EXPECT_EQ(made.program.moves, 1u);
   EXPECT_FALSE(row_of(krl(program("LIN $POS_ACT\n")).program, "$POS_ACT").corrected());
@@ -372,20 +438,25 @@ TEST(Krl, AMotionToWhereTheAxesAreHasNoTarget) {
 }
 
 TEST(Krl, WhatARoutineIsHandedIsNothingOfADataListAndMayBeSetByIt) {
-  const std::string dat = "DEFDAT p PUBLIC\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const std::string dat =
+      "DEFDAT p PUBLIC\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
   const std::string by_value = "DEF go(XP1:IN)\nLIN XP1\nEND\n";
-  EXPECT_NE(why(krl(program("go({X 310,Y 0,Z 500,A 0,B 60,C 0})\n") + by_value, dat), "XP1").find("is a parameter"),
+  EXPECT_NE(why(krl(program("go({X 310,Y 0,Z 500,A 0,B 60,C 0})\n") + by_value, dat), "XP1")
+                .find("is a parameter"),
             std::string::npos);
   const auto handed = [&](const std::string& call, const std::string& routine) {
     return why(krl(program(call + "\nLIN XP1\n") + routine, dat), "XP1");
   };
   const std::string sets = "DEF shift(P:OUT)\nP.Z=P.Z+10\nEND\n";
-  EXPECT_NE(handed("shift(XP1)", sets).find("XP1 may be set by SHIFT (p.src line 6)"), std::string::npos)
+  EXPECT_NE(handed("shift(XP1)", sets).find("XP1 may be set by SHIFT (p.src line 6)"),
+            std::string::npos)
       << handed("shift(XP1)", sets);
   EXPECT_NE(handed("ELSEWHERE(3,XP1)", "").find("may be set by ELSEWHERE"), std::string::npos);
-  EXPECT_NE(handed("n=measure(XP1)", "DEFFCT INT measure(P)\nRETURN 1\nENDFCT\n").find("may be set by"),
-            std::string::npos);
-  for (const char* call : {"show(XP1)", "$IN_A=INV_POS(XP1)", "BAS(#PTP_PARAMS,100)", "ELSEWHERE(XP1:XP1)"})
+  EXPECT_NE(
+      handed("n=measure(XP1)", "DEFFCT INT measure(P)\nRETURN 1\nENDFCT\n").find("may be set by"),
+      std::string::npos);
+  for (const char* call :
+       {"show(XP1)", "$IN_A=INV_POS(XP1)", "BAS(#PTP_PARAMS,100)", "ELSEWHERE(XP1:XP1)"})
     EXPECT_EQ(handed(call, "DEF show(P:IN)\nEND\n").find("may be set"), std::string::npos) << call;
 }
 
@@ -394,28 +465,36 @@ TEST(Krl, RoutinesThatTheFilesLackAreToldWhereTheyMightChangeToolOrBase) {
     return fmt::format("{}", fmt::join(krl(src, kFdat).program.notes, "\n"));
   };
   const std::string calls = "GRIP_OPEN( )\nIF ($IN[1]) THEN\nPULSE($OUT[1],TRUE,1)\nENDIF\nLIN ";
-  EXPECT_NE(notes(program(calls + kPoint + "\n")).find("GRIP_OPEN: not in the files handed over, taken to leave $TOOL"),
+  EXPECT_NE(notes(program(calls + kPoint + "\n"))
+                .find("GRIP_OPEN: not in the files handed over, taken to leave $TOOL"),
             std::string::npos)
       << notes(program(calls + kPoint + "\n"));
-  EXPECT_EQ(notes("DEF p( )\nGRIP_OPEN( )\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2)\nLIN " + kPoint + "\nEND\n")
-                .find("not in the files"),
-            std::string::npos);
+  EXPECT_EQ(
+      notes("DEF p( )\nGRIP_OPEN( )\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2)\nLIN " + kPoint + "\nEND\n")
+          .find("not in the files"),
+      std::string::npos);
   EXPECT_EQ(notes(program("LIN " + kPoint + "\n")).find("not in the files"), std::string::npos);
 }
 
 TEST(Krl, AToolThatAnIndexMayChangeIsNotConstant) {
-  const test::Corrected tool = krl(program("TOOL_DATA[i]={X 0,Y 0,Z 1,A 0,B 0,C 0}\nLIN " + kPoint + "\n"));
-  EXPECT_NE(why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos) << why(tool, kPoint);
+  const test::Corrected tool =
+      krl(program("TOOL_DATA[i]={X 0,Y 0,Z 1,A 0,B 0,C 0}\nLIN " + kPoint + "\n"));
+  EXPECT_NE(why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos)
+      << why(tool, kPoint);
   const test::Corrected load = krl(program("LOAD_DATA[1].M=5\nLIN " + kPoint + "\n"));
-  EXPECT_NE(fmt::format("{}", fmt::join(load.program.notes, "\n")).find("is set at run time (p.src line 6)"),
+  EXPECT_NE(fmt::format("{}", fmt::join(load.program.notes, "\n"))
+                .find("is set at run time (p.src line 6)"),
             std::string::npos);
 }
 
 TEST(Krl, WhatInitmovSetsIsNotTheToolAndBaseOfBefore) {
   const test::Corrected made = krl(program("BAS(#INITMOV,0)\nLIN " + kPoint + "\n"));
-  EXPECT_NE(why(made, kPoint).find("BAS(#INITMOV) sets it to its default (p.src line 6)"), std::string::npos)
+  EXPECT_NE(why(made, kPoint).find("BAS(#INITMOV) sets it to its default (p.src line 6)"),
+            std::string::npos)
       << why(made, kPoint);
-  EXPECT_TRUE(row_of(krl(program("BAS(#INITMOV,0)\n" + kSet + "LIN " + kPoint + "\n")).program, kPoint).corrected());
+  EXPECT_TRUE(
+      row_of(krl(program("BAS(#INITMOV,0)\n" + kSet + "LIN " + kPoint + "\n")).program, kPoint)
+          .corrected());
 }
 
 TEST(Krl, ARowOfFramesThatContradictsTheFilesLeavesThePointWithBothValues) {
@@ -435,32 +514,40 @@ TEST(Krl, ARowOfFramesThatContradictsTheFilesLeavesThePointWithBothValues) {
 
 TEST(Krl, AUnitThatIsNoneCarriesNoBase) {
   const auto with = [](const std::string& type) {
-    return krl(
-        program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
-        "DEFDAT p\nMACH_DEF_INDEX[2]=3\nMACHINE_DEF[3]={NAME[] \" \",COOP_KRC_INDEX 0,PARENT[] \" \",ROOT {X 0.0,Y "
-        "0.0,Z 0.0,A 0.0,B 0.0,C 0.0},MECH_TYPE " +
-            type + ",GEOMETRY[] \" \"}\nENDDAT\n");
+    return krl(program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
+               "DEFDAT p\nMACH_DEF_INDEX[2]=3\nMACHINE_DEF[3]={NAME[] \" \",COOP_KRC_INDEX "
+               "0,PARENT[] \" \",ROOT {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},MECH_TYPE " +
+                   type + ",GEOMETRY[] \" \"}\nENDDAT\n");
   };
   EXPECT_TRUE(row_of(with("#NONE").program, kPoint).corrected()) << why(with("#NONE"), kPoint);
-  EXPECT_NE(why(with("#EASYS"), kPoint).find("external kinematics carry base 2"), std::string::npos);
+  EXPECT_NE(why(with("#EASYS"), kPoint).find("external kinematics carry base 2"),
+            std::string::npos);
 }
 
 TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
-  for (const char* motion : {"PTP {E1 90}", "ASYPTP {E1 90}", "PTP_REL {E1 90}", "LIN_REL {X 5,Y 0,Z 0,E1 90}"}) {
-    const test::Corrected made = krl(program("LIN " + kPoint + "\n" + motion + "\nLIN " + kMore + "\n"));
-    EXPECT_NE(why(made, kPoint).find("external axis a moves"), std::string::npos) << motion << why(made, kPoint);
+  for (const char* motion :
+       {"PTP {E1 90}", "ASYPTP {E1 90}", "PTP_REL {E1 90}", "LIN_REL {X 5,Y 0,Z 0,E1 90}"}) {
+    const test::Corrected made =
+        krl(program("LIN " + kPoint + "\n" + motion + "\nLIN " + kMore + "\n"));
+    EXPECT_NE(why(made, kPoint).find("external axis a moves"), std::string::npos)
+        << motion << why(made, kPoint);
     EXPECT_NE(why(made, kMore).find("external axis a moves"), std::string::npos) << motion;
-    Program read = read_program(Dialect::kKrl, {{"p.src", program("LIN " + kPoint + "\n" + motion + "\n")}}, {});
+    Program read = read_program(Dialect::kKrl,
+                                {{"p.src", program("LIN " + kPoint + "\n" + motion + "\n")}}, {});
     ASSERT_TRUE(take_idle_axes(read, {"external axis a"})) << motion;
     EXPECT_TRUE(read.moved_axes.empty());
   }
-  EXPECT_TRUE(row_of(krl(program("LIN_REL {Z 5,E1 0}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
+  EXPECT_TRUE(
+      row_of(krl(program("LIN_REL {Z 5,E1 0}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
 }
 
 TEST(Krl, FdatThatTheProgramMakesItselfIsNotGuessed) {
-  for (const char* line : {"FDAT_ACT.BASE_NO=2", "FDAT_ACT={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}"}) {
-    const test::Corrected made = krl(program(std::string(line) + "\nBAS(#FRAMES)\nLIN " + kPoint + "\n"));
-    EXPECT_NE(why(made, kPoint).find("FDAT_ACT is set by itself (p.src line 6)"), std::string::npos) << line;
+  for (const char* line :
+       {"FDAT_ACT.BASE_NO=2", "FDAT_ACT={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}"}) {
+    const test::Corrected made =
+        krl(program(std::string(line) + "\nBAS(#FRAMES)\nLIN " + kPoint + "\n"));
+    EXPECT_NE(why(made, kPoint).find("FDAT_ACT is set by itself (p.src line 6)"), std::string::npos)
+        << line;
   }
 }
 

@@ -9,7 +9,8 @@
 #include "server/measurement/files/csv_table.h"
 #include "tests/support/shifting_model.h"
 
-// Programs in the manner of posts: tests/clients/programs/KIND/NUMBER-NAME/. What each becomes stands in expected.csv.
+// Programs in the manner of posts: tests/clients/programs/KIND/NUMBER-NAME/. What each becomes
+// stands in expected.csv.
 namespace trammel::cam {
 namespace {
 
@@ -25,7 +26,8 @@ struct Post {
 std::vector<Post> posts_of(const std::string& kind) {
   std::vector<Post> posts;
   std::set<fs::path> folders;
-  for (const auto& entry : fs::directory_iterator(kFolder + "/" + kind)) folders.insert(entry.path());
+  for (const auto& entry : fs::directory_iterator(kFolder + "/" + kind))
+    folders.insert(entry.path());
   for (const fs::path& folder : folders) {
     Post post{kind, folder.filename().string(), {}};
     std::set<fs::path> files{fs::directory_iterator(folder), fs::directory_iterator()};
@@ -58,7 +60,8 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Every byte that is no number stands where it was, and what was folded stands in lines that the receipt names.
+/// Every byte that is no number stands where it was, and what was folded stands in lines that the
+/// receipt names.
 void expect_bytes_kept(const Post& post, const test::Corrected& made) {
   for (std::size_t f = 0; f < post.files.size(); ++f) {
     const std::vector<std::string> before = lines_of(post.files[f].text);
@@ -66,7 +69,8 @@ void expect_bytes_kept(const Post& post, const test::Corrected& made) {
     ASSERT_EQ(before.size(), after.size()) << post.files[f].name;
     std::set<int> folded;
     for (const ReceiptRow& row : made.program.rows) {
-      if (row.folded && row.file == post.files[f].name) folded.insert(row.used_at.begin(), row.used_at.end());
+      if (row.folded && row.file == post.files[f].name)
+        folded.insert(row.used_at.begin(), row.used_at.end());
     }
     for (std::size_t i = 0; i < before.size(); ++i) {
       if (folded.contains(static_cast<int>(i) + 1)) continue;
@@ -85,7 +89,8 @@ void expect_shifted(const Post& post, const test::Corrected& made) {
     double nearest = 1;
     for (const ProgramTarget& target : again.targets) {
       if (is_joints(target.coordinates)) continue;
-      const Vector3 p = again.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers).translation();
+      const Vector3 p = again.frames[target.frame].X_BO *
+                        pose_of(target.coordinates, target.numbers).translation();
       nearest = std::min(nearest, (p - wanted).norm());
     }
     EXPECT_LT(to_mm(nearest), 2e-3) << row.name << " of " << row.file << " line " << row.line;
@@ -95,7 +100,8 @@ void expect_shifted(const Post& post, const test::Corrected& made) {
 class Posts : public testing::TestWithParam<std::string> {};
 
 TEST_P(Posts, ComeBackWithCorrectedNumbersAndEveryOtherByte) {
-  const CsvTable expected = CsvTable::parse(read_text_file(kFolder + "/expected.csv").value(), "expected.csv").value();
+  const CsvTable expected =
+      CsvTable::parse(read_text_file(kFolder + "/expected.csv").value(), "expected.csv").value();
   std::map<std::string, std::string> wanted;
   for (std::size_t row = 0; row < expected.size(); ++row)
     wanted[expected.field(row, 0)] =
@@ -106,10 +112,13 @@ TEST_P(Posts, ComeBackWithCorrectedNumbersAndEveryOtherByte) {
     ASSERT_EQ(made.refusal, "");
     expect_bytes_kept(post, made);
     expect_shifted(post, made);
-    EXPECT_EQ(fmt::format("{} {} {}", made.program.moves, made.program.moves_corrected, made.program.left_alone()),
+    EXPECT_EQ(fmt::format("{} {} {}", made.program.moves, made.program.moves_corrected,
+                          made.program.left_alone()),
               wanted[post.kind + "/" + post.name]);
-    for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected() || !row.message.empty()) << row.name;
-    for (const std::string& note : made.program.notes) EXPECT_EQ(note.find("look taught"), std::string::npos) << note;
+    for (const ReceiptRow& row : made.program.rows)
+      EXPECT_TRUE(row.corrected() || !row.message.empty()) << row.name;
+    for (const std::string& note : made.program.notes)
+      EXPECT_EQ(note.find("look taught"), std::string::npos) << note;
     for (const SourceFile& file : post.files) {
       const auto at = static_cast<std::size_t>(&file - post.files.data());
       if (!made.program.changed[at]) continue;
@@ -119,12 +128,14 @@ TEST_P(Posts, ComeBackWithCorrectedNumbersAndEveryOtherByte) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Posts,
-                         testing::Values("rapid", "krl", "fanuc", "inform", "urscript", "camrob", "robodk"),
+                         testing::Values("rapid", "krl", "fanuc", "inform", "urscript", "camrob",
+                                         "robodk"),
                          [](const auto& kind) { return kind.param; });
 
 TEST(Posts, AreEnoughOfEachKind) {
   for (const char* kind : {"rapid", "krl", "fanuc"}) EXPECT_GE(posts_of(kind).size(), 15u) << kind;
-  for (const char* kind : {"inform", "urscript", "camrob", "robodk"}) EXPECT_GE(posts_of(kind).size(), 6u) << kind;
+  for (const char* kind : {"inform", "urscript", "camrob", "robodk"})
+    EXPECT_GE(posts_of(kind).size(), 6u) << kind;
 }
 
 }  // namespace

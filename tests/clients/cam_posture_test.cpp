@@ -10,15 +10,16 @@
 #include "server/base/units.h"
 #include "server/robot/cell.h"
 
-// Which of its solutions does a controller take? The oracle has its own kinematics of a UR10 and finds its solutions by
-// descents from many places.
+// Which of its solutions does a controller take? The oracle has its own kinematics of a UR10 and
+// finds its solutions by descents from many places.
 namespace trammel::cam {
 namespace {
 
 using Joints = Eigen::Matrix<double, 6, 1>;
 
 Eigen::Isometry3d oracle_flange(const Joints& q) {
-  constexpr std::array<double, 6> kD = {.1273, 0, 0, .163941, .1157, .0922}, kA = {0, -.612, -.5723, 0, 0, 0},
+  constexpr std::array<double, 6> kD = {.1273, 0, 0, .163941, .1157, .0922},
+                                  kA = {0, -.612, -.5723, 0, 0, 0},
                                   kAlpha = {kPi / 2, 0, 0, kPi / 2, -kPi / 2, 0};
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   for (std::size_t j = 0; j < 6; ++j) {
@@ -54,16 +55,17 @@ std::vector<Joints> oracle_solutions(const Eigen::Isometry3d& wanted, std::mt199
         more(j) += 1e-6;
         J.col(j) = (off(more, wanted) - e) / 1e-6;
       }
-      Joints way =
-          -(J.transpose() * J + 1e-9 * Eigen::Matrix<double, 6, 6>::Identity()).ldlt().solve(J.transpose() * e);
+      Joints way = -(J.transpose() * J + 1e-9 * Eigen::Matrix<double, 6, 6>::Identity())
+                        .ldlt()
+                        .solve(J.transpose() * e);
       if (way.norm() > 0.5) way *= 0.5 / way.norm();
       q += way;
       e = off(q, wanted);
     }
     if (e.norm() > 1e-9) continue;
     for (int j = 0; j < 6; ++j) q(j) = std::remainder(q(j), 2 * kPi);
-    const bool known =
-        std::any_of(found.begin(), found.end(), [&](const Joints& one) { return (one - q).norm() < 1e-4; });
+    const bool known = std::any_of(found.begin(), found.end(),
+                                   [&](const Joints& one) { return (one - q).norm() < 1e-4; });
     if (!known) found.push_back(q);
   }
   return found;
@@ -75,30 +77,36 @@ Joints turned_to(Joints q, const Joints& near) {
 }
 
 std::string joints_text(const Joints& q) {
-  return fmt::format("[{:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}]", q(0), q(1), q(2), q(3), q(4), q(5));
+  return fmt::format("[{:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}]", q(0), q(1), q(2), q(3),
+                     q(4), q(5));
 }
 std::string pose_of_joints(const Joints& q) {
   const Eigen::Isometry3d X = oracle_flange(q) * kTcp;
   const Eigen::AngleAxisd turn(X.linear());
   const Eigen::Vector3d p = X.translation(), w = turn.angle() * turn.axis();
-  return fmt::format("p[{:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}]", p(0), p(1), p(2), w(0), w(1), w(2));
+  return fmt::format("p[{:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}]", p(0), p(1), p(2),
+                     w(0), w(1), w(2));
 }
 
 NominalTargets ur(const std::string& lines) {
-  static const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur10.yaml").value();
+  static const Chain chain =
+      read_robot(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur10.yaml").value();
   const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n" + lines + "end\n";
   const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, {});
   EXPECT_TRUE(program.left.empty()) << program.left[0].why;
-  return nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
+  return nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "")
+      .value();
 }
 /// Of the last target in the text.
 const NominalTarget& last_of(const NominalTargets& nominal) { return nominal.targets.back(); }
 
-/// Where postures meet nothing is nearer than the other: away from a stretched elbow, wrist and shoulder.
+/// Where postures meet nothing is nearer than the other: away from a stretched elbow, wrist and
+/// shoulder.
 bool is_open(const Joints& q) {
   const Eigen::Isometry3d X = oracle_flange(q);
   const Eigen::Vector3d wrist = X.translation() - .0922 * X.linear().col(2);
-  return std::abs(std::sin(q(2))) > .3 && std::abs(std::sin(q(4))) > .3 && wrist.head<2>().norm() > .3;
+  return std::abs(std::sin(q(2))) > .3 && std::abs(std::sin(q(4))) > .3 &&
+         wrist.head<2>().norm() > .3;
 }
 Joints drawn(std::mt19937& random) {
   std::uniform_real_distribution<double> angle(-2.8, 2.8);
@@ -122,7 +130,8 @@ TEST(Posture, JointsThatAMotionNamesDecideWhereverTheArmComesFrom) {
     const Joints q = drawn(random);
     Joints named = q;
     for (int j = 0; j < 6; ++j) named(j) += near(random);
-    const std::string goal = "  movej(get_inverse_kin(" + pose_of_joints(q) + ", qnear=" + joints_text(named) + "))\n";
+    const std::string goal =
+        "  movej(get_inverse_kin(" + pose_of_joints(q) + ", qnear=" + joints_text(named) + "))\n";
     for (const std::string& before : {std::string(), "  movej(" + joints_text(kReady) + ")\n"}) {
       const NominalTargets made = ur(before + goal);
       ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
@@ -133,8 +142,9 @@ TEST(Posture, JointsThatAMotionNamesDecideWhereverTheArmComesFrom) {
 
 TEST(Posture, JointsThatAVariableNamesDecideToo) {
   const Joints q = with({0.89955, -1.91986, 1.74533, -1.39626, -1.57080, -0.67124});
-  const NominalTargets made = ur("  global W_p=" + pose_of_joints(q) + "\n  global W_q=" + joints_text(q) +
-                                 "\n  movej(get_inverse_kin(W_p, W_q), a=1.4)\n");
+  const NominalTargets made =
+      ur("  global W_p=" + pose_of_joints(q) + "\n  global W_q=" + joints_text(q) +
+         "\n  movej(get_inverse_kin(W_p, W_q), a=1.4)\n");
   ASSERT_TRUE(made.targets[0].q) << made.targets[0].why_not;
   EXPECT_LT((*made.targets[0].q - q).norm(), 1e-6);
 }
@@ -147,22 +157,26 @@ TEST(Posture, AMotionOfTheAxesTakesTheSolutionNextToTheJointsBefore) {
     std::vector<std::pair<double, Joints>> all;
     for (const Joints& q : oracle_solutions(oracle_flange(somewhere), random))
       all.emplace_back((turned_to(q, from) - from).norm(), turned_to(q, from));
-    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::sort(all.begin(), all.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
     ASSERT_GE(all.size(), 2u);
     if (all[1].first - all[0].first < .05 * all[0].first) continue;
     ++decided;
-    const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(somewhere) + ")\n");
+    const NominalTargets made =
+        ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(somewhere) + ")\n");
     const NominalTarget& last = last_of(made);
     ASSERT_TRUE(last.q) << last.why_not;
-    EXPECT_LT((*last.q - all[0].second).norm(), 1e-6) << joints_text(from) << " to " << joints_text(somewhere);
+    EXPECT_LT((*last.q - all[0].second).norm(), 1e-6)
+        << joints_text(from) << " to " << joints_text(somewhere);
   }
   EXPECT_GT(decided, 15);
 }
 
 TEST(Posture, WholeTurnsAreTakenOffThatTheLimitsDoNotNeed) {
   const Joints from = with({0.3, -1.2, -1.6, -1.9, 1.57, 0});
-  const NominalTargets made = ur("  movej(" + joints_text(from) +
-                                 ")\n  movej(p[-0.739592, -0.225787, 0.083127, -2.5469731, 1.8226580, -0.0123047])\n");
+  const NominalTargets made =
+      ur("  movej(" + joints_text(from) +
+         ")\n  movej(p[-0.739592, -0.225787, 0.083127, -2.5469731, 1.8226580, -0.0123047])\n");
   ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
   EXPECT_LT((*last_of(made).q - Eigen::VectorXd(from)).cwiseAbs().maxCoeff(), kPi);
 }
@@ -174,7 +188,8 @@ TEST(Posture, ALineKeepsThePostureThatItBeginsIn) {
     const Joints from = drawn(random);
     Joints to = from;
     for (int j = 0; j < 6; ++j) to(j) += step(random);
-    const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movel(" + pose_of_joints(to) + ")\n");
+    const NominalTargets made =
+        ur("  movej(" + joints_text(from) + ")\n  movel(" + pose_of_joints(to) + ")\n");
     ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
     EXPECT_LT((*last_of(made).q - to).norm(), 1e-6);
   }
@@ -185,19 +200,22 @@ TEST(Posture, WithoutJointsBeforeATargetIsLeftWithTheReason) {
   const std::string ready = "  movej(" + joints_text(kReady) + ")\n";
   EXPECT_NE(last_of(ur(goal)).why_not.find("the program does not say these"), std::string::npos);
   EXPECT_TRUE(last_of(ur(ready + goal)).q);
-  // At the head of a loop the arm comes from its end, too; joints that are there again and again are one posture.
+  // At the head of a loop the arm comes from its end, too; joints that are there again and again
+  // are one posture.
   EXPECT_FALSE(last_of(ur("  while i < 2:\n" + goal + "  end\n")).q);
   EXPECT_TRUE(last_of(ur(ready + "  while i < 2:\n" + goal + "  end\n")).q);
 }
 
 TEST(Posture, JointsThatAreLeftAsTheyStandSayWhereTheArmIsAllTheSame) {
   const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur10.yaml").value();
-  const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n  movej(" + joints_text(kReady) +
-                           ")\n  movej(" + pose_of_joints(kReady) + ")\nend\n";
+  const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n  movej(" +
+                           joints_text(kReady) + ")\n  movej(" + pose_of_joints(kReady) +
+                           ")\nend\n";
   ReadOptions options;
   options.keep_joints = true;
   const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, options);
-  const auto made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
+  const auto made =
+      nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
   ASSERT_EQ(made.targets.size(), 1u);
   EXPECT_TRUE(made.targets[0].q) << made.targets[0].why_not;
 }
@@ -205,8 +223,8 @@ TEST(Posture, JointsThatAreLeftAsTheyStandSayWhereTheArmIsAllTheSame) {
 TEST(Posture, APointThatIsReachedInTwoPosturesIsLeft) {
   const Joints other = with({0.89955, -1.91986, 1.74533, -1.39626, -1.57080, -0.67124});
   const std::string lines = "  hole = " + pose_of_joints(other) +
-                            "\n  movej(get_inverse_kin(hole, qnear=" + joints_text(other) + "))\n  movej(" +
-                            joints_text(kReady) + ")\n  movej(hole)\n";
+                            "\n  movej(get_inverse_kin(hole, qnear=" + joints_text(other) +
+                            "))\n  movej(" + joints_text(kReady) + ")\n  movej(hole)\n";
   const NominalTargets made = ur(lines);
   ASSERT_EQ(made.targets.size(), 2u);
   EXPECT_EQ(made.targets[0].why_not, "motions come to it in different postures");
@@ -236,23 +254,29 @@ TEST(Posture, OfTwoPosturesThatAreNearlyAsNearTheOneIsTakenThatEveryMeasureCalls
   }
   // Nearer to q by four thousandths of the way, along the straight line between the two.
   const Joints from = q + 0.498 * (other - q);
-  const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(q) + ")\n");
+  const NominalTargets made =
+      ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(q) + ")\n");
   ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
   EXPECT_LT((*last_of(made).q - q).norm(), 1e-5);
 }
 
-// A line does not turn the wrist over: joint 5 keeps its sign, and joints 4 and 6 stay within half a turn.
+// A line does not turn the wrist over: joint 5 keeps its sign, and joints 4 and 6 stay within half
+// a turn.
 TEST(Posture, WhatATargetOfKrlDoesNotSayFollowsFromTheMotionBeforeWhereverThatTargetStands) {
   const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
   const std::string config = "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\nENDDAT\n";
-  const std::string dat = "DEFDAT p PUBLIC\nDECL E6POS XP1={X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 2}\nENDDAT\n";
+  const std::string dat =
+      "DEFDAT p PUBLIC\nDECL E6POS XP1={X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 2}\nENDDAT\n";
   const std::string src =
-      "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XP1\nLIN {X 1500,Y 200,Z 800,A 0,B 90,C 0}\nEND\n";
-  const Program program = read_program(Dialect::kKrl, {{"p.src", src}, {"p.dat", dat}, {"$config.dat", config}}, {});
+      "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XP1\nLIN {X 1500,Y 200,Z 800,A 0,B 90,C "
+      "0}\nEND\n";
+  const Program program =
+      read_program(Dialect::kKrl, {{"p.src", src}, {"p.dat", dat}, {"$config.dat", config}}, {});
   ASSERT_TRUE(program.left.empty()) << program.left[0].why;
   Pose X_FT = Pose::Identity();
   X_FT.translation().z() = 0.2;
-  const auto targets = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value().targets;
+  const auto targets =
+      nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value().targets;
   ASSERT_EQ(targets.size(), 2u);
   for (const NominalTarget& target : targets) {
     ASSERT_TRUE(target.q) << target.why_not;
@@ -261,15 +285,18 @@ TEST(Posture, WhatATargetOfKrlDoesNotSayFollowsFromTheMotionBeforeWhereverThatTa
   }
 }
 
-/// Targets of a KRL program with a tool 200 mm long, in the order of the program's targets, and the notes.
+/// Targets of a KRL program with a tool 200 mm long, in the order of the program's targets, and the
+/// notes.
 NominalTargets of_krl(const std::string& lines, std::size_t count) {
   const std::string config = "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\nENDDAT\n";
   const std::string src = "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\n" + lines + "END\n";
   const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
-  const Program program = read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}}, {});
+  const Program program =
+      read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}}, {});
   Pose X_FT = Pose::Identity();
   X_FT.translation().z() = 0.2;
-  NominalTargets made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
+  NominalTargets made =
+      nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
   EXPECT_EQ(made.targets.size(), count) << lines;
   return made;
 }
@@ -282,27 +309,35 @@ TEST(Posture, WhatFollowsAMotionThatIsLeftIsLeftUnlessItSaysItsOwnPosture) {
        {"PTP XP[i]\n", "PTP_REL {A1 90}\n", "PTP XHOME\n", "IF $IN[1] THEN\nPTP XHOME\nENDIF\n"}) {
     const std::string begin = kWristUp + between;
     const NominalTargets open = of_krl(begin + "LIN " + kNext + "}\n", 2);
-    EXPECT_NE(open.targets.back().why_not.find("the program does not say these"), std::string::npos) << between;
+    EXPECT_NE(open.targets.back().why_not.find("the program does not say these"), std::string::npos)
+        << between;
     EXPECT_TRUE(of_krl(begin + "LIN " + kNext + ",S 2,T 35}\n", 2).targets.back().q) << between;
-    EXPECT_TRUE(of_krl(begin + "PTP " + kNext + ",S 2,T 35}\nLIN {X 1500,Y 200,Z 700,A 0,B 90,C 0}\n", 3).targets[2].q);
+    EXPECT_TRUE(
+        of_krl(begin + "PTP " + kNext + ",S 2,T 35}\nLIN {X 1500,Y 200,Z 700,A 0,B 90,C 0}\n", 3)
+            .targets[2]
+            .q);
   }
-  EXPECT_TRUE(of_krl(kWristUp + "LIN_REL {Z 50}\nLIN $POS_ACT\nLIN " + kNext + "}\n", 2).targets.back().q)
+  EXPECT_TRUE(
+      of_krl(kWristUp + "LIN_REL {Z 50}\nLIN $POS_ACT\nLIN " + kNext + "}\n", 2).targets.back().q)
       << "lines keep the posture, wherever they end";
-  EXPECT_TRUE(of_krl("PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nLIN " + kNext + "}\n", 2).targets.back().q);
+  EXPECT_TRUE(
+      of_krl("PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nLIN " + kNext + "}\n", 2).targets.back().q);
 }
 
 TEST(Posture, AxesThatStayAsTheyAreStillSayWhereTheArmStands) {
   const std::string config =
       "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\n"
       "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nENDDAT\n";
-  const std::string src = "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XHOME\nLIN " + kNext + "}\nEND\n";
+  const std::string src =
+      "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XHOME\nLIN " + kNext + "}\nEND\n";
   const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
-  const Program program =
-      read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}}, {.spared = {"$config.dat"}});
+  const Program program = read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}},
+                                       {.spared = {"$config.dat"}});
   ASSERT_EQ(program.targets.size(), 1u);
   Pose X_FT = Pose::Identity();
   X_FT.translation().z() = 0.2;
-  const auto made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
+  const auto made =
+      nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
   ASSERT_TRUE(made.targets[0].q) << made.targets[0].why_not;
   EXPECT_GT((*made.targets[0].q)(4), 0);
 }
@@ -313,7 +348,9 @@ TEST(Posture, ALineOfKrlKeepsThePostureWhateverItsStatusSays) {
     ASSERT_TRUE(made.targets[0].q && made.targets[1].q) << motion;
     EXPECT_GT((*made.targets[0].q)(4), 0);
     EXPECT_GT((*made.targets[1].q)(4), 0) << motion;
-    EXPECT_NE(made.targets[1].doubt.find("another posture than the motion before"), std::string::npos) << motion;
+    EXPECT_NE(made.targets[1].doubt.find("another posture than the motion before"),
+              std::string::npos)
+        << motion;
     EXPECT_EQ(made.targets[0].doubt, "");
   }
   const NominalTargets free = of_krl(kWristUp + "PTP " + kNext + ",S 6,T 27}\n", 2);
@@ -324,7 +361,8 @@ TEST(Posture, ALineOfKrlKeepsThePostureWhateverItsStatusSays) {
 TEST(Posture, AStatusThatItsTurnContradictsIsToldAtTheTarget) {
   const NominalTargets made = of_krl("PTP {X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 2}\n", 1);
   ASSERT_TRUE(made.targets[0].q);
-  EXPECT_NE(made.targets[0].doubt.find("joint 1 is at -"), std::string::npos) << made.targets[0].doubt;
+  EXPECT_NE(made.targets[0].doubt.find("joint 1 is at -"), std::string::npos)
+      << made.targets[0].doubt;
 }
 
 }  // namespace

@@ -12,9 +12,11 @@ namespace {
 
 const std::string kTool =
     "MODULE M\n  PERS tooldata "
-    "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\n";
+    "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];"
+    "\n";
 
-/// What is said of a module whose targets are these, with the digits of a controller; empty: nothing of taught ones.
+/// What is said of a module whose targets are these, with the digits of a controller; empty:
+/// nothing of taught ones.
 std::string said_of(const std::vector<Pose>& poses) {
   std::string data, moves;
   for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -22,13 +24,14 @@ std::string said_of(const std::vector<Pose>& poses) {
     const Eigen::Quaterniond q(poses[k].linear());
     data += fmt::format(
         "  CONST robtarget "
-        "p{}:=[[{:.2f},{:.2f},{:.2f}],[{:.6f},{:.6f},{:.6f},{:.6f}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
-        "\n",
+        "p{}:=[[{:.2f},{:.2f},{:.2f}],[{:.6f},{:.6f},{:.6f},{:.6f}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,"
+        "9E9]];\n",
         k, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z());
     moves += fmt::format("    MoveL p{},v100,fine,tSpindle;\n", k);
   }
   const test::Corrected made = test::corrected_by_shift(
-      Dialect::kRapid, {{"m.mod", kTool + data + "  PROC main()\n" + moves + "  ENDPROC\nENDMODULE\n"}});
+      Dialect::kRapid,
+      {{"m.mod", kTool + data + "  PROC main()\n" + moves + "  ENDPROC\nENDMODULE\n"}});
   EXPECT_EQ(made.refusal, "");
   for (const std::string& note : made.program.notes) {
     if (note.find("look taught") != std::string::npos) return note;
@@ -42,8 +45,9 @@ std::vector<Pose> jogged(unsigned seed) {
   std::normal_distribution<double> place(0, .2), tilt(0, 2e-3);
   std::vector<Pose> poses;
   for (int k = 0; k < 5; ++k)
-    poses.push_back(make_pose(rotation_exp({0, kPi, 0}) * rotation_exp({tilt(random), tilt(random), tilt(random)}),
-                              {1.4 + place(random), place(random), .9 + place(random)}));
+    poses.push_back(make_pose(
+        rotation_exp({0, kPi, 0}) * rotation_exp({tilt(random), tilt(random), tilt(random)}),
+        {1.4 + place(random), place(random), .9 + place(random)}));
   return poses;
 }
 

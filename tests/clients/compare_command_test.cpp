@@ -15,7 +15,8 @@ namespace {
 using nlohmann::json;
 
 constexpr double kDegree = 0.017453292519943295;
-constexpr double kZero = 5e-3, kZeroBefore = -2.6e-4;  // rad, of joint 4: afterwards, and in the shipped truth
+constexpr double kZero = 5e-3,
+                 kZeroBefore = -2.6e-4;  // rad, of joint 4: afterwards, and in the shipped truth
 
 std::string text_of(const std::string& path) { return test::demand(read_text_file(path)); }
 
@@ -32,41 +33,47 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
-/// Two models of one robot, whose joint 4 got another zero between them, and one of a robot that is longer.
+/// Two models of one robot, whose joint 4 got another zero between them, and one of a robot that is
+/// longer.
 class Compare : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<test::TemporaryFolder>();
     const std::string shipped = TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml";
-    const std::string changed =
-        folder_->write("changed.yaml", replaced(text_of(shipped), "q4_rad: -2.6e-4", "q4_rad: 5e-3"));
+    const std::string changed = folder_->write(
+        "changed.yaml", replaced(text_of(shipped), "q4_rad: -2.6e-4", "q4_rad: 5e-3"));
     const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
     make("before", cell, shipped, 1);
     make("now", cell, changed, 2);
     measure("fresh", cell, changed, 3);
     folder_->write("longer.yaml",
-                   replaced(text_of(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"), "d_mm: 780", "d_mm: 790"));
-    make(
-        "other",
-        folder_->write("other-cell.yaml", replaced(text_of(cell), "../models/abb_irb6640-205-275.yaml", "longer.yaml")),
-        shipped, 4);
+                   replaced(text_of(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"),
+                            "d_mm: 780", "d_mm: 790"));
+    make("other",
+         folder_->write(
+             "other-cell.yaml",
+             replaced(text_of(cell), "../models/abb_irb6640-205-275.yaml", "longer.yaml")),
+         shipped, 4);
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
   static std::string file(const std::string& name) { return folder_->file(name); }
   static json json_in(const std::string& name) { return json::parse(text_of(file(name))); }
-  static void measure(const std::string& name, const std::string& cell, const std::string& truth, int seed) {
-    ASSERT_EQ(trammel({"plan", "--cell", cell, "--count", "60", "--seed", std::to_string(seed), "-o",
-                       file(name + "-plan.csv")}),
+  static void measure(const std::string& name, const std::string& cell, const std::string& truth,
+                      int seed) {
+    ASSERT_EQ(trammel({"plan", "--cell", cell, "--count", "60", "--seed", std::to_string(seed),
+                       "-o", file(name + "-plan.csv")}),
               0);
-    ASSERT_EQ(trammel({"simulate", "--cell", cell, "--truth", truth, "--plan", file(name + "-plan.csv"), "--seed",
-                       std::to_string(seed), "-o", file(name + ".csv")}),
-              0);
+    ASSERT_EQ(
+        trammel({"simulate", "--cell", cell, "--truth", truth, "--plan", file(name + "-plan.csv"),
+                 "--seed", std::to_string(seed), "-o", file(name + ".csv")}),
+        0);
   }
-  static void make(const std::string& name, const std::string& cell, const std::string& truth, int seed) {
+  static void make(const std::string& name, const std::string& cell, const std::string& truth,
+                   int seed) {
     measure(name, cell, truth, seed);
-    ASSERT_EQ(trammel({"train", "--cell", cell, "--batch", file(name + ".csv"), "--level", "M3", "--bias", "none", "-o",
-                       file(name + ".model")}),
+    ASSERT_EQ(trammel({"train", "--cell", cell, "--batch", file(name + ".csv"), "--level", "M3",
+                       "--bias", "none", "-o", file(name + ".model")}),
               0);
   }
 
@@ -74,8 +81,8 @@ class Compare : public testing::Test {
 };
 
 TEST_F(Compare, LeadsWithTheZeroThatChanged) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--json", file("c.json"), "--report",
-                     file("c.html")}),
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--json", file("c.json"),
+                     "--report", file("c.html")}),
             0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("a").at("cell"), "cell-7");
@@ -93,7 +100,8 @@ TEST_F(Compare, LeadsWithTheZeroThatChanged) {
   for (const json& one : told.at("parameters")) {
     if (one.at("name") != "q4") continue;
     EXPECT_TRUE(one.at("beyond_u95").get<bool>());
-    EXPECT_NEAR(one.at("difference").get<double>(), one.at("b").get<double>() - one.at("a").get<double>(), 1e-12);
+    EXPECT_NEAR(one.at("difference").get<double>(),
+                one.at("b").get<double>() - one.at("a").get<double>(), 1e-12);
   }
   EXPECT_EQ(told.at("most_moved").at(0).at("joints").size(), 6u);
   EXPECT_TRUE(told.at("most_moved").at(0).at("joints").contains("q1_deg"));
@@ -103,8 +111,8 @@ TEST_F(Compare, LeadsWithTheZeroThatChanged) {
 }
 
 TEST_F(Compare, MeasurementsSayWhichModelTheRobotIsLike) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("fresh.csv"), "--json",
-                     file("c.json")}),
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch",
+                     file("fresh.csv"), "--json", file("c.json")}),
             0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("poses"), 60);
@@ -115,8 +123,8 @@ TEST_F(Compare, MeasurementsSayWhichModelTheRobotIsLike) {
 }
 
 TEST_F(Compare, APoseThatOneOfThemWasTrainedOnJudgesNeither) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("now.csv"), "--json",
-                     file("c.json")}),
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("now.csv"),
+                     "--json", file("c.json")}),
             0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("trained_on"), 60);
@@ -125,16 +133,19 @@ TEST_F(Compare, APoseThatOneOfThemWasTrainedOnJudgesNeither) {
 
 TEST_F(Compare, AModelOfAnotherRobotIsRefusedWithASentence) {
   testing::internal::CaptureStderr();
-  const int code = trammel({"compare", file("other.model"), file("now.model"), "--json", file("none.json")});
+  const int code =
+      trammel({"compare", file("other.model"), file("now.model"), "--json", file("none.json")});
   const std::string said = testing::internal::GetCapturedStderr();
   EXPECT_EQ(code, 3);
-  EXPECT_NE(said.find("was trained for another robot than cell cell-7 has"), std::string::npos) << said;
+  EXPECT_NE(said.find("was trained for another robot than cell cell-7 has"), std::string::npos)
+      << said;
   EXPECT_FALSE(read_text_file(file("none.json")));
 }
 
 TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
-  const std::vector<std::string> changed = {"check",           "--model", file("before.model"), "--batch",
-                                            file("fresh.csv"), "--json",  file("h.json")};
+  const std::vector<std::string> changed = {"check",       "--model",         file("before.model"),
+                                            "--batch",     file("fresh.csv"), "--json",
+                                            file("h.json")};
   EXPECT_EQ(trammel(changed), 0);
   const json told = json_in("h.json");
   EXPECT_EQ(told.at("verdict"), "changed");
@@ -143,17 +154,22 @@ TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
   std::vector<std::string> strictly = changed;
   strictly.emplace_back("--strict");
   EXPECT_EQ(trammel(strictly), 1);
-  EXPECT_EQ(trammel({"check", "--model", file("now.model"), "--batch", file("fresh.csv"), "--strict"}), 0);
+  EXPECT_EQ(
+      trammel({"check", "--model", file("now.model"), "--batch", file("fresh.csv"), "--strict"}),
+      0);
 }
 
 TEST_F(Compare, RemediesTellEachStepWhatItSetsAndWhatItLeaves) {
-  ASSERT_EQ(trammel({"remedies", "--model", file("now.model"), "--json", file("r.json"), "-o", file("r.html")}), 0);
+  ASSERT_EQ(trammel({"remedies", "--model", file("now.model"), "--json", file("r.json"), "-o",
+                     file("r.html")}),
+            0);
   const json told = json_in("r.json");
   std::vector<std::string> names;
   for (const json& step : told.at("steps")) names.push_back(step.at("step"));
   EXPECT_EQ(names, (std::vector<std::string>{"frames", "zeros", "lengths", "loads", "trammel"}));
   const json& zeros = told.at("steps").at(1);
-  EXPECT_LT(zeros.at("left_rms_mm").get<double>(), told.at("steps").at(0).at("left_rms_mm").get<double>());
+  EXPECT_LT(zeros.at("left_rms_mm").get<double>(),
+            told.at("steps").at(0).at("left_rms_mm").get<double>());
   EXPECT_LT(told.at("steps").at(4).at("left_rms_mm").get<double>(), 0.04);
   bool found = false;
   for (const json& value : zeros.at("values")) {
@@ -165,13 +181,15 @@ TEST_F(Compare, RemediesTellEachStepWhatItSetsAndWhatItLeaves) {
   EXPECT_TRUE(found) << zeros;
   const json& lines = told.at("budget").at("lines");
   for (std::size_t k = 1; k < lines.size(); ++k)
-    EXPECT_GE(lines[k - 1].at("alone_rms_mm").get<double>(), lines[k].at("alone_rms_mm").get<double>()) << k;
+    EXPECT_GE(lines[k - 1].at("alone_rms_mm").get<double>(),
+              lines[k].at("alone_rms_mm").get<double>())
+        << k;
   EXPECT_EQ(told.at("notes").back().at("code"), "robot_not_confirmed");
 }
 
 TEST_F(Compare, APredictedProgramHasTheNotesOfItsModelAsCodes) {
-  ASSERT_EQ(trammel({"predict", TRAMMEL_SOURCE_DIR "/config/programs/drill.mod", "--model", file("now.model"), "-o",
-                     file("p.csv"), "--json", file("p.json")}),
+  ASSERT_EQ(trammel({"predict", TRAMMEL_SOURCE_DIR "/config/programs/drill.mod", "--model",
+                     file("now.model"), "-o", file("p.csv"), "--json", file("p.json")}),
             0);
   const json told = json_in("p.json");
   std::vector<std::string> codes;

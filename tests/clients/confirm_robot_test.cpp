@@ -19,9 +19,10 @@ using Verdict = RobotComparison::Verdict;
 Cell cell_with(const std::string& robot, const std::string& tools = "tools: {gripper: null}\n",
                const std::string& base = "null") {
   std::ifstream file(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + robot);
-  const std::string robot_yaml((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  const Result<Cell> cell =
-      parse_cell("version: 1\ncell: shown\nrobot: r.yaml\nbase: " + base + "\n" + tools, robot_yaml, "cell");
+  const std::string robot_yaml((std::istreambuf_iterator<char>(file)),
+                               std::istreambuf_iterator<char>());
+  const Result<Cell> cell = parse_cell(
+      "version: 1\ncell: shown\nrobot: r.yaml\nbase: " + base + "\n" + tools, robot_yaml, "cell");
   EXPECT_TRUE(cell) << sentence(cell.error());
   return *cell;
 }
@@ -63,9 +64,12 @@ std::string screen(const Controller& controller, int poses = 6, double reach_deg
     JointVector q(controller.robot.size());
     for (double& value : q) value = std::round(angle(random) * rounding) / rounding;
     for (const double value : q) text += fmt::format("{:.{}f},", value, controller.decimals);
-    const Pose X = controller.X_SB * controller.robot.flange_pose(q * from_deg(1)) * controller.X_FT;
-    const Vector3 p = 1e3 * X.translation(), a = angles_of(X.linear(), controller.angles) * to_deg(1);
-    text += fmt::format("{:.2f},{:.2f},{:.2f},{:.3f},{:.3f},{:.3f}\n", p.x(), p.y(), p.z(), a.x(), a.y(), a.z());
+    const Pose X =
+        controller.X_SB * controller.robot.flange_pose(q * from_deg(1)) * controller.X_FT;
+    const Vector3 p = 1e3 * X.translation(),
+                  a = angles_of(X.linear(), controller.angles) * to_deg(1);
+    text += fmt::format("{:.2f},{:.2f},{:.2f},{:.3f},{:.3f},{:.3f}\n", p.x(), p.y(), p.z(), a.x(),
+                        a.y(), a.z());
   }
   return text;
 }
@@ -86,7 +90,8 @@ Chain altered(const Chain& robot, int joint, double LinkGeometry::*number, doubl
   return *Chain::make(robot.name(), joints, robot.couplings());
 }
 
-class EveryMakersAngles : public testing::TestWithParam<std::tuple<std::string, Angles, std::string>> {};
+class EveryMakersAngles
+    : public testing::TestWithParam<std::tuple<std::string, Angles, std::string>> {};
 
 TEST_P(EveryMakersAngles, AreReadAsTheyAreMeant) {
   const auto& [robot, angles, header] = GetParam();
@@ -101,21 +106,24 @@ TEST_P(EveryMakersAngles, AreReadAsTheyAreMeant) {
 
 INSTANTIATE_TEST_SUITE_P(
     ConfirmRobot, EveryMakersAngles,
-    testing::Values(std::tuple("kuka_kr210-r2700-extra.yaml", Angles::kKuka, "A1,A2,A3,A4,A5,A6,X,Y,Z,A,B,C"),
-                    std::tuple("fanuc_m-20ia.yaml", Angles::kFanuc, "J1,J2,J3,J4,J5,J6,X,Y,Z,W,P,R"),
-                    std::tuple("universal-robots_ur5.yaml", Angles::kUniversalRobots,
-                               "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"),
-                    std::tuple("staubli_tx2-90l.yaml", Angles::kStaubli, "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ"),
-                    std::tuple("abb_irb6640-205-275.yaml", Angles::kKuka,
-                               "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg")));
+    testing::Values(
+        std::tuple("kuka_kr210-r2700-extra.yaml", Angles::kKuka, "A1,A2,A3,A4,A5,A6,X,Y,Z,A,B,C"),
+        std::tuple("fanuc_m-20ia.yaml", Angles::kFanuc, "J1,J2,J3,J4,J5,J6,X,Y,Z,W,P,R"),
+        std::tuple("universal-robots_ur5.yaml", Angles::kUniversalRobots,
+                   "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"),
+        std::tuple("staubli_tx2-90l.yaml", Angles::kStaubli, "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ"),
+        std::tuple("abb_irb6640-205-275.yaml", Angles::kKuka,
+                   "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg")));
 
 TEST(ConfirmRobot, NamesTheNumberThatIsNotTheControllers) {
   const Cell cell = cell_with("abb_irb6640-205-275.yaml");
-  const RobotComparison found = compared(cell, screen({altered(cell.robot, 3, &LinkGeometry::d, 0.020)}));
+  const RobotComparison found =
+      compared(cell, screen({altered(cell.robot, 3, &LinkGeometry::d, 0.020)}));
   EXPECT_EQ(found.verdict, Verdict::kDiffers);
   EXPECT_NEAR(found.position_max, 0.020, 1e-3);
   ASSERT_EQ(found.could_be.size(), 1U) << found.could_be.front();
-  EXPECT_NE(found.could_be.front().find("d_mm of joint 4"), std::string::npos) << found.could_be.front();
+  EXPECT_NE(found.could_be.front().find("d_mm of joint 4"), std::string::npos)
+      << found.could_be.front();
 }
 
 TEST(ConfirmRobot, FindsASignAZeroAndACoupling) {
@@ -130,9 +138,11 @@ TEST(ConfirmRobot, FindsASignAZeroAndACoupling) {
   std::vector<Joint> turned = joints;
   turned[4].sign *= -1;
   EXPECT_NE(first(*Chain::make("turned", turned)).find("sign of joint 5"), std::string::npos);
-  EXPECT_NE(first(altered(cell.robot, 1, &LinkGeometry::theta, from_deg(1))).find("theta_deg of joint 2"),
+  EXPECT_NE(
+      first(altered(cell.robot, 1, &LinkGeometry::theta, from_deg(1))).find("theta_deg of joint 2"),
+      std::string::npos);
+  EXPECT_NE(first(*Chain::make("coupled", joints, {{2, 1, 1.0}})).find("joint 3 follows joint 2"),
             std::string::npos);
-  EXPECT_NE(first(*Chain::make("coupled", joints, {{2, 1, 1.0}})).find("joint 3 follows joint 2"), std::string::npos);
 }
 
 TEST(ConfirmRobot, AnotherRobotOfTheFamilyIsNotTheFilesOne) {
@@ -141,15 +151,17 @@ TEST(ConfirmRobot, AnotherRobotOfTheFamilyIsNotTheFilesOne) {
   other = altered(other, 3, &LinkGeometry::d, 0.02415);
   other = altered(other, 4, &LinkGeometry::d, 0.00505);
   other = altered(other, 5, &LinkGeometry::d, 0.0173);
-  const RobotComparison found = compared(cell, screen({other, Angles::kUniversalRobots, Pose::Identity(),
-                                                       Pose::Identity(), "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"}));
+  const RobotComparison found =
+      compared(cell, screen({other, Angles::kUniversalRobots, Pose::Identity(), Pose::Identity(),
+                             "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"}));
   EXPECT_EQ(found.verdict, Verdict::kDiffers) << found.why;
   EXPECT_EQ(found.could_be.size(), 4U) << fmt::format("{}", fmt::join(found.could_be, "; "));
 }
 
 TEST(ConfirmRobot, KnowsToolsAndBasesOfTheCell) {
   const Cell cell =
-      cell_with("kuka_kr210-r2700-extra.yaml", "tools: {gripper: {xyz_mm: [10, 20, 150]}}\n", "{xyz_mm: [0, 0, 800]}");
+      cell_with("kuka_kr210-r2700-extra.yaml", "tools: {gripper: {xyz_mm: [10, 20, 150]}}\n",
+                "{xyz_mm: [0, 0, 800]}");
   Controller controller{cell.robot};
   controller.X_FT = *cell.tools.at("gripper");
   controller.X_SB = *cell.X_WB;
@@ -193,13 +205,14 @@ TEST(ConfirmRobot, SaysWhatThePosesDoNotShow) {
 TEST(ConfirmRobot, AConfirmationHoldsForTheRobotFileThatWasCompared) {
   Cell cell = cell_with("kuka_kr210-r2700-extra.yaml");
   EXPECT_FALSE(confirmation_of(cell));
-  const Result<std::string> text =
-      with_confirmation(cell, RobotConfirmation{sha256_hex(cell.robot_yaml), 6, 0.01, 0.002, "2026-11-26"});
+  const Result<std::string> text = with_confirmation(
+      cell, RobotConfirmation{sha256_hex(cell.robot_yaml), 6, 0.01, 0.002, "2026-11-26"});
   ASSERT_TRUE(text);
   const Cell confirmed = *parse_cell(*text, cell.robot_yaml, "cell");
   ASSERT_TRUE(confirmation_of(confirmed));
   EXPECT_EQ(confirmation_of(confirmed)->poses, 6);
-  EXPECT_FALSE(confirmation_of(*parse_cell(*text, cell.robot_yaml + "# mended\n", "cell"))) << "of another robot file";
+  EXPECT_FALSE(confirmation_of(*parse_cell(*text, cell.robot_yaml + "# mended\n", "cell")))
+      << "of another robot file";
   EXPECT_EQ(*with_confirmation(confirmed, std::nullopt), cell.cell_yaml) << "taken back";
 }
 

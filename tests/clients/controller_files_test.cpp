@@ -19,16 +19,19 @@ const std::string kPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
 
 const std::string kTools =
     "//TOOL 0\r\n///NAME "
-    "\r\n0.000,0.000,0.000,0.0000,0.0000,0.0000\r\n0.000,0.000,0.000\r\n0.000\r\n0.000,0.000,0.000\r\n"
+    "\r\n0.000,0.000,0.000,0.0000,0.0000,0.0000\r\n0.000,0.000,0.000\r\n0.000\r\n0.000,0.000,0."
+    "000\r\n"
     "//TOOL 1\r\n///NAME SPINDLE "
     "2\r\n100.000,0.000,150.000,0.0000,-45.0000,0.0000\r\n0.000,0.000,100.000\r\n100.000\r\n"
     "0.000,0.000,0.000\r\n";
 const std::string kUserFrames =
-    "//UFRAME 1\r\n///NAME PANEL\r\n///TOOL 1\r\n///GROUP 1,0,0,0\r\n///PULSE\r\n////RORG C000=1,2,3,4,5,6\r\n"
+    "//UFRAME 1\r\n///NAME PANEL\r\n///TOOL 1\r\n///GROUP 1,0,0,0\r\n///PULSE\r\n////RORG "
+    "C000=1,2,3,4,5,6\r\n"
     "////BUSER 1800.000,-250.000,800.000,0.0000,0.0000,0.0000\r\n//UFRAME 2\r\n///NAME OTHER\r\n"
     "////BUSER 1.000,2.000,3.000,0.0000,0.0000,0.0000\r\n";
 const std::string kSystemVariables =
-    "[*SYSTEM*]$MNUFRAME  Storage: SHADOW  Access: RW  : ARRAY[1,9] OF POSITION\n    [1,1] =   'panel'\n"
+    "[*SYSTEM*]$MNUFRAME  Storage: SHADOW  Access: RW  : ARRAY[1,9] OF POSITION\n    [1,1] =   "
+    "'panel'\n"
     "  Group: 1   Config: N D B, 0, 0, 0\n  X:  1800.000   Y:  -250.000   Z:   800.000\n"
     "  W:      .000   P:      .000   R:      .000\n    [1,2] = Uninitialized\n"
     "[*SYSTEM*]$MNUTOOL  Storage: SHADOW  Access: RW  : ARRAY[1,9] OF POSITION\n    [1,1] = \n"
@@ -40,10 +43,13 @@ class ControllerFiles : public testing::Test {
  protected:
   ControllerFiles() {
     const Result<Cell> cell = read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml");
-    folder_.write("cell.model", serialize(test::nominal_model(std::make_shared<const Cell>(cell.value()), 10)));
+    folder_.write("cell.model",
+                  serialize(test::nominal_model(std::make_shared<const Cell>(cell.value()), 10)));
     fs::create_directories(folder_.file("in"));
   }
-  void copy(const std::string& program) const { fs::copy(kPrograms + program, folder_.file("in/" + program)); }
+  void copy(const std::string& program) const {
+    fs::copy(kPrograms + program, folder_.file("in/" + program));
+  }
   /// What it ends with; what it says is in `said_`.
   int correct(const std::string& input, const std::string& frames = "") {
     fs::remove_all(folder_.file("out"));
@@ -57,7 +63,9 @@ class ControllerFiles : public testing::Test {
     return code;
   }
   int correct_folder(const std::string& frames = "") { return correct(folder_.file("in"), frames); }
-  [[nodiscard]] bool has_said(const std::string& words) const { return said_.find(words) != std::string::npos; }
+  [[nodiscard]] bool has_said(const std::string& words) const {
+    return said_.find(words) != std::string::npos;
+  }
 
   test::TemporaryFolder folder_;
   std::string said_;
@@ -99,7 +107,8 @@ TEST_F(ControllerFiles, OfAYaskawaParametersAreSaidNotToBeRead) {
   copy("drill.jbi");
   folder_.write("in/TOOL.CND", kTools);
   folder_.write("in/UFRAME.CND", kUserFrames);
-  for (const char* name : {"ALL.PRM", "RC.PRM", "HOME2.DAT"}) folder_.write(std::string("in/") + name, "//RC YAS\r\n");
+  for (const char* name : {"ALL.PRM", "RC.PRM", "HOME2.DAT"})
+    folder_.write(std::string("in/") + name, "//RC YAS\r\n");
   EXPECT_EQ(correct_folder(), 0) << said_;
   EXPECT_TRUE(has_said("ALL.PRM, RC.PRM: parameters of the controller are not read")) << said_;
   EXPECT_TRUE(has_said("HOME2.DAT: data of the controller")) << said_;
@@ -109,11 +118,13 @@ TEST_F(ControllerFiles, AControllersOwnListIsTakenAsFrames) {
   const std::string variables = folder_.write("SYSFRAME.VA", kSystemVariables);
   EXPECT_EQ(correct(kPrograms + "drill.ls", variables), 0) << said_;
   EXPECT_TRUE(has_said("UFRAME[1], UTOOL[1]: taken from SYSFRAME.VA")) << said_;
-  EXPECT_EQ(correct(kPrograms + "drill.jbi", folder_.write("LIST.CND", kTools + kUserFrames)), 0) << said_;
+  EXPECT_EQ(correct(kPrograms + "drill.jbi", folder_.write("LIST.CND", kTools + kUserFrames)), 0)
+      << said_;
   EXPECT_EQ(correct(kPrograms + "drill.jbi", variables), kWrongUsage) << "of another controller";
   EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("sysframe.sv", "binary")), kRefusedData);
   EXPECT_TRUE(has_said("SYSFRAME.VA")) << said_;
-  EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("numreg.va", "[*NUMREG*]$NUMREG\n")), kRefusedData);
+  EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("numreg.va", "[*NUMREG*]$NUMREG\n")),
+            kRefusedData);
   EXPECT_TRUE(has_said("$MNUFRAME")) << said_;
 }
 

@@ -22,12 +22,14 @@ constexpr int kRefusedData = 3;
 
 const std::string kPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
 
-/// A model of the shipped cell that knows of no errors: what is corrected is written as it was, with its digits.
+/// A model of the shipped cell that knows of no errors: what is corrected is written as it was,
+/// with its digits.
 class CorrectProgram : public testing::Test {
  protected:
   void SetUp() override {
     const Result<Cell> cell = read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml");
-    folder_.write("cell.model", serialize(test::nominal_model(std::make_shared<const Cell>(*cell), 10)));
+    folder_.write("cell.model",
+                  serialize(test::nominal_model(std::make_shared<const Cell>(*cell), 10)));
   }
   int correct(std::vector<std::string> arguments) { return run("correct", std::move(arguments)); }
   int run(const char* command, std::vector<std::string> arguments) {
@@ -48,8 +50,10 @@ class CorrectProgram : public testing::Test {
     return folder_.write(
         name,
         "MODULE M\r\n  PERS tooldata "
-        "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\r\n"
-        "  CONST robtarget p10:=[[1800.1,0,1000],[0.669131,0,0.743145,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+        "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,"
+        "0]];\r\n"
+        "  CONST robtarget "
+        "p10:=[[1800.1,0,1000],[0.669131,0,0.743145,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
         "  PROC main()\n" +
             lines + "  ENDPROC\nENDMODULE\n");
   }
@@ -59,8 +63,8 @@ class CorrectProgram : public testing::Test {
 
 TEST_F(CorrectProgram, WhatItWasBeforeIsKeptBesideItAndRestoredByteForByte) {
   const std::string before = module("m.mod");
-  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("r.csv"), "--json",
-                     file("r.json")}),
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("r.csv"),
+                     "--json", file("r.json")}),
             0);
   EXPECT_EQ(text("out.mod.original"), text("m.mod"));
   EXPECT_NE(text("out.mod"), text("m.mod"));
@@ -78,7 +82,8 @@ TEST_F(CorrectProgram, WhatItWasBeforeIsKeptBesideItAndRestoredByteForByte) {
 TEST_F(CorrectProgram, WithoutItsOriginalOrWithAnotherOneNothingIsUndone) {
   const std::string before = module("m.mod");
   ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), 0);
-  EXPECT_EQ(correct({"--undo", before, "-o", file("back.mod")}), kRefusedData) << "it is not marked";
+  EXPECT_EQ(correct({"--undo", before, "-o", file("back.mod")}), kRefusedData)
+      << "it is not marked";
   folder_.write("out.mod.original", "MODULE Other\nENDMODULE\n");
   EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kRefusedData);
   fs::remove(file("out.mod.original"));
@@ -97,7 +102,8 @@ TEST_F(CorrectProgram, ACorrectedProgramIsCorrectedAgainOnlyFromItsOriginal) {
 
 TEST_F(CorrectProgram, WhatIsLeftDecidesTheExitCode) {
   const std::string before = module("m.mod", true);
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("strict.mod"), "--strict"}), kRefusedData);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("strict.mod"), "--strict"}),
+            kRefusedData);
   EXPECT_FALSE(exists("strict.mod"));
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kNotAll);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("allowed.mod"), "--allow-failed"}), 0);
@@ -109,14 +115,17 @@ TEST_F(CorrectProgram, AStrictToleranceWritesNothingWhereATargetIsOutOfDomain) {
   ModelParts learned_elsewhere = load_model(model()).value().parts();
   learned_elsewhere.q_min.setConstant(from_deg(-1));
   learned_elsewhere.q_max.setConstant(from_deg(1));
-  folder_.write("elsewhere.model", serialize(CompensatedModel::make(std::move(learned_elsewhere)).value()));
-  const auto corrected = [&](const std::string& by, const std::string& out, std::vector<std::string> more) {
-    more.insert(more.begin(), {"--model", file(by), before, "-o", file(out), "--tolerance", "0.2", "--receipt",
-                               file(out + ".csv"), "--json", file(out + ".json")});
+  folder_.write("elsewhere.model",
+                serialize(CompensatedModel::make(std::move(learned_elsewhere)).value()));
+  const auto corrected = [&](const std::string& by, const std::string& out,
+                             std::vector<std::string> more) {
+    more.insert(more.begin(), {"--model", file(by), before, "-o", file(out), "--tolerance", "0.2",
+                               "--receipt", file(out + ".csv"), "--json", file(out + ".json")});
     return correct(std::move(more));
   };
   EXPECT_EQ(corrected("elsewhere.model", "strict.mod", {"--strict"}), kRefusedData);
-  for (const char* name : {"strict.mod", "strict.mod.original", "strict.mod.csv", "strict.mod.json"})
+  for (const char* name :
+       {"strict.mod", "strict.mod.original", "strict.mod.csv", "strict.mod.json"})
     EXPECT_FALSE(exists(name)) << name;
   EXPECT_EQ(corrected("elsewhere.model", "told.mod", {}), 0) << "without --strict it is only told";
   EXPECT_EQ(nlohmann::json::parse(text("told.mod.json"))["tolerance"]["out_of_domain"], 1);
@@ -129,9 +138,12 @@ TEST_F(CorrectProgram, WrongUsageChangesNothing) {
   const std::string was = text("m.mod");
   EXPECT_EQ(correct({before, "-o", file("out.mod")}), kWrongUsage) << "no model";
   EXPECT_EQ(correct({"--model", model(), before, "-o", before}), kWrongUsage) << "over its input";
-  EXPECT_EQ(correct({"--model", model(), "--format", "fortran", before, "-o", file("out.mod")}), kWrongUsage);
-  EXPECT_EQ(correct({"--model", model(), "--tool", "gripper", before, "-o", file("out.mod")}), kWrongUsage);
-  EXPECT_EQ(correct({"--model", model(), folder_.write("x.txt", "x"), "-o", file("out.mod")}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), "--format", "fortran", before, "-o", file("out.mod")}),
+            kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), "--tool", "gripper", before, "-o", file("out.mod")}),
+            kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), folder_.write("x.txt", "x"), "-o", file("out.mod")}),
+            kWrongUsage);
   EXPECT_EQ(text("m.mod"), was);
   EXPECT_FALSE(exists("out.mod"));
 }
@@ -139,7 +151,8 @@ TEST_F(CorrectProgram, WrongUsageChangesNothing) {
 TEST_F(CorrectProgram, AToolOfAnotherCellIsRefusedAndNothingIsWritten) {
   std::string other = read_text_file(module("m.mod")).value();
   other.replace(other.find("[100,0,150]"), 11, "[100.2,0,150]");
-  EXPECT_EQ(correct({"--model", model(), folder_.write("o.mod", other), "-o", file("out.mod")}), kRefusedData);
+  EXPECT_EQ(correct({"--model", model(), folder_.write("o.mod", other), "-o", file("out.mod")}),
+            kRefusedData);
   EXPECT_FALSE(exists("out.mod"));
 }
 
@@ -155,29 +168,35 @@ TEST_F(CorrectProgram, AFolderComesBackAsAFolder) {
   EXPECT_EQ(text("back/m.mod"), text("in/m.mod"));
 }
 
-/// A KUKA folder as its archive has it: a position that a motion of the program goes to stands in the controller's own
-/// file.
+/// A KUKA folder as its archive has it: a position that a motion of the program goes to stands in
+/// the controller's own file.
 void write_krl_folder(const test::TemporaryFolder& folder, const std::string& under) {
   const std::string config = read_text_file(kPrograms + "$config.dat").value();
-  for (const char* place : {"/KRC/R1/System", "/KRC/R1/Program"}) fs::create_directories(folder.file(under + place));
+  for (const char* place : {"/KRC/R1/System", "/KRC/R1/Program"})
+    fs::create_directories(folder.file(under + place));
   folder.write(under + "/KRC/R1/System/$config.dat",
                config.substr(0, config.rfind("ENDDAT")) +
                    "DECL E6POS XHOME={X 0.0,Y 125.0,Z 100.0,A 0.0,B 90.0,C 0.0,S 2,T 0}\nENDDAT\n");
   const std::string drill = read_text_file(kPrograms + "drill.src").value();
-  folder.write(under + "/KRC/R1/Program/drill.src", drill.substr(0, drill.rfind("END")) + "PTP XHOME\nEND\n");
-  folder.write(under + "/KRC/R1/Program/drill.dat", read_text_file(kPrograms + "drill.dat").value());
+  folder.write(under + "/KRC/R1/Program/drill.src",
+               drill.substr(0, drill.rfind("END")) + "PTP XHOME\nEND\n");
+  folder.write(under + "/KRC/R1/Program/drill.dat",
+               read_text_file(kPrograms + "drill.dat").value());
 }
 
 TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
   write_krl_folder(folder_, "in");
   const std::string config = "/KRC/R1/System/$config.dat", program = "/KRC/R1/Program/drill.dat";
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("r.csv")}), kNotAll);
+  EXPECT_EQ(
+      correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("r.csv")}),
+      kNotAll);
   EXPECT_EQ(text("out" + config), text("in" + config));
   EXPECT_FALSE(exists("out" + config + ".original"));
   EXPECT_NE(text("out" + program), text("in" + program)) << "the program itself is corrected";
-  EXPECT_NE(text("r.csv").find("system file of the controller"), std::string::npos) << text("r.csv");
-  EXPECT_EQ(correct({"--model", model(), file("in" + config), file("in/KRC/R1/Program/drill.src"), file("in" + program),
-                     "-o", file("asked/")}),
+  EXPECT_NE(text("r.csv").find("system file of the controller"), std::string::npos)
+      << text("r.csv");
+  EXPECT_EQ(correct({"--model", model(), file("in" + config), file("in/KRC/R1/Program/drill.src"),
+                     file("in" + program), "-o", file("asked/")}),
             0);
   EXPECT_NE(text("asked/$config.dat"), text("in" + config)) << "asked for by its name";
 }
@@ -203,17 +222,21 @@ TEST_F(CorrectProgram, PulsesAreToldInSixNumbersAndOfYaskawaJobsAlone) {
 }
 
 TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
-  for (const auto& [program, other] : {std::pair("drill.ls", "orderfil.dat"), std::pair("drill.jbi", "HOME2.DAT"),
-                                       std::pair("drill.mod", "log.dat")}) {
+  for (const auto& [program, other] :
+       {std::pair("drill.ls", "orderfil.dat"), std::pair("drill.jbi", "HOME2.DAT"),
+        std::pair("drill.mod", "log.dat")}) {
     fs::remove_all(file("in"));
     fs::create_directories(file("in"));
     fs::copy(kPrograms + program, file(std::string("in/") + program));
     folder_.write(std::string("in/") + other, "! options of this controller\n");
-    EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--frames", kPrograms + "frames.csv"}), 0)
+    EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--frames",
+                       kPrograms + "frames.csv"}),
+              0)
         << program;
   }
   write_krl_folder(folder_, "krl");
-  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}), kNotAll) << "its data lists are read";
+  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}), kNotAll)
+      << "its data lists are read";
   EXPECT_TRUE(exists("krl-out/KRC/R1/Program/drill.dat"));
 }
 
@@ -224,8 +247,8 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
   const auto with = [&](const std::string& rows, const std::string& command = "correct") {
     folder_.write("frames.csv", header + rows + "\n");
     testing::internal::CaptureStderr();
-    const int code = run(command.c_str(), {"--model", model(), kPrograms + "drill.ls", "-o", file("out"), "--frames",
-                                           file("frames.csv")});
+    const int code = run(command.c_str(), {"--model", model(), kPrograms + "drill.ls", "-o",
+                                           file("out"), "--frames", file("frames.csv")});
     return fmt::format("{}: {}", code, testing::internal::GetCapturedStderr());
   };
   EXPECT_TRUE(with(tool + "\nUFRAME[1]" + frame).starts_with("0: "));
@@ -234,27 +257,34 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
     for (const char* command : {"correct", "predict"}) {
       const std::string said = with(tool + "\nUFRAME[1]" + frame + "\n" + name + frame, command);
       EXPECT_TRUE(said.starts_with("3: ")) << name << said;
-      for (const std::string& part : {std::string("frames.csv row 4"), std::string(name), std::string("UFRAME[1]"),
-                                      std::string("UTOOL[1]"), std::string("robot_base")})
+      for (const std::string& part :
+           {std::string("frames.csv row 4"), std::string(name), std::string("UFRAME[1]"),
+            std::string("UTOOL[1]"), std::string("robot_base")})
         EXPECT_NE(said.find(part), std::string::npos) << name << ": " << said;
     }
   }
-  EXPECT_TRUE(with(tool + "\nuframe[1]" + frame).starts_with("3: ")) << "misspelt, and the frame is missing";
+  EXPECT_TRUE(with(tool + "\nuframe[1]" + frame).starts_with("3: "))
+      << "misspelt, and the frame is missing";
   EXPECT_TRUE(
-      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",yes").starts_with("0: "));
+      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",yes")
+          .starts_with("0: "));
   EXPECT_TRUE(
-      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",no").starts_with("3: "));
-  EXPECT_TRUE(with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",maybe").starts_with("3: "));
+      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",no")
+          .starts_with("3: "));
+  EXPECT_TRUE(
+      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",maybe").starts_with("3: "));
 }
 
 TEST_F(CorrectProgram, FramesOfABackupServeEveryProgramOfIt) {
   ASSERT_EQ(run("import-backup", {kPrograms + "backup", "--frames", file("frames.csv")}), 0);
-  EXPECT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--frames", file("frames.csv")}), 0);
+  EXPECT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--frames",
+                     file("frames.csv")}),
+            0);
 }
 
 TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
-  ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--report", file("page.html"),
-                     "--tolerance", "0.2", "--json", file("r.json")}),
+  ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--report",
+                     file("page.html"), "--tolerance", "0.2", "--json", file("r.json")}),
             0);
   const std::string page = text("page.html");
   EXPECT_NE(page.find("1 of 1 targets are inside"), std::string::npos);
@@ -276,8 +306,8 @@ TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
   };
   for (const std::vector<std::string>& example : examples) {
     std::vector<std::string> arguments = example;
-    arguments.insert(arguments.end(), {"--model", model(), "--frames", kPrograms + "frames.csv", "-o", file("out/"),
-                                       "--json", file("r.json")});
+    arguments.insert(arguments.end(), {"--model", model(), "--frames", kPrograms + "frames.csv",
+                                       "-o", file("out/"), "--json", file("r.json")});
     EXPECT_EQ(correct(arguments), 0) << example.back();
     const auto json = nlohmann::json::parse(text("r.json"));
     EXPECT_EQ(json["left_alone"], 0) << example.back();
@@ -288,7 +318,9 @@ TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
 
 TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   const std::string before = module("m.mod", true);
-  EXPECT_EQ(run("predict", {"--model", model(), before, "-o", file("p.csv"), "--json", file("p.json")}), kNotAll)
+  EXPECT_EQ(
+      run("predict", {"--model", model(), before, "-o", file("p.csv"), "--json", file("p.json")}),
+      kNotAll)
       << "CRobT() is decided at run time";
   const CsvTable table = CsvTable::parse(text("p.csv"), "p.csv").value();
   ASSERT_EQ(table.size(), 2u);
@@ -304,18 +336,24 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   EXPECT_EQ(run("predict", {"--model", model(), file("out.mod"), "-o", file("q.csv")}), kNotAll)
       << "a corrected one, too";
   EXPECT_EQ(run("predict", {"--model", model(), "-o", file("q.csv")}), kWrongUsage);
-  EXPECT_EQ(run("predict", {"--model", model(), before, "--joints", before, "-o", file("q.csv")}), kWrongUsage);
-  EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}), kWrongUsage);
+  EXPECT_EQ(run("predict", {"--model", model(), before, "--joints", before, "-o", file("q.csv")}),
+            kWrongUsage);
+  EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}),
+            kWrongUsage);
 }
 
 TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodNothingIsWritten) {
-  for (const char* text :
-       {"", "\x8f\x01\xe3\xff\x10\n\x99,\x02", "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n"}) {
+  for (const char* text : {"", "\x8f\x01\xe3\xff\x10\n\x99,\x02",
+                           "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n"}) {
     for (const char* name : {"m.mod", "m.src", "m.ls", "m.jbi", "m.script"}) {
       const std::string path = folder_.write(name, text);
-      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out")}), kRefusedData) << name << ": " << text;
-      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out"), "--allow-failed"}), kRefusedData) << name;
-      EXPECT_EQ(run("predict", {"--model", model(), path, "-o", file("out")}), kRefusedData) << name;
+      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out")}), kRefusedData)
+          << name << ": " << text;
+      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out"), "--allow-failed"}),
+                kRefusedData)
+          << name;
+      EXPECT_EQ(run("predict", {"--model", model(), path, "-o", file("out")}), kRefusedData)
+          << name;
       EXPECT_FALSE(exists("out"));
     }
   }
@@ -326,7 +364,9 @@ TEST_F(CorrectProgram, AFolderOfWhichSomeFilesHaveNoMotionIsCorrected) {
   module("in/a.mod");
   const std::string home = "MODULE H\n  PROC home()\n  ENDPROC\nENDMODULE\n";
   folder_.write("in/h.mod", home);
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("out/r.csv")}), 0)
+  EXPECT_EQ(
+      correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("out/r.csv")}),
+      0)
       << "the receipt may lie in the folder that is made";
   EXPECT_EQ(text("out/h.mod"), home);
   EXPECT_TRUE(exists("out/r.csv"));
@@ -334,33 +374,47 @@ TEST_F(CorrectProgram, AFolderOfWhichSomeFilesHaveNoMotionIsCorrected) {
 
 TEST_F(CorrectProgram, AReceiptThatCannotBeWrittenLeavesNoCorrectedProgram) {
   const std::string before = module("m.mod");
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("no/r.csv")}), kRefusedData);
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--report", file("no/r.html")}), kRefusedData);
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod")}), kWrongUsage);
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod.original")}),
+  EXPECT_EQ(
+      correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("no/r.csv")}),
+      kRefusedData);
+  EXPECT_EQ(
+      correct({"--model", model(), before, "-o", file("out.mod"), "--report", file("no/r.html")}),
+      kRefusedData);
+  EXPECT_EQ(
+      correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod")}),
+      kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt",
+                     file("out.mod.original")}),
             kWrongUsage);
   fs::create_directory(file("in"));
   const std::string inside = module("in/a.mod");
   const std::string was = read_text_file(inside).value();
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", inside}), kWrongUsage);
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", file("out/a.mod")}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", inside}),
+            kWrongUsage);
+  EXPECT_EQ(
+      correct({"--model", model(), file("in"), "-o", file("out"), "--json", file("out/a.mod")}),
+      kWrongUsage);
   EXPECT_EQ(read_text_file(inside).value(), was);
   EXPECT_FALSE(exists("out.mod"));
   EXPECT_FALSE(exists("out"));
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("new/out.mod"), "--receipt", file("new/r.csv")}), 0);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("new/out.mod"), "--receipt",
+                     file("new/r.csv")}),
+            0);
 }
 
 TEST_F(CorrectProgram, MeasuringProgramsOfEveryControllerArePredictedAsTheyArePlanned) {
   const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
-  ASSERT_EQ(run("plan", {"--cell", cell, "--count", "4", "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl",
-                         file("p.src"), "--fanuc", file("p.ls"), "--urscript", file("p.script")}),
+  ASSERT_EQ(run("plan",
+                {"--cell", cell, "--count", "4", "-o", file("p.csv"), "--rapid", file("p.mod"),
+                 "--krl", file("p.src"), "--fanuc", file("p.ls"), "--urscript", file("p.script")}),
             0);
   for (const char* name : {"p.mod", "p.src", "p.ls", "p.script"}) {
     EXPECT_EQ(run("predict", {"--model", model(), file(name), "-o", file("where.csv")}), 0) << name;
     const CsvTable where = CsvTable::parse(text("where.csv"), "where.csv").value();
     EXPECT_GE(where.size(), 4u) << name;
     for (std::size_t row = 0; row < where.size(); ++row)
-      EXPECT_NE(where.field(row, where.require("status").value()), "refused") << name << " row " << row + 1;
+      EXPECT_NE(where.field(row, where.require("status").value()), "refused")
+          << name << " row " << row + 1;
   }
 }
 

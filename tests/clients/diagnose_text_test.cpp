@@ -14,7 +14,8 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
   for (const char* part :
        {"ambiguous: The gear of joint 3", "gear ripple in joint 3", "order = 48.503 ± 0.040",
         "± is U(k=2): two standard uncertainties", "could also be: link geometry (d6)",
-        "Have the gear of joint 3 looked at", "9 um rms. It changes with the position of joint 4", "pose p28 (row 29)",
+        "Have the gear of joint 3 looked at", "9 um rms. It changes with the position of joint 4",
+        "pose p28 (row 29)",
         "would not have shown: backlash: needs both approach directions (joints 2)",
         "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
@@ -30,8 +31,8 @@ TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
   diagnosis.could_not_have_seen.push_back({payload, 0.9, 1e-5, {}, "a second known payload"});
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
   for (const char* part : {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
-                           "payload mass or centre of gravity from gearbox compliance (C2), gearbox compliance (C3) "
-                           "(needs a second known payload)"}) {
+                           "payload mass or centre of gravity from gearbox compliance (C2), "
+                           "gearbox compliance (C3) (needs a second known payload)"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }
@@ -48,10 +49,10 @@ TEST(DiagnoseText, SaysWhatWouldNotHaveBeenNamedForCertainAndHowLargeTheNoiseIs)
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   for (Measurement& m : diagnosis.batch.measurements) m.context.direction.clear();
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
-  for (const char* part :
-       {"150 poses. Noise: 22.5 um rms, what is left of a position when all that was found is corrected",
-        "would not have been named for certain (looked for by the order of the poses): backlash: "
-        "needs both approach directions (joints 2)"}) {
+  for (const char* part : {"150 poses. Noise: 22.5 um rms, what is left of a position when all "
+                           "that was found is corrected",
+                           "would not have been named for certain (looked for by the order of the "
+                           "poses): backlash: needs both approach directions (joints 2)"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }
@@ -60,7 +61,8 @@ TEST(DiagnoseText, APoseThatMayShowWhatTheSimulationLacksIsNotCalledABadOne) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   Finding out{.cause = {.cause = "outlier", .pose_id = "p9"}, .effect_rms = 1e-3};
   diagnosis.findings = {out};
-  EXPECT_NE(diagnosis_text(diagnosis_json(diagnosis)).find("single bad pose, pose p9"), std::string::npos);
+  EXPECT_NE(diagnosis_text(diagnosis_json(diagnosis)).find("single bad pose, pose p9"),
+            std::string::npos);
   diagnosis.findings.front().could_also_be = {unknown_cause()};
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
   EXPECT_EQ(text.find("bad pose"), std::string::npos) << text;
@@ -69,7 +71,8 @@ TEST(DiagnoseText, APoseThatMayShowWhatTheSimulationLacksIsNotCalledABadOne) {
 
 TEST(DiagnoseText, NextPosesAreAPlanThatTheOtherCommandsRead) {
   const Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
-  const JointList plan = test::demand(parse_joint_csv(next_poses_csv(diagnosis_json(diagnosis)), "next.csv"));
+  const JointList plan =
+      test::demand(parse_joint_csv(next_poses_csv(diagnosis_json(diagnosis)), "next.csv"));
   ASSERT_EQ(plan.poses.size(), 10u);
   EXPECT_LT((plan.poses[4].context.q - diagnosis.next_poses.q[4]).norm(), 1e-9);
 }

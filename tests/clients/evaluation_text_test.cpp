@@ -19,7 +19,8 @@ Evaluation evaluation() {
   evaluation.nlpd = -9.25;
   evaluation.nominal.rms = 3e-3;
   evaluation.calibrated.rms = 4e-4;
-  evaluation.compensated = {1e-4, 9e-5, 2e-4, 3e-4, Vector3(1e-5, 2e-5, -3e-5), Vector3(4e-5, 5e-5, 6e-5)};
+  evaluation.compensated = {
+      1e-4, 9e-5, 2e-4, 3e-4, Vector3(1e-5, 2e-5, -3e-5), Vector3(4e-5, 5e-5, 6e-5)};
   return evaluation;
 }
 
@@ -35,9 +36,10 @@ TEST(EvaluationJson, HasAnOrientationInDegreesWhereOneWasMeasuredAndSoHasTheText
   EXPECT_FALSE(json.contains("coverage_95"));
   turned.orientation->coverage_95 = .95;
   EXPECT_EQ(evaluation_json(turned)["orientation"]["coverage_95"], .95);
-  EXPECT_NE(evaluation_table(turned).find("orientation, deg rms of 5 poses: nominal 1.0000, calibrated 0.5000, "
-                                          "compensated 0.1000; 95.0 % of rotations"),
-            std::string::npos);
+  EXPECT_NE(
+      evaluation_table(turned).find("orientation, deg rms of 5 poses: nominal 1.0000, calibrated "
+                                    "0.5000, compensated 0.1000; 95.0 % of rotations"),
+      std::string::npos);
 }
 
 TEST(EvaluationJson, TellsDistancesByThemselvesAndNoFigureOfPositionsWhereNoneWasMeasured) {
@@ -66,16 +68,18 @@ TEST(ResidualsCsv, HasARowAPoseInMillimetresAndMarksSuspects) {
     batch.measurements.push_back(m);
   }
   CompensatedModel::LevelErrors errors;
-  errors.nominal = errors.calibrated = errors.compensated = errors.stddev = Eigen::Matrix3Xd::Constant(3, 2, 1e-5);
+  errors.nominal = errors.calibrated = errors.compensated = errors.stddev =
+      Eigen::Matrix3Xd::Constant(3, 2, 1e-5);
   errors.compensated.col(1) = Vector3(3e-5, 4e-5, 0);
   errors.compensated(2, 1) = 6e-5;
   errors.in_domain = {true, false};
   EXPECT_EQ(
       residuals_csv(batch, errors),
-      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,cz_mm,nominal_mm,"
-      "in_domain,suspect\n"
+      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,"
+      "cz_mm,nominal_mm,in_domain,suspect\n"
       "p1,2,0.0173205,0.01,0.01,0.01,0.01,0.01,0.01,1,1,1,0.0173205,0.01,0.01,0.01,0.0173205,1,0\n"
-      "\"p,2\",3,0.0781025,0.03,0.04,0.06,0.01,0.01,0.01,3,4,6,0.0173205,0.01,0.01,0.01,0.0173205,0,1\n");
+      "\"p,2\",3,0.0781025,0.03,0.04,0.06,0.01,0.01,0.01,3,4,6,0.0173205,0.01,0.01,0.01,0.0173205,"
+      "0,1\n");
 }
 
 TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {
@@ -89,10 +93,12 @@ TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {
   json.erase("nlpd");
   json["levels"].erase("nominal");
   json["levels"].erase("calibrated");
-  const auto expected = nlohmann::json::parse("{\"poses\":7," + compensated + ",\"levels\":{\"compensated\":{" +
-                                              compensated + "}},\"coverage_95\":0.9,\"in_domain\":6}");
+  const auto expected =
+      nlohmann::json::parse("{\"poses\":7," + compensated + ",\"levels\":{\"compensated\":{" +
+                            compensated + "}},\"coverage_95\":0.9,\"in_domain\":6}");
   // Through text with 12 digits: a factor of 1000 may cost the last bit.
-  std::function<nlohmann::json(const nlohmann::json&)> rounded = [&](const nlohmann::json& value) -> nlohmann::json {
+  std::function<nlohmann::json(const nlohmann::json&)> rounded =
+      [&](const nlohmann::json& value) -> nlohmann::json {
     if (value.is_number_float()) return fmt::format("{:.12g}", value.get<double>());
     if (!value.is_structured()) return value;
     nlohmann::json copy = value;
@@ -106,7 +112,8 @@ TEST(EvaluationTable, HasALineForEachLevel) {
   const std::string table = evaluation_table(evaluation());
   EXPECT_NE(table.find("nominal         3.0000"), std::string::npos) << table;
   EXPECT_NE(table.find("calibrated      0.4000"), std::string::npos) << table;
-  EXPECT_NE(table.find("compensated     0.1000    0.0900    0.2000    0.3000"), std::string::npos) << table;
+  EXPECT_NE(table.find("compensated     0.1000    0.0900    0.2000    0.3000"), std::string::npos)
+      << table;
   EXPECT_NE(table.find("6 of 7 poses in domain; 90.0 %"), std::string::npos) << table;
   EXPECT_NE(table.find("-2.342 nat"), std::string::npos) << table;
   Evaluation old = evaluation();
@@ -120,9 +127,9 @@ TEST(EvaluationTable, SaysWhereABiasDoesNotHelp) {
   Evaluation worse = evaluation();
   worse.compensated.rms = 4.1e-4;
   worse.bias_gain_z = -3;
-  EXPECT_NE(
-      evaluation_table(worse).find("the bias does not help here: 0.4100 mm with it, 0.4000 mm without on 7 poses"),
-      std::string::npos);
+  EXPECT_NE(evaluation_table(worse).find(
+                "the bias does not help here: 0.4100 mm with it, 0.4000 mm without on 7 poses"),
+            std::string::npos);
   EXPECT_TRUE(evaluation_json(worse).contains("doubt_of_bias"));
   // A model without a bias: the same but for the last bit.
   Evaluation none = evaluation();
@@ -142,14 +149,15 @@ TEST(ModelText, SaysWhatCouldNotBeIdentified) {
 
 TEST(ModelText, TellsWhatWasAskedBeforeABiasWasLeftOut) {
   CompensatedModel::Parts parts = test::nominal_model(test::small_cell("cell-3"), 12).parts();
-  parts.bias_choice = BiasChoice{
-      "none",
-      {{"none", 23.6e-6, -9.8, 24e-6, 25e-6, 0, 0, "taken"}, {"se", 23.8e-6, -9.7, 0, 0, 1e-12, 2e-12, "no"}},
-      "no bias helps"};
+  parts.bias_choice = BiasChoice{"none",
+                                 {{"none", 23.6e-6, -9.8, 24e-6, 25e-6, 0, 0, "taken"},
+                                  {"se", 23.8e-6, -9.7, 0, 0, 1e-12, 2e-12, "no"}},
+                                 "no bias helps"};
   const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
   const std::string text = model_text(model);
   EXPECT_NE(text.find("no bias helps\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("none                                    0.0236      0.0240      0.0250        -2.892  taken"),
+  EXPECT_NE(text.find("none                                    0.0236      0.0240      0.0250      "
+                      "  -2.892  taken"),
             std::string::npos)
       << text;
   const auto json = model_json(model)["bias_choice"];

@@ -27,7 +27,8 @@ class Help : public testing::Test {
     return app_.get_subcommands([](CLI::App* one) { return !one->get_name().empty(); });
   }
   static std::string help_of(const CLI::App& command) {
-    return command.get_formatter()->make_help(&command, "trammel " + command.get_name(), CLI::AppFormatMode::Normal);
+    return command.get_formatter()->make_help(&command, "trammel " + command.get_name(),
+                                              CLI::AppFormatMode::Normal);
   }
   static std::vector<std::string> lines_of(const std::string& text) {
     std::istringstream in(text);
@@ -50,11 +51,13 @@ class Help : public testing::Test {
 TEST_F(Help, OfEveryCommandFitsIn80ColumnsWithoutBrokenWords) {
   for (CLI::App* command : commands()) {
     const std::string help = help_of(*command);
-    for (const std::string& line : lines_of(help)) EXPECT_LE(line.size(), 80u) << command->get_name() << ": " << line;
+    for (const std::string& line : lines_of(help))
+      EXPECT_LE(line.size(), 80u) << command->get_name() << ": " << line;
     const std::string all = fmt::format(" {} ", fmt::join(words_of(help), " "));
     for (const OptionText& option : described(*command).options) {
       for (const std::string& word : words_of(option.description))
-        EXPECT_NE(all.find(" " + word + " "), std::string::npos) << command->get_name() << " breaks " << word;
+        EXPECT_NE(all.find(" " + word + " "), std::string::npos)
+            << command->get_name() << " breaks " << word;
     }
   }
   EXPECT_GE(commands().size(), 35u);
@@ -67,7 +70,8 @@ TEST_F(Help, OfEveryCommandHasExamplesThatTheCommandLineTakes) {
     EXPECT_NE(help_of(*command).find(examples), std::string::npos) << command->get_name();
     for (const std::string& line : lines_of(examples)) {
       EXPECT_LE(line.size(), 80u) << line;
-      std::vector<std::string> words = words_of(line.starts_with("  trammel ") ? line.substr(10) : line);
+      std::vector<std::string> words =
+          words_of(line.starts_with("  trammel ") ? line.substr(10) : line);
       if (words[0] == "source") words = {"completion", "bash"};
       if (const auto into = std::find(words.begin(), words.end(), ">"); into != words.end())
         words.erase(into, words.end());
@@ -111,7 +115,8 @@ TEST_F(Help, ManualPagesAndCompletionsHaveEveryCommandAndOption) {
   const CommandText program = described(app_);
   const auto pages = manual_pages(program, "1.2.3", folder_.path());
   ASSERT_EQ(pages.size(), program.commands.size() + 1);
-  const std::string bash = bash_completion(program), zsh = zsh_completion(program), fish = fish_completion(program);
+  const std::string bash = bash_completion(program), zsh = zsh_completion(program),
+                    fish = fish_completion(program);
   for (std::size_t k = 0; k < program.commands.size(); ++k) {
     const CommandText& command = program.commands[k];
     EXPECT_TRUE(pages[k + 1].path.ends_with("/trammel-" + command.name + ".1"));
@@ -134,9 +139,9 @@ TEST_F(Help, ManualPagesAndCompletionsHaveEveryCommandAndOption) {
 TEST_F(Help, TheShellCompletesCommandsOptionsAndTheirValues) {
   folder_.write("completion", bash_completion(described(app_)));
   const auto completed = [&](const std::string& words, int at) {
-    const std::string script =
-        fmt::format("source {}; COMP_WORDS=({}); COMP_CWORD={}; _trammel; echo \"${{COMPREPLY[*]}}\"",
-                    folder_.file("completion"), words, at);
+    const std::string script = fmt::format(
+        "source {}; COMP_WORDS=({}); COMP_CWORD={}; _trammel; echo \"${{COMPREPLY[*]}}\"",
+        folder_.file("completion"), words, at);
     return test::run({"/bin/bash", "-c", script}).out;
   };
   EXPECT_EQ(completed("trammel pl", 1), "plan\n");
@@ -151,14 +156,18 @@ TEST_F(Help, DefaultsStandBehindWhatTheCommandLineSays) {
       folder_.write("defaults", "# of this desk\nport = 17501\nseed=7\ncell = /data/cell-7.yaml\n");
   using Words = std::vector<std::string>;
   EXPECT_EQ(with_defaults(app_, {"status"}, path).value(), (Words{"status", "--port", "17501"}));
-  EXPECT_EQ(with_defaults(app_, {"status", "--port", "1"}, path).value(), (Words{"status", "--port", "1"}));
+  EXPECT_EQ(with_defaults(app_, {"status", "--port", "1"}, path).value(),
+            (Words{"status", "--port", "1"}));
   EXPECT_EQ(with_defaults(app_, {"plan", "--count", "5"}, path).value(),
             (Words{"plan", "--count", "5", "--seed", "7", "--cell", "/data/cell-7.yaml"}));
-  EXPECT_EQ(with_defaults(app_, {"jobs"}, path).value(), (Words{"jobs", "--port", "17501"})) << "all cells";
+  EXPECT_EQ(with_defaults(app_, {"jobs"}, path).value(), (Words{"jobs", "--port", "17501"}))
+      << "all cells";
   EXPECT_EQ(with_defaults(app_, {"status"}, "").value(), (Words{"status"}));
   const std::string by_notepad = folder_.write("bom", "\xef\xbb\xbfport = 17501\r\n");
-  EXPECT_EQ(with_defaults(app_, {"status"}, by_notepad).value(), (Words{"status", "--port", "17501"}));
-  const auto unknown = with_defaults(app_, {"status"}, folder_.write("other", "port = 1\nprot = 2\n"));
+  EXPECT_EQ(with_defaults(app_, {"status"}, by_notepad).value(),
+            (Words{"status", "--port", "17501"}));
+  const auto unknown =
+      with_defaults(app_, {"status"}, folder_.write("other", "port = 1\nprot = 2\n"));
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().row, 2);
   EXPECT_EQ(unknown.error().field, "prot");

@@ -12,8 +12,10 @@ std::size_t near(const Words& columns, TableKind kind = TableKind::kBatch) {
 }
 
 TEST(NearColumns, AreToldWithTheOneThatWasMeant) {
-  EXPECT_EQ(near_columns({"q1_deg", "x_mm", "temprature_c"}, TableKind::kBatch, "b.csv"),
-            Words({"b.csv: column temprature_c is not known and is left aside; temperature_c was meant?"}));
+  EXPECT_EQ(
+      near_columns({"q1_deg", "x_mm", "temprature_c"}, TableKind::kBatch, "b.csv"),
+      Words(
+          {"b.csv: column temprature_c is not known and is left aside; temperature_c was meant?"}));
   EXPECT_EQ(near({"pose_ids"}), 1u);
   EXPECT_EQ(near({"Pose_Ids"}), 1u);
   EXPECT_EQ(near({"tiem_s"}), 1u);

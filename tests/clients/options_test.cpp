@@ -15,8 +15,8 @@ TEST(ModelReference, IsACellOrAVersionOfIt) {
 }
 
 TEST(ModelReference, RefusesWhatIsNoVersion) {
-  for (const char* text :
-       {"", "@3", "cell-7@", "cell-7@0", "cell-7@-1", "cell-7@x", "cell-7@3x", "cell-7@99999999999"}) {
+  for (const char* text : {"", "@3", "cell-7@", "cell-7@0", "cell-7@-1", "cell-7@x", "cell-7@3x",
+                           "cell-7@99999999999"}) {
     const auto reference = parse_model_reference(text);
     ASSERT_FALSE(reference) << text;
     EXPECT_EQ(reference.error().code, ErrorCode::kUsage);
@@ -31,8 +31,8 @@ TEST(CellId, IsTakenAsItIsOrFromTheCellFileThatHoldsIt) {
 
 TEST(ExitCode, TellsUsageDataAndServiceApart) {
   EXPECT_EQ(exit_code(ErrorCode::kUsage), 2);
-  for (const ErrorCode code :
-       {ErrorCode::kRefused, ErrorCode::kNotFound, ErrorCode::kConflict, ErrorCode::kTooLarge, ErrorCode::kInternal}) {
+  for (const ErrorCode code : {ErrorCode::kRefused, ErrorCode::kNotFound, ErrorCode::kConflict,
+                               ErrorCode::kTooLarge, ErrorCode::kInternal}) {
     EXPECT_EQ(exit_code(code), 3);
   }
   EXPECT_EQ(exit_code(ErrorCode::kBusy), 4);

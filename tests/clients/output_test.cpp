@@ -71,7 +71,8 @@ TEST_F(OutputsTest, AreWrittenAllOrNone) {
   ASSERT_FALSE(written);
   EXPECT_EQ(refusal_of(written), Refusal(file("later/b")));
   EXPECT_EQ(test::read_file(file("a")), "old");
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1) << "a part was left";
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1)
+      << "a part was left";
 
   std::filesystem::create_directory(file("later"));
   ASSERT_TRUE(outputs.write());

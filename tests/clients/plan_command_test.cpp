@@ -17,7 +17,8 @@ namespace {
 class PlanCommand : public testing::Test {
  protected:
   int plan(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"trammel", "plan", "--cell", TRAMMEL_SOURCE_DIR "/config/cell-7.yaml"});
+    arguments.insert(arguments.begin(),
+                     {"trammel", "plan", "--cell", TRAMMEL_SOURCE_DIR "/config/cell-7.yaml"});
     std::vector<const char*> argv;
     for (const std::string& argument : arguments) argv.push_back(argument.c_str());
     return run_command_line(static_cast<int>(argv.size()), argv.data());
@@ -29,8 +30,9 @@ class PlanCommand : public testing::Test {
 };
 
 TEST_F(PlanCommand, WritesPlanProgramsAndFigures) {
-  ASSERT_EQ(plan({"--count", "8", "--criterion", "separate:backlash:2,geometry", "--bidirectional", "-o", file("p.csv"),
-                  "--rapid", file("p.mod"), "--krl", file("p.src"), "--json", file("p.json")}),
+  ASSERT_EQ(plan({"--count", "8", "--criterion", "separate:backlash:2,geometry", "--bidirectional",
+                  "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl", file("p.src"), "--json",
+                  file("p.json")}),
             0);
   const JointList list = read_joint_csv(file("p.csv")).value();
   ASSERT_EQ(list.poses.size(), 16u);
@@ -46,14 +48,16 @@ TEST_F(PlanCommand, WritesPlanProgramsAndFigures) {
 }
 
 TEST_F(PlanCommand, MakesAProgramOfPosesThatWereChosenElsewhere) {
-  const std::string chosen = folder_.write(
-      "next.csv", "pose_id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\nn1,10,20,-30,40,50,60\nn2,0,0,69.9,0,5,0\n");
+  const std::string chosen = folder_.write("next.csv",
+                                           "pose_id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\nn1,"
+                                           "10,20,-30,40,50,60\nn2,0,0,69.9,0,5,0\n");
   ASSERT_EQ(plan({"--from", chosen, "-o", file("p.csv"), "--rapid", file("p.mod")}), 0);
   const JointList list = read_joint_csv(file("p.csv")).value();
   ASSERT_EQ(list.poses.size(), 2u);
   EXPECT_EQ(list.poses[0].pose_id, "n1");
   EXPECT_EQ(list.poses[0].context.direction, std::vector<int>(6, -1));
-  EXPECT_EQ(list.poses[1].context.direction, std::vector<int>(6, 1)) << "joint 3 cannot come from above";
+  EXPECT_EQ(list.poses[1].context.direction, std::vector<int>(6, 1))
+      << "joint 3 cannot come from above";
   EXPECT_NE(text("p.mod").find("[10,20,-30,40,50,60]"), std::string::npos) << text("p.mod");
   EXPECT_EQ(plan({"--from", chosen, "--count", "3", "-o", file("p.csv")}), 2);
   EXPECT_EQ(plan({"-o", file("p.csv")}), 2);
@@ -61,18 +65,22 @@ TEST_F(PlanCommand, MakesAProgramOfPosesThatWereChosenElsewhere) {
 
 TEST_F(PlanCommand, APlanThatIsReadAgainKeepsItsSides) {
   ASSERT_EQ(plan({"--count", "7", "-o", file("p.csv")}), 0);
-  ASSERT_EQ(plan({"--from", file("p.csv"), "-o", file("q.csv"), "--krl", file("q.src"), "--keep-order"}), 0);
+  ASSERT_EQ(
+      plan({"--from", file("p.csv"), "-o", file("q.csv"), "--krl", file("q.src"), "--keep-order"}),
+      0);
   EXPECT_EQ(text("q.csv"), text("p.csv"));
 }
 
 TEST_F(PlanCommand, EveryProgramReadsBackAsThePlanInItsOrder) {
-  ASSERT_EQ(plan({"--count", "12", "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl", file("p.src"), "--fanuc",
-                  file("p.ls"), "--urscript", file("p.script"), "--fanuc-tool", "3"}),
-            0);
+  ASSERT_EQ(
+      plan({"--count", "12", "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl", file("p.src"),
+            "--fanuc", file("p.ls"), "--urscript", file("p.script"), "--fanuc-tool", "3"}),
+      0);
   const JointList list = read_joint_csv(file("p.csv")).value();
   ASSERT_EQ(list.poses.size(), 12u);
   for (const char* name : {"p.mod", "p.src", "p.ls", "p.script"}) {
-    const cam::Program program = cam::read_program(*cam::dialect_of_file(name), {{name, text(name)}}, {});
+    const cam::Program program =
+        cam::read_program(*cam::dialect_of_file(name), {{name, text(name)}}, {});
     std::vector<std::vector<double>> slow;  // the second of two motions is to the pose
     for (std::size_t m = 1; m < program.moves.size(); m += 2) {
       ASSERT_EQ(program.moves[m].targets.size(), 1u) << name;
@@ -84,15 +92,18 @@ TEST_F(PlanCommand, EveryProgramReadsBackAsThePlanInItsOrder) {
     ASSERT_EQ(slow.size(), 12u) << name;
     for (std::size_t i = 0; i < slow.size(); ++i) {
       for (Eigen::Index j = 0; j < 6; ++j)
-        EXPECT_NEAR(slow[i][static_cast<std::size_t>(j)], to_deg(list.poses[i].context.q(j)), 1e-6) << name;
+        EXPECT_NEAR(slow[i][static_cast<std::size_t>(j)], to_deg(list.poses[i].context.q(j)), 1e-6)
+            << name;
     }
   }
   EXPECT_NE(text("p.ls").find("UT : 3"), std::string::npos);
-  EXPECT_EQ(plan({"--count", "5", "-o", file("q.csv"), "--fanuc", file("q.ls"), "--fanuc-tool", "0"}), 3);
+  EXPECT_EQ(
+      plan({"--count", "5", "-o", file("q.csv"), "--fanuc", file("q.ls"), "--fanuc-tool", "0"}), 3);
 }
 
 TEST_F(PlanCommand, APlanWithAProgramIsInTheOrderOfLittleTravel) {
-  const std::vector<std::string> options = {"--count", "40", "--criterion", "observability", "--krl", file("p.src")};
+  const std::vector<std::string> options = {"--count",       "40",    "--criterion",
+                                            "observability", "--krl", file("p.src")};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.begin(), options.begin(), options.end());
     return plan(more);
@@ -118,14 +129,17 @@ TEST_F(PlanCommand, APlanWithAProgramIsInTheOrderOfLittleTravel) {
 }
 
 TEST_F(PlanCommand, RefusesBeforeItWritesAnything) {
-  EXPECT_EQ(plan({"--count", "5", "-o", file("p.csv"), "--rapid", file("p.mod"), "--rapid-tool", "no tool"}), 3);
+  EXPECT_EQ(plan({"--count", "5", "-o", file("p.csv"), "--rapid", file("p.mod"), "--rapid-tool",
+                  "no tool"}),
+            3);
   EXPECT_FALSE(std::filesystem::exists(file("p.csv")));
   EXPECT_FALSE(std::filesystem::exists(file("p.mod")));
 }
 
 TEST_F(PlanCommand, TellsWrongCriteriaFromRightOnes) {
-  for (const char* wrong : {"luck", "separate", "separate:payload", "separate:payload,payload", "separate:,payload",
-                            "separate:payload,gremlins", "separate:backlash:9,payload"}) {
+  for (const char* wrong :
+       {"luck", "separate", "separate:payload", "separate:payload,payload", "separate:,payload",
+        "separate:payload,gremlins", "separate:backlash:9,payload"}) {
     EXPECT_EQ(plan({"--count", "5", "-o", file("p.csv"), "--criterion", wrong}), 2) << wrong;
   }
   EXPECT_EQ(plan({"--count", "5", "-o", file("p.csv"), "--criterion", "observability"}), 0);

@@ -19,9 +19,10 @@ CirclePointResult measured_robot() {
   circle.plane_rms = 6.75e-6;
   result.circles = {circle};
   result.axes.resize(2);
-  result.parameters = {{"a2", true, 1.28, -0.465e-3, 0.02e-3, true, ""},
-                       {"q2", false, -kPi / 2, from_deg(-0.029), from_deg(0.001), true, ""},
-                       {"d1", true, 0.78, 0, 0, false, "nothing marks the base's height, \"really\""}};
+  result.parameters = {
+      {"a2", true, 1.28, -0.465e-3, 0.02e-3, true, ""},
+      {"q2", false, -kPi / 2, from_deg(-0.029), from_deg(0.001), true, ""},
+      {"d1", true, 0.78, 0, 0, false, "nothing marks the base's height, \"really\""}};
   return result;
 }
 
@@ -29,8 +30,10 @@ TEST(StructureText, TellsCirclePointsInMillimetresMicrometresAndDegrees) {
   const std::string text = circle_point_text(measured_robot());
   EXPECT_NE(text.find("J2 A"), std::string::npos);
   EXPECT_NE(text.find("6.75"), std::string::npos);
-  EXPECT_NE(text.find("a2 [mm]          1280.0000     -0.4650    0.0200"), std::string::npos) << text;
-  EXPECT_NE(text.find("q2 [deg]          -90.0000     -0.0290    0.0010"), std::string::npos) << text;
+  EXPECT_NE(text.find("a2 [mm]          1280.0000     -0.4650    0.0200"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("q2 [deg]          -90.0000     -0.0290    0.0010"), std::string::npos)
+      << text;
   EXPECT_NE(text.find("d1 not measured"), std::string::npos);
 }
 
@@ -66,7 +69,8 @@ TEST(StructureText, TellsStiffnessInRadiansPerNewtonMillimetre) {
   EXPECT_NE(text.find("2.971e-10"), std::string::npos) << text;
   EXPECT_NE(text.find("4.044e-10"), std::string::npos) << text;
   const auto json = deflection_json(result);
-  EXPECT_NEAR(json["elements"][0]["model_2"]["compliance_rad_per_nmm"].get<double>(), 4.044e-10, 1e-20);
+  EXPECT_NEAR(json["elements"][0]["model_2"]["compliance_rad_per_nmm"].get<double>(), 4.044e-10,
+              1e-20);
   EXPECT_EQ(json["elements"][0]["link"], "bends");
 }
 

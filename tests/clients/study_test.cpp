@@ -12,7 +12,8 @@ namespace trammel::cli {
 namespace {
 
 VirtualRobot shipped_robot() {
-  auto cell = std::make_shared<const Cell>(read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml").value());
+  auto cell =
+      std::make_shared<const Cell>(read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml").value());
   return read_virtual_robot(TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", cell).value();
 }
 
@@ -33,7 +34,8 @@ TEST(Study, TheCompleteCalibrationReachesTheNoiseFloorAndTheTruth) {
     ASSERT_NE(found, parameter.identified.end()) << parameter.name;
     if (!found->second.identified) continue;
     const Parameter& identified = found->second.parameter;
-    EXPECT_NEAR(identified.scale * found->second.value, parameter.truth, 4 * identified.scale * found->second.stddev)
+    EXPECT_NEAR(identified.scale * found->second.value, parameter.truth,
+                4 * identified.scale * found->second.stddev)
         << parameter.name;
   }
 }
@@ -71,7 +73,8 @@ TEST(StudyText, NamesABiasThatWasAskedForAndLeftOut) {
 TEST(StudyCommand, WritesTheSourcesFiguresBesideOurs) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("study.json");
-  const std::vector<const char*> argv = {"trammel", "study", "drilling", "--seed", "3", "--json", path.c_str()};
+  const std::vector<const char*> argv = {"trammel", "study",  "drilling",  "--seed",
+                                         "3",       "--json", path.c_str()};
   ASSERT_EQ(run_command_line(static_cast<int>(argv.size()), argv.data()), 0);
   const auto json = nlohmann::json::parse(read_text_file(path).value());
   EXPECT_EQ(json["study"], "drilling");
@@ -89,7 +92,8 @@ TEST(StudyCommand, WritesTheSourcesFiguresBesideOurs) {
 TEST(StudyCommand, RefusesAnUnknownStudyAndAMissingCell) {
   const std::vector<const char*> unknown = {"trammel", "study", "7dim"};
   EXPECT_EQ(run_command_line(static_cast<int>(unknown.size()), unknown.data()), 2);
-  const std::vector<const char*> missing = {"trammel", "study", "cal", "--cell", "/no/such/cell.yaml"};
+  const std::vector<const char*> missing = {"trammel", "study", "cal", "--cell",
+                                            "/no/such/cell.yaml"};
   EXPECT_EQ(run_command_line(static_cast<int>(missing.size()), missing.data()), 3);
 }
 

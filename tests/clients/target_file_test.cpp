@@ -20,7 +20,8 @@ Refusal refusal(const std::string& text) {
 }
 
 TEST(TargetFile, ReadsPosesWithABranch) {
-  const auto file = parse_targets_csv("conf," + kPose + ",note\n3,1000,-200,1500,0,1,0,0,hole 7\n", "t.csv");
+  const auto file =
+      parse_targets_csv("conf," + kPose + ",note\n3,1000,-200,1500,0,1,0,0,hole 7\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   ASSERT_EQ(file->rows.size(), 1u);
   const Target& target = file->rows[0].target;
@@ -34,11 +35,13 @@ TEST(TargetFile, ReadsPosesWithABranch) {
 
 TEST(TargetFile, RefusesWhatWasCorrectedAlready) {
   const std::string header = "conf," + kPose + ",status,error_before_mm,error_after_mm,model_id\n";
-  const auto again = parse_targets_csv(header + "3,1000,-200,1500,0,1,0,0,ok,0.7,0.01,m1\n", "t.csv");
+  const auto again =
+      parse_targets_csv(header + "3,1000,-200,1500,0,1,0,0,ok,0.7,0.01,m1\n", "t.csv");
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().field, "model_id");
   EXPECT_NE(again.error().message.find("m1"), std::string::npos) << again.error().message;
-  EXPECT_TRUE(parse_targets_csv("conf," + kPose + ",status\n3,1000,-200,1500,0,1,0,0,ok\n", "t.csv"));
+  EXPECT_TRUE(
+      parse_targets_csv("conf," + kPose + ",status\n3,1000,-200,1500,0,1,0,0,ok\n", "t.csv"));
 }
 
 TEST(TargetFile, ReadsPosesWithASeed) {
@@ -49,7 +52,8 @@ TEST(TargetFile, ReadsPosesWithASeed) {
 }
 
 TEST(TargetFile, EachRowMaySayItsBranchInItsOwnWay) {
-  const auto file = parse_targets_csv(kPose + ",conf,q1_deg\n1,2,3,1,0,0,0,5,\n1,2,3,1,0,0,0,,90\n", "t.csv");
+  const auto file =
+      parse_targets_csv(kPose + ",conf,q1_deg\n1,2,3,1,0,0,0,5,\n1,2,3,1,0,0,0,,90\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->rows[0].target.conf, 5);
   EXPECT_FALSE(file->rows[0].target.seed);
@@ -65,8 +69,8 @@ TEST(TargetFile, ReadsJointTargetsAlone) {
 }
 
 TEST(TargetFile, ReadsHowTheArmComesToATarget) {
-  const auto file =
-      parse_targets_csv("conf," + kPose + ",dir1,dir2,temperature_c,time_s\n3,1,2,3,1,0,0,0,1,-1,31.5,60\n", "t.csv");
+  const auto file = parse_targets_csv(
+      "conf," + kPose + ",dir1,dir2,temperature_c,time_s\n3,1,2,3,1,0,0,0,1,-1,31.5,60\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   const Target& target = file->rows[0].target;
   EXPECT_EQ(target.direction, (std::vector<int>{1, -1}));
@@ -86,7 +90,8 @@ TEST(TargetFile, RefusesWhatIsNoTarget) {
   EXPECT_EQ(refusal(kPose + ",conf\n"), Refusal("t.csv").beyond(0, 1));
   EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), Refusal("t.csv", 2, "conf"));
   EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), Refusal("t.csv", 2, "conf").beyond(8, 7));
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"), Refusal("t.csv", 2, "qw").beyond(1.00499, 1));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"),
+            Refusal("t.csv", 2, "qw").beyond(1.00499, 1));
   EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), Refusal("t.csv", 3, "q1_deg").text("nan"));
 }
 
@@ -112,7 +117,8 @@ TEST(TargetFile, PositionsThatAllLookLikeMetresAreRefused) {
   const Status refused = check(metres, robot);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refusal_of(refused), Refusal("t.csv", 2, "x_mm").beyond(1.5, 10));
-  EXPECT_NE(refused.error().message.find("look like metres"), std::string::npos) << refused.error().message;
+  EXPECT_NE(refused.error().message.find("look like metres"), std::string::npos)
+      << refused.error().message;
   EXPECT_TRUE(check(metres + "1500,200,1100,1,0,0,0,1\n", robot)) << "one is not";
   EXPECT_TRUE(check("1500,200,1100,1,0,0,0,1\n", robot));
   Joint x, y, z;

@@ -42,9 +42,11 @@ TEST(StrictTolerance, ATargetOfUnknownErrorIsRefused) {
 }
 
 TEST(StrictTolerance, WhatIsLeftAsItWasIsRefusedWithoutATolerance) {
-  const Status answer = check_strictly("1 of 2 targets are left as they were:\n  row 2: unreachable\n", std::nullopt);
+  const Status answer =
+      check_strictly("1 of 2 targets are left as they were:\n  row 2: unreachable\n", std::nullopt);
   ASSERT_FALSE(answer);
-  EXPECT_NE(why(answer).find("1 of 2 targets are left as they were"), std::string::npos) << why(answer);
+  EXPECT_NE(why(answer).find("1 of 2 targets are left as they were"), std::string::npos)
+      << why(answer);
 }
 
 }  // namespace

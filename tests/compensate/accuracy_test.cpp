@@ -13,7 +13,8 @@
 namespace trammel {
 namespace {
 
-/// Of |t| f, t ~ N(0, I), ln f ~ N(0, 0.2²), as much as a model's own deviation is doubted: 95 % are within.
+/// Of |t| f, t ~ N(0, I), ln f ~ N(0, 0.2²), as much as a model's own deviation is doubted: 95 %
+/// are within.
 constexpr double kNinetyFive = 3.0539;
 
 constexpr double kScatter = 45e-6;  // m: more than the tracker is said to have
@@ -23,13 +24,16 @@ CompensatedModel small_model(double held_out, double noise = kScatter) {
   test::SmallBatch shape;
   shape.poses = 400;
   shape.noise = noise;
-  const MeasurementBatch batch = parse_batch_csv(test::small_batch_csv(*cell, shape), "b.csv").value();
+  const MeasurementBatch batch =
+      parse_batch_csv(test::small_batch_csv(*cell, shape), "b.csv").value();
   TrainOptions options;
   options.bias = "none";
   return train(cell, check_against_cell(batch, *cell, drawn(held_out, 1)).value(), options).value();
 }
 
-PositionAccuracy accuracy_of(const CompensatedModel& model) { return PositionAccuracy::of(model).value(); }
+PositionAccuracy accuracy_of(const CompensatedModel& model) {
+  return PositionAccuracy::of(model).value();
+}
 
 TEST(Accuracy, TakesTheTrackersNoiseOutOfWhatIsLeft) {
   const double tracker = test::small_cell("cell-3")->tracker.sigma;
@@ -40,7 +44,8 @@ TEST(Accuracy, TakesTheTrackersNoiseOutOfWhatIsLeft) {
 
 TEST(Accuracy, WhatIsWithinARadiusIsTheShareThatTheRadiusIsOf) {
   const PositionAccuracy accuracy = accuracy_of(small_model(0.3));
-  for (const double share : {0.5, 0.9, 0.95, 0.99}) EXPECT_NEAR(accuracy.within(accuracy.at(share)), share, 1e-3);
+  for (const double share : {0.5, 0.9, 0.95, 0.99})
+    EXPECT_NEAR(accuracy.within(accuracy.at(share)), share, 1e-3);
   EXPECT_LT(accuracy.least(), accuracy.at(0.95));
   EXPECT_GT(accuracy.most(), accuracy.at(0.95));
 }
@@ -69,7 +74,8 @@ TEST(Accuracy, ABatchOfFreshPosesJudgesRowByRow) {
   test::SmallBatch shape;
   shape.seed = 2;
   shape.noise = kScatter;
-  const MeasurementBatch batch = parse_batch_csv(test::small_batch_csv(model.cell(), shape), "f.csv").value();
+  const MeasurementBatch batch =
+      parse_batch_csv(test::small_batch_csv(model.cell(), shape), "f.csv").value();
   MeasurementBatch fresh = check_against_cell(batch, model.cell())->rows();
   const PositionAccuracy accuracy = PositionAccuracy::of(model, fresh).value();
   EXPECT_GT(accuracy.judged_by(), 30);
@@ -88,18 +94,23 @@ TEST(Accuracy, IsRightAtFreshPosesOfArmsThatItNeverSaw) {
   double right = 0;
   constexpr int kArms = 5;
   for (std::uint64_t arm = 1; arm <= kArms; ++arm) {
-    const VirtualRobot robot = test::with_zero_off(test::chapter_5_robot(cell), 2, 1e-4 * static_cast<double>(arm));
+    const VirtualRobot robot =
+        test::with_zero_off(test::chapter_5_robot(cell), 2, 1e-4 * static_cast<double>(arm));
     TrainOptions options;
     options.bias = "none";
     const CompensatedModel model =
-        train(cell, check_against_cell(test::measured(robot, 80, arm), *cell, drawn(0.2, arm)).value(), options)
+        train(cell,
+              check_against_cell(test::measured(robot, 80, arm), *cell, drawn(0.2, arm)).value(),
+              options)
             .value();
     VirtualRobot exact = robot;
     exact.sigma = 1e-12;
-    const MeasurementBatch truth = check_against_cell(test::measured(exact, 300, 50 + arm), *cell)->rows();
+    const MeasurementBatch truth =
+        check_against_cell(test::measured(exact, 300, 50 + arm), *cell)->rows();
     const double radius = accuracy_of(model).at(0.95);
     const CompensatedModel::LevelErrors errors = model.errors_B(truth);
-    right += static_cast<double>((errors.compensated.colwise().norm().array() <= radius).count()) / 300 / kArms;
+    right += static_cast<double>((errors.compensated.colwise().norm().array() <= radius).count()) /
+             300 / kArms;
   }
   EXPECT_GT(right, 0.90);
   EXPECT_LT(right, 0.985);

@@ -19,8 +19,8 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-/// M2 on a robot whose joints give way, in the 6 dim (s) range of Table 5.3, so that the bias has something to learn
-/// and the domain an outside.
+/// M2 on a robot whose joints give way, in the 6 dim (s) range of Table 5.3, so that the bias has
+/// something to learn and the domain an outside.
 class Compensated : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -30,7 +30,8 @@ class Compensated : public testing::Test {
     TrainOptions options;
     options.level = "M2";
     options.bias = "se";
-    model_ = new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 200, 31), options)));
+    model_ =
+        new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 200, 31), options)));
   }
   static void TearDownTestSuite() {
     delete robot_;
@@ -38,7 +39,9 @@ class Compensated : public testing::Test {
   }
 
   static std::vector<std::pair<double, double>> small_range() {
-    const auto deg = [](double low, double high) { return std::pair{from_deg(low), from_deg(high)}; };
+    const auto deg = [](double low, double high) {
+      return std::pair{from_deg(low), from_deg(high)};
+    };
     return {deg(-15, 15), deg(-15, 15), deg(-15, 30), deg(-30, 30), deg(30, 60), deg(-30, 30)};
   }
 
@@ -61,7 +64,9 @@ class Compensated : public testing::Test {
   }
 
   static const CompensatedModel& model() { return *model_; }
-  static Correction correct(const Target& target) { return model_->correct(target, "spindle", "spindle"); }
+  static Correction correct(const Target& target) {
+    return model_->correct(target, "spindle", "spindle");
+  }
 
   static VirtualRobot* robot_;
   static CompensatedModel* model_;
@@ -91,12 +96,14 @@ TEST_F(Compensated, TheLogDensityOfItsErrorsIsThatOfItsOwnStddevs) {
   double sum = 0;
   for (Eigen::Index i = 0; i < errors.stddev.size(); ++i) {
     const double s = errors.stddev(i);
-    sum += std::log(std::exp(-0.5 * std::pow(errors.compensated(i) / s, 2)) / (s * std::sqrt(8 * std::atan(1.0))));
+    sum += std::log(std::exp(-0.5 * std::pow(errors.compensated(i) / s, 2)) /
+                    (s * std::sqrt(8 * std::atan(1.0))));
   }
   const Evaluation evaluation = model().evaluate(batch);
   EXPECT_NEAR(*evaluation.nlpd, -sum / static_cast<double>(errors.stddev.size()), 1e-9);
   // A coordinate that spreads by s has entropy log(s sqrt(2 pi e)).
-  EXPECT_NEAR(nlpd_in_mm(*evaluation.nlpd), std::log(to_mm(evaluation.compensated.rms) / std::sqrt(3)) + 1.42, 0.4);
+  EXPECT_NEAR(nlpd_in_mm(*evaluation.nlpd),
+              std::log(to_mm(evaluation.compensated.rms) / std::sqrt(3)) + 1.42, 0.4);
 }
 
 TEST_F(Compensated, AModelFileOfBeforeTheLogDensityWasKeptLoads) {
@@ -108,7 +115,8 @@ TEST_F(Compensated, AModelFileOfBeforeTheLogDensityWasKeptLoads) {
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_EQ(loaded->provenance().hash, old.provenance().hash);
   EXPECT_FALSE(loaded->parts().training.nlpd);
-  EXPECT_EQ(*deserialize(serialize(model()), "memory")->parts().training.nlpd, *model().parts().training.nlpd);
+  EXPECT_EQ(*deserialize(serialize(model()), "memory")->parts().training.nlpd,
+            *model().parts().training.nlpd);
 }
 
 TEST_F(Compensated, CorrectedTargetsLandWhereTheyWereWanted) {
@@ -120,13 +128,16 @@ TEST_F(Compensated, CorrectedTargetsLandWhereTheyWereWanted) {
     ASSERT_EQ(correction.status, CorrectionStatus::kOk) << correction.message;
     EXPECT_LE(correction.iterations, 10);
     EXPECT_LT(correction.left, 1e-7);
-    const double before = (true_pose_B(m.context.q).translation() - target.X_BT.translation()).norm();
-    const double after = (true_pose_B(correction.q).translation() - target.X_BT.translation()).norm();
+    const double before =
+        (true_pose_B(m.context.q).translation() - target.X_BT.translation()).norm();
+    const double after =
+        (true_pose_B(correction.q).translation() - target.X_BT.translation()).norm();
     EXPECT_GT(to_mm(before), 1);
     EXPECT_LT(to_mm(after), 0.15);
     EXPECT_NEAR(correction.error_before, before, 0.15e-3);
     // The commanded pose is what the nominal controller turns into these joints.
-    EXPECT_LT(pose_difference(correction.X_BT_commanded, target_at(correction.q).X_BT).norm(), 1e-8);
+    EXPECT_LT(pose_difference(correction.X_BT_commanded, target_at(correction.q).X_BT).norm(),
+              1e-8);
   }
 }
 
@@ -158,9 +169,12 @@ TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
   PoseContext context;
   context.q = far;
   context.tool = context.payload = "spindle";
-  EXPECT_LT(pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(), 1e-9);
+  EXPECT_LT(
+      pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(),
+      1e-9);
   EXPECT_GT(to_mm(prediction.error_B.norm()), 0.5);  // never a silent zero
-  EXPECT_GT(prediction.stddev_B.norm(), 3 * model().predict(inside(), "spindle", "spindle").stddev_B.norm());
+  EXPECT_GT(prediction.stddev_B.norm(),
+            3 * model().predict(inside(), "spindle", "spindle").stddev_B.norm());
   const Correction correction = correct(target_at(far));
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
   EXPECT_LT(correction.left, 1e-7);  // corrected all the same, by physics alone
@@ -180,7 +194,8 @@ std::vector<ErrorPrediction> on_the_way_out(const CompensatedModel& model, int s
 }
 
 /// The largest change between neighbours, m.
-double largest_step(const std::vector<ErrorPrediction>& predictions, Vector3 ErrorPrediction::*what) {
+double largest_step(const std::vector<ErrorPrediction>& predictions,
+                    Vector3 ErrorPrediction::*what) {
   double largest = 0;
   for (std::size_t k = 1; k < predictions.size(); ++k) {
     largest = std::max(largest, (predictions[k].*what - predictions[k - 1].*what).norm());
@@ -218,7 +233,8 @@ TEST_F(Compensated, ACorrectionInTheFadeSettlesAndTellsHowMuchOfTheBiasItTook) {
   const Correction correction = correct(target_at(q));
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
   EXPECT_LT(correction.left, 1e-7);
-  EXPECT_NE(correction.message.find(fmt::format("{:.0f} % of the learned bias", 100 * weight)), std::string::npos)
+  EXPECT_NE(correction.message.find(fmt::format("{:.0f} % of the learned bias", 100 * weight)),
+            std::string::npos)
       << correction.message;
 }
 
@@ -260,18 +276,22 @@ TEST_F(Compensated, WhatWasLearnedWithOneToolIsNotAppliedToAnother) {
   PoseContext context;
   context.q = inside();
   context.tool = context.payload = "spindle";
-  EXPECT_LT(pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(), 1e-9);
+  EXPECT_LT(
+      pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(),
+      1e-9);
 }
 
 TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
   Target far = target_at(inside());
   far.X_BT.translation().x() += 3;
   EXPECT_EQ(correct(far).status, CorrectionStatus::kUnreachable);
-  EXPECT_TRUE(std::isnan(correct(far).error_before) && std::isnan(correct(far).error_after)) << "no silent zero";
+  EXPECT_TRUE(std::isnan(correct(far).error_before) && std::isnan(correct(far).error_after))
+      << "no silent zero";
   JointVector beyond = inside();
   beyond(2) = from_deg(75);  // limit 70
   EXPECT_EQ(correct(target_at(beyond)).status, CorrectionStatus::kJointLimit);
-  EXPECT_NE(correct(target_at(beyond)).message.find("joint 3 would be at 75.0 deg, limit 70"), std::string::npos)
+  EXPECT_NE(correct(target_at(beyond)).message.find("joint 3 would be at 75.0 deg, limit 70"),
+            std::string::npos)
       << correct(target_at(beyond)).message;
   JointVector stretched = inside();
   stretched(2) = -std::atan2(1.142, 0.2);  // the forearm in line with the upper arm
@@ -309,11 +329,14 @@ TEST_F(Compensated, ATargetThatMeetsALimitOnlyOnceCorrectedSaysByHowMuch) {
       const Correction correction = correct(target);
       if (correction.status != CorrectionStatus::kJointLimit) continue;
       ++met;
-      EXPECT_NE(correction.message.find(fmt::format("joint {} would be at ", j + 1)), std::string::npos)
+      EXPECT_NE(correction.message.find(fmt::format("joint {} would be at ", j + 1)),
+                std::string::npos)
           << correction.message;
-      EXPECT_NE(correction.message.find(fmt::format(" deg, limit {:.6g}", to_deg(limit))), std::string::npos)
+      EXPECT_NE(correction.message.find(fmt::format(" deg, limit {:.6g}", to_deg(limit))),
+                std::string::npos)
           << correction.message;
-      EXPECT_EQ(correction.message.find(fmt::format("at {:.1f} deg", to_deg(limit))), std::string::npos)
+      EXPECT_EQ(correction.message.find(fmt::format("at {:.1f} deg", to_deg(limit))),
+                std::string::npos)
           << "not told from its limit: " << correction.message;
       EXPECT_EQ(correction.error_after, correction.error_before);
       EXPECT_EQ(correction.q, edge) << "left as it was";
@@ -331,7 +354,8 @@ TEST_F(Compensated, WhereAnotherBranchWouldReachItIsSaidAndItDoes) {
     Target elsewhere = target;
     elsewhere.conf = conf;
     const Correction tried = correct(elsewhere);
-    const bool reached = tried.status == CorrectionStatus::kOk || tried.status == CorrectionStatus::kOutOfDomain;
+    const bool reached =
+        tried.status == CorrectionStatus::kOk || tried.status == CorrectionStatus::kOutOfDomain;
     const std::size_t at = tried.message.find("; conf ");
     if (reached) {
       EXPECT_EQ(at, std::string::npos) << tried.message;
@@ -342,8 +366,10 @@ TEST_F(Compensated, WhereAnotherBranchWouldReachItIsSaidAndItDoes) {
     for (char digit = '0'; digit <= '7'; ++digit) {
       elsewhere.conf = digit - '0';
       const CorrectionStatus status = correct(elsewhere).status;
-      const bool would = status == CorrectionStatus::kOk || status == CorrectionStatus::kOutOfDomain;
-      EXPECT_EQ(list.find(digit) != std::string::npos, would) << "conf " << digit << ": " << tried.message;
+      const bool would =
+          status == CorrectionStatus::kOk || status == CorrectionStatus::kOutOfDomain;
+      EXPECT_EQ(list.find(digit) != std::string::npos, would)
+          << "conf " << digit << ": " << tried.message;
     }
     ++advised;
   }
@@ -356,10 +382,12 @@ TEST_F(Compensated, WhatIsExpectedAfterwardsIsTheTrueErrorsStddevWithoutTheInstr
   const ErrorPrediction there = model().predict(inside(), "spindle", "spindle");
   EXPECT_NEAR(to_mm(correction.error_after), to_mm(there.true_stddev_B.norm()), 1e-6);
   const ErrorPrediction commanded = model().predict(correction.q, "spindle", "spindle");
-  EXPECT_NEAR(commanded.true_stddev_B.norm(), there.true_stddev_B.norm(), 0.02 * there.true_stddev_B.norm());
+  EXPECT_NEAR(commanded.true_stddev_B.norm(), there.true_stddev_B.norm(),
+              0.02 * there.true_stddev_B.norm());
   EXPECT_NEAR(correction.stddev * std::sqrt(3.0), correction.error_after, 1e-12);
   EXPECT_LT(correction.error_after, there.stddev_B.norm());
-  EXPECT_GT(to_mm(correction.error_after), 1e-3) << "what the iteration leaves is no error to expect";
+  EXPECT_GT(to_mm(correction.error_after), 1e-3)
+      << "what the iteration leaves is no error to expect";
 }
 
 /// rms of the true errors after correction over rms of those expected.
@@ -379,8 +407,8 @@ struct InAndOut {
 };
 
 /// Of the targets that `poses` are the nominal poses of.
-void correct_all(const CompensatedModel& model, const VirtualRobot& robot, const MeasurementBatch& poses,
-                 InAndOut& honesty) {
+void correct_all(const CompensatedModel& model, const VirtualRobot& robot,
+                 const MeasurementBatch& poses, InAndOut& honesty) {
   for (const Measurement& m : poses.measurements) {
     PoseContext context = m.context;
     Target target;
@@ -391,7 +419,8 @@ void correct_all(const CompensatedModel& model, const VirtualRobot& robot, const
     if (!in_domain && correction.status != CorrectionStatus::kOutOfDomain) continue;
     context.q = correction.q;
     const Vector3 missed = robot.truth.pose_W(context).translation() - target.X_BT.translation();
-    (in_domain ? honesty.in_domain : honesty.out_of_domain).add(missed.norm(), correction.error_after);
+    (in_domain ? honesty.in_domain : honesty.out_of_domain)
+        .add(missed.norm(), correction.error_after);
   }
 }
 
@@ -403,14 +432,19 @@ TEST(Corrections, ExpectTheTrueErrorOnAverageOverModels) {
   double in_domain = 0, out_of_domain = 0;
   std::uint64_t seed = 100;
   const std::vector<std::tuple<const char*, const char*, int>> trainings = {
-      {"M3", "none", 60}, {"M3", "se", 100}, {"M3", "se", 150}, {"M3", "none", 120}, {"M2", "se + parameters", 120},
+      {"M3", "none", 60},
+      {"M3", "se", 100},
+      {"M3", "se", 150},
+      {"M3", "none", 120},
+      {"M2", "se + parameters", 120},
       {"M2", "se", 200}};
   for (const auto& [level, bias, poses] : trainings) {
     TrainOptions options;
     options.level = level;
     options.bias = bias;
     options.seed = ++seed;
-    const auto model = test::demand(train(narrow, test::measured(measured_in, poses, seed), options));
+    const auto model =
+        test::demand(train(narrow, test::measured(measured_in, poses, seed), options));
     InAndOut honesty;
     correct_all(model, measured_in, test::measured(measured_in, 200, 500 + seed), honesty);
     correct_all(model, measured_in, test::measured(anywhere, 200, 600 + seed), honesty);

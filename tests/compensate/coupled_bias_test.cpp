@@ -34,7 +34,8 @@ JointVector inside() {
   return q;
 }
 
-/// M2 on a robot whose joints give way, with a bias that may learn the missing compliance in the shape of compliance.
+/// M2 on a robot whose joints give way, with a bias that may learn the missing compliance in the
+/// shape of compliance.
 class CoupledBias : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -74,7 +75,8 @@ TEST_F(CoupledBias, IsTheSameAfterItWasStoredBitForBit) {
   EXPECT_EQ(serialize(*again), text);
   const MeasurementBatch fresh = test::measured(*robot_, 20, 32);
   for (const Measurement& m : fresh.measurements) {
-    expect_same(model_->predict(m.context.q, "spindle", "spindle"), again->predict(m.context.q, "spindle", "spindle"));
+    expect_same(model_->predict(m.context.q, "spindle", "spindle"),
+                again->predict(m.context.q, "spindle", "spindle"));
   }
 }
 
@@ -90,13 +92,15 @@ TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThe
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"]["poses"][3]["payload"] = "feather";
   EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "hash"));
-  // Even with a fitting hash a pose that the cell cannot have is refused, and so are too few of them.
+  // Even with a fitting hash a pose that the cell cannot have is refused, and so are too few of
+  // them.
   file["hash"] = sha256_hex(file["content"].dump());
   EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")),
             Refusal("cell.model", {}, "bias").text("spindle feather"));
   file["content"]["bias"].erase("poses");
   file["hash"] = sha256_hex(file["content"].dump());
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "bias").beyond(0, 90));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")),
+            Refusal("cell.model", {}, "bias").beyond(0, 90));
 }
 
 TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
@@ -114,30 +118,38 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
   };
   static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal([](PoseContext&) {}), Refusal::none());
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction.pop_back(); }), Refusal("", {}, "direction").beyond(5, 6));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction[2] = 2; }), Refusal("", {}, "direction").beyond(2, 1));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction.pop_back(); }),
+            Refusal("", {}, "direction").beyond(5, 6));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction[2] = 2; }),
+            Refusal("", {}, "direction").beyond(2, 1));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.velocity = JointVector::Zero(5); }),
             Refusal("", {}, "velocity").beyond(5, 6));
-  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.velocity)(1) = kNan; }), Refusal("", {}, "velocity"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.velocity)(1) = kNan; }),
+            Refusal("", {}, "velocity"));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.time = kNan; }), Refusal("", {}, "time"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.temperature = kNan; }), Refusal("", {}, "temperature"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.index = -1; }), Refusal("", {}, "index").beyond(-1, 0));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.temperature = kNan; }),
+            Refusal("", {}, "temperature"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.index = -1; }),
+            Refusal("", {}, "index").beyond(-1, 0));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.before = JointVector::Zero(7); }),
             Refusal("", {}, "before").beyond(7, 6));
-  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.before)(5) = kNan; }), Refusal("", {}, "before"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.before)(5) = kNan; }),
+            Refusal("", {}, "before"));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.lagged.pop_back(); }),
             Refusal("", {}, "lagged_c").beyond(kHeatLags.size() - 1, kHeatLags.size()));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.lagged[2] = kNan; }), Refusal("", {}, "lagged_c"));
 
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
-  file["content"]["bias"]["poses"][3]["velocity"] = {{"rows", 3}, {"columns", 2}, {"values", {0, 0, 0, 0, 0, 0}}};
+  file["content"]["bias"]["poses"][3]["velocity"] = {
+      {"rows", 3}, {"columns", 2}, {"values", {0, 0, 0, 0, 0, 0}}};
   file["hash"] = sha256_hex(file["content"].dump());
   const Result<CompensatedModel> read = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(read);
   EXPECT_EQ(refusal_of(read), Refusal("cell.model"));
 
   constexpr std::int64_t kHuge = std::int64_t{1} << 32;  // whose square overflows to 0
-  file["content"]["covariance"] = {{"rows", kHuge}, {"columns", kHuge}, {"values", nlohmann::json::array()}};
+  file["content"]["covariance"] = {
+      {"rows", kHuge}, {"columns", kHuge}, {"values", nlohmann::json::array()}};
   file["hash"] = sha256_hex(file["content"].dump());
   const Result<CompensatedModel> huge = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(huge);
@@ -167,7 +179,8 @@ TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {
 
 TEST_F(CoupledBias, ManyPosesSayWhatOneSays) {
   std::vector<PoseContext> poses;
-  for (const Measurement& m : test::measured(*robot_, 30, 34).measurements) poses.push_back(posed(m.context.q));
+  for (const Measurement& m : test::measured(*robot_, 30, 34).measurements)
+    poses.push_back(posed(m.context.q));
   const std::vector<ErrorPrediction> many = model_->predict_all(poses);
   for (const std::size_t i : {0u, 17u, 29u}) {
     const ErrorPrediction one = model_->predict(poses[i].q, "spindle", "spindle");
@@ -182,20 +195,23 @@ TEST_F(CoupledBias, TheCovarianceOfAPredictionIsTheBiasOwnAndTheNoise) {
   const BiasPrediction bias = model_->bias()->predict(inside(), model_->features(posed(inside())));
   const double sigma = model_->cell().tracker.sigma;
   Matrix3 expected = bias.covariance_B;
-  expected.diagonal() += (bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2()).cwiseMax(sigma * sigma);
+  expected.diagonal() +=
+      (bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2()).cwiseMax(sigma * sigma);
   // The identified parameters' covariance is part of the bias': not added a second time.
   EXPECT_LT((at.covariance_B - expected).norm(), 1e-12 * expected.norm());
   EXPECT_GT(std::abs(at.covariance_B(0, 2)), 1e-4 * at.covariance_B.trace());
   for (int d = 0; d < 3; ++d) {
     EXPECT_NEAR(at.stddev_B[d], std::sqrt(at.covariance_B(d, d)), 1e-15);
-    EXPECT_NEAR(std::pow(at.stddev_B[d], 2) - std::pow(at.true_stddev_B[d], 2), sigma * sigma, 1e-15);
+    EXPECT_NEAR(std::pow(at.stddev_B[d], 2) - std::pow(at.true_stddev_B[d], 2), sigma * sigma,
+                1e-15);
   }
 }
 
 TEST(BiasPhysics, AToolThatChangedIsNotTheToolThatNobodyKnows) {
   const auto cell = test::cell_7_unlocated();
   const PhysicalModel without = test::demand(make_physical_model(cell, {"base", "geometry"}));
-  const PhysicalModel changed = test::demand(make_physical_model(cell, {"base", "geometry", "tool_changed@10"}));
+  const PhysicalModel changed =
+      test::demand(make_physical_model(cell, {"base", "geometry", "tool_changed@10"}));
   const auto columns = [](const PhysicalModel& physics) {
     return BiasPhysics(physics).at(posed(inside())).by_parameter.cols();
   };
@@ -220,7 +236,8 @@ TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
   const BiasPrediction bias = model_->bias()->predict(far, model_->features(posed(far)));
   const PhysicalModel& physics = model_->parts().physics;
   const Vector3 calibrated = physics.X_WB.inverse() * physics.pose_W(posed(far)).translation();
-  EXPECT_LT((at.X_BT_predicted.translation() - calibrated - bias.mean_B + bias.nearby_B).norm(), 1e-12);
+  EXPECT_LT((at.X_BT_predicted.translation() - calibrated - bias.mean_B + bias.nearby_B).norm(),
+            1e-12);
   EXPECT_GT(to_mm((bias.mean_B - bias.nearby_B).norm()), 0.3);
   Target target;
   target.joint_target = true;
@@ -228,7 +245,8 @@ TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
   const Correction correction = model.correct(target, "spindle", "spindle");
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
   EXPECT_LT(correction.left, 1e-7);
-  EXPECT_NE(correction.message.find("the blocks of the bias and 0 % of its kernel"), std::string::npos)
+  EXPECT_NE(correction.message.find("the blocks of the bias and 0 % of its kernel"),
+            std::string::npos)
       << correction.message;
   const Vector3 reached = robot_->truth.pose_W(posed(correction.q)).translation();
   EXPECT_LT(to_mm((reached - correction.X_BT_wanted.translation()).norm()), 0.15);
@@ -236,7 +254,8 @@ TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
 
 TEST_F(CoupledBias, AMapOfJoint2IsUsedWhereJoint2WasMeasuredThoughJoint1IsFarOut) {
   const auto map_of_2 = [](const PoseContext& at) {
-    return Vector3(3e-4 * std::sin(5 * at.q(1) + 1) * model_->features(at).by_joint.col(1).head<3>());
+    return Vector3(3e-4 * std::sin(5 * at.q(1) + 1) *
+                   model_->features(at).by_joint.col(1).head<3>());
   };
   // Learned from the poses on one side of joint 1 only.
   CompensatedModel::Parts parts = model_->parts();
@@ -266,11 +285,14 @@ TEST_F(CoupledBias, AMapOfJoint2IsUsedWhereJoint2WasMeasuredThoughJoint1IsFarOut
     if (predicted.bias_weight > 0) continue;
     ++far;
     EXPECT_FALSE(predicted.in_domain);
-    const Vector3 true_B = model.parts().physics.X_WB.inverse() * robot_->truth.pose_W(at).translation() + map_of_2(at);
+    const Vector3 true_B =
+        model.parts().physics.X_WB.inverse() * robot_->truth.pose_W(at).translation() +
+        map_of_2(at);
     const Vector3 error_B = true_B - predicted.X_BT_predicted.translation();
     left += error_B.squaredNorm();
     of_map += map_of_2(at).squaredNorm();
-    inside += static_cast<int>((error_B.array().abs() <= 1.96 * predicted.true_stddev_B.array()).count());
+    inside +=
+        static_cast<int>((error_B.array().abs() <= 1.96 * predicted.true_stddev_B.array()).count());
   }
   ASSERT_GT(far, 50);
   EXPECT_GT(to_mm(std::sqrt(of_map / far)), 0.2);
@@ -292,8 +314,11 @@ TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   const PhysicalModel& physics = model_->parts().physics;
   const BiasFeatures features = model_->features(posed(inside()));
   ASSERT_EQ(features.by_joint.cols(), 6);
-  ASSERT_EQ(features.by_parameter.cols(), 36) << "base, geometry, and compliance, which the model lacks";
-  const auto pose_B = [&](const JointVector& q) { return physics.X_WB.inverse() * physics.pose_W(posed(q)); };
+  ASSERT_EQ(features.by_parameter.cols(), 36)
+      << "base, geometry, and compliance, which the model lacks";
+  const auto pose_B = [&](const JointVector& q) {
+    return physics.X_WB.inverse() * physics.pose_W(posed(q));
+  };
   const double h = 1e-5;
   for (Eigen::Index j = 0; j < 6; ++j) {
     JointVector up = inside(), down = inside();
@@ -305,13 +330,15 @@ TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   // A first parameter of the base: x0, 2 mm of prior.
   EXPECT_NEAR(features.by_parameter.col(0).head(3).norm(), 2e-3, 1e-12);
   // What the compliance of joint 3 does, beside a model that has it.
-  const PhysicalModel with = test::demand(make_physical_model(robot_->truth.cell, {"base", "geometry", "compliance"}));
+  const PhysicalModel with =
+      test::demand(make_physical_model(robot_->truth.cell, {"base", "geometry", "compliance"}));
   PhysicalModel soft = with;
   soft.values.head(30) = physics.values;
   soft.values.tail(6).setZero();
   PhysicalModel softer = soft;
   softer.values(32) = 1e-3 * with.parameters()[32].prior_scale;
-  const Vector6 moved = pose_difference(softer.pose_W(posed(inside())), soft.pose_W(posed(inside()))) / 1e-3;
+  const Vector6 moved =
+      pose_difference(softer.pose_W(posed(inside())), soft.pose_W(posed(inside()))) / 1e-3;
   EXPECT_GT(moved.head(3).norm(), 1e-4);
   EXPECT_LT((features.by_parameter.col(32) - moved).norm(), 1e-3 * moved.norm());
 }

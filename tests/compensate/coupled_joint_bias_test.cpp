@@ -31,7 +31,8 @@ PoseContext at(const JointVector& q) {
   return context;
 }
 
-/// What gear 3 is off by, as the tool shows it. As this robot counts, the gear turns by the sum of joints 2 and 3.
+/// What gear 3 is off by, as the tool shows it. As this robot counts, the gear turns by the sum of
+/// joints 2 and 3.
 Vector3 shown(const JointVector& q, const BiasFeatures& features) {
   return 3e-4 * std::sin(5 * (q(1) + q(2)) + 1) * features.by_joint.col(2).head<3>();
 }
@@ -49,7 +50,8 @@ BiasState learned(const BiasPhysics& physics, std::mt19937& random) {
     state.features.push_back(physics.at(at(q)));
     state.residual_B.row(i) = shown(q, state.features.back()).transpose();
   }
-  const Eigen::Index of_kernel = test::demand(spelled_bias(state.kernel)).kernel->parameter_count(kJoints);
+  const Eigen::Index of_kernel =
+      test::demand(spelled_bias(state.kernel)).kernel->parameter_count(kJoints);
   state.hyperparameters.setZero(of_kernel + 2, kCoordinates);
   state.hyperparameters.row(of_kernel).setConstant(std::log(1e-6));
   state.hyperparameters.row(of_kernel + 1).setConstant(std::log(1e-5));

@@ -1,5 +1,5 @@
-// An arm whose lengths are written down here, not read by the project's kinematics: its budget must name what was put
-// wrong.
+// An arm whose lengths are written down here, not read by the project's kinematics: its budget must
+// name what was put wrong.
 #include "server/compensate/budget/error_budget.h"
 
 #include <gtest/gtest.h>
@@ -37,10 +37,11 @@ Arm irb120() {
 /// What is put wrong.
 struct World {
   Arm arm = irb120();
-  Eigen::VectorXd zeros = Eigen::VectorXd::Zero(6);  ///< rad, as the controller counts: the joint stands farther
-  Vector3 base = Vector3::Zero();                    ///< m, where the robot really stands
-  Vector3 tool = Vector3(0.04, -0.025, 0.14);        ///< m
-  double ripple = 0;                                 ///< rad, of the gear of joint 3, 20 waves a turn
+  Eigen::VectorXd zeros =
+      Eigen::VectorXd::Zero(6);    ///< rad, as the controller counts: the joint stands farther
+  Vector3 base = Vector3::Zero();  ///< m, where the robot really stands
+  Vector3 tool = Vector3(0.04, -0.025, 0.14);  ///< m
+  double ripple = 0;                           ///< rad, of the gear of joint 3, 20 waves a turn
 };
 
 Vector3 tip(const World& world, const Eigen::VectorXd& q) {
@@ -50,7 +51,8 @@ Vector3 tip(const World& world, const Eigen::VectorXd& q) {
     const Link& link = world.arm[i];
     const auto k = static_cast<Eigen::Index>(i);
     const double ripple = i == 2 ? world.ripple * std::sin(20 * q(k)) : 0;
-    X.rotate(Eigen::AngleAxisd(link.theta + link.sign * (q(k) + world.zeros(k)) + ripple, Vector3::UnitZ()));
+    X.rotate(Eigen::AngleAxisd(link.theta + link.sign * (q(k) + world.zeros(k)) + ripple,
+                               Vector3::UnitZ()));
     X.translate(Vector3(link.a, 0, link.d));
     X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX()));
   }
@@ -61,7 +63,8 @@ std::vector<Eigen::VectorXd> drawn_poses(int count) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> angle(-1.1, 1.1);
   std::vector<Eigen::VectorXd> poses;
-  for (int k = 0; k < count; ++k) poses.push_back(Eigen::VectorXd::NullaryExpr(6, [&] { return angle(random); }));
+  for (int k = 0; k < count; ++k)
+    poses.push_back(Eigen::VectorXd::NullaryExpr(6, [&] { return angle(random); }));
   return poses;
 }
 
@@ -84,22 +87,28 @@ MeasurementBatch measured(const World& world, const std::vector<Eigen::VectorXd>
 
 std::shared_ptr<const Cell> own_cell(const std::string& robot_yaml, const std::string& sources) {
   const std::string text = fmt::format(
-      "version: 1\ncell: own\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
+      "version: 1\ncell: own\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, "
+      "0]}}\n"
       "tools: {{tip: {{xyz_mm: [40, -25, 140], q_wxyz: [1, 0, 0, 0]}}}}\n"
-      "tracker: {{sigma_mm: 0.013, sigma_deg: 0.003}}\nmodel: {{error_sources: [{}], bias: none}}\n",
+      "tracker: {{sigma_mm: 0.013, sigma_deg: 0.003}}\nmodel: {{error_sources: [{}], bias: "
+      "none}}\n",
       sources);
   return std::make_shared<const Cell>(test::demand(parse_cell(text, robot_yaml, "cell.yaml")));
 }
 
-std::string shipped_robot() { return test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb120-3-06.yaml")); }
+std::string shipped_robot() {
+  return test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb120-3-06.yaml"));
+}
 
 CompensatedModel trained(const World& world, const std::string& sources, int poses = 120,
                          const std::string& robot_yaml = shipped_robot()) {
   const auto cell = own_cell(robot_yaml, sources);
   TrainOptions options;
   options.bias = "none";
-  return test::demand(
-      train(cell, test::demand(check_against_cell(measured(world, drawn_poses(poses)), *cell, drawn(0, 1))), options));
+  return test::demand(train(
+      cell,
+      test::demand(check_against_cell(measured(world, drawn_poses(poses)), *cell, drawn(0, 1))),
+      options));
 }
 
 /// With the tool and the payload that the model knows.
@@ -120,7 +129,8 @@ const ErrorBudget& budget_of(const CompensatedModel& model) {
 }
 
 /// mm rms: how far the tip goes when joint `j` (0-based) gets its zero back.
-double alone_by_hand(const World& world, Eigen::Index j, const std::vector<Eigen::VectorXd>& poses) {
+double alone_by_hand(const World& world, Eigen::Index j,
+                     const std::vector<Eigen::VectorXd>& poses) {
   World right = world;
   right.zeros(j) = 0;
   double sum = 0;
@@ -154,7 +164,8 @@ TEST(ErrorBudget, LeadsWithTheLostZeroItsAngleItsMillimetresAndWhatToDo) {
     EXPECT_GT(*line->times_usual, 10) << joint;
   }
   EXPECT_EQ(budget.as_it_stands.lines.front().line.substr(0, 5), "zero:");
-  EXPECT_NE(in_words(budget).at(1).find("re-master joint"), std::string::npos) << in_words(budget).at(1);
+  EXPECT_NE(in_words(budget).at(1).find("re-master joint"), std::string::npos)
+      << in_words(budget).at(1);
 }
 
 TEST(ErrorBudget, AddsUpToTheWholeInBothViews) {
@@ -200,7 +211,8 @@ TEST(ErrorBudget, TellsAHealthyArmThatNothingStandsOut) {
   world.arm[1].a += 0.2e-3;
   world.arm[2].alpha += 3e-4;
   const CompensatedModel model = trained(world, "base, geometry");
-  for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
+  for (const BudgetLine& line : budget_of(model).as_it_stands.lines)
+    EXPECT_EQ(line.action, "") << line.line;
 }
 
 TEST(ErrorBudget, OfABaseThatStandsElsewhereIsNothingBeyondFrames) {
@@ -236,7 +248,8 @@ TEST(ErrorBudget, NamesWhatTooFewPosesCannotTellInOneLine) {
   const BudgetLine* untold = budget_of(model).line("untold");
   ASSERT_NE(untold, nullptr);
   EXPECT_GT(untold->with.size(), 3u);
-  for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
+  for (const BudgetLine& line : budget_of(model).as_it_stands.lines)
+    EXPECT_EQ(line.action, "") << line.line;
 }
 
 TEST(ErrorBudget, OfAModelWithoutAnyParameterIsWhatIsLeft) {
@@ -301,7 +314,8 @@ TEST(ErrorBudget, BetweenTwoModelsNamesWhatChangedFromOneToTheOther) {
   World now = before;
   now.zeros(3) = 0.4 * kDegree;
   now.base = Vector3(0.02, 0.01, 0);  // the tracker stands elsewhere: that is no change of the arm
-  const CompensatedModel one = trained(before, "base, geometry"), other = trained(now, "base, geometry");
+  const CompensatedModel one = trained(before, "base, geometry"),
+                         other = trained(now, "base, geometry");
   const ModelDifference difference = difference_between(one, other, at_poses_of(one, 60));
   const BudgetLine& first = difference.budget.beyond_frames.lines.front();
   EXPECT_EQ(first.line, "zero:4");
@@ -328,7 +342,8 @@ TEST(ErrorBudget, BetweenTwoModelsIsARippleThatGrewAtItsOwnOrder) {
   const BudgetLine& first = difference.budget.beyond_frames.lines.front();
   EXPECT_EQ(first.line, "gear_transmission:3") << "the order is no part of its name";
   EXPECT_GT(first.share, 0.9);
-  const ModelDifference gone = difference_between(other, trained(before, "base, geometry"), at_poses_of(other, 60));
+  const ModelDifference gone =
+      difference_between(other, trained(before, "base, geometry"), at_poses_of(other, 60));
   EXPECT_EQ(gone.budget.beyond_frames.lines.front().line, "gear_transmission:3");
 }
 
@@ -338,7 +353,8 @@ TEST(ErrorBudget, BetweenAModelAndItselfIsNothing) {
   const CompensatedModel model = trained(world, "base, geometry");
   const ModelDifference difference = difference_between(model, model, at_poses_of(model, 20));
   EXPECT_EQ(difference.budget.as_it_stands.error_rms, 0);
-  for (const BudgetLine& line : difference.budget.as_it_stands.lines) EXPECT_LT(line.alone_rms, 1e-12) << line.line;
+  for (const BudgetLine& line : difference.budget.as_it_stands.lines)
+    EXPECT_LT(line.alone_rms, 1e-12) << line.line;
 }
 
 }  // namespace

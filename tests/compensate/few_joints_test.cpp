@@ -27,10 +27,13 @@ struct Arm {
   std::vector<std::pair<double, double>> limits;  ///< deg or mm
 };
 
-/// Two parallel arms, a quill that slides downwards, and a turning flange; the second arm is too long, the zero of
-/// joint 2 is off, the quill leans.
+/// Two parallel arms, a quill that slides downwards, and a turning flange; the second arm is too
+/// long, the zero of joint 2 is off, the quill leans.
 Arm scara() {
-  Arm arm{"scara", {{0.34, 0, 0.325, 0}, {0, 0, 0.275, kPi}, {0, 0, 0, 0, true}, {0.05, 0, 0, 0}}, {}, {}};
+  Arm arm{"scara",
+          {{0.34, 0, 0.325, 0}, {0, 0, 0.275, kPi}, {0, 0, 0, 0, true}, {0.05, 0, 0, 0}},
+          {},
+          {}};
   arm.built = arm.drawn;
   arm.built[0].a += 0.4e-3;
   arm.built[1].a -= 0.6e-3;
@@ -45,7 +48,11 @@ Arm scara() {
 Arm five_axes() {
   const double right = kPi / 2;
   Arm arm{"five",
-          {{0.5, 0, 0.15, right}, {0, right, 0.6, 0}, {0, 0, 0.55, 0}, {0, -right, 0.08, -right}, {0.12, 0, 0, 0}},
+          {{0.5, 0, 0.15, right},
+           {0, right, 0.6, 0},
+           {0, 0, 0.55, 0},
+           {0, -right, 0.08, -right},
+           {0.12, 0, 0, 0}},
           {},
           {}};
   arm.built = arm.drawn;
@@ -66,8 +73,8 @@ Pose flange(const std::vector<Row>& rows, const JointVector& q) {
     const Row& row = rows[i];
     const double value = q(static_cast<Eigen::Index>(i));
     X = X * Eigen::Translation3d(0, 0, row.d + (row.slides ? value : 0)) *
-        Eigen::AngleAxisd(row.theta + (row.slides ? 0 : value), Vector3::UnitZ()) * Eigen::Translation3d(row.a, 0, 0) *
-        Eigen::AngleAxisd(row.alpha, Vector3::UnitX());
+        Eigen::AngleAxisd(row.theta + (row.slides ? 0 : value), Vector3::UnitZ()) *
+        Eigen::Translation3d(row.a, 0, 0) * Eigen::AngleAxisd(row.alpha, Vector3::UnitX());
   }
   return X;
 }
@@ -80,9 +87,11 @@ std::string robot_yaml(const Arm& arm) {
   for (std::size_t i = 0; i < arm.drawn.size(); ++i) {
     const Row& row = arm.drawn[i];
     text += fmt::format(
-        "  - {{type: {}, d_mm: {:.6f}, theta_deg: {:.9f}, a_mm: {:.6f}, alpha_deg: {:.9f}, {}: [{}, {}]}}\n",
-        row.slides ? "prismatic" : "revolute", to_mm(row.d), to_deg(row.theta), to_mm(row.a), to_deg(row.alpha),
-        row.slides ? "limits_mm" : "limits_deg", arm.limits[i].first, arm.limits[i].second);
+        "  - {{type: {}, d_mm: {:.6f}, theta_deg: {:.9f}, a_mm: {:.6f}, alpha_deg: {:.9f}, {}: "
+        "[{}, {}]}}\n",
+        row.slides ? "prismatic" : "revolute", to_mm(row.d), to_deg(row.theta), to_mm(row.a),
+        to_deg(row.alpha), row.slides ? "limits_mm" : "limits_deg", arm.limits[i].first,
+        arm.limits[i].second);
   }
   return text;
 }
@@ -91,9 +100,11 @@ std::shared_ptr<const Cell> cell_of(const Arm& arm) {
   const std::string cell = fmt::format(
       "version: 1\ncell: {}\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
       "tools: {{gripper: {{xyz_mm: [{}, {}, {}], q_wxyz: [1, 0, 0, 0]}}}}\n"
-      "tracker: {{sigma_mm: 0.01, sigma_deg: 0.003}}\nmodel: {{error_sources: [base, geometry], bias: none}}\n",
+      "tracker: {{sigma_mm: 0.01, sigma_deg: 0.003}}\nmodel: {{error_sources: [base, geometry], "
+      "bias: none}}\n",
       arm.name, to_mm(kTool.x()), to_mm(kTool.y()), to_mm(kTool.z()));
-  return std::make_shared<const Cell>(test::demand(parse_cell(cell, robot_yaml(arm), arm.name + ".yaml")));
+  return std::make_shared<const Cell>(
+      test::demand(parse_cell(cell, robot_yaml(arm), arm.name + ".yaml")));
 }
 
 class Poses {
@@ -103,8 +114,8 @@ class Poses {
     JointVector q(static_cast<Eigen::Index>(arm_.limits.size()));
     for (std::size_t i = 0; i < arm_.limits.size(); ++i) {
       const auto [low, high] = arm_.limits[i];
-      const double value =
-          std::uniform_real_distribution<double>(0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)(random_);
+      const double value = std::uniform_real_distribution<double>(0.9 * low + 0.1 * high,
+                                                                  0.1 * low + 0.9 * high)(random_);
       q(static_cast<Eigen::Index>(i)) = arm_.drawn[i].slides ? from_mm(value) : from_deg(value);
     }
     return q;
@@ -131,10 +142,11 @@ std::string measured(const Arm& arm, int count) {
     }
     const Pose X = tool(arm.built, q);
     Vector3 p = X.translation(), turn;
-    for (int axis = 0; axis < 3; ++axis) p(axis) += poses.noise(1e-5), turn(axis) = poses.noise(from_deg(0.003));
+    for (int axis = 0; axis < 3; ++axis)
+      p(axis) += poses.noise(1e-5), turn(axis) = poses.noise(from_deg(0.003));
     const Eigen::Quaterniond r(rotation_exp(turn) * X.linear());
-    csv += fmt::format("{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f}\n", to_mm(p.x()), to_mm(p.y()), to_mm(p.z()),
-                       r.w(), r.x(), r.y(), r.z());
+    csv += fmt::format("{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f}\n", to_mm(p.x()),
+                       to_mm(p.y()), to_mm(p.z()), r.w(), r.x(), r.y(), r.z());
   }
   return csv;
 }
@@ -149,8 +161,8 @@ Trained trained(const Arm& arm) {
   const auto cell = cell_of(arm);
   TrainOptions options;
   options.bias = "none";
-  const CheckedBatch batch =
-      test::demand(check_against_cell(test::demand(parse_batch(measured(arm, 120), "batch.csv")), *cell));
+  const CheckedBatch batch = test::demand(
+      check_against_cell(test::demand(parse_batch(measured(arm, 120), "batch.csv")), *cell));
   return {arm, cell, test::demand(train(cell, batch, options))};
 }
 
@@ -160,7 +172,9 @@ Target target_at(const Trained& robot, const JointVector& q) {
   target.seed = q;
   return target;
 }
-Correction corrected(const Trained& robot, const Target& target) { return robot.model.correct(target, "gripper", ""); }
+Correction corrected(const Trained& robot, const Target& target) {
+  return robot.model.correct(target, "gripper", "");
+}
 
 class ArmOfFewJoints : public testing::TestWithParam<Arm> {};
 
@@ -172,11 +186,16 @@ TEST_P(ArmOfFewJoints, PutsThePointOfItsToolWhereItIsWanted) {
     const Target target = target_at(robot, poses.next());
     const Correction made = corrected(robot, target);
     ASSERT_EQ(to_string(made.status), "ok") << made.message;
-    before = std::max(before, (tool(robot.arm.built, *target.seed).translation() - target.X_BT.translation()).norm());
-    after = std::max(after, (tool(robot.arm.built, made.q).translation() - target.X_BT.translation()).norm());
+    before = std::max(
+        before,
+        (tool(robot.arm.built, *target.seed).translation() - target.X_BT.translation()).norm());
+    after = std::max(
+        after, (tool(robot.arm.built, made.q).translation() - target.X_BT.translation()).norm());
     expected = std::max(expected, made.error_after);
     // The controller's own kinematics bring the tool to what is commanded.
-    EXPECT_LT((tool(robot.arm.drawn, made.q).translation() - made.X_BT_commanded.translation()).norm(), 1e-9);
+    EXPECT_LT(
+        (tool(robot.arm.drawn, made.q).translation() - made.X_BT_commanded.translation()).norm(),
+        1e-9);
   }
   EXPECT_GT(to_mm(before), 0.5);
   EXPECT_LT(to_mm(after), 0.02);
@@ -190,7 +209,8 @@ TEST_P(ArmOfFewJoints, TellsWhatIsLeftOfTheRotation) {
   const Vector3 left = pose_difference(target.X_BT, tool(robot.arm.built, made.q)).tail<3>();
   ASSERT_GT(to_deg(left.norm()), 0.005);
   EXPECT_NEAR(to_deg(made.turn_after), to_deg(left.norm()), 0.004);
-  EXPECT_NE(made.message.find(fmt::format("with {} joints", robot.arm.drawn.size())), std::string::npos)
+  EXPECT_NE(made.message.find(fmt::format("with {} joints", robot.arm.drawn.size())),
+            std::string::npos)
       << made.message;
 }
 
@@ -202,14 +222,16 @@ TEST_P(ArmOfFewJoints, TakesATargetWhoseOrientationWasRounded) {
     target.X_BT.linear() = rotation_exp(Vector3(5e-5, -5e-5, 5e-5)) * target.X_BT.linear();
     const Correction made = corrected(robot, target);
     ASSERT_EQ(to_string(made.status), "ok") << made.message;
-    EXPECT_LT((tool(robot.arm.built, made.q).translation() - target.X_BT.translation()).norm(), 2e-5);
+    EXPECT_LT((tool(robot.arm.built, made.q).translation() - target.X_BT.translation()).norm(),
+              2e-5);
   }
 }
 
 TEST_P(ArmOfFewJoints, CannotTurnTheToolInEveryWayAndSaysSo) {
   const Trained robot = trained(GetParam());
   Target target = target_at(robot, Poses(robot.arm, 8).next());
-  // About a direction that no joint turns the tool about: across the tool's axis, in the arm's plane.
+  // About a direction that no joint turns the tool about: across the tool's axis, in the arm's
+  // plane.
   const Vector3 across = robot.arm.name == "scara" ? Vector3(Vector3::UnitX()) : [&] {
     const double azimuth = (*target.seed)(0);
     return Vector3(std::cos(azimuth), std::sin(azimuth), 0);

@@ -35,8 +35,8 @@ joint_ranges_deg: {q1: [-40, 40], q2: [-15, 45], q3: [-15, 45], q4: [-80, 80], q
 class FlangeBias : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const auto cell =
-        std::make_shared<const Cell>(test::demand(parse_cell(kCell, test::cell_7()->robot_yaml, "cell.yaml")));
+    const auto cell = std::make_shared<const Cell>(
+        test::demand(parse_cell(kCell, test::cell_7()->robot_yaml, "cell.yaml")));
     robot_ = new VirtualRobot(test::chapter_5_robot(cell));
     three_ = new CompensatedModel(trained({"a", "b", "c"}, "se + flange"));
     one_ = new CompensatedModel(trained({"a"}, "se + flange"));
@@ -47,7 +47,8 @@ class FlangeBias : public testing::Test {
     delete one_;
   }
 
-  static MeasurementBatch measured(const std::vector<std::string>& tools, int poses, std::uint64_t seed, bool noise) {
+  static MeasurementBatch measured(const std::vector<std::string>& tools, int poses,
+                                   std::uint64_t seed, bool noise) {
     const Eigen::MatrixXd q = test::demand(plan_poses(*robot_->truth.cell, {poses, seed}));
     std::vector<PoseContext> contexts;
     for (Eigen::Index i = 0; i < q.rows(); ++i) {
@@ -85,8 +86,9 @@ class FlangeBias : public testing::Test {
     missed.compensated = std::sqrt(errors.compensated.squaredNorm() / 300);
     missed.calibrated = std::sqrt(errors.calibrated.squaredNorm() / 300);
     missed.stddev = std::sqrt(errors.stddev.squaredNorm() / 300);
-    missed.inside =
-        static_cast<double>((errors.compensated.array().abs() < 1.96 * errors.stddev.array()).count()) / 900;
+    missed.inside = static_cast<double>(
+                        (errors.compensated.array().abs() < 1.96 * errors.stddev.array()).count()) /
+                    900;
     return missed;
   }
 

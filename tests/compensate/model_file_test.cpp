@@ -30,7 +30,8 @@ const std::string& small_model_text() {
     parts.physics = test::demand(make_physical_model(cell, {"base"}));
     const auto P = parts.physics.values.size();
     parts.covariance = Eigen::MatrixXd::Identity(P, P) * 1e-8;
-    for (const Parameter& p : parts.physics.parameters()) parts.parameters.push_back({p, 0.0, 1e-4, true});
+    for (const Parameter& p : parts.physics.parameters())
+      parts.parameters.push_back({p, 0.0, 1e-4, true});
     parts.rank = static_cast<int>(P);
     parts.provenance.trained_at = 1'700'000'000;
     return serialize(test::demand(CompensatedModel::make(std::move(parts))));
@@ -97,7 +98,8 @@ TEST(ModelFile, EveryFlippedBitOfASmallFileIsRefused) {
     for (int bit = 0; bit < 8; ++bit) {
       text[i] = static_cast<char>(good ^ (1 << bit));
       ASSERT_FALSE(deserialize(text, "cell.model"))
-          << "byte " << i << " bit " << bit << " in " << text.substr(i - std::min<std::size_t>(i, 20), 40);
+          << "byte " << i << " bit " << bit << " in "
+          << text.substr(i - std::min<std::size_t>(i, 20), 40);
     }
     text[i] = good;
   }
@@ -106,7 +108,8 @@ TEST(ModelFile, EveryFlippedBitOfASmallFileIsRefused) {
 TEST(ModelFile, EveryTruncationOfASmallFileIsRefused) {
   const std::string& text = small_model_text();
   for (std::size_t size = 0; size < text.size(); ++size) {
-    ASSERT_FALSE(deserialize(text.substr(0, size), "cell.model")) << size << " bytes of " << text.size();
+    ASSERT_FALSE(deserialize(text.substr(0, size), "cell.model"))
+        << size << " bytes of " << text.size();
   }
 }
 
@@ -157,7 +160,8 @@ TEST(ModelFile, ThatWouldPredictOtherwiseNowIsRefused) {
 
 TEST(ModelFile, WhosePredictionsAreOfAnotherModelIsRefusedThoughBothHashesFit) {
   const auto moved = [](json& content) {
-    content["X_WB"]["values"][3] = 1.0;  // the nominal base: nothing of it in an error in B, all of it in the model
+    content["X_WB"]["values"][3] =
+        1.0;  // the nominal base: nothing of it in an error in B, all of it in the model
     content["values"]["values"][0] = 2e-3;
     content["parameters"][0]["value"] = 2e-3;
   };
@@ -194,19 +198,24 @@ TEST(ModelFile, ThatPredictsNoLengthIsRefused) {
 
 TEST(ModelFile, NestedAMillionDeepIsRefusedOnTheSmallestStack) {
   const std::size_t million = 1'000'000;
-  for (const auto& [open, close] : std::vector<std::pair<std::string, std::string>>{{"[", "]"}, {"{\"a\":", "}"}}) {
+  for (const auto& [open, close] :
+       std::vector<std::pair<std::string, std::string>>{{"[", "]"}, {"{\"a\":", "}"}}) {
     const std::string unclosed = R"({"trammel_model":2,"content":)" + repeated(open, million);
     EXPECT_EQ(refusal_on_a_small_stack(unclosed), too_large(17, 16));
-    const std::string closed = file_with(repeated(open, million) + (open == "[" ? "" : "1") + repeated(close, million));
+    const std::string closed =
+        file_with(repeated(open, million) + (open == "[" ? "" : "1") + repeated(close, million));
     EXPECT_EQ(refusal_on_a_small_stack(closed), too_large(17, 16));
   }
 }
 
 TEST(ModelFile, WhatIsTooLargeIsRefusedBeforeItIsParsed) {
   EXPECT_EQ(refusal_with(repeated("[", 30'000'000)), too_large(17, 16));
-  EXPECT_EQ(refusal_with(file_with("[" + repeated("[],", 10'000'000) + "1]")), too_large(200'001, 200'000));
-  EXPECT_EQ(refusal_with(file_with("[" + repeated("0,", 20'000'000) + "0]")), too_large(4'000'001, 4'000'000));
-  EXPECT_EQ(refusal_with(file_with('"' + std::string(100'000'000, 'x') + '"')), too_large(100'000'002, 1'048'576));
+  EXPECT_EQ(refusal_with(file_with("[" + repeated("[],", 10'000'000) + "1]")),
+            too_large(200'001, 200'000));
+  EXPECT_EQ(refusal_with(file_with("[" + repeated("0,", 20'000'000) + "0]")),
+            too_large(4'000'001, 4'000'000));
+  EXPECT_EQ(refusal_with(file_with('"' + std::string(100'000'000, 'x') + '"')),
+            too_large(100'000'002, 1'048'576));
   EXPECT_EQ(refusal_with(file_with(std::string(100'000'000, '9'))), too_large(100'000'000, 64));
   EXPECT_EQ(refusal_with(std::string(300'000'000, ' ')), too_large(300'000'000, 268'435'456));
 }
@@ -224,10 +233,13 @@ TEST(ModelFile, AnyTypeInAnyPlaceIsRefusedInASentence) {
                                     json::array({json::array()})};
   for (const auto& [path, value] : good.items()) {  // of an empty list null
     for (const json& other : others) {
-      const std::string text = spoiled([&](json& content) { content[json::json_pointer(path)] = other; });
-      const Result<CompensatedModel> read = deserialize(text, "cell.model");  // refused, or a value that can be
+      const std::string text =
+          spoiled([&](json& content) { content[json::json_pointer(path)] = other; });
+      const Result<CompensatedModel> read =
+          deserialize(text, "cell.model");  // refused, or a value that can be
       if (!read) {
-        EXPECT_TRUE(read.error().file.starts_with("cell.model")) << path << ": " << sentence(read.error());
+        EXPECT_TRUE(read.error().file.starts_with("cell.model"))
+            << path << ": " << sentence(read.error());
         EXPECT_FALSE(read.error().message.empty()) << path;
       }
       EXPECT_TRUE(!read || other.is_primitive() || value.is_null()) << path << " = " << other;
@@ -247,7 +259,9 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
   const auto frame = [](std::vector<double> values) {
     return json{{"rows", 3}, {"columns", 4}, {"values", std::move(values)}};
   };
-  const auto refused_with = [](const std::function<void(json&)>& change) { return refusal_with(spoiled(change)); };
+  const auto refused_with = [](const std::function<void(json&)>& change) {
+    return refusal_with(spoiled(change));
+  };
   EXPECT_EQ(refused_with([&](json& c) {
               c["X_WB"] = frame({2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
             }),
@@ -260,7 +274,8 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
               c["X_WB"] = frame({1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0});
             }),
             Refusal("cell.model", {}, "base"));
-  EXPECT_EQ(refused_with([](json& c) { c["values"]["values"][0] = nullptr; }), Refusal("cell.model"));
+  EXPECT_EQ(refused_with([](json& c) { c["values"]["values"][0] = nullptr; }),
+            Refusal("cell.model"));
   EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][1] = 1e-9; }),
             Refusal("cell.model", {}, "covariance").beyond(0.1, 1e-06));
   EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][0] = -1e-9; }),
@@ -283,15 +298,20 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
             Refusal("cell.model", {}, "parameters").beyond(5, 6));
   EXPECT_EQ(refused_with([](json& c) { c["parameters"][0]["stddev"] = -1; }),
             Refusal("cell.model", {}, "x0").beyond(-1, 0));
-  EXPECT_EQ(refused_with([](json& c) { c["rank"] = 99; }), Refusal("cell.model", {}, "rank").beyond(99, 6));
-  EXPECT_EQ(refused_with([](json& c) { c["q_min"]["values"][0] = 9; }), Refusal("cell.model", {}, "joint_ranges"));
+  EXPECT_EQ(refused_with([](json& c) { c["rank"] = 99; }),
+            Refusal("cell.model", {}, "rank").beyond(99, 6));
+  EXPECT_EQ(refused_with([](json& c) { c["q_min"]["values"][0] = 9; }),
+            Refusal("cell.model", {}, "joint_ranges"));
   EXPECT_EQ(refused_with([](json& c) {
               c["trained_with"] = json::array({json::array({"drill", ""})});
             }),
             Refusal("cell.model", {}, "trained_with").text("drill"));
-  EXPECT_EQ(refused_with([](json& c) { c["error_sources"] = std::vector<std::string>(100'000, "base"); }),
-            Refusal("cell.model", {}, "error_sources").beyond(100000, 500));
-  EXPECT_EQ(refused_with([](json& c) { c["error_sources"] = {"gear_transmission:3@" + repeated("5+", 9999)}; }),
+  EXPECT_EQ(
+      refused_with([](json& c) { c["error_sources"] = std::vector<std::string>(100'000, "base"); }),
+      Refusal("cell.model", {}, "error_sources").beyond(100000, 500));
+  EXPECT_EQ(refused_with([](json& c) {
+              c["error_sources"] = {"gear_transmission:3@" + repeated("5+", 9999)};
+            }),
             Refusal("cell.model", {}, "error_sources").beyond(20018, 1000));
   EXPECT_EQ(refused_with([](json& c) {
               c["error_sources"] = json::array();
@@ -308,7 +328,8 @@ TEST(ModelFile, TextsAndTimesThatNobodyCanBeToldAreRefusedInAFileAndLeftInWhatWa
   const auto with = [](const char* part, const std::function<void(json&)>& change) {
     json file = json::parse(small_model_text());
     change(file[part]);
-    file[fmt::format("{}hash", part == std::string("stamp") ? "stamp_" : "")] = sha256_hex(file[part].dump());
+    file[fmt::format("{}hash", part == std::string("stamp") ? "stamp_" : "")] =
+        sha256_hex(file[part].dump());
     return file.dump();
   };
   const auto provenance = [&](const char* key, const std::string& text) {
@@ -332,7 +353,8 @@ TEST(ModelFile, TextsAndTimesThatNobodyCanBeToldAreRefusedInAFileAndLeftInWhatWa
            }),
       with("content",
            [&](json& c) {
-             c["unidentifiable"] = {{{"singular_value", 0}, {"parameters", {"a"}}, {"sentence", "see\x1b[2J"}}};
+             c["unidentifiable"] = {
+                 {{"singular_value", 0}, {"parameters", {"a"}}, {"sentence", "see\x1b[2J"}}};
            }),
       stamp("program_version", escape),
       stamp("program_version", std::string(257, '1')),
@@ -346,13 +368,16 @@ TEST(ModelFile, TextsAndTimesThatNobodyCanBeToldAreRefusedInAFileAndLeftInWhatWa
   }
   EXPECT_EQ(refusal_with(wrong.front()),
             Refusal("cell.model", {}, "level").of(ErrorCode::kTooLarge).beyond(4097, 4096));
-  EXPECT_EQ(refusal_with(provenance("batch_id", repeated("a+", 999) + std::string(256, 'b'))), Refusal::none());
+  EXPECT_EQ(refusal_with(provenance("batch_id", repeated("a+", 999) + std::string(256, 'b'))),
+            Refusal::none());
 }
 
 TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
   const auto bias_of = [](const std::string& kernel, std::size_t poses) {
     const auto matrix = [](std::size_t rows, std::size_t columns, double value) {
-      return json{{"rows", rows}, {"columns", columns}, {"values", std::vector<double>(rows * columns, value)}};
+      return json{{"rows", rows},
+                  {"columns", columns},
+                  {"values", std::vector<double>(rows * columns, value)}};
     };
     return json{{"kernel", kernel},
                 {"q", matrix(poses, 6, 0.5)},
@@ -366,9 +391,11 @@ TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
   };
   EXPECT_EQ(refused_bias("se", 100'000),
             Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(100000, 20000));
-  EXPECT_EQ(
-      refused_bias("se" + repeated(" + se", 50), 20),
-      Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(51, 32).text("se" + repeated(" + se", 50)));
+  EXPECT_EQ(refused_bias("se" + repeated(" + se", 50), 20),
+            Refusal("cell.model", {}, "bias")
+                .of(ErrorCode::kTooLarge)
+                .beyond(51, 32)
+                .text("se" + repeated(" + se", 50)));
   EXPECT_EQ(refused_bias(repeated("(", 2'000), 20),
             Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(2000, 1000));
   EXPECT_EQ(refused_bias(repeated("(", 100'000), 20),
@@ -385,13 +412,14 @@ std::string coupled(const std::string& source, const std::function<void(json& co
   std::string robot = test::small_robot_yaml();
   const std::string none = "coupling: []";
   robot.replace(robot.find(none), none.size(), "coupling: [{joint: 3, follows: 2, ratio: -1}]");
-  const auto cell =
-      std::make_shared<const Cell>(test::demand(parse_cell(test::small_cell_yaml("cell-1"), robot, "cell.yaml")));
+  const auto cell = std::make_shared<const Cell>(
+      test::demand(parse_cell(test::small_cell_yaml("cell-1"), robot, "cell.yaml")));
   CompensatedModel::Parts parts = test::nominal_model(cell, 40).parts();
   parts.physics = test::demand(make_physical_model(cell, {source}));
   const auto P = parts.physics.values.size();
   parts.covariance = Eigen::MatrixXd::Identity(P, P) * 1e-8;
-  for (const Parameter& p : parts.physics.parameters()) parts.parameters.push_back({p, p.prior, 1e-4, true});
+  for (const Parameter& p : parts.physics.parameters())
+    parts.parameters.push_back({p, p.prior, 1e-4, true});
   parts.rank = static_cast<int>(P);
   parts.provenance.trained_at = 1'700'000'000;
   json file = json::parse(serialize(test::demand(CompensatedModel::make(std::move(parts)))));
@@ -402,9 +430,10 @@ std::string coupled(const std::string& source, const std::function<void(json& co
 
 TEST(ModelFile, WhoseCausesOfACoupledJointFollowedTheCommandedAngleIsToBeTrainedAgain) {
   const auto as_before = [](json& content) { content.erase("angles"); };
-  for (const char* source : {"gear_transmission:3@48.5", "backlash:2", "joint_map:3@2", "encoder_eccentricity:3",
-                             "joint_slip:2@5", "early_reading"}) {
-    EXPECT_EQ(refusal_with(coupled(source, as_before)), Refusal("cell.model", {}, "angles").text(source));
+  for (const char* source : {"gear_transmission:3@48.5", "backlash:2", "joint_map:3@2",
+                             "encoder_eccentricity:3", "joint_slip:2@5", "early_reading"}) {
+    EXPECT_EQ(refusal_with(coupled(source, as_before)),
+              Refusal("cell.model", {}, "angles").text(source));
     EXPECT_EQ(refusal_with(coupled(source, [](json&) {})), Refusal::none()) << source;
   }
   for (const char* source : {"base", "geometry", "tool", "backlash:5"})
@@ -414,7 +443,8 @@ TEST(ModelFile, WhoseCausesOfACoupledJointFollowedTheCommandedAngleIsToBeTrained
 TEST(ModelFile, ADeviceThatNeverEndsIsNoModel) {
   const Result<CompensatedModel> endless = load_model("/dev/zero");
   ASSERT_FALSE(endless);
-  EXPECT_EQ(refusal_of(endless), Refusal("/dev/zero").of(ErrorCode::kTooLarge).beyond((1 << 28) + (1 << 16), 1 << 28));
+  EXPECT_EQ(refusal_of(endless),
+            Refusal("/dev/zero").of(ErrorCode::kTooLarge).beyond((1 << 28) + (1 << 16), 1 << 28));
 }
 
 }  // namespace

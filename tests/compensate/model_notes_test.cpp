@@ -14,14 +14,16 @@ namespace trammel {
 namespace {
 
 /// cell-7 with another payload, or none; a model of it with these sources, nothing identified.
-CompensatedModel model_of(const std::vector<std::string>& sources, const std::map<std::string, Payload>& payloads) {
+CompensatedModel model_of(const std::vector<std::string>& sources,
+                          const std::map<std::string, Payload>& payloads) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   cell->payloads = payloads;
   CompensatedModel::Parts parts;
   parts.physics = test::demand(make_physical_model(cell, sources));
   parts.q_min = JointVector::Constant(6, -1);
   parts.q_max = JointVector::Constant(6, 1);
-  for (const Parameter& parameter : parts.physics.parameters()) parts.parameters.push_back({parameter, 0, 0, true});
+  for (const Parameter& parameter : parts.physics.parameters())
+    parts.parameters.push_back({parameter, 0, 0, true});
   const auto P = parts.physics.parameter_count();
   parts.covariance = Eigen::MatrixXd::Zero(P, P);
   parts.trained_with = {{"spindle", payloads.empty() ? "" : payloads.begin()->first}};
@@ -41,12 +43,14 @@ const std::map<std::string, Payload> kWeightless = {{"spindle", {0, Vector3(0, 0
 
 TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
   for (const auto& payloads : {std::map<std::string, Payload>{}, kWeightless}) {
-    for (const char* form : {"compliance_linear", "compliance_first_order", "compliance_equilibrium"}) {
+    for (const char* form :
+         {"compliance_linear", "compliance_first_order", "compliance_equilibrium"}) {
       const std::vector<std::string> notes = noted(model_of({"base", "geometry", form}, payloads));
       ASSERT_EQ(notes.size(), 1U) << form;
       EXPECT_EQ(notes.front(),
-                "gearbox compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 "
-                "is M2; give payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
+                "gearbox compliance does nothing here: neither link masses nor a payload with a "
+                "mass are given, so M3 is M2; give payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, "
+                "z]}} in the cell file");
     }
   }
   EXPECT_TRUE(noted(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());
@@ -55,12 +59,13 @@ TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
 TEST(ModelNotes, EverySourceThatHasNothingToActOnIsNamed) {
   const std::vector<std::string> idle = noted(model_of({"base", "link_bending:2"}, kWeightless));
   ASSERT_EQ(idle.size(), 1U);
-  EXPECT_TRUE(idle.front().starts_with("bending of link 2 does nothing here: neither link masses nor a payload"))
+  EXPECT_TRUE(idle.front().starts_with(
+      "bending of link 2 does nothing here: neither link masses nor a payload"))
       << idle[0];
   const std::vector<std::string> stiff = noted(model_of({"base", "geometry", "payload"}, kHeavy));
   ASSERT_EQ(stiff.size(), 1U);
-  EXPECT_TRUE(
-      stiff.front().starts_with("payload mass or centre of gravity does nothing here: nothing gives way under a load"))
+  EXPECT_TRUE(stiff.front().starts_with(
+      "payload mass or centre of gravity does nothing here: nothing gives way under a load"))
       << stiff[0];
 }
 
@@ -77,8 +82,9 @@ CompensatedModel off_by(const std::string& name, double value, double stddev = 0
 
 TEST(ModelNotes, WhatNoRobotIsOffItsDrawingByWaitsForAPerson) {
   for (const auto& [name, within, beyond] :
-       {std::tuple("a6", 2.9e-3, -3.1e-3), std::tuple("d4", -2.9e-3, 20e-3), std::tuple("alpha2", 2.9e-3, 3.1e-3),
-        std::tuple("beta2", 2.9e-3, -3.1e-3), std::tuple("q5", from_deg(0.9), from_deg(-1.1))}) {
+       {std::tuple("a6", 2.9e-3, -3.1e-3), std::tuple("d4", -2.9e-3, 20e-3),
+        std::tuple("alpha2", 2.9e-3, 3.1e-3), std::tuple("beta2", 2.9e-3, -3.1e-3),
+        std::tuple("q5", from_deg(0.9), from_deg(-1.1))}) {
     EXPECT_FALSE(stop_of(off_by(name, within))) << name;
     const auto stop = stop_of(off_by(name, beyond));
     ASSERT_TRUE(stop) << name;
@@ -120,10 +126,12 @@ TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors)
     parts.rank = 30;
     parts.training.coverage_95_stated = inside;
     const double fitted = 1 - parts.rank / (3.0 * poses);
-    parts.training.calibrated.rms = times * std::sqrt(3.0 * fitted) * parts.physics.cell->tracker.sigma;
+    parts.training.calibrated.rms =
+        times * std::sqrt(3.0 * fitted) * parts.physics.cell->tracker.sigma;
     parts.discrepancy = times * parts.physics.cell->tracker.sigma;
     const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
-    return std::any_of(notes.begin(), notes.end(), [](const Note& note) { return note.code == "sigma_overstated"; });
+    return std::any_of(notes.begin(), notes.end(),
+                       [](const Note& note) { return note.code == "sigma_overstated"; });
   };
   EXPECT_TRUE(overstated(0.48, 60));
   EXPECT_FALSE(overstated(0.52, 60));
@@ -135,7 +143,8 @@ TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
   const auto left = [](double times) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
     parts.training.gauges.emplace().rows = 60;
-    parts.discrepancy = parts.training.gauges->compensated = times * parts.physics.cell->tracker.sigma;
+    parts.discrepancy = parts.training.gauges->compensated =
+        times * parts.physics.cell->tracker.sigma;
     std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
     std::erase_if(notes, [](const Note& note) { return note.code != "left_over_sigma"; });
     return notes;
@@ -172,8 +181,8 @@ TEST(ModelNotes, RowsThatFitNothingAreNamedAndManyOfThemWaitForAPerson) {
   };
   EXPECT_EQ(note().severity, Note::Severity::kWarning);
   EXPECT_EQ(note().text,
-            "2 of the measured rows do not fit the others, by up to 30 mm, and hardly count: rows 3, 9; measure them "
-            "again");
+            "2 of the measured rows do not fit the others, by up to 30 mm, and hardly count: rows "
+            "3, 9; measure them again");
   for (int row = 10; row < 20; ++row) parts.suspects.push_back({"more", row, 0.01, 300});
   EXPECT_EQ(note().severity, Note::Severity::kStop);
   parts.suspects.clear();
@@ -182,7 +191,8 @@ TEST(ModelNotes, RowsThatFitNothingAreNamedAndManyOfThemWaitForAPerson) {
 
 TEST(ModelNotes, ABaseWhoseTurnThePosesDoNotTellWaitsForAPerson) {
   CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
-  parts.unidentifiable.push_back({0, {"gamma0", "beta0", "alpha0"}, "they hardly tell how the base is turned"});
+  parts.unidentifiable.push_back(
+      {0, {"gamma0", "beta0", "alpha0"}, "they hardly tell how the base is turned"});
   EXPECT_FALSE(stop_of(test::demand(CompensatedModel::make(parts)))) << "the cell says it";
   auto anywhere = std::make_shared<Cell>(*parts.physics.cell);
   anywhere->X_WB.reset();
@@ -230,10 +240,9 @@ TEST(DoubtOfBias, SaysThatABiasThatMakesItWorseDoesNotHelp) {
 }
 
 TEST(DoubtOfBias, SaysWhatIsNoMoreThanChance) {
-  EXPECT_EQ(
-      doubt_of_bias(compared(23.3e-6, 22.9e-6, 1.1)).value(),
-      "the bias is not shown to help here: 0.0229 mm with it, 0.0233 mm without on 1000 poses, no more than chance "
-      "would make of it");
+  EXPECT_EQ(doubt_of_bias(compared(23.3e-6, 22.9e-6, 1.1)).value(),
+            "the bias is not shown to help here: 0.0229 mm with it, 0.0233 mm without on 1000 "
+            "poses, no more than chance would make of it");
   EXPECT_FALSE(doubt_of_bias(compared(0.48e-3, 0.2e-3, 20)));
   EXPECT_FALSE(doubt_of_bias(compared(22.9e-6, 22.9e-6, {})));  // no bias
 }

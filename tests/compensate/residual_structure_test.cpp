@@ -13,7 +13,8 @@ namespace {
 const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
 
 /// A model of these sources, identified on the batch.
-CompensatedModel identified(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+CompensatedModel identified(const std::shared_ptr<const Cell>& cell,
+                            const std::vector<std::string>& sources,
                             const MeasurementBatch& batch) {
   CalibrationResult found = test::demand(calibrate(cell, sources, batch, {}));
   CompensatedModel::Parts parts;
@@ -25,7 +26,8 @@ CompensatedModel identified(const std::shared_ptr<const Cell>& cell, const std::
   return test::demand(CompensatedModel::make(std::move(parts)));
 }
 
-std::optional<ResidualOrder> structure(const CompensatedModel& model, const MeasurementBatch& batch) {
+std::optional<ResidualOrder> structure(const CompensatedModel& model,
+                                       const MeasurementBatch& batch) {
   return most_structured(residual_orders(model, batch, model.errors_B(batch).calibrated));
 }
 
@@ -40,7 +42,8 @@ TEST(ResidualStructure, NoiseHasNone) {
 TEST(ResidualStructure, ARippleThatTheModelLacksIsToldByItsJoint) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
-  const Eigen::Index first = add_source(robot.truth, test::demand(make_error_source("gear_transmission:2@9", *cell)));
+  const Eigen::Index first =
+      add_source(robot.truth, test::demand(make_error_source("gear_transmission:2@9", *cell)));
   robot.truth.values.segment(first, 3) << 9, 1.5e-4, 1e-4;
   const MeasurementBatch batch = test::measured(robot, 400, 3);
   const auto told = structure(identified(cell, kM3, batch), batch);

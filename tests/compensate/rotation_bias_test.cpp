@@ -42,7 +42,8 @@ class RotationBias : public testing::Test {
     for (const char* spec : {"joint_map:4@3", "joint_map:5@4", "joint_map:6@5"}) {
       const ErrorSourcePtr map = test::demand(make_error_source(spec, *robot_->truth.cell));
       const Eigen::Index first = add_source(robot_->truth, map);
-      robot_->truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size())).setConstant(3e-4);
+      robot_->truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size()))
+          .setConstant(3e-4);
     }
     batch_ = new MeasurementBatch(test::measured(*robot_, 130, 71));
     model_ = new CompensatedModel(trained(*batch_, "se + joint_map"));
@@ -69,7 +70,8 @@ class RotationBias : public testing::Test {
       const Correction correction = model.correct(target, "spindle", "spindle");
       if (correction.status != CorrectionStatus::kOk) continue;
       const Pose reached = robot_->truth.X_WB.inverse() * robot_->truth.pose_W(posed(correction.q));
-      sum += rotation_log(correction.X_BT_wanted.linear() * reached.linear().transpose()).squaredNorm();
+      sum += rotation_log(correction.X_BT_wanted.linear() * reached.linear().transpose())
+                 .squaredNorm();
       ++count;
     }
     EXPECT_GT(count, 40);
@@ -120,7 +122,8 @@ TEST_F(RotationBias, TheTrueOrientationOfCorrectedTargetsIsNearerAndTheIntervals
 }
 
 TEST_F(RotationBias, FadesAwayWithThatOfThePositionButForItsBlocks) {
-  const PoseContext far = posed(model_->parts().q_max + 0.5 * (model_->parts().q_max - model_->parts().q_min));
+  const PoseContext far =
+      posed(model_->parts().q_max + 0.5 * (model_->parts().q_max - model_->parts().q_min));
   const auto turn_beyond_calibrated = [&](const CompensatedModel& model) {
     const ErrorPrediction prediction = model.predict(far.q, "spindle", "spindle");
     EXPECT_EQ(prediction.bias_weight, 0.0);
@@ -143,7 +146,8 @@ TEST_F(RotationBias, PredictionsAndCorrectionsTakeTheSamePartOfBothBiases) {
     const BiasPrediction turn = turning.predict(q, turned(features));
     Pose X_BT = physics.X_WB.inverse() * physics.pose_W(posed(q));
     X_BT.translation() += move.mean_B - (1 - weight) * move.nearby_B;
-    X_BT.linear() = (rotation_exp(turn.mean_B - (1 - weight) * turn.nearby_B) * X_BT.linear()).eval();
+    X_BT.linear() =
+        (rotation_exp(turn.mean_B - (1 - weight) * turn.nearby_B) * X_BT.linear()).eval();
     EXPECT_GT(turn.nearby_B.norm(), 1e-7);
     return X_BT;
   };
@@ -151,7 +155,8 @@ TEST_F(RotationBias, PredictionsAndCorrectionsTakeTheSamePartOfBothBiases) {
   q << 0.1, -0.1, 0.2, 0.2, 0.8, -0.1;
   for (const auto& [beyond, weight] : {std::pair{0.0, 1.0}, {0.15, 0.5}, {0.5, 0.0}}) {
     CompensatedModel::Parts parts = model_->parts();
-    parts.q_max(0) = parts.q_min(0) + (q(0) - parts.q_min(0)) / (1 + beyond);  // as if joint 1 had not come so far
+    parts.q_max(0) = parts.q_min(0) +
+                     (q(0) - parts.q_min(0)) / (1 + beyond);  // as if joint 1 had not come so far
     const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
     const ErrorPrediction at = model.predict(q, "spindle", "spindle");
     EXPECT_NEAR(at.bias_weight, weight, 0.05);
@@ -161,14 +166,16 @@ TEST_F(RotationBias, PredictionsAndCorrectionsTakeTheSamePartOfBothBiases) {
     target.joint_target = true;
     target.seed = q;
     const Correction correction = model.correct(target, "spindle", "spindle");
-    const Vector6 left = pose_difference(correction.X_BT_wanted, with_part(correction.q, at.bias_weight));
+    const Vector6 left =
+        pose_difference(correction.X_BT_wanted, with_part(correction.q, at.bias_weight));
     EXPECT_LT(left.head<3>().norm(), 1e-7) << weight;
     EXPECT_LT(left.tail<3>().norm(), 1e-7) << weight;
   }
 }
 
 TEST_F(RotationBias, FarOutATurnMayBeMissedByAsMuchAsThereWasToLearn) {
-  const PoseContext far = posed(model_->parts().q_max + 0.5 * (model_->parts().q_max - model_->parts().q_min));
+  const PoseContext far =
+      posed(model_->parts().q_max + 0.5 * (model_->parts().q_max - model_->parts().q_min));
   const BiasModel turning = turning_of(*model_);
   const BiasPrediction turn = turning.predict(far.q, turned(model_->features(far)));
   const PhysicalModel& physics = model_->parts().physics;
@@ -177,12 +184,14 @@ TEST_F(RotationBias, FarOutATurnMayBeMissedByAsMuchAsThereWasToLearn) {
   const Eigen::MatrixXd J_B = physics.X_WB.linear().transpose() * J_W.bottomRows<3>();
   const Vector3 identified = (J_B * model_->parts().covariance * J_B.transpose()).diagonal();
   const double instrument = model_->cell().tracker.sigma_rotation;
-  const Vector3 noise =
-      (turn.measured_stddev_B.cwiseAbs2() - turn.stddev_B.cwiseAbs2()).cwiseMax(instrument * instrument);
-  const Vector3 learned = turning.state().residual_B.colwise().squaredNorm() / turning.state().q.rows();
+  const Vector3 noise = (turn.measured_stddev_B.cwiseAbs2() - turn.stddev_B.cwiseAbs2())
+                            .cwiseMax(instrument * instrument);
+  const Vector3 learned =
+      turning.state().residual_B.colwise().squaredNorm() / turning.state().q.rows();
   const ErrorPrediction prediction = model_->predict(far.q, "spindle", "spindle");
   ASSERT_EQ(prediction.bias_weight, 0.0);
-  const Vector3 expected = turn.stddev_B.cwiseAbs2() + identified + noise + learned.cwiseMax(turn.nearby_B.cwiseAbs2());
+  const Vector3 expected =
+      turn.stddev_B.cwiseAbs2() + identified + noise + learned.cwiseMax(turn.nearby_B.cwiseAbs2());
   EXPECT_LT((prediction.rotation_stddev_B->cwiseAbs2() - expected).norm(), 1e-9 * expected.norm());
   EXPECT_GT(std::sqrt(learned.sum()), 3e-4);
 }
@@ -204,7 +213,8 @@ TEST_F(RotationBias, IsTheSameAfterItWasStoredBitForBitAndTheHashCoversIt) {
   file["self_test_hash"] = sha256_hex(file["self_test"].dump());
   file["hash"] = sha256_hex(file["content"].dump());
   const CompensatedModel old = test::demand(deserialize(file.dump(), "cell.model"));
-  const ErrorPrediction a = model_->predict(batch_->measurements[0].context.q, "spindle", "spindle");
+  const ErrorPrediction a =
+      model_->predict(batch_->measurements[0].context.q, "spindle", "spindle");
   const ErrorPrediction b = old.predict(batch_->measurements[0].context.q, "spindle", "spindle");
   EXPECT_EQ(a.X_BT_predicted.translation(), b.X_BT_predicted.translation());
   EXPECT_EQ(a.covariance_B, b.covariance_B);

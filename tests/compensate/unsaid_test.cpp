@@ -11,10 +11,12 @@ namespace {
 CompensatedModel model_of(const std::string& source, const std::vector<double>& values) {
   CompensatedModel::Parts parts;
   parts.physics = test::demand(make_physical_model(test::cell_7(), {source}));
-  parts.physics.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  parts.physics.values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   parts.q_min = JointVector::Constant(6, -1);
   parts.q_max = JointVector::Constant(6, 1);
-  for (const Parameter& parameter : parts.physics.parameters()) parts.parameters.push_back({parameter, 0, 0, true});
+  for (const Parameter& parameter : parts.physics.parameters())
+    parts.parameters.push_back({parameter, 0, 0, true});
   const auto P = parts.physics.parameter_count();
   parts.covariance = Eigen::MatrixXd::Zero(P, P);
   parts.trained_with = {{"spindle", "spindle"}};
@@ -32,7 +34,8 @@ TEST(Unsaid, WhereARobotComesFromIsUncertaintyToBothSides) {
   EXPECT_LT(unsaid.error_B.norm(), 1e-9);
   asked.before = asked.q + JointVector::Constant(6, 2);
   const ErrorPrediction from_above = model.predict_all({asked}).front();
-  EXPECT_NEAR(unsaid.true_stddev_B.norm(), from_above.error_B.norm(), 0.01 * from_above.error_B.norm());
+  EXPECT_NEAR(unsaid.true_stddev_B.norm(), from_above.error_B.norm(),
+              0.01 * from_above.error_B.norm());
   EXPECT_GT(from_above.error_B.norm(), kHalfWidth * 0.8) << "more than half a metre from the axis";
   EXPECT_LT(from_above.true_stddev_B.norm(), 1e-6);
   asked.before = asked.q - JointVector::Constant(6, 2);

@@ -35,7 +35,8 @@ CompensatedModel trained(const std::shared_ptr<const Cell>& cell, const Measurem
   return demand(train(cell, demand(check_against_cell(batch, *cell)), options));
 }
 
-MeasurementBatch as_measured(const VirtualRobot& robot, std::vector<PoseContext> poses, std::uint64_t seed) {
+MeasurementBatch as_measured(const VirtualRobot& robot, std::vector<PoseContext> poses,
+                             std::uint64_t seed) {
   SimulateOptions options;
   options.seed = seed;
   MeasurementBatch batch = demand(simulate(robot, poses, options));
@@ -55,7 +56,8 @@ std::vector<PoseContext> from_one_side(const std::vector<PlannedPose>& plan, int
 /// The shipped robot whose second gear has 0.1 mrad of play to each side.
 VirtualRobot with_play(const std::shared_ptr<const Cell>& cell) {
   VirtualRobot robot = test::chapter_5_robot(cell);
-  const Eigen::Index first = add_source(robot.truth, demand(make_error_source("backlash:2", *cell)));
+  const Eigen::Index first =
+      add_source(robot.truth, demand(make_error_source("backlash:2", *cell)));
   robot.truth.values(first) = 1e-4;
   return robot;
 }
@@ -71,24 +73,29 @@ TEST(WhatWasMeasured, APromiseFromOneSideOfPlayIsSaidToBeOfThatSideAndWouldBeWro
   const VirtualRobot robot = with_play(cell);
   const Plan plan = demand(make_plan(cell, {80, 1}));
   const Plan fresh = demand(make_plan(cell, {40, 2}));
-  const CompensatedModel model = trained(cell, as_measured(robot, from_one_side(plan.poses, -1), 1));
+  const CompensatedModel model =
+      trained(cell, as_measured(robot, from_one_side(plan.poses, -1), 1));
   EXPECT_EQ(one_sided(model.parts().measured), "from above");
   EXPECT_TRUE(has_note(model, kOneSide));
-  const double same = model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3)).compensated.rms;
-  const double other = model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3)).compensated.rms;
+  const double same =
+      model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3)).compensated.rms;
+  const double other =
+      model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3)).compensated.rms;
   EXPECT_GT(other, 4 * same);
 }
 
 TEST(WhatWasMeasured, APlanMeasuresBothSidesSoThatThePromiseCountsThePlay) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = with_play(cell);
-  const CompensatedModel model =
-      trained(cell, as_measured(robot, from_one_side(demand(make_plan(cell, {80, 1})).poses, 0), 1));
+  const CompensatedModel model = trained(
+      cell, as_measured(robot, from_one_side(demand(make_plan(cell, {80, 1})).poses, 0), 1));
   EXPECT_EQ(words_of(model.parts().measured, *cell).sides, "every joint from both sides");
   EXPECT_FALSE(has_note(model, kOneSide));
   const Plan fresh = demand(make_plan(cell, {40, 2}));
-  const double above = model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3)).compensated.rms;
-  const double below = model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3)).compensated.rms;
+  const double above =
+      model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3)).compensated.rms;
+  const double below =
+      model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3)).compensated.rms;
   EXPECT_LT(std::max(above, below), 1.5 * std::min(above, below));
 }
 
@@ -96,11 +103,12 @@ TEST(WhatWasMeasured, NamesTheJointsOfEachSide) {
   WhatWasMeasured measured;
   measured.approaches = {{30, 30}, {0, 60}, {0, 0}, {59, 1}};
   EXPECT_EQ(words_of(measured, *test::cell_7()).sides,
-            "from both sides in joint 1, from above only in joint 2, from below only in joint 4, from a side that is "
-            "not recorded in joint 3");
+            "from both sides in joint 1, from above only in joint 2, from below only in joint 4, "
+            "from a side that is not recorded in joint 3");
   EXPECT_EQ(one_sided(measured), "from above in joint 2, from below in joint 4");
   measured.approaches = {{0, 0}, {0, 0}};
-  EXPECT_EQ(words_of(measured, *test::cell_7()).sides, "every joint from a side that is not recorded");
+  EXPECT_EQ(words_of(measured, *test::cell_7()).sides,
+            "every joint from a side that is not recorded");
   EXPECT_EQ(one_sided(measured), "");
   EXPECT_EQ(one_sided(std::nullopt), "");
 }
@@ -133,8 +141,9 @@ TEST(WhatWasMeasured, FreshPosesOfAPlanOfFewAreInDomain) {
     const VirtualRobot robot = test::chapter_5_robot(cell);
     int inside = 0;
     for (std::uint64_t seed = 1; seed <= 5; ++seed)
-      inside +=
-          trained(cell, test::measured(robot, 30, seed)).evaluate(test::measured(robot, 200, seed + 50)).in_domain;
+      inside += trained(cell, test::measured(robot, 30, seed))
+                    .evaluate(test::measured(robot, 200, seed + 50))
+                    .in_domain;
     EXPECT_GE(inside / 1000.0, 0.96) << (cell->workspace ? "poses in front" : "poses all around");
   }
 }
@@ -149,10 +158,12 @@ TEST(WhatWasMeasured, TheMarginOfTheRangesIsLargerOfFewPoses) {
   EXPECT_NEAR(measured.range_margin(), 0.1, 1e-9) << "however few";
 }
 
-/// Poses whose joints are each in the model's range, with the flange at least this far behind the base, m.
+/// Poses whose joints are each in the model's range, with the flange at least this far behind the
+/// base, m.
 std::vector<JointVector> behind(const CompensatedModel& model, double by) {
   JointRanges ranges;
-  for (Eigen::Index j = 0; j < 6; ++j) ranges.emplace_back(model.parts().q_min(j), model.parts().q_max(j));
+  for (Eigen::Index j = 0; j < 6; ++j)
+    ranges.emplace_back(model.parts().q_min(j), model.parts().q_max(j));
   std::vector<JointVector> poses;
   const Eigen::MatrixXd all = latin_hypercube(ranges, 4000, 9);
   for (Eigen::Index i = 0; i < all.rows(); ++i) {
@@ -171,11 +182,13 @@ TEST(WhatWasMeasured, PosesBehindARobotThatWasMeasuredInFrontAreOutOfDomainAndHe
   const std::vector<JointVector> poses = behind(model, 0.2);
   ASSERT_GT(poses.size(), 200u) << "each joint by itself is in its range there";
   int inside = 0;
-  for (const JointVector& q : poses) inside += model.predict(q, "spindle", "spindle").in_domain ? 1 : 0;
+  for (const JointVector& q : poses)
+    inside += model.predict(q, "spindle", "spindle").in_domain ? 1 : 0;
   EXPECT_EQ(inside, 0);
 }
 
-/// Share of fresh poses behind the robot that are in domain, of a robot that was measured at `poses` places in front.
+/// Share of fresh poses behind the robot that are in domain, of a robot that was measured at
+/// `poses` places in front.
 double share_behind(int poses) {
   const auto cell = cell_in_front();
   const VirtualRobot robot = test::chapter_5_robot(cell);
@@ -203,10 +216,12 @@ TEST(WhatWasMeasured, FewPosesInFrontMakeNoDomainBehindTheRobot) {
 TEST(WhatWasMeasured, PosesBeyondTheOutlineFromAboveAreOutOfDomain) {
   const auto cell = test::cell_7();
   MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 400, 1);
-  std::erase_if(batch.measurements,
-                [&](const Measurement& m) { return cell->robot.flange_pose(m.context.q).translation().x() < 0.3; });
+  std::erase_if(batch.measurements, [&](const Measurement& m) {
+    return cell->robot.flange_pose(m.context.q).translation().x() < 0.3;
+  });
   batch.measurements.resize(30);
-  const WhatWasMeasured measured = what_was_measured(demand(make_physical_model(cell, {"base"})), batch);
+  const WhatWasMeasured measured =
+      what_was_measured(demand(make_physical_model(cell, {"base"})), batch);
   WhatWasMeasured before = measured;
   before.outline.resize(0);
   int behind = 0, in_reach = 0, inside = 0;
@@ -225,9 +240,12 @@ TEST(WhatWasMeasured, PosesBeyondTheOutlineFromAboveAreOutOfDomain) {
 
 TEST(WhatWasMeasured, ItsVolumeIsThatOfThePosesNotOfTheJointsRanges) {
   const auto cell = cell_in_front();
-  const WhatWasMeasured measured = *trained(cell, test::measured(test::chapter_5_robot(cell), 80, 1)).parts().measured;
-  EXPECT_TRUE((measured.lower.array() >= cell->workspace->lower.array() - 0.02).all()) << measured.lower.transpose();
-  EXPECT_TRUE((measured.upper.array() <= cell->workspace->upper.array() + 0.02).all()) << measured.upper.transpose();
+  const WhatWasMeasured measured =
+      *trained(cell, test::measured(test::chapter_5_robot(cell), 80, 1)).parts().measured;
+  EXPECT_TRUE((measured.lower.array() >= cell->workspace->lower.array() - 0.02).all())
+      << measured.lower.transpose();
+  EXPECT_TRUE((measured.upper.array() <= cell->workspace->upper.array() + 0.02).all())
+      << measured.upper.transpose();
   EXPECT_LE(measured.volume, (measured.upper - measured.lower).prod());
   EXPECT_GT(measured.volume, 0.3 * (measured.upper - measured.lower).prod());
 }
@@ -256,15 +274,18 @@ std::string changed(const std::string& text, const std::function<void(json& cont
 
 TEST(WhatWasMeasured, IsInTheModelFileAndAnOlderFileSaysThatItIsNotOnRecord) {
   const auto cell = cell_in_front();
-  const CompensatedModel model = trained(cell, test::measured(test::chapter_5_robot(cell), 60, 1), "se");
+  const CompensatedModel model =
+      trained(cell, test::measured(test::chapter_5_robot(cell), 60, 1), "se");
   const CompensatedModel read = demand(deserialize(serialize(model), "m"));
   EXPECT_EQ(in_words(read.parts().measured, *cell), in_words(model.parts().measured, *cell));
   EXPECT_EQ(read.parts().measured->flange_B, model.parts().measured->flange_B);
-  const CompensatedModel older =
-      demand(deserialize(changed(serialize(model), [](json& content) { content.erase("measured"); }), "m"));
-  EXPECT_TRUE(in_words(older.parts().measured, *cell).find("sides of approach: not on record") != std::string::npos);
+  const CompensatedModel older = demand(deserialize(
+      changed(serialize(model), [](json& content) { content.erase("measured"); }), "m"));
+  EXPECT_TRUE(in_words(older.parts().measured, *cell).find("sides of approach: not on record") !=
+              std::string::npos);
   for (const JointVector& q : behind(model, 0.2)) {
-    const ErrorPrediction now = model.predict(q, "spindle", "spindle"), before = older.predict(q, "spindle", "spindle");
+    const ErrorPrediction now = model.predict(q, "spindle", "spindle"),
+                          before = older.predict(q, "spindle", "spindle");
     EXPECT_EQ(now.error_B, before.error_B) << "what the model answers does not depend on it";
     EXPECT_EQ(now.covariance_B, before.covariance_B);
   }
@@ -272,11 +293,14 @@ TEST(WhatWasMeasured, IsInTheModelFileAndAnOlderFileSaysThatItIsNotOnRecord) {
 
 TEST(WhatWasMeasured, AFileOfAnotherArmsSidesIsRefused) {
   const auto cell = test::cell_7();
-  const std::string text = serialize(trained(cell, test::measured(test::chapter_5_robot(cell), 40, 1)));
-  EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["approaches"].erase(0); }), "m"));
+  const std::string text =
+      serialize(trained(cell, test::measured(test::chapter_5_robot(cell), 40, 1)));
+  EXPECT_FALSE(
+      deserialize(changed(text, [](json& c) { c["measured"]["approaches"].erase(0); }), "m"));
   EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["reach_m"] = -1; }), "m"));
   EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"].erase("flange_m"); }), "m"));
-  EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["outline_m"]["values"] = {1}; }), "m"));
+  EXPECT_FALSE(
+      deserialize(changed(text, [](json& c) { c["measured"]["outline_m"]["values"] = {1}; }), "m"));
 }
 
 }  // namespace

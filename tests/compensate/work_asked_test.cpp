@@ -15,7 +15,8 @@ CompensatedModel trained(const VirtualRobot& robot, int poses, std::uint64_t see
   TrainOptions options;
   options.bias = "none";
   const MeasurementBatch batch = test::measured(robot, poses, seed);
-  return test::demand(train(robot.truth.cell, test::demand(check_against_cell(batch, *robot.truth.cell)), options));
+  return test::demand(
+      train(robot.truth.cell, test::demand(check_against_cell(batch, *robot.truth.cell)), options));
 }
 
 /// Of the cell's ranges, and some with joint 1 far beyond those of the training.
@@ -59,7 +60,8 @@ TEST(WorkAsked, PosesOutsideTheDomainAreCountedAndAreTheOnesToMeasure) {
   TrainOptions options;
   options.bias = "se";
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 100, 1);
-  const CompensatedModel model = test::demand(train(cell, test::demand(check_against_cell(batch, *cell)), options));
+  const CompensatedModel model =
+      test::demand(train(cell, test::demand(check_against_cell(batch, *cell)), options));
   const WorkAsked inside = work_asked(model, nullptr, work(*cell, 40, 0));
   const WorkAsked asked = work_asked(model, nullptr, work(*cell, 40, 5));
   EXPECT_GE(asked.in_force.out_of_domain, inside.in_force.out_of_domain + 5);

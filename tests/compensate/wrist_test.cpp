@@ -22,13 +22,17 @@ class ThroughTheWrist : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     auto cell = std::make_shared<Cell>(*test::cell_7());
-    const auto deg = [](double low, double high) { return std::pair{from_deg(low), from_deg(high)}; };
-    cell->joint_ranges = {deg(-3, 15), deg(-15, 15), deg(-15, 30), deg(-170, 170), deg(-40, 40), deg(-170, 170)};
+    const auto deg = [](double low, double high) {
+      return std::pair{from_deg(low), from_deg(high)};
+    };
+    cell->joint_ranges = {deg(-3, 15),    deg(-15, 15), deg(-15, 30),
+                          deg(-170, 170), deg(-40, 40), deg(-170, 170)};
     robot_ = new VirtualRobot(test::chapter_5_robot(cell));
     TrainOptions options;
     options.level = "M3";
     options.bias = "se";
-    model_ = new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 150, 7), options)));
+    model_ =
+        new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 150, 7), options)));
   }
   static void TearDownTestSuite() {
     delete robot_;
@@ -78,7 +82,8 @@ class ThroughTheWrist : public testing::Test {
     int corrected = 0, count = 0, in_wrist = 0, outside = 0;
     double worst = 0;  ///< m, how far the true tool is from where it is wanted
   };
-  /// Along a path around the point that the tool has with the wrist stretched, `beside` (m) that point.
+  /// Along a path around the point that the tool has with the wrist stretched, `beside` (m) that
+  /// point.
   static Jumps along(const std::function<Vector3(double)>& place, double length, double beside) {
     Jumps jumps;
     const Pose middle = nominal(stretched());
@@ -108,7 +113,8 @@ class ThroughTheWrist : public testing::Test {
       correction = now;
       error = true_now;
       if (made.status == CorrectionStatus::kOk)
-        jumps.worst = std::max(jumps.worst, (truth(made.q).translation() - X_BT.translation()).norm());
+        jumps.worst =
+            std::max(jumps.worst, (truth(made.q).translation() - X_BT.translation()).norm());
     }
     return jumps;
   }
@@ -139,9 +145,11 @@ TEST_F(ThroughTheWrist, ACircleIsCorrectedWithoutAJump) {
 }
 
 TEST_F(ThroughTheWrist, ASpiralAcrossTheEdgeOfTheDomainIsCorrectedWithoutAJump) {
-  // Around a point 60 mm beside, so that the third turn meets the singularity and axis 4 is not wound up.
+  // Around a point 60 mm beside, so that the third turn meets the singularity and axis 4 is not
+  // wound up.
   const auto spiral = [](double s) {
-    const double a = (std::sqrt(0.03 * 0.03 + 2 * 0.0032 * s) - 0.03) / 0.0032, r = 0.03 + 0.0032 * a;
+    const double a = (std::sqrt(0.03 * 0.03 + 2 * 0.0032 * s) - 0.03) / 0.0032,
+                 r = 0.03 + 0.0032 * a;
     return Vector3(0, 0.06 + r * std::cos(a), r * std::sin(a));
   };
   const Jumps jumps = along(spiral, 0.46, 0);
@@ -168,7 +176,8 @@ TEST_F(ThroughTheWrist, TheWristStaysOnItsSide) {
       const Correction made = correct(nominal(q), q);
       ASSERT_EQ(made.status, CorrectionStatus::kOk) << made.message;
       EXPECT_GT(made.q(4) * side, 0) << opening;
-      const auto again = inverse_kinematics(arm(), made.X_BT_commanded * X_FT().inverse(), side < 0 ? 1 : 0, made.q);
+      const auto again = inverse_kinematics(arm(), made.X_BT_commanded * X_FT().inverse(),
+                                            side < 0 ? 1 : 0, made.q);
       EXPECT_LT((again->q - made.q).norm(), 1e-5) << "what the controller makes of it";
     }
   }
@@ -178,7 +187,8 @@ TEST_F(ThroughTheWrist, AtTheBorderBothWaysOfCorrectingMeet) {
   JointVector inside = stretched(), outside = stretched();
   inside(4) = 0.1049999;
   outside(4) = 0.1050001;
-  const Correction one = correct(nominal(inside), inside), other = correct(nominal(outside), outside);
+  const Correction one = correct(nominal(inside), inside),
+                   other = correct(nominal(outside), outside);
   EXPECT_LT(((one.q - inside) - (other.q - outside)).norm(), 1e-5);
   EXPECT_LT((one.X_BT_commanded.translation() - nominal(inside).translation() -
              (other.X_BT_commanded.translation() - nominal(outside).translation()))

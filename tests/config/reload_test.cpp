@@ -26,8 +26,9 @@ TEST(Reload, TakesOnLimitsAndTheLogAndNamesWhatHasChanged) {
   EXPECT_EQ(plan.config.dds.client_requests, 3);
   EXPECT_EQ(plan.config.trainer.queue_capacity, 5);
   EXPECT_EQ(plan.config.trainer.keep.models, 7);
-  EXPECT_EQ(plan.now, (std::vector<std::string>{"log: level", "log: format", "dds: client_requests",
-                                                "trainer: queue_capacity", "trainer: keep_models"}));
+  EXPECT_EQ(plan.now,
+            (std::vector<std::string>{"log: level", "log: format", "dds: client_requests",
+                                      "trainer: queue_capacity", "trainer: keep_models"}));
   EXPECT_TRUE(plan.later.empty());
 }
 
@@ -41,8 +42,8 @@ TEST(Reload, LeavesAndNamesWhatChangesWithTheNextStartOnly) {
   EXPECT_TRUE(plan.now.empty());
   EXPECT_EQ(plan.config.dds.compute_workers, config().dds.compute_workers);
   EXPECT_TRUE(plan.config.cells.contains("cell-7"));
-  EXPECT_EQ(plan.later, (std::vector<std::string>{"dds: compute_workers", "trainer: max_poses", "log: file",
-                                                  "cells: cell-7 (left out)"}));
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"dds: compute_workers", "trainer: max_poses",
+                                                  "log: file", "cells: cell-7 (left out)"}));
 }
 
 TEST(Reload, TakesOnCellsThatAreAddedAndKeepsTheOthersAsTheyAre) {
@@ -81,7 +82,8 @@ TEST(Reload, WhereItIsReachedAndWhereItStoresChangesWithTheNextStartAndIsNamed) 
   file.http.port = 20001;
   const ReloadPlan plan = plan_reload(config(), file);
   EXPECT_TRUE(plan.now.empty());
-  EXPECT_EQ(plan.later, (std::vector<std::string>{"store", "dds: address", "dds: port", "dds: domain", "http: port"}));
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"store", "dds: address", "dds: port",
+                                                  "dds: domain", "http: port"}));
   EXPECT_EQ(plan.config.store, config().store);
   EXPECT_EQ(plan.config.dds.port, config().dds.port);
   EXPECT_EQ(plan.config.http.port, config().http.port);

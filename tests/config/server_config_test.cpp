@@ -34,7 +34,8 @@ class ServerConfigTest : public testing::Test {
     return config.value_or(ServerConfig{});
   }
 
-  static inline const std::string kMinimal = "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n";
+  static inline const std::string kMinimal =
+      "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n";
   test::TemporaryFolder folder_;
 };
 
@@ -85,26 +86,31 @@ TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
     for (std::string key; keys >> key;) {
       const auto at = shipped.find((section.empty() ? "\n" : "\n  ") + key + ":");
       ASSERT_NE(at, std::string::npos) << key << " is not in " << kShipped;
-      if (key == "version" || key == "dds" || key == "trainer" || key == "log" || key == "http") continue;
-      EXPECT_NE(shipped.substr(at + 1, shipped.find('\n', at + 1) - at).find('#'), std::string::npos) << key;
+      if (key == "version" || key == "dds" || key == "trainer" || key == "log" || key == "http")
+        continue;
+      EXPECT_NE(shipped.substr(at + 1, shipped.find('\n', at + 1) - at).find('#'),
+                std::string::npos)
+          << key;
     }
   }
 }
 
 TEST_F(ServerConfigTest, PagesStayOnThisHostWhateverTheFileSays) {
   for (const char* address : {"0.0.0.0", "192.168.1.4", "localhost", "::1", "plant"}) {
-    const auto config =
-        read_server_config(folder_.write("server.yaml", kMinimal + fmt::format("http: {{address: '{}'}}\n", address)));
+    const auto config = read_server_config(
+        folder_.write("server.yaml", kMinimal + fmt::format("http: {{address: '{}'}}\n", address)));
     ASSERT_FALSE(config) << address;
-    EXPECT_NE(sentence(config.error()).find("stay on this host"), std::string::npos) << sentence(config.error());
+    EXPECT_NE(sentence(config.error()).find("stay on this host"), std::string::npos)
+        << sentence(config.error());
   }
-  EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {allow_network: true}\n")));
+  EXPECT_FALSE(
+      read_server_config(folder_.write("server.yaml", kMinimal + "http: {allow_network: true}\n")));
   EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {port: 80}\n")));
 }
 
 TEST_F(ServerConfigTest, LetsNoNodesInBesideSecurityWhereTheyHaveNoRole) {
-  const auto config =
-      read_server_config(folder_.write("server.yaml", kMinimal + "dds: {ros2: true, security: certificates}\n"));
+  const auto config = read_server_config(
+      folder_.write("server.yaml", kMinimal + "dds: {ros2: true, security: certificates}\n"));
   ASSERT_FALSE(config);
   EXPECT_NE(sentence(config.error()).find("ros2"), std::string::npos) << sentence(config.error());
 }
@@ -112,11 +118,11 @@ TEST_F(ServerConfigTest, LetsNoNodesInBesideSecurityWhereTheyHaveNoRole) {
 TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
       "models_in_memory_mb: 512\n"
-      "dds: {domain: 3, address: 127.0.0.2, port: 18000, compute_workers: 4, "
-      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, ros2: "
-      "true}\n"
-      "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
-      "cpu_s: 30}\n"
+      "dds: {domain: 3, address: 127.0.0.2, port: 18000, compute_workers: 4, max_clients: 7, "
+      "client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, "
+      "ros2: true}\n"
+      "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, "
+      "seed: 9, memory_mb: 64, cpu_s: 30}\n"
       "log: {level: debug, file: trammel.log, format: json}\n"
       "http: {address: 127.0.0.2, port: 9464}\n");
   EXPECT_EQ(config.log.format, "json");
@@ -151,7 +157,8 @@ TEST_F(ServerConfigTest, RefusesUnknownDoubledAndMissingKeys) {
   EXPECT_EQ(refusal_for("dds: {prot: 17500}\n"), at(5, "dds: prot"));
   EXPECT_EQ(refusal_for("trainer: {}\ntrainer: {}\n"), at(5, "trainer"));
   EXPECT_EQ(refusal_of("version: 1\nserver: a\nstore: t.db\n"), at(1, "cells"));
-  EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), at(1, "version").beyond(0, 1));
+  EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"),
+            at(1, "version").beyond(0, 1));
 }
 
 TEST_F(ServerConfigTest, APartAmongServersThatFollowEachOtherIsRefusedWithWhatToDoInstead) {
@@ -169,8 +176,10 @@ TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
   EXPECT_EQ(refusal_for("dds: {domain: 233}\n"), at(5, "dds: domain").beyond(233, 232));
   EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), at(5, "dds: compute_workers").beyond(0, 1));
   EXPECT_EQ(refusal_for("record: {folder: r, max_mb: 1}\n"), at(5, "record: max_mb").beyond(1, 8));
-  EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
-  EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"),
+            at(5, "trainer: validation_share").beyond(0, 0.05));
+  EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"),
+            at(5, "trainer: accept_ratio").beyond(-1, 0.1));
   EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), at(5, "trainer: seed").beyond(-1, 0));
   EXPECT_EQ(refusal_for("trainer: {memory_mb: 63}\n"), at(5, "trainer: memory_mb").beyond(63, 64));
   EXPECT_EQ(refusal_for("trainer: {cpu_s: 0}\n"), at(5, "trainer: cpu_s").beyond(0, 1));
@@ -178,10 +187,13 @@ TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
 }
 
 TEST_F(ServerConfigTest, RefusesWrongTypes) {
-  EXPECT_EQ(refusal_for("trainer: {queue_capacity: many}\n"), at(5, "trainer: queue_capacity").text("many"));
-  EXPECT_EQ(refusal_for("trainer: {validation_share: .nan}\n"), at(5, "trainer: validation_share").text(".nan"));
+  EXPECT_EQ(refusal_for("trainer: {queue_capacity: many}\n"),
+            at(5, "trainer: queue_capacity").text("many"));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: .nan}\n"),
+            at(5, "trainer: validation_share").text(".nan"));
   EXPECT_EQ(refusal_for("dds: 17500\n"), at(5, "dds"));
-  EXPECT_EQ(refusal_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), at(5, "dds: allow_network").text("maybe"));
+  EXPECT_EQ(refusal_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"),
+            at(5, "dds: allow_network").text("maybe"));
   EXPECT_EQ(refusal_of("- a\n- b\n"), at(1));
   EXPECT_EQ(refusal_of("version: [1\n"), at(2));
 }
@@ -192,42 +204,49 @@ TEST_F(ServerConfigTest, RefusesAWordOfConsentThatIsNoneAlsoWhereTheAddressDoesN
     EXPECT_EQ(refusal_for(fmt::format("dds: {{{}: nope}}\n", key)), at(5, field).text("nope"));
     EXPECT_EQ(refusal_for(fmt::format("dds: {{{}: 7}}\n", key)), at(5, field).text("7"));
     for (const char* no_word : {"[1]", "null", "{a: 1}"}) {
-      const auto read =
-          read_server(folder_.write("server.yaml", kMinimal + fmt::format("dds: {{{}: {}}}\n", key, no_word)));
+      const auto read = read_server(
+          folder_.write("server.yaml", kMinimal + fmt::format("dds: {{{}: {}}}\n", key, no_word)));
       ASSERT_EQ(read.problems.size(), 1u) << key << ": " << no_word;
       EXPECT_EQ(read.problems[0].field, field) << no_word;
       EXPECT_EQ(read.problems[0].row, 5) << no_word;
     }
   }
   const auto both = read_server(folder_.write(
-      "server.yaml", kMinimal + "dds: {address: 192.168.1.5, allow_network: nope, without_security: nope}\n"));
+      "server.yaml",
+      kMinimal + "dds: {address: 192.168.1.5, allow_network: nope, without_security: nope}\n"));
   EXPECT_EQ(both.problems.size(), 2u) << "each by itself, and not the address";
 }
 
 TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
-  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), at(5, "dds: address").text("192.168.1.5"));
+  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"),
+            at(5, "dds: address").text("192.168.1.5"));
   EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), at(5, "dds: address").text("0.0.0.0"));
   EXPECT_EQ(refusal_for("dds: {address: localhost}\n"), at(5, "dds: address").text("localhost"));
   EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5, allow_network: true}\n"),
             at(5, "dds: address").text("192.168.1.5"));
-  EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true, without_security: true}\n").dds.address,
+  EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true, without_security: true}\n")
+                .dds.address,
             "192.168.1.5");
-  const ServerConfig secured = read("dds: {address: 192.168.1.5, allow_network: true, security: keys}\n");
+  const ServerConfig secured =
+      read("dds: {address: 192.168.1.5, allow_network: true, security: keys}\n");
   EXPECT_EQ(secured.dds.address, "192.168.1.5");
   EXPECT_EQ(secured.dds.security, folder_.file("keys"));
 }
 
 TEST_F(ServerConfigTest, DiscoveryServersAreFewDifferentAndWithinReach) {
   const std::vector<HostPort> expected = {{"127.0.0.1", 11811}, {"127.0.0.1", 11812}};
-  EXPECT_EQ(read("dds: {discovery_servers: [127.0.0.1, '127.0.0.1:11812']}\n").dds.discovery_servers, expected);
+  EXPECT_EQ(
+      read("dds: {discovery_servers: [127.0.0.1, '127.0.0.1:11812']}\n").dds.discovery_servers,
+      expected);
   EXPECT_EQ(refusal_for("dds: {discovery_servers: ['127.0.0.1:80']}\n"),
             at(5, "dds: discovery_servers").text("127.0.0.1:80"));
   EXPECT_EQ(refusal_for("dds: {discovery_servers: [127.0.0.1, '127.0.0.1:11811']}\n"),
             at(5, "dds: discovery_servers").text("127.0.0.1:11811"));
-  EXPECT_EQ(refusal_for("dds: {discovery_servers: [10.1.0.4]}\n"), at(5, "dds: discovery_servers").text("10.1.0.4"));
-  EXPECT_EQ(refusal_for("dds: {discovery_servers: ['127.0.0.1:2001', '127.0.0.1:2002', '127.0.0.1:2003', "
-                        "'127.0.0.1:2004', '127.0.0.1:2005', '127.0.0.1:2006', '127.0.0.1:2007', '127.0.0.1:2008', "
-                        "'127.0.0.1:2009']}\n"),
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: [10.1.0.4]}\n"),
+            at(5, "dds: discovery_servers").text("10.1.0.4"));
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: ['127.0.0.1:2001', '127.0.0.1:2002', "
+                        "'127.0.0.1:2003', '127.0.0.1:2004', '127.0.0.1:2005', '127.0.0.1:2006', "
+                        "'127.0.0.1:2007', '127.0.0.1:2008', '127.0.0.1:2009']}\n"),
             at(5, "dds: discovery_servers").beyond(9, 8));
 }
 
@@ -241,12 +260,15 @@ TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {
 TEST_F(ServerConfigTest, RefusesTwoCellsOfOneNameAndACellThatCannotBeRead) {
   const std::string start = "version: 1\nserver: a\nstore: t.db\n";
   folder_.write("copy.yaml", test::small_cell_yaml("cell-7"));
-  EXPECT_EQ(refusal_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), at({}, "cells").text("cell-7"));
+  EXPECT_EQ(refusal_of(start + "cells: [cell-7.yaml, copy.yaml]\n"),
+            at({}, "cells").text("cell-7"));
   EXPECT_EQ(refusal_of(start + "cells: [nowhere.yaml]\n"), Refusal(folder_.file("nowhere.yaml")));
   EXPECT_EQ(refusal_of(start + "cells: []\n"), at(4, "cells").beyond(0, 1));
 }
 
-TEST_F(ServerConfigTest, RefusesAFileThatIsNotThere) { EXPECT_FALSE(read_server_config(folder_.file("nowhere.yaml"))); }
+TEST_F(ServerConfigTest, RefusesAFileThatIsNotThere) {
+  EXPECT_FALSE(read_server_config(folder_.file("nowhere.yaml")));
+}
 
 }  // namespace
 }  // namespace trammel

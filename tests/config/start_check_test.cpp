@@ -33,10 +33,11 @@ class StartCheckTest : public testing::Test {
     write_server("");
   }
   void write_server(const std::string& more, const std::string& store = "t.db") {
-    server_ =
-        folder_.write("server.yaml", fmt::format("version: 1\nserver: a\ncells: [cell-7.yaml, cell-8.yaml]\nstore: {}\n"
-                                                 "dds: {{port: {}}}\n{}",
-                                                 store, own_ports(), more));
+    server_ = folder_.write(
+        "server.yaml",
+        fmt::format("version: 1\nserver: a\ncells: [cell-7.yaml, cell-8.yaml]\nstore: {}\n"
+                    "dds: {{port: {}}}\n{}",
+                    store, own_ports(), more));
   }
   /// cell-7 with `old` replaced.
   void change_cell(const std::string& old, const std::string& with) {
@@ -58,14 +59,17 @@ class StartCheckTest : public testing::Test {
     return all;
   }
   /// One of the problems is of this file and key, with this word or value as it stands there.
-  void expect_problem(const std::string& file, const std::string& field, const std::string& is = "") const {
+  void expect_problem(const std::string& file, const std::string& field,
+                      const std::string& is = "") const {
     const std::vector<Error> found = check().problems;
     const auto is_it = [&](const Error& problem) {
       const std::string value = problem.value ? fmt::format("{:g}", *problem.value) : "";
       return problem.file == folder_.file(file) && problem.field == field &&
              (is.empty() || problem.text == is || problem.text == folder_.file(is) || value == is);
     };
-    EXPECT_TRUE(std::any_of(found.begin(), found.end(), is_it)) << file << " " << field << " is not in\n" << problems();
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), is_it))
+        << file << " " << field << " is not in\n"
+        << problems();
   }
 
   test::TemporaryFolder folder_;
@@ -75,7 +79,8 @@ class StartCheckTest : public testing::Test {
   std::map<std::string, std::string> listing() const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
-      files[entry.path().string()] = entry.is_regular_file() ? test::read_file(entry.path().string()) : "";
+      files[entry.path().string()] =
+          entry.is_regular_file() ? test::read_file(entry.path().string()) : "";
     }
     return files;
   }
@@ -83,7 +88,8 @@ class StartCheckTest : public testing::Test {
 
 TEST_F(StartCheckTest, WhatCanStartHasNoProblems) {
   EXPECT_EQ(problems(), "");
-  static_cast<void>(test::demand(Store::open(folder_.file("t.db"))));  // a store that was there before
+  static_cast<void>(
+      test::demand(Store::open(folder_.file("t.db"))));  // a store that was there before
   EXPECT_EQ(problems(), "");
 }
 
@@ -107,7 +113,8 @@ TEST_F(StartCheckTest, WhatIsWrongWithTheFilesIsNamed) {
   expect_problem("nowhere.yaml", "robot");
   change_cell("tracker:", "traker:");
   expect_problem("cell-7.yaml", "traker");
-  folder_.write("robot.yaml", "version: 1\nname: x\njoints: [{d_mm: long, a_mm: 1, limits_deg: [0, 1]}]\n");
+  folder_.write("robot.yaml",
+                "version: 1\nname: x\njoints: [{d_mm: long, a_mm: 1, limits_deg: [0, 1]}]\n");
   expect_problem("robot.yaml", "joints 1: d_mm", "long");
   write_server("log: {level: wran}\n");
   expect_problem("server.yaml", "log: level", "wran");
@@ -117,9 +124,10 @@ TEST_F(StartCheckTest, WhatIsWrongWithTheFilesIsNamed) {
 
 TEST_F(StartCheckTest, EveryProblemIsNamedInOneRun) {
   change_cell("bias: none", "bias: rbf");
-  folder_.write("cell-8.yaml",
-                "version: 2\ncell: a b\nrobot: nowhere.yaml\ntools: {}\ntracker: {sigma_mm: -1}\nnoise: 1\n"
-                "model: {error_sources: base}\n");
+  folder_.write(
+      "cell-8.yaml",
+      "version: 2\ncell: a b\nrobot: nowhere.yaml\ntools: {}\ntracker: {sigma_mm: -1}\nnoise: 1\n"
+      "model: {error_sources: base}\n");
   write_server("trainer: {seed: -1, accept_ratio: 99}\nlog: {level: loud}\n", "nowhere/t.db");
   expect_problem("cell-7.yaml", "model: bias", "rbf");
   expect_problem("cell-8.yaml", "version", "2");

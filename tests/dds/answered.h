@@ -36,7 +36,8 @@ class Answered final : private ReplySink {
     const std::string id = request_id_text(request.header().request_id());
     auto received = std::make_unique<wire::Received<Request>>();
     static_cast<Request&>(*received) = request;
-    return std::make_unique<Call<Operation>>(context_, std::move(received), ReplyAddress{}, id, nullptr);
+    return std::make_unique<Call<Operation>>(context_, std::move(received), ReplyAddress{}, id,
+                                             nullptr);
   }
   void send(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
     replies_.push_back(*static_cast<Reply*>(reply.get()));

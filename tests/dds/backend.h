@@ -34,7 +34,8 @@ inline CompensatedModel shifted_model(const std::shared_ptr<const Cell>& cell, d
     identified.value = parts.physics.values[static_cast<Eigen::Index>(i)];
     parts.parameters.push_back(identified);
   }
-  parts.covariance = Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
+  parts.covariance =
+      Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
   parts.q_min = JointVector::Constant(cell->robot.size(), from_deg(-60));
   parts.q_max = JointVector::Constant(cell->robot.size(), from_deg(60));
   parts.trained_with = {{"spindle", cell->payloads.empty() ? "" : cell->payloads.begin()->first}};
@@ -53,14 +54,15 @@ struct Backend {
     if (!opened) throw std::runtime_error(opened.error().message);
     store = std::move(*opened);
     trainer = std::make_unique<Trainer>(
-        std::map<std::string, std::shared_ptr<const Cell>>{{"cell-7", cell}, {"cell-8", small_cell("cell-8")}}, *store,
-        registry, options);
+        std::map<std::string, std::shared_ptr<const Cell>>{{"cell-7", cell},
+                                                           {"cell-8", small_cell("cell-8")}},
+        *store, registry, options);
   }
 
   /// Puts a model that predicts `version` tenths of a millimetre in force, in memory only.
   std::shared_ptr<const ServedModel> serve(int version) {
-    auto served =
-        std::make_shared<const ServedModel>(ServedModel{"cell-7", version, shifted_model(cell, version * 1e-4)});
+    auto served = std::make_shared<const ServedModel>(
+        ServedModel{"cell-7", version, shifted_model(cell, version * 1e-4)});
     registry.publish(served);
     return served;
   }

@@ -167,7 +167,8 @@ TEST(ChannelBook, AParticipantThatComesUnderOneNameAfterTheOtherOpensFewChannels
   EXPECT_LE(opened.size(), 30u);
   EXPECT_GE(opened.size(), 8u) << "who comes again now and then";
   EXPECT_TRUE(desk.has("honest"));
-  for (const char* name : {"a", "b", "c"}) desk.book.found({"other", name, "PredictError_Reply"}, desk.now);
+  for (const char* name : {"a", "b", "c"})
+    desk.book.found({"other", name, "PredictError_Reply"}, desk.now);
   desk.tend();
   for (const char* name : {"a", "b", "c"}) EXPECT_TRUE(desk.has(name)) << "somebody else";
 }
@@ -178,7 +179,8 @@ TEST(ChannelBook, OnlyTheFirstWhoListensInAPartitionIsAnsweredThere) {
   desk.book.found({"a stranger", "a", "PredictError_Reply"}, desk.now);
   EXPECT_TRUE(desk.book.may_listen("participant of a", "a"));
   EXPECT_FALSE(desk.book.may_listen("a stranger", "a"));
-  EXPECT_TRUE(desk.book.may_listen("a stranger", "somewhere else")) << "its reader may be found in a moment";
+  EXPECT_TRUE(desk.book.may_listen("a stranger", "somewhere else"))
+      << "its reader may be found in a moment";
   EXPECT_FALSE(desk.book.listens("a stranger", "somewhere else"));
   desk.book.lost({"a stranger", "a", "PredictError_Reply"});
   desk.leaves("b");
@@ -201,7 +203,8 @@ TEST(ChannelBook, AClientThatIsStartedAgainUnderItsNameFollowsTheOneThatDied) {
 
 TEST(ChannelBook, OneParticipantThatListensInAThousandPartitionsTakesFewChannels) {
   Desk desk(100);
-  for (int i = 0; i < 1000; ++i) desk.book.found({"one", "p" + std::to_string(i), "PredictError_Reply"}, desk.now);
+  for (int i = 0; i < 1000; ++i)
+    desk.book.found({"one", "p" + std::to_string(i), "PredictError_Reply"}, desk.now);
   desk.comes("honest");
   for (int i = 0; i < 100; ++i) desk.tend(milliseconds(200));
   EXPECT_LE(desk.open.size(), 10U);

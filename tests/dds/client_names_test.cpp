@@ -10,7 +10,8 @@
 namespace trammel {
 namespace {
 
-/// GUIDs that begin as DDS-Security has them begin: computed from the DER of the subjects, outside this program.
+/// GUIDs that begin as DDS-Security has them begin: computed from the DER of the subjects, outside
+/// this program.
 std::string participant(std::initializer_list<unsigned char> begin, unsigned char process = 7) {
   std::string octets(begin.begin(), begin.end());
   octets.resize(12, static_cast<char>(process));
@@ -25,11 +26,14 @@ constexpr const char* kName = "CN=engineer-1,O=Trammel";
 
 TEST(ConfirmedSubject, AClaimCountsWhereTheGuidHasItsHash) {
   EXPECT_EQ(wire::confirmed_subject(kClaim, kEngineer), kName);
-  EXPECT_EQ(wire::confirmed_subject(kClaim, kPrintable), kName) << "however the authority encodes it";
-  EXPECT_EQ(wire::confirmed_subject("/O=Fr\\xC3\\xA4serei A/B/CN=x", kUmlaut), "CN=x,O=Fr\\C3\\A4serei A/B");
+  EXPECT_EQ(wire::confirmed_subject(kClaim, kPrintable), kName)
+      << "however the authority encodes it";
+  EXPECT_EQ(wire::confirmed_subject("/O=Fr\\xC3\\xA4serei A/B/CN=x", kUmlaut),
+            "CN=x,O=Fr\\C3\\A4serei A/B");
   EXPECT_EQ(wire::confirmed_subject(kClaim, kEngineer2), "") << "a forged token";
   EXPECT_EQ(wire::confirmed_subject("/CN=engineer-1/O=Trammel", kEngineer), "") << "another order";
-  for (const char* nonsense : {"", "/", "=", "/=", "/CN", "/CN=", "\\x", "/CN=\\x", "/CN=\\xC", "/CN=\\xZZ"})
+  for (const char* nonsense :
+       {"", "/", "=", "/=", "/CN", "/CN=", "\\x", "/CN=\\x", "/CN=\\xC", "/CN=\\xZZ"})
     EXPECT_EQ(wire::confirmed_subject(nonsense, kEngineer), "") << nonsense;
   EXPECT_EQ(wire::confirmed_subject(kClaim, ""), "");
   EXPECT_EQ(wire::confirmed_subject(std::string(1 << 20, '/'), kEngineer), "");
@@ -63,7 +67,8 @@ TEST(ClientNames, WhoIsRefusedIsToldByWhatItHasSaidOfItself) {
   names.announced(kPrintable, "", "10.1.0.9");
   EXPECT_EQ(names.refused(kPrintable), "shows no certificate, at 10.1.0.9");
   names.left(kPrintable);
-  EXPECT_EQ(names.refused(kPrintable), "says nothing of itself") << "forgotten with the participant";
+  EXPECT_EQ(names.refused(kPrintable), "says nothing of itself")
+      << "forgotten with the participant";
 }
 
 TEST(ClientNames, ANameIsForgottenOnceItsRequestsAreOver) {

@@ -33,7 +33,9 @@ struct Announcement {
 
 /// A participant that announces itself, behind a time stamp, as RTPS 2.3 lays it out.
 Bytes message_of(const Announcement& a) {
-  const auto n = [&](std::uint32_t value, std::size_t size) { return number(value, size, a.little_endian); };
+  const auto n = [&](std::uint32_t value, std::size_t size) {
+    return number(value, size, a.little_endian);
+  };
   const auto parameter = [&](std::uint32_t id, const Bytes& value) {
     Bytes bytes = n(id, 2);
     add(bytes, n(static_cast<std::uint32_t>(value.size()), 2));
@@ -78,7 +80,8 @@ TEST(DomainGate, AnAnnouncementOfAnotherDomainIsKnownByItsParameterOrItsUserData
     for (const bool inline_qos : {true, false}) {
       for (const bool last : {true, false}) {
         const auto other = [&](std::optional<std::uint32_t> domain, const std::string& user_data) {
-          return is_of_another_domain(message_of({little_endian, domain, user_data, inline_qos, last}), 5);
+          return is_of_another_domain(
+              message_of({little_endian, domain, user_data, inline_qos, last}), 5);
         };
         EXPECT_FALSE(other({}, "")) << "it does not say";
         EXPECT_FALSE(other(5, ""));

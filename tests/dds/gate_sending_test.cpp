@@ -30,7 +30,8 @@ using eprosima::fastrtps::rtps::Locator_t;
 using eprosima::fastrtps::rtps::LocatorsIterator;
 using eprosima::fastrtps::rtps::SenderResource;
 
-constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kResident = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9},
+constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
+                 kResident = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9},
                  kNewcomer = {1, 15, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
 constexpr std::uint32_t kPublications = 0x000003c2, kTheirReader = 0x000003c7;
 constexpr std::uint16_t kOfResident = 2001, kOfNewcomer = 2002;  // UDP ports
@@ -39,8 +40,8 @@ constexpr std::uint16_t kOfResident = 2001, kOfNewcomer = 2002;  // UDP ports
 class CountedSends final : public SenderResource {
  public:
   CountedSends() : SenderResource(LOCATOR_KIND_UDPv4) {
-    send_lambda_ = [this](const unsigned char*, std::uint32_t, LocatorsIterator* first, LocatorsIterator* last,
-                          const std::chrono::steady_clock::time_point&) {
+    send_lambda_ = [this](const unsigned char*, std::uint32_t, LocatorsIterator* first,
+                          LocatorsIterator* last, const std::chrono::steady_clock::time_point&) {
       for (; *first != *last; ++*first) ports_.push_back((**first).port);
       return true;
     };
@@ -56,7 +57,8 @@ class CountedSends final : public SenderResource {
 /// What the library would get.
 class HeardMessages final : public rtps::TransportReceiverInterface {
  public:
-  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&, const Locator_t&) override {
+  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&,
+                      const Locator_t&) override {
     ++messages;
   }
   int messages = 0;
@@ -66,8 +68,11 @@ PacketBytes announcement(const Prefix& of, std::uint16_t port) {
   PacketBytes lease;
   test::put32(lease, 10);
   test::put32(lease, 0);
-  const ParameterList list =
-      ParameterList().guid(0x0050, of, 0x000001c1).locator(0x0032, port).locator(0x0031, port).add(0x0002, lease);
+  const ParameterList list = ParameterList()
+                                 .guid(0x0050, of, 0x000001c1)
+                                 .locator(0x0032, port)
+                                 .locator(0x0031, port)
+                                 .add(0x0002, lease);
   return Packet(of).data({0, 0x000100c2, 1, {}, list.payload()}).bytes();
 }
 
@@ -75,20 +80,23 @@ class GateSending : public testing::Test {
  protected:
   explicit GateSending(const GateOptions& options = {})
       : gate_(dynamic_cast<rtps::ChainingTransport*>(
-            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)->create_transport())) {
+            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)
+                ->create_transport())) {
     hear(announcement(kResident, kOfResident));
     hear(announcement(kNewcomer, kOfNewcomer));
   }
   void hear(const PacketBytes& message) {
-    gate_->receive(&heard_, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
-                   locator("127.0.0.1", 3000));
+    gate_->receive(&heard_, message.data(), static_cast<std::uint32_t>(message.size()),
+                   locator("127.0.0.1", 2000), locator("127.0.0.1", 3000));
   }
   /// To both of them.
   void send(const PacketBytes& message) {
     rtps::LocatorList to;
-    for (const std::uint16_t port : {kOfResident, kOfNewcomer}) to.push_back(locator("127.0.0.1", port));
+    for (const std::uint16_t port : {kOfResident, kOfNewcomer})
+      to.push_back(locator("127.0.0.1", port));
     rtps::Locators first(to.begin()), last(to.end());
-    gate_->send(&sends_, message.data(), static_cast<std::uint32_t>(message.size()), &first, &last, {});
+    gate_->send(&sends_, message.data(), static_cast<std::uint32_t>(message.size()), &first, &last,
+                {});
   }
   static PacketBytes offer(std::uint32_t count) {
     return Packet(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, count).bytes();
@@ -148,9 +156,13 @@ TEST_F(GuardedGate, WhatComesInOurOwnNameIsHeardOnlyWhereWeHaveSentIt) {
   EXPECT_EQ(heard(offer(8)), 0) << "a count that we have not said";
   EXPECT_EQ(heard(Packet(kSelf).heartbeat(kTheirReader, kPublications, 900, 900, 7).bytes()), 0);
   send(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes());
-  EXPECT_EQ(heard(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 0)
+  EXPECT_EQ(
+      heard(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()),
+      0)
       << "it was for somebody else";
-  EXPECT_EQ(heard(Packet(kResident).to(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 1);
+  EXPECT_EQ(
+      heard(Packet(kResident).to(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()),
+      1);
 }
 
 TEST(Hearing, WhatComesBeforeTheLibraryHearsWaits) {
@@ -158,19 +170,20 @@ TEST(Hearing, WhatComesBeforeTheLibraryHearsWaits) {
   GateOptions options;
   options.hearing = hearing;
   const std::unique_ptr<rtps::ChainingTransport> gate(dynamic_cast<rtps::ChainingTransport*>(
-      with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)->create_transport()));
+      with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)
+          ->create_transport()));
   HeardMessages heard;
   const PacketBytes message = announcement(kResident, kOfResident);
   auto received = std::async(std::launch::async, [&] {
-    gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
-                  locator("127.0.0.1", 3000));
+    gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()),
+                  locator("127.0.0.1", 2000), locator("127.0.0.1", 3000));
   });
   EXPECT_EQ(received.wait_for(milliseconds(100)), std::future_status::timeout);
   hearing->begins();
   received.get();
   EXPECT_EQ(heard.messages, 1);
-  gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
-                locator("127.0.0.1", 3000));
+  gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()),
+                locator("127.0.0.1", 2000), locator("127.0.0.1", 3000));
   EXPECT_EQ(heard.messages, 2);
 }
 

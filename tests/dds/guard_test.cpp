@@ -24,18 +24,22 @@ using test::PacketBytes;
 using test::ParameterList;
 using test::Prefix;
 
-constexpr Prefix kSource = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr Prefix kSource = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
+                 kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
 constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;
 constexpr std::uint32_t kUserWriter = 0x00000103, kUserReader = 0x00000104;
 /// A socket of 127.0.0.1, as the guard numbers it.
-constexpr std::uint64_t loopback(std::uint16_t port) { return std::uint64_t{port} << 32 | 0x7f000001u; }
+constexpr std::uint64_t loopback(std::uint16_t port) {
+  return std::uint64_t{port} << 32 | 0x7f000001u;
+}
 constexpr std::uint64_t kSocket = loopback(4711), kOtherSocket = loopback(4712);
 const PacketBytes kSample = {0, 1, 0, 0, 1, 2, 3, 4};
 
 /// Why the guard drops it; empty: it passes.
 std::optional<Dropped> fate(Guard& guard, const PacketBytes& message) {
   std::vector<std::uint64_t> before;
-  for (std::size_t i = 0; i < kDroppedReasons; ++i) before.push_back(guard.counts().of(static_cast<Dropped>(i)));
+  for (std::size_t i = 0; i < kDroppedReasons; ++i)
+    before.push_back(guard.counts().of(static_cast<Dropped>(i)));
   if (guard.check(message, kSocket)) return std::nullopt;
   for (std::size_t i = 0; i < kDroppedReasons; ++i) {
     if (guard.counts().of(static_cast<Dropped>(i)) == before[i] + 1) return static_cast<Dropped>(i);
@@ -65,13 +69,17 @@ ParameterList participant(std::uint32_t lease_s = 10) {
       .add(0x0002, lasting(lease_s));
 }
 ParameterList writer() {
-  return ParameterList().guid(0x005a, kSource, kUserWriter).text(0x0005, "Topic").text(0x0007, "Type");
+  return ParameterList()
+      .guid(0x005a, kSource, kUserWriter)
+      .text(0x0005, "Topic")
+      .text(0x0007, "Type");
 }
 PacketBytes announcement(const ParameterList& list, std::uint32_t by = kAnnouncer) {
   return from().data({0, by, 1, {}, list.payload()}).bytes();
 }
 /// A list with one more parameter, whose value is so many words.
-PacketBytes with(std::uint16_t id, const std::vector<std::uint32_t>& words, std::uint32_t by = kPublications) {
+PacketBytes with(std::uint16_t id, const std::vector<std::uint32_t>& words,
+                 std::uint32_t by = kPublications) {
   PacketBytes value;
   for (const std::uint32_t word : words) test::put32(value, word);
   return announcement(writer().add(id, value), by);
@@ -82,16 +90,27 @@ TEST(Guard, WhatHonestParticipantsSendPasses) {
   EXPECT_EQ(fate(guard, announcement(participant())), kPasses);
   EXPECT_EQ(fate(guard, announcement(writer(), kPublications)), kPasses);
   EXPECT_EQ(fate(guard, announcement(writer(), kSubscriptions)), kPasses);
-  EXPECT_EQ(fate(guard, from().data({0, kUserWriter, 1, {}, kSample}).heartbeat(0, kUserWriter, 1, 1, 1).bytes()),
-            kPasses);
-  EXPECT_EQ(fate(guard, from().to(kOther).heartbeat(0, kUserWriter, 1, 0, 2).bytes()), kPasses) << "nothing sent yet";
+  EXPECT_EQ(
+      fate(
+          guard,
+          from().data({0, kUserWriter, 1, {}, kSample}).heartbeat(0, kUserWriter, 1, 1, 1).bytes()),
+      kPasses);
+  EXPECT_EQ(fate(guard, from().to(kOther).heartbeat(0, kUserWriter, 1, 0, 2).bytes()), kPasses)
+      << "nothing sent yet";
   EXPECT_EQ(fate(guard, from().gap(0, kUserWriter, 2, 9).bytes()), kPasses);
-  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 0, 0, 1).bytes()), kPasses) << "before any";
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 0, 0, 1).bytes()), kPasses)
+      << "before any";
   EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 7, 256, 2).bytes()), kPasses);
-  EXPECT_EQ(fate(guard, from().fragments({0, kUserWriter, 9, 1, 2, 1024, 4096, PacketBytes(2048)}).bytes()), kPasses);
-  EXPECT_EQ(fate(guard, from().submessage(0x09, 1, PacketBytes(8)).submessage(0x01, 1, {}).bytes()), kPasses);
-  const PacketBytes leaves = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
-  EXPECT_EQ(fate(guard, from().data({0, kAnnouncer, 2, leaves, {}}).bytes()), kPasses) << "it leaves";
+  EXPECT_EQ(
+      fate(guard,
+           from().fragments({0, kUserWriter, 9, 1, 2, 1024, 4096, PacketBytes(2048)}).bytes()),
+      kPasses);
+  EXPECT_EQ(fate(guard, from().submessage(0x09, 1, PacketBytes(8)).submessage(0x01, 1, {}).bytes()),
+            kPasses);
+  const PacketBytes leaves =
+      ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_EQ(fate(guard, from().data({0, kAnnouncer, 2, leaves, {}}).bytes()), kPasses)
+      << "it leaves";
 }
 
 TEST(Guard, WhatIsNoRtpsMessageIsDropped) {
@@ -100,19 +119,22 @@ TEST(Guard, WhatIsNoRtpsMessageIsDropped) {
   PacketBytes other = from().data({0, kUserWriter, 1, {}, kSample}).bytes();
   other[4] = 1;
   EXPECT_EQ(fate(other), Dropped::kHeader) << "version 1";
-  EXPECT_EQ(fate(Packet(Prefix{}).data({0, kUserWriter, 1, {}, kSample}).bytes()), Dropped::kSource);
+  EXPECT_EQ(fate(Packet(Prefix{}).data({0, kUserWriter, 1, {}, kSample}).bytes()),
+            Dropped::kSource);
 }
 
 TEST(Guard, SubmessagesThatDoNotFitAreDropped) {
   const PacketBytes data = from().data({0, kUserWriter, 1, {}, kSample}).bytes();
   for (std::size_t size = kHeader + 1; size < data.size(); ++size) {
-    EXPECT_EQ(fate(PacketBytes(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size))), Dropped::kLength)
+    EXPECT_EQ(fate(PacketBytes(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size))),
+              Dropped::kLength)
         << size << " of " << data.size() << " bytes";
   }
   PacketBytes odd = from().submessage(0x01, 1, PacketBytes(3)).bytes();
   test::put_bytes(odd, {0x01, 1, 0, 0});
   EXPECT_EQ(fate(odd), Dropped::kLength) << "the library would go on at another place";
-  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {}, {}}).bytes()), Dropped::kLength) << "neither data nor state";
+  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {}, {}}).bytes()), Dropped::kLength)
+      << "neither data nor state";
   PacketBytes both = data;
   both[kHeader + 1] |= kKey;
   EXPECT_EQ(fate(both), Dropped::kLength) << "data and key at once";
@@ -135,14 +157,17 @@ TEST(Guard, AStatisticsSubmessagePassesNowhere) {
   const PacketBytes honest = with_statistics(56, true);
   const auto passed = guard.check(honest, kSocket);
   ASSERT_TRUE(passed);
-  EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), from().data({0, kUserWriter, 1, {}, kSample}).bytes())
+  EXPECT_EQ(PacketBytes(passed->begin(), passed->end()),
+            from().data({0, kUserWriter, 1, {}, kSample}).bytes())
       << "without it";
 }
 
 TEST(Guard, NobodySpeaksInTheNameOfAnother) {
   EXPECT_EQ(fate(announcement(ParameterList().guid(0x0050, kOther, 0x000001c1))), Dropped::kSource);
-  EXPECT_EQ(fate(announcement(ParameterList().guid(0x005a, kOther, kUserWriter), kPublications)), Dropped::kSource);
-  const PacketBytes ends_another = ParameterList().guid(0x0070, kOther, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_EQ(fate(announcement(ParameterList().guid(0x005a, kOther, kUserWriter), kPublications)),
+            Dropped::kSource);
+  const PacketBytes ends_another =
+      ParameterList().guid(0x0070, kOther, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   EXPECT_EQ(fate(from().data({0, kAnnouncer, 2, ends_another, {}}).bytes()), Dropped::kSource);
   EXPECT_EQ(fate(from().submessage(kInfoSource, 1, PacketBytes(20)).bytes()), Dropped::kSource);
 }
@@ -150,15 +175,21 @@ TEST(Guard, NobodySpeaksInTheNameOfAnother) {
 TEST(Guard, NumbersThatNoWriterReachesAreDropped) {
   constexpr std::int64_t kHuge = std::int64_t{1} << 62;
   for (const std::int64_t number : {std::int64_t{0}, std::int64_t{-1}, kHuge}) {
-    EXPECT_EQ(fate(from().data({0, kUserWriter, number, {}, kSample}).bytes()), Dropped::kNumber) << number;
-    EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, number, number, 1).bytes()), Dropped::kNumber) << number;
+    EXPECT_EQ(fate(from().data({0, kUserWriter, number, {}, kSample}).bytes()), Dropped::kNumber)
+        << number;
+    EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, number, number, 1).bytes()), Dropped::kNumber)
+        << number;
     EXPECT_EQ(fate(from().gap(0, kUserWriter, number, 5).bytes()), Dropped::kNumber) << number;
     EXPECT_EQ(fate(from().gap(0, kUserWriter, 1, number).bytes()), Dropped::kNumber) << number;
-    EXPECT_EQ(fate(from().fragments({0, kUserWriter, number, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes()),
+    EXPECT_EQ(fate(from()
+                       .fragments({0, kUserWriter, number, 1, 1, 1024, 4096, PacketBytes(1024)})
+                       .bytes()),
               Dropped::kNumber);
   }
-  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 5, 3, 1).bytes()), Dropped::kNumber) << "ends before it begins";
-  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 1, 1 << 30, 1).bytes()), Dropped::kNumber) << "no history is so long";
+  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 5, 3, 1).bytes()), Dropped::kNumber)
+      << "ends before it begins";
+  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 1, 1 << 30, 1).bytes()), Dropped::kNumber)
+      << "no history is so long";
   EXPECT_EQ(fate(from().acknack(kUserReader, kUserWriter, -1, 0, 1).bytes()), Dropped::kNumber);
 }
 
@@ -172,7 +203,8 @@ TEST(Guard, SetsOfMoreThan256NumbersAreDropped) {
   EXPECT_EQ(fate(from().submessage(kGap, 1, body).bytes()), Dropped::kNumberSet);
   body.resize(body.size() - 4);
   test::put32(body, 256);
-  EXPECT_EQ(fate(from().submessage(kGap, 1, body).bytes()), Dropped::kNumberSet) << "without its bits";
+  EXPECT_EQ(fate(from().submessage(kGap, 1, body).bytes()), Dropped::kNumberSet)
+      << "without its bits";
 }
 
 TEST(Guard, CountsAndLengthsOfAnnouncementsStayWithinTheirParameter) {
@@ -197,22 +229,25 @@ TEST(Guard, CountsAndLengthsOfAnnouncementsStayWithinTheirParameter) {
       {"a lease", with(0x0002, {1, 2, 3}, kAnnouncer)},
       {"a lease that is negative", with(0x0002, {0x80000000u, 0}, kAnnouncer)},
   };
-  for (const auto& [what, message] : hostile) EXPECT_EQ(fate(message), Dropped::kParameters) << what;
+  for (const auto& [what, message] : hostile)
+    EXPECT_EQ(fate(message), Dropped::kParameters) << what;
   EXPECT_EQ(fate(with(0x0073, {2, 0})), kPasses);
   EXPECT_EQ(fate(with(0x0029, {2, 2, 0x41, 1, 0})), kPasses);
 
   PacketBytes endless = writer().payload();
   endless.resize(endless.size() - 4);
-  EXPECT_EQ(fate(from().data({0, kPublications, 1, {}, endless}).bytes()), Dropped::kParameters) << "no sentinel";
-  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {0x70, 0, 0xff, 0x7f}, kSample}).bytes()), Dropped::kParameters);
+  EXPECT_EQ(fate(from().data({0, kPublications, 1, {}, endless}).bytes()), Dropped::kParameters)
+      << "no sentinel";
+  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {0x70, 0, 0xff, 0x7f}, kSample}).bytes()),
+            Dropped::kParameters);
   ParameterList crowded = participant();
   for (int i = 0; i < 100; ++i) crowded.locator(0x0032, 1);
   EXPECT_EQ(fate(announcement(crowded)), Dropped::kParameters) << "a hundred addresses to send to";
 }
 
 TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
-  for (const std::uint16_t id :
-       std::initializer_list<std::uint16_t>{0x0069, 0x0072, 0x0075, 0x0035}) {  // type objects, content filters
+  for (const std::uint16_t id : std::initializer_list<std::uint16_t>{
+           0x0069, 0x0072, 0x0075, 0x0035}) {  // type objects, content filters
     Guard guard(kMaxTextSample);
     const PacketBytes message = with(id, {0xfffffff0u, 0});
     const auto passed = guard.check(message, kSocket);
@@ -222,20 +257,24 @@ TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
 }
 
 /// The message of kSource as the library sees it; empty: not at all.
-PacketBytes let_in(Guard& guard, const PacketBytes& message, Guard::Time now = std::chrono::steady_clock::now()) {
+PacketBytes let_in(Guard& guard, const PacketBytes& message,
+                   Guard::Time now = std::chrono::steady_clock::now()) {
   const auto passed = guard.check(message, kSocket, now);
   return passed ? PacketBytes(passed->begin(), passed->end()) : PacketBytes();
 }
 /// `guard` is that of kOther, to whom kSource has spoken.
-void speak(Guard& guard, const Prefix& who = kSource, Guard::Time now = std::chrono::steady_clock::now()) {
+void speak(Guard& guard, const Prefix& who = kSource,
+           Guard::Time now = std::chrono::steady_clock::now()) {
   guard.sent(Packet(kOther).bytes());
-  ASSERT_TRUE(guard.check(Packet(who).to(kOther).acknack(kUserReader, kUserWriter, 0, 0, 1).bytes(), kSocket, now));
+  ASSERT_TRUE(guard.check(Packet(who).to(kOther).acknack(kUserReader, kUserWriter, 0, 0, 1).bytes(),
+                          kSocket, now));
 }
 
 TEST(Guard, AParticipantThatIsNotHeardIsNotKeptForEver) {
   Guard guard(kMaxTextSample);
   const PacketBytes message = announcement(participant(0x7fffffffu));
-  EXPECT_EQ(let_in(guard, message), announcement(participant(ParticipantWatch::kStrangersLease.count())));
+  EXPECT_EQ(let_in(guard, message),
+            announcement(participant(ParticipantWatch::kStrangersLease.count())));
   speak(guard);
   EXPECT_EQ(let_in(guard, message), announcement(participant(kLongestLeaseSeconds)));
 }
@@ -249,7 +288,8 @@ TEST(Guard, WhoHasNotSpokenToUsYetIsAStrangerWithAShortLease) {
   speak(guard);
   EXPECT_EQ(let_in(guard, message), message);
   const ParameterList without = ParameterList().guid(0x0050, kSource, 0x000001c1);
-  EXPECT_EQ(fate(announcement(without)), Dropped::kParticipants) << "the library would keep it for 100 s";
+  EXPECT_EQ(fate(announcement(without)), Dropped::kParticipants)
+      << "the library would keep it for 100 s";
   EXPECT_EQ(fate(guard, announcement(without)), kPasses) << "one who is known";
 }
 
@@ -281,9 +321,12 @@ TEST(Guard, AStrangerTakesNoAnswersFromWhoIsKnown) {
   ASSERT_FALSE(let_in(guard, announcement(participant().locator(0x0032, 5)), now).empty());
   speak(guard, kSource, now);
   const Prefix stranger = {1, 15, 7};
-  const ParameterList names = ParameterList().guid(0x0050, stranger, 0x000001c1).add(0x0002, lasting(10));
+  const ParameterList names =
+      ParameterList().guid(0x0050, stranger, 0x000001c1).add(0x0002, lasting(10));
   ASSERT_TRUE(guard.check(
-      Packet(stranger).data({0, kAnnouncer, 1, {}, ParameterList(names).locator(0x0032, 5).payload()}).bytes(),
+      Packet(stranger)
+          .data({0, kAnnouncer, 1, {}, ParameterList(names).locator(0x0032, 5).payload()})
+          .bytes(),
       kOtherSocket, now));
   for (int i = 0; i < 100; ++i) EXPECT_TRUE(guard.lets_out(loopback(5), now));
 }
@@ -340,7 +383,8 @@ TEST(Guard, AnEndpointListensWhereItsParticipantDoesAndNowhereElse) {
 
 /// Says that kSource has gone.
 PacketBytes goodbye() {
-  const PacketBytes gone = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  const PacketBytes gone =
+      ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   return from().data({0, kAnnouncer, 2, gone, {}}).bytes();
 }
 /// The same as Cyclone DDS says it: by a key, and in the inline QoS the status alone.
@@ -360,11 +404,13 @@ std::vector<int> kinds(const PacketBytes& message) {
   return ids;
 }
 
-// The library's thread that ends leases may be at the same participant: one of both ends the process.
+// The library's thread that ends leases may be at the same participant: one of both ends the
+// process.
 TEST(Guard, AGoodbyeReachesNoReaderOfTheLibraryAndTheLeaseDecides) {
   const PacketBytes with_payload =
       from()
-          .data({0, kAnnouncer, 2, ParameterList().add(0x0071, {0, 0, 0, 3}).bytes(), participant().payload()})
+          .data({0, kAnnouncer, 2, ParameterList().add(0x0071, {0, 0, 0, 3}).bytes(),
+                 participant().payload()})
           .bytes();
   for (const PacketBytes& message : {goodbye(), goodbye_by_key(kSource), with_payload}) {
     Guard guard(kMaxTextSample);
@@ -383,9 +429,11 @@ TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
     Guard guard(kMaxTextSample);
     const PacketBytes passed = let_in(guard, goodbye_by_key(kSource, by));
     ASSERT_FALSE(passed.empty());
-    const PacketBytes hash = ParameterList().add(0x0071, {0, 0, 0, 3}).guid(0x0070, kSource, 0x000001c1).bytes();
+    const PacketBytes hash =
+        ParameterList().add(0x0071, {0, 0, 0, 3}).guid(0x0070, kSource, 0x000001c1).bytes();
     const auto at = std::search(passed.begin(), passed.end(), hash.begin(), hash.end());
-    EXPECT_EQ(at - passed.begin(), static_cast<std::ptrdiff_t>(kHeader + 4 + 20)) << "behind the head of its sample";
+    EXPECT_EQ(at - passed.begin(), static_cast<std::ptrdiff_t>(kHeader + 4 + 20))
+        << "behind the head of its sample";
     EXPECT_EQ(passed[kHeader + 1], kLittleEndian | kInlineQos);
   }
   EXPECT_EQ(fate(goodbye_by_key(kOther)), Dropped::kSource);
@@ -397,23 +445,27 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreNobodyIsSentAwayWithoutProof) {
   Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
   EXPECT_EQ(kinds(let_in(open, goodbye())), std::vector<int>{kData});
   EXPECT_EQ(kinds(let_in(secured, goodbye())), std::vector<int>{kPad});
-  const PacketBytes of_writer = ParameterList().guid(0x0070, kSource, kUserWriter).add(0x0071, {0, 0, 0, 3}).bytes();
+  const PacketBytes of_writer =
+      ParameterList().guid(0x0070, kSource, kUserWriter).add(0x0071, {0, 0, 0, 3}).bytes();
   const PacketBytes writer_gone = from().data({0, kPublications, 9, of_writer, {}}).bytes();
   EXPECT_EQ(let_in(open, writer_gone), writer_gone);
-  EXPECT_EQ(kinds(let_in(secured, writer_gone)), std::vector<int>{kGap}) << "else its number is asked for for ever";
+  EXPECT_EQ(kinds(let_in(secured, writer_gone)), std::vector<int>{kGap})
+      << "else its number is asked for for ever";
   const PacketBytes alive_and_gone =
       from()
-          .data({0, kAnnouncer, 2, ParameterList().add(0x0071, {0, 0, 0, 3}).bytes(), participant().payload()})
+          .data({0, kAnnouncer, 2, ParameterList().add(0x0071, {0, 0, 0, 3}).bytes(),
+                 participant().payload()})
           .bytes();
   EXPECT_EQ(kinds(let_in(secured, alive_and_gone)), std::vector<int>{kPad});
   const PacketBytes signed_one =
       from()
           .submessage(kSecureRtpsPrefix, 1, PacketBytes(20))
-          .data({0,
-                 kAnnouncer,
-                 2,
-                 ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes(),
-                 {}})
+          .data(
+              {0,
+               kAnnouncer,
+               2,
+               ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes(),
+               {}})
           .submessage(kSecureRtpsPostfix, 1, PacketBytes(20))
           .bytes();
   Guard all_signed(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
@@ -426,9 +478,11 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreNobodySaysSomethingElseOfThem) {
   for (Guard* guard : {&open, &secured}) {
     ASSERT_FALSE(let_in(*guard, announcement(participant(10).locator(0x0032, 5))).empty());
     speak(*guard);
-    EXPECT_EQ(kinds(let_in(*guard, announcement(participant(10).locator(0x0032, 5)))), std::vector<int>{kData});
+    EXPECT_EQ(kinds(let_in(*guard, announcement(participant(10).locator(0x0032, 5)))),
+              std::vector<int>{kData});
   }
-  for (const ParameterList& other : {participant(1).locator(0x0032, 5), participant(10).locator(0x0032, 6)}) {
+  for (const ParameterList& other :
+       {participant(1).locator(0x0032, 5), participant(10).locator(0x0032, 6)}) {
     EXPECT_EQ(kinds(let_in(secured, announcement(other))), std::vector<int>{kPad});
     EXPECT_EQ(kinds(let_in(open, announcement(other))), std::vector<int>{kData});
   }
@@ -446,7 +500,8 @@ PacketBytes signed_message(const PacketBytes& inner, const PacketBytes& behind_p
 
 TEST(Guard, WhereMessagesAreSignedNothingThatIsNotSpeaksForAnEndpointOfATopic) {
   for (const PacketBytes& message :
-       {from().heartbeat(0, kUserWriter, 1000, 1000, 1).bytes(), from().gap(0, kUserWriter, 1, 1000).bytes(),
+       {from().heartbeat(0, kUserWriter, 1000, 1000, 1).bytes(),
+        from().gap(0, kUserWriter, 1, 1000).bytes(),
         from().acknack(kUserReader, kUserWriter, 1000, 0, 1).bytes(),
         from().data({0, kUserWriter, 1000, {}, kSample}).bytes(),
         from().fragments({0, kUserWriter, 9, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes()}) {
@@ -493,8 +548,9 @@ TEST(Guard, WhatIsSignedIsNotChanged) {
   };
   EXPECT_EQ(let_in(guard, skips(4'000'000, 1)), skips(4'000'000, 1));
   EXPECT_EQ(fate(guard, skips(std::int64_t{1} << 40, 2)), Dropped::kSkipped);
-  EXPECT_EQ(fate(guard, signed_message(from().gap(0, kUserWriter, 1, std::int64_t{1} << 40).bytes())),
-            Dropped::kSkipped);
+  EXPECT_EQ(
+      fate(guard, signed_message(from().gap(0, kUserWriter, 1, std::int64_t{1} << 40).bytes())),
+      Dropped::kSkipped);
 }
 
 TEST(Guard, ASignedMessageMayRepeatItsHeaderAndNameNobodyElse) {
@@ -526,14 +582,18 @@ TEST(Guard, TheHandshakeOfStrangersIsReadBeforeTheLibraryReadsIt) {
   };
   EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 0})), kPasses);
   EXPECT_EQ(fate(handshake({1, 0, 0xffffffffu})), Dropped::kParameters) << "tokens";
-  EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 1, 1, 0, 0xffffffffu})), Dropped::kParameters) << "binary value";
+  EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 1, 1, 0, 0xffffffffu})), Dropped::kParameters)
+      << "binary value";
   EXPECT_EQ(fate(handshake({0xfffffff0u})), Dropped::kParameters) << "class";
 }
 
-/// A handshake by kSource that says it is of `speaker`, and proves that the certificate is of `proven`.
-PacketBytes handshake_of(const Prefix& speaker, const PacketBytes& proven, std::uint32_t by = 0x000201c3) {
+/// A handshake by kSource that says it is of `speaker`, and proves that the certificate is of
+/// `proven`.
+PacketBytes handshake_of(const Prefix& speaker, const PacketBytes& proven,
+                         std::uint32_t by = 0x000201c3) {
   PacketBytes payload = identities(speaker);
-  for (const std::uint32_t word : {1, 0, 1, 1, 0, 0, 2}) test::put32(payload, word);  // class, token, two octet values
+  for (const std::uint32_t word : {1, 0, 1, 1, 0, 0, 2})
+    test::put32(payload, word);  // class, token, two octet values
   test::put_bytes(payload, {5, 0, 0, 0, 'c', '.', 'i', 'd', 0, 0, 0, 0, 0, 0, 0, 0});
   test::put_bytes(payload, {8, 0, 0, 0, 'c', '.', 'p', 'd', 'a', 't', 'a', 0});
   test::put32(payload, static_cast<std::uint32_t>(proven.size()));
@@ -553,41 +613,53 @@ PacketBytes announced_guid(std::uint16_t id, const Prefix& of) {
 
 TEST(Guard, WhoShowsACertificateSpeaksForItselfAlone) {
   EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kSource))), kPasses);
-  EXPECT_EQ(fate(handshake_of(kOther, announced_guid(0x50, kSource))), Dropped::kSource) << "in another's handshake";
-  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther))), Dropped::kSource) << "own proof, other's GUID";
-  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x70, kOther))), Dropped::kSource) << "by its key hash";
-  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x05, kSource))), Dropped::kSource) << "without a GUID";
-  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther), kUserWriter)), Dropped::kSource)
+  EXPECT_EQ(fate(handshake_of(kOther, announced_guid(0x50, kSource))), Dropped::kSource)
+      << "in another's handshake";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther))), Dropped::kSource)
+      << "own proof, other's GUID";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x70, kOther))), Dropped::kSource)
+      << "by its key hash";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x05, kSource))), Dropped::kSource)
+      << "without a GUID";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther), kUserWriter)),
+            Dropped::kSource)
       << "by whichever writer";
 }
 
 TEST(Guard, FragmentsThatTheirSampleDoesNotHaveAreDropped) {
-  const auto fragments = [](std::uint32_t first, std::uint16_t count, std::uint16_t size, std::uint32_t sample,
-                            std::size_t payload, std::uint32_t by = kUserWriter) {
+  const auto fragments = [](std::uint32_t first, std::uint16_t count, std::uint16_t size,
+                            std::uint32_t sample, std::size_t payload,
+                            std::uint32_t by = kUserWriter) {
     return from().fragments({0, by, 1, first, count, size, sample, PacketBytes(payload)}).bytes();
   };
   EXPECT_EQ(fate(fragments(4, 1, 1000, 3500, 500)), kPasses) << "the last one is shorter";
-  EXPECT_EQ(fate(fragments(0, 1, 1024, 4096, 1024)), Dropped::kFragment) << "the first has number 1";
+  EXPECT_EQ(fate(fragments(0, 1, 1024, 4096, 1024)), Dropped::kFragment)
+      << "the first has number 1";
   EXPECT_EQ(fate(fragments(5, 1, 1024, 4096, 1024)), Dropped::kFragment) << "four fragments";
   EXPECT_EQ(fate(fragments(3, 3, 1024, 4096, 3072)), Dropped::kFragment);
-  EXPECT_EQ(fate(fragments(0xffffffffu, 2, 1024, 4096, 2048)), Dropped::kFragment) << "wraps around";
+  EXPECT_EQ(fate(fragments(0xffffffffu, 2, 1024, 4096, 2048)), Dropped::kFragment)
+      << "wraps around";
   EXPECT_EQ(fate(fragments(1, 0, 1024, 4096, 1024)), Dropped::kFragment);
   EXPECT_EQ(fate(fragments(1, 1, 0, 4096, 1024)), Dropped::kFragment) << "fragments without size";
-  EXPECT_EQ(fate(fragments(1, 1, 1, 4096, 4)), Dropped::kFragment) << "the library keeps a list in each";
+  EXPECT_EQ(fate(fragments(1, 1, 1, 4096, 4)), Dropped::kFragment)
+      << "the library keeps a list in each";
   EXPECT_EQ(fate(fragments(1, 2, 1024, 4096, 1024)), Dropped::kFragment) << "two said, one there";
-  EXPECT_EQ(fate(fragments(1, 1, 1024, 4096, 1024, kPublications)), Dropped::kFragment) << "would hide a list";
+  EXPECT_EQ(fate(fragments(1, 1, 1024, 4096, 1024, kPublications)), Dropped::kFragment)
+      << "would hide a list";
   EXPECT_EQ(fate(fragments(2, 1, 60000, kMaxTextSample + 1, 60000)), Dropped::kSampleSize);
 
   Guard guard(kMaxTextSample);
   EXPECT_EQ(fate(guard, fragments(1, 1, 1024, 4096, 1024)), kPasses);
-  EXPECT_EQ(fate(guard, fragments(2, 1, 2048, 4096, 2048)), Dropped::kFragment) << "another size than before";
+  EXPECT_EQ(fate(guard, fragments(2, 1, 2048, 4096, 2048)), Dropped::kFragment)
+      << "another size than before";
 }
 
 TEST(Guard, OfASampleThatIsTooLargeTheBeginningPassesAsASampleThatSaysSo) {
   Guard guard(kMaxTextSample);
   PacketBytes beginning(60000, 'x');
   std::copy(kSample.begin(), kSample.end(), beginning.begin());
-  const PacketBytes first = from().fragments({0, kUserWriter, 7, 1, 1, 60000, 40u << 20, beginning}).bytes();
+  const PacketBytes first =
+      from().fragments({0, kUserWriter, 7, 1, 1, 60000, 40u << 20, beginning}).bytes();
   const auto passed = guard.check(first, kSocket);
   ASSERT_TRUE(passed);
   Bytes rest = passed->subspan(kHeader);
@@ -622,14 +694,19 @@ TEST(Guard, SamplesBegunAndNotFinishedAreBounded) {
   int begun = 0;
   for (std::int64_t number = 1; number <= 64; ++number) {
     const PacketBytes first =
-        from().fragments({0, kUserWriter, number, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)}).bytes();
+        from()
+            .fragments({0, kUserWriter, number, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)})
+            .bytes();
     if (fate(guard, first) == kPasses) ++begun;
   }
   EXPECT_EQ(begun, static_cast<int>(UnfinishedSamples::kMostBytesOfOne / kMaxTextSample));
   const PacketBytes of_another =
-      Packet(kOther).fragments({0, kUserWriter, 1, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)}).bytes();
+      Packet(kOther)
+          .fragments({0, kUserWriter, 1, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)})
+          .bytes();
   EXPECT_EQ(fate(guard, of_another), kPasses);
-  EXPECT_EQ(fate(guard, from().data({0, kUserWriter, 70, {}, kSample}).bytes()), kPasses) << "small ones go on";
+  EXPECT_EQ(fate(guard, from().data({0, kUserWriter, 70, {}, kSample}).bytes()), kPasses)
+      << "small ones go on";
 }
 
 TEST(Guard, FinishedSamplesMakeRoom) {
@@ -638,8 +715,10 @@ TEST(Guard, FinishedSamplesMakeRoom) {
   for (std::int64_t number = 1; number <= 20; ++number) {
     for (std::uint32_t first = 1; first <= kFragments; ++first) {
       const std::size_t size = std::min<std::size_t>(60000, kMaxTextSample - (first - 1) * 60000);
-      const PacketBytes part =
-          from().fragments({0, kUserWriter, number, first, 1, 60000, kMaxTextSample, PacketBytes(size)}).bytes();
+      const PacketBytes part = from()
+                                   .fragments({0, kUserWriter, number, first, 1, 60000,
+                                               kMaxTextSample, PacketBytes(size)})
+                                   .bytes();
       ASSERT_EQ(fate(guard, part), kPasses) << "sample " << number << " fragment " << first;
     }
   }
@@ -663,13 +742,16 @@ TEST(Guard, AWriterThatSkipsABillionNumbersIsFollowedInSteps) {
   int steps = 0;
   for (std::uint32_t count = 1; reached < kFirst && steps < 100'000; ++count, ++steps) {
     now += std::chrono::milliseconds(100);
-    const PacketBytes heartbeat = from().heartbeat(0, kUserWriter, kFirst, kFirst + 3, count).bytes();
+    const PacketBytes heartbeat =
+        from().heartbeat(0, kUserWriter, kFirst, kFirst + 3, count).bytes();
     const auto passed = guard.check(heartbeat, kSocket, now);
     ASSERT_TRUE(passed);
     const std::int64_t first = first_of(*passed);
-    ASSERT_LE(first - reached, SequenceWatch::kHeartbeatStep + 1) << "the library counts through each";
+    ASSERT_LE(first - reached, SequenceWatch::kHeartbeatStep + 1)
+        << "the library counts through each";
     reached = first;
-    guard.sent(Packet(kOther).to(kSource).acknack(kUserReader, kUserWriter, first, 0, count).bytes());
+    guard.sent(
+        Packet(kOther).to(kSource).acknack(kUserReader, kUserWriter, first, 0, count).bytes());
   }
   EXPECT_EQ(reached, kFirst) << "it arrives in the end";
 }
@@ -678,7 +760,9 @@ TEST(Guard, WhatOurReaderHasNotConfirmedIsNotSkippedFurther) {
   Guard guard(kMaxTextSample);
   for (std::uint32_t count = 1; count <= 100; ++count) {
     const PacketBytes heartbeat =
-        from().heartbeat(0, kUserWriter, std::int64_t{1} << 40, std::int64_t{1} << 40, count).bytes();
+        from()
+            .heartbeat(0, kUserWriter, std::int64_t{1} << 40, std::int64_t{1} << 40, count)
+            .bytes();
     const auto passed = guard.check(heartbeat, kSocket);
     ASSERT_TRUE(passed);
     EXPECT_LE(first_of(*passed), SequenceWatch::kHeartbeatStep + 1);
@@ -696,7 +780,8 @@ TEST(Guard, AGapIsTakenInSteps) {
     const auto passed = guard.check(gap, kSocket, now);
     if (!passed) continue;
     Reader reader(passed->subspan(kHeader + 4 + 8), true);
-    const std::int64_t start = reader.sequence_number().value_or(0), end = reader.sequence_number().value_or(0);
+    const std::int64_t start = reader.sequence_number().value_or(0),
+                       end = reader.sequence_number().value_or(0);
     ASSERT_EQ(start, reached) << "nothing is left out";
     ASSERT_LE(end - start, SequenceWatch::kGapStep);
     reached = end;
@@ -708,7 +793,8 @@ TEST(Guard, AFloodOfGapsDoesNotKeepTheReceiverBusy) {
   Guard guard(kMaxTextSample);
   const Guard::Time now = std::chrono::steady_clock::now();
   for (std::int64_t i = 0; i < 1000; ++i) {
-    static_cast<void>(guard.check(from().gap(0, kUserWriter, 1 + (i << 20), (i + 1) << 20).bytes(), kSocket, now));
+    static_cast<void>(guard.check(from().gap(0, kUserWriter, 1 + (i << 20), (i + 1) << 20).bytes(),
+                                  kSocket, now));
   }
   EXPECT_GT(guard.counts().of(Dropped::kSkipped), 900u);
   EXPECT_EQ(fate(guard, from().gap(0, kUserWriter, 1, 100).bytes()), kPasses) << "small ones go on";
@@ -721,7 +807,8 @@ TEST(Guard, ACountThatJumpsIsDroppedAndTheHonestOneGoesOn) {
   EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, kAll).bytes()), Dropped::kCount);
   EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, 11).bytes()), kPasses);
   EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, 3).bytes()), kPasses);
-  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, kAll).bytes()), Dropped::kCount);
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, kAll).bytes()),
+            Dropped::kCount);
   EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, 4).bytes()), kPasses);
 }
 
@@ -731,7 +818,8 @@ TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
     return from().nack_frag(kUserReader, kUserWriter, number, fragment, count).bytes();
   };
   EXPECT_EQ(fate(guard, asks(7, 1, 1)), Dropped::kNotSent);
-  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes());
+  guard.sent(
+      Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes());
   EXPECT_EQ(fate(guard, asks(7, 4, 2)), kPasses);
   EXPECT_EQ(fate(guard, asks(7, 5, 3)), Dropped::kNotSent);
   EXPECT_EQ(fate(guard, asks(7, 0xffffffffu, 4)), Dropped::kNotSent);
@@ -742,7 +830,8 @@ TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
 Prefix known_inhabitant(Guard& guard, std::uint16_t number, Guard::Time now) {
   Prefix prefix = kSource;
   prefix[10] = static_cast<unsigned char>(number);
-  const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(100));
+  const ParameterList list =
+      ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(100));
   const PacketBytes announced = Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes();
   EXPECT_TRUE(guard.check(announced, loopback(5000 + number), now));
   speak(guard, prefix, now);
@@ -752,10 +841,14 @@ Prefix known_inhabitant(Guard& guard, std::uint16_t number, Guard::Time now) {
 TEST(Guard, WhatWasSentIsNotAskedForAgainWithoutEnd) {
   Guard guard(kMaxTextSample);
   constexpr std::uint32_t kBytes = 30u << 20, kSize = 60000;
-  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, kSize, kBytes, PacketBytes(kSize)}).bytes());
+  guard.sent(Packet(kOther)
+                 .fragments({0, kUserWriter, 7, 1, 1, kSize, kBytes, PacketBytes(kSize)})
+                 .bytes());
   Guard::Time now = std::chrono::steady_clock::now();
   std::uint32_t count = 0;
-  const auto passes = [&](const Packet& message) { return guard.check(message.bytes(), kSocket, now).has_value(); };
+  const auto passes = [&](const Packet& message) {
+    return guard.check(message.bytes(), kSocket, now).has_value();
+  };
   const auto asks = [&](const Prefix& who, std::uint32_t samples = 1) {
     return Packet(who).to(kOther).acknack(kUserReader, kUserWriter, 7, samples, ++count);
   };
@@ -796,17 +889,21 @@ TEST(Guard, WhoMissesManySmallSamplesAfterALargeOneIsSentThemAgain) {
   Guard guard(kMaxTextSample);
   constexpr std::uint32_t kLarge = 30u << 20, kSize = 60000;
   constexpr std::uint32_t kSmallOnes = 60;
-  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+  guard.sent(Packet(kOther)
+                 .fragments({0, kUserWriter, 7, 1, 1, kSize, kLarge, PacketBytes(kSize)})
+                 .bytes());
   for (std::int64_t number = 8; number < 8 + kSmallOnes; ++number)
     guard.sent(Packet(kOther).data({0, kUserWriter, number, {}, kSample}).bytes());
   const Guard::Time now = std::chrono::steady_clock::now();
   const Prefix one = known_inhabitant(guard, 1, now);
   for (std::uint32_t count = 1; count <= 1000; ++count) {
-    const Packet asks = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 8, kSmallOnes, count);
+    const Packet asks =
+        Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 8, kSmallOnes, count);
     ASSERT_EQ(asked_for(guard, asks.bytes(), now), static_cast<int>(kSmallOnes)) << count;
   }
   EXPECT_EQ(guard.counts().of(Dropped::kRepairs), 0u);
-  const Packet asks_for_large = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 7, 1, 1001);
+  const Packet asks_for_large =
+      Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 7, 1, 1001);
   EXPECT_EQ(asked_for(guard, asks_for_large.bytes(), now), 1);
 }
 
@@ -814,19 +911,26 @@ TEST(Guard, WhoAsksForAllThatThereIsMakesTheServerSendNoMoreThanTheLimit) {
   Guard guard(kMaxTextSample);
   constexpr std::uint32_t kLarge = 30u << 20, kSize = 60000;
   for (std::int64_t number = 1; number <= 64; ++number)
-    guard.sent(Packet(kOther).fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+    guard.sent(Packet(kOther)
+                   .fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)})
+                   .bytes());
   const Guard::Time begin = std::chrono::steady_clock::now();
   static_cast<void>(known_inhabitant(guard, 1, begin));
-  const Prefix hostile = known_inhabitant(guard, 1, begin);  // no stranger any more: its lease is what it says
+  const Prefix hostile =
+      known_inhabitant(guard, 1, begin);  // no stranger any more: its lease is what it says
   std::uint32_t count = 0;
   double sent = 0;
-  for (std::chrono::milliseconds after{0}; after < std::chrono::seconds(60); after += std::chrono::milliseconds(50)) {
+  for (std::chrono::milliseconds after{0}; after < std::chrono::seconds(60);
+       after += std::chrono::milliseconds(50)) {
     const Guard::Time now = begin + after;
-    const Packet all = Packet(hostile).to(kOther).acknack(kUserReader, kUserWriter, 1, 256, ++count);
+    const Packet all =
+        Packet(hostile).to(kOther).acknack(kUserReader, kUserWriter, 1, 256, ++count);
     sent += static_cast<double>(kLarge) * std::min(64, asked_for(guard, all.bytes(), now));
-    const Packet parts = Packet(hostile).to(kOther).nack_frag(kUserReader, kUserWriter, 64, 1, count);
+    const Packet parts =
+        Packet(hostile).to(kOther).nack_frag(kUserReader, kUserWriter, 64, 1, count);
     if (guard.check(parts.bytes(), kSocket, now)) sent += kSize;
-    const double limit = RepairWatch::kAtOnce + RepairWatch::kPerSecond * std::chrono::duration<double>(after).count() +
+    const double limit = RepairWatch::kAtOnce +
+                         RepairWatch::kPerSecond * std::chrono::duration<double>(after).count() +
                          RepairWatch::kPerSecond * RepairWatch::kDebtSeconds;
     ASSERT_LE(sent, limit) << "after " << after.count() << " ms";
   }
@@ -837,11 +941,14 @@ TEST(Guard, NobodyIsRefusedForLongerThanTwoSeconds) {
   Guard guard(kMaxTextSample);
   constexpr std::uint32_t kLarge = 32u << 20, kSize = 60000;
   for (std::int64_t number = 1; number <= 64; ++number)
-    guard.sent(Packet(kOther).fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+    guard.sent(Packet(kOther)
+                   .fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)})
+                   .bytes());
   const Guard::Time now = std::chrono::steady_clock::now();
   const Prefix one = known_inhabitant(guard, 1, now);
   const auto asks = [&](std::uint32_t samples, std::uint32_t count, Guard::Time when) {
-    const Packet message = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 1, samples, count);
+    const Packet message =
+        Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 1, samples, count);
     return asked_for(guard, message.bytes(), when);
   };
   EXPECT_EQ(asks(64, 1, now), 7) << "the first of them: 256 MB";
@@ -855,8 +962,10 @@ TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
   for (unsigned char i = 0; i < 200; ++i) {
     Prefix prefix = kSource;
     prefix[11] = i;
-    const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(10));
-    if (guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), kSocket)) ++passed;
+    const ParameterList list =
+        ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(10));
+    if (guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), kSocket))
+      ++passed;
   }
   EXPECT_EQ(passed, ParticipantWatch::kNewOfOneSocket);
   EXPECT_TRUE(guard.check(announcement(participant()), kOtherSocket)) << "from another socket";
@@ -865,13 +974,17 @@ TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
 /// A participant of a socket of its own.
 Prefix inhabitant(std::uint64_t number) {
   Prefix prefix = kSource;
-  for (std::size_t i = 0; i < 4; ++i) prefix[8 + i] = static_cast<unsigned char>(number >> 8 * (3 - i));
+  for (std::size_t i = 0; i < 4; ++i)
+    prefix[8 + i] = static_cast<unsigned char>(number >> 8 * (3 - i));
   return prefix;
 }
 bool hears(Guard& guard, std::uint64_t number, Guard::Time now, std::uint32_t lease_s = 20) {
   const Prefix prefix = inhabitant(number);
-  const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(lease_s));
-  return guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), 1000 + number, now)
+  const ParameterList list =
+      ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(lease_s));
+  return guard
+      .check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), 1000 + number,
+             now)
       .has_value();
 }
 
@@ -915,7 +1028,8 @@ TEST(Guard, InventedParticipantsAreNoMoreThanTheLibraryCanBearAndTheirPlacesAreF
       EXPECT_TRUE(hears(guard, 0, now, 300)) << "whoever is known stays so: " << i;
     }
   }
-  EXPECT_LE(heard, ParticipantWatch::kStrangersAtOnce + 30 * ParticipantWatch::kStrangersPerSecond + 1);
+  EXPECT_LE(heard,
+            ParticipantWatch::kStrangersAtOnce + 30 * ParticipantWatch::kStrangersPerSecond + 1);
   const Guard::Time over = begun + std::chrono::seconds(30) + ParticipantWatch::kStrangersLease;
   EXPECT_TRUE(hears(guard, 70000, over));
 }
@@ -927,7 +1041,8 @@ TEST(Guard, AThousandThatAreInventedOnceAreForgottenTogetherAndThatIsCheap) {
   for (std::uint64_t i = 0; i < 1000; ++i) heard += hears(guard, i, now, 40) ? 1 : 0;
   EXPECT_EQ(heard, ParticipantWatch::kCrowd);
   EXPECT_FALSE(hears(guard, 5000, now));
-  EXPECT_TRUE(hears(guard, 5000, now + std::chrono::milliseconds(100))) << "who is there announces itself again";
+  EXPECT_TRUE(hears(guard, 5000, now + std::chrono::milliseconds(100)))
+      << "who is there announces itself again";
 }
 
 TEST(Guard, WhoLeavesMakesRoom) {
@@ -935,7 +1050,8 @@ TEST(Guard, WhoLeavesMakesRoom) {
   const Guard::Time now = Guard::Time() + std::chrono::hours(1);
   for (std::uint64_t i = 0; i < ParticipantWatch::kCrowd; ++i) ASSERT_TRUE(hears(guard, i, now));
   const Prefix leaver = inhabitant(7);
-  const PacketBytes leaves = ParameterList().guid(0x0070, leaver, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  const PacketBytes leaves =
+      ParameterList().guid(0x0070, leaver, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   ASSERT_TRUE(guard.check(Packet(leaver).data({0, kAnnouncer, 2, leaves, {}}).bytes(), 1007, now));
   EXPECT_TRUE(hears(guard, 5000, now));
 }
@@ -944,18 +1060,22 @@ TEST(Guard, TheEndpointsOfAParticipantAreCountedAndOneTooManyIsSkipped) {
   constexpr std::size_t kMost = 5;
   Guard guard(kMaxTextSample, nullptr, {}, Proof::kNone, kMost);
   const auto announced = [](std::uint32_t entity, const Prefix& of = kSource) {
-    const ParameterList list = ParameterList().guid(0x005a, of, entity).text(0x0005, "Topic").text(0x0007, "Type");
+    const ParameterList list =
+        ParameterList().guid(0x005a, of, entity).text(0x0005, "Topic").text(0x0007, "Type");
     return Packet(of).data({0, kPublications, 7, {}, list.payload()}).bytes();
   };
   const auto kind = [&](const PacketBytes& message) { return kinds(let_in(guard, message)); };
   EXPECT_EQ(kind(announced(0x103)), std::vector<int>{kData}) << "of nobody whom the library knows";
   ASSERT_FALSE(let_in(guard, announcement(participant(100))).empty());
   speak(guard);
-  for (std::uint32_t i = 1; i <= kMost; ++i) EXPECT_EQ(kind(announced(i << 8 | 3)), std::vector<int>{kData}) << i;
-  EXPECT_EQ(kind(announced(6u << 8 | 3)), std::vector<int>{kGap}) << "else its number is asked for for ever";
+  for (std::uint32_t i = 1; i <= kMost; ++i)
+    EXPECT_EQ(kind(announced(i << 8 | 3)), std::vector<int>{kData}) << i;
+  EXPECT_EQ(kind(announced(6u << 8 | 3)), std::vector<int>{kGap})
+      << "else its number is asked for for ever";
   EXPECT_EQ(guard.counts().of(Dropped::kEndpoints), 1u);
   EXPECT_EQ(kind(announced(2u << 8 | 3)), std::vector<int>{kData}) << "one that is known";
-  const PacketBytes hash = ParameterList().guid(0x0070, kSource, 2u << 8 | 3).add(0x0071, {0, 0, 0, 3}).bytes();
+  const PacketBytes hash =
+      ParameterList().guid(0x0070, kSource, 2u << 8 | 3).add(0x0071, {0, 0, 0, 3}).bytes();
   ASSERT_FALSE(let_in(guard, from().data({0, kPublications, 8, hash, {}}).bytes()).empty());
   EXPECT_EQ(kind(announced(6u << 8 | 3)), std::vector<int>{kData}) << "one has gone";
   EXPECT_EQ(kind(announced(7u << 8 | 3)), std::vector<int>{kGap});
@@ -975,7 +1095,8 @@ TEST(Guard, AReaderOfAllPartitionsIsNotHeard) {
     } while (value.size() % 4 != 0);
     return fate(announcement(writer().add(0x0029, value), kSubscriptions));
   };
-  for (const char* name : {"*", "vict*", "[a-z]*-1", "client-?"}) EXPECT_EQ(of_partition(name), Dropped::kWildcard);
+  for (const char* name : {"*", "vict*", "[a-z]*-1", "client-?"})
+    EXPECT_EQ(of_partition(name), Dropped::kWildcard);
   EXPECT_EQ(of_partition("client-7.a_b"), kPasses);
   EXPECT_EQ(of_partition(std::string(41, 'a')), kPasses) << "a length is no wildcard";
 }
@@ -992,14 +1113,19 @@ TEST(Guard, SecuredMessagesPassWhenTheyHaveHeadAndTail) {
                      .bytes()),
             kPasses);
   EXPECT_EQ(fate(from().submessage(kSecurePrefix, 1, PacketBytes(20)).bytes()), Dropped::kSecurity);
-  EXPECT_EQ(fate(from().submessage(kSecurePrefix, 1, PacketBytes(8)).submessage(kSecurePostfix, 1, tail).bytes()),
+  EXPECT_EQ(fate(from()
+                     .submessage(kSecurePrefix, 1, PacketBytes(8))
+                     .submessage(kSecurePostfix, 1, tail)
+                     .bytes()),
             Dropped::kSecurity);
   PacketBytes many = tail;
   many[16] = 0x7f;
-  EXPECT_EQ(fate(from().submessage(kSecurePostfix, 1, many).bytes()), Dropped::kSecurity) << "codes that are not there";
+  EXPECT_EQ(fate(from().submessage(kSecurePostfix, 1, many).bytes()), Dropped::kSecurity)
+      << "codes that are not there";
   secret[0] = 0xff;
-  EXPECT_EQ(fate(from().submessage(kSecureBody, 1, secret).submessage(kSecurePostfix, 1, tail).bytes()),
-            Dropped::kSecurity);
+  EXPECT_EQ(
+      fate(from().submessage(kSecureBody, 1, secret).submessage(kSecurePostfix, 1, tail).bytes()),
+      Dropped::kSecurity);
 }
 
 std::vector<PacketBytes> everything() {
@@ -1009,7 +1135,10 @@ std::vector<PacketBytes> everything() {
       with(0x0029, {1, 2, 0x41}, kSubscriptions),
       with(0x1001, {1, 0, 1, 1, 0, 1, 0, 0}, kAnnouncer),
       with(0x0075, {1, 2, 3}),
-      from().to(kOther).data({0, kUserWriter, 1, ParameterList().guid(0x0070, kSource, 1).bytes(), kSample}).bytes(),
+      from()
+          .to(kOther)
+          .data({0, kUserWriter, 1, ParameterList().guid(0x0070, kSource, 1).bytes(), kSample})
+          .bytes(),
       from()
           .submessage(0x09, 1, PacketBytes(8))
           .data({0, kUserWriter, 2, {}, kSample})
@@ -1018,8 +1147,14 @@ std::vector<PacketBytes> everything() {
       from().fragments({0, kUserWriter, 3, 1, 1, 64, 256, PacketBytes(64)}).bytes(),
       from().gap(0, kUserWriter, 4, 6).acknack(kUserReader, kUserWriter, 3, 40, 2).bytes(),
       from().nack_frag(kUserReader, kUserWriter, 3, 2, 1).bytes(),
-      from().data({0, kUserWriter, 5, {}, kSample}).submessage(kStatistics, 1, PacketBytes(56)).bytes(),
-      from().submessage(kSecurePrefix, 1, PacketBytes(20)).submessage(kSecurePostfix, 1, PacketBytes(20)).bytes()};
+      from()
+          .data({0, kUserWriter, 5, {}, kSample})
+          .submessage(kStatistics, 1, PacketBytes(56))
+          .bytes(),
+      from()
+          .submessage(kSecurePrefix, 1, PacketBytes(20))
+          .submessage(kSecurePostfix, 1, PacketBytes(20))
+          .bytes()};
 }
 
 constexpr Prefix kRelay = {0x44, 0x53, 0, 0x5f, 0x45, 0x50, 0x52, 0x4f, 0x53, 0x49, 0x4d, 0x41};
@@ -1038,8 +1173,11 @@ TEST(Guard, ADiscoveryServerAnnouncesOthers) {
   const auto whole = guard.check(announced, kRelaySocket);
   ASSERT_TRUE(whole);
   EXPECT_TRUE(std::equal(whole->begin(), whole->end(), announced.begin(), announced.end()));
-  const PacketBytes leaves = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
-  EXPECT_TRUE(guard.check(Packet(kRelay).data({0, kAnnouncer, 8, leaves, {}}).bytes(), kRelaySocket)) << "they leave";
+  const PacketBytes leaves =
+      ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_TRUE(
+      guard.check(Packet(kRelay).data({0, kAnnouncer, 8, leaves, {}}).bytes(), kRelaySocket))
+      << "they leave";
 }
 
 TEST(Guard, NobodyElseDoesSoInItsName) {
@@ -1051,7 +1189,8 @@ TEST(Guard, NobodyElseDoesSoInItsName) {
   EXPECT_FALSE(guard.check(passed_on(participant(), kOther), kRelaySocket)) << "from its address";
   EXPECT_EQ(guard.counts().of(Dropped::kSource), 3u);
   Guard usual(kMaxTextSample);
-  EXPECT_FALSE(usual.check(passed_on(participant()), kRelaySocket)) << "who asks no discovery server has none";
+  EXPECT_FALSE(usual.check(passed_on(participant()), kRelaySocket))
+      << "who asks no discovery server has none";
 }
 
 TEST(Guard, WhatADiscoveryServerMayNotPassOnIsSaidNotToExist) {
@@ -1090,7 +1229,8 @@ TEST(Guard, AMillionMutatedPacketsAreReadWithinTheirBytes) {
     PacketBytes message = corpus[random() % corpus.size()];
     const int changes = static_cast<int>(random() % 4);
     for (int i = 0; i < changes; ++i) {
-      message[random() % message.size()] = random() % 4 == 0 ? 0xff : static_cast<unsigned char>(random());
+      message[random() % message.size()] =
+          random() % 4 == 0 ? 0xff : static_cast<unsigned char>(random());
     }
     if (random() % 8 == 0) message.resize(random() % (message.size() + 1));
     message.shrink_to_fit();  // a sanitizer sees the byte behind it

@@ -26,7 +26,8 @@ class HandlersTest : public testing::Test {
   wire::PredictErrorRequest predict_request(int count = 1) const {
     wire::PredictErrorRequest request;
     request.about().cell("cell-7");
-    request.poses(std::vector<wire::CommandedJoints>(static_cast<std::size_t>(count), commanded(kJoints)));
+    request.poses(
+        std::vector<wire::CommandedJoints>(static_cast<std::size_t>(count), commanded(kJoints)));
     return request;
   }
   static wire::Approach unknown_approach() {
@@ -74,7 +75,8 @@ class HandlersTest : public testing::Test {
     request.version(version);
     return request;
   }
-  wire::ReleaseBatchesRequest release_request(wire::ReleaseAction action, std::vector<std::string> batches) const {
+  wire::ReleaseBatchesRequest release_request(wire::ReleaseAction action,
+                                              std::vector<std::string> batches) const {
     wire::ReleaseBatchesRequest request;
     request.about().cell("cell-7");
     request.change().expected_version(-1);
@@ -100,7 +102,8 @@ TEST_F(HandlersTest, PredictAnswersFromTheModelInForceAndNamesIt) {
   ASSERT_TRUE(reply) << reply.error().message;
   ASSERT_EQ(reply->predictions().size(), 2u);
   EXPECT_NEAR(reply->predictions()[1].dx_mm(), 0.3, 1e-9);
-  EXPECT_NEAR(reply->predictions()[1].predicted().x_mm() - reply->predictions()[1].nominal().x_mm(), 0.3, 1e-9);
+  EXPECT_NEAR(reply->predictions()[1].predicted().x_mm() - reply->predictions()[1].nominal().x_mm(),
+              0.3, 1e-9);
   EXPECT_EQ(reply->model().version(), 3);
   EXPECT_EQ(reply->model().hash(), served->model.provenance().hash);
   EXPECT_TRUE(reply->model().in_force());
@@ -117,7 +120,8 @@ TEST_F(HandlersTest, AnEmptyRequestIsAnsweredEmpty) {
 }
 
 TEST_F(HandlersTest, ACellWithoutModelIsNotAnswered) {
-  EXPECT_EQ(refusal(predict_request()), Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-7"));
+  EXPECT_EQ(refusal(predict_request()),
+            Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-7"));
 }
 
 TEST_F(HandlersTest, TheContextMustFit) {
@@ -147,8 +151,8 @@ TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
   CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
   parts.physics.tools["probe"] = Pose::Identity();
   parts.trained_with = {{"probe", ""}};
-  backend_.registry.publish(
-      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
+  backend_.registry.publish(std::make_shared<const ServedModel>(
+      ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
   EXPECT_EQ(refusal(predict_request()), Refusal("", {}, "tool_id").text("spindle"));
   EXPECT_EQ(refusal(correct_request()), Refusal("", {}, "tool_id").text("spindle"));
 }
@@ -163,13 +167,15 @@ TEST_F(HandlersTest, AModelIdMustBeTheOneInForce) {
   request.about().model("@2");
   EXPECT_TRUE(handlers_.answer(request));
   request.about().model("0123456789ab");
-  EXPECT_EQ(refusal(request), Refusal("", {}, "model").of(ErrorCode::kConflict).text("0123456789ab"));
+  EXPECT_EQ(refusal(request),
+            Refusal("", {}, "model").of(ErrorCode::kConflict).text("0123456789ab"));
   request.about().model("@2x");
   EXPECT_EQ(refusal(request), Refusal("", {}, "model").of(ErrorCode::kConflict).text("@2x"));
 }
 
 TEST_F(HandlersTest, AStoredVersionAnswersWhenItIsNamed) {
-  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 5e-4), 0, false, ""));
+  ASSERT_TRUE(
+      backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 5e-4), 0, false, ""));
   backend_.serve(2);
   auto request = predict_request();
   request.about().model("@1");
@@ -230,7 +236,8 @@ TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
   check.poses({commanded(kJoints), commanded(corrected.joints_rad())});
   const auto there = handlers_.answer(check);
   ASSERT_TRUE(there) << there.error().message;
-  EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(), 1e-3);
+  EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(),
+              1e-3);
 }
 
 TEST_F(HandlersTest, ATargetLeftAloneNamesJointAndLimitAndRepeatsItsErrorBefore) {
@@ -241,7 +248,8 @@ TEST_F(HandlersTest, ATargetLeftAloneNamesJointAndLimitAndRepeatsItsErrorBefore)
   ASSERT_TRUE(reply) << reply.error().message;
   const wire::CorrectedTarget& left = reply->corrections().front();
   EXPECT_EQ(left.status(), wire::TARGET_JOINT_LIMIT);
-  EXPECT_NE(left.message().find("joint 3 would be at 85.9 deg, limit 70"), std::string::npos) << left.message();
+  EXPECT_NE(left.message().find("joint 3 would be at 85.9 deg, limit 70"), std::string::npos)
+      << left.message();
   EXPECT_NEAR(left.error_before_mm(), 0.8, 1e-6);
   EXPECT_EQ(left.error_after_mm(), left.error_before_mm());
   EXPECT_EQ(left.joints_rad(), request.targets()[0].joints_rad());
@@ -260,7 +268,8 @@ TEST_F(HandlersTest, WhereNoJointsLeadNothingIsExpected) {
       ASSERT_TRUE(reply) << reply.error().message;
       const wire::CorrectedTarget& left = reply->corrections().front();
       EXPECT_EQ(left.status(), wire::TARGET_UNREACHABLE) << far_mm << ": " << left.message();
-      EXPECT_TRUE(std::isnan(left.error_before_mm()) && std::isnan(left.error_after_mm())) << far_mm;
+      EXPECT_TRUE(std::isnan(left.error_before_mm()) && std::isnan(left.error_after_mm()))
+          << far_mm;
     }
   }
 }
@@ -274,8 +283,8 @@ TEST_F(HandlersTest, EveryNumberOfAPredictionIsTheModels) {
   const auto reply = handlers_.answer(predict_request());
   ASSERT_TRUE(reply) << reply.error().message;
   const wire::PredictedError& got = reply->predictions().front();
-  const ErrorPrediction expected =
-      model.predict(Eigen::Map<const JointVector>(kJoints.data(), 6), "spindle", predict_request().about().payload());
+  const ErrorPrediction expected = model.predict(Eigen::Map<const JointVector>(kJoints.data(), 6),
+                                                 "spindle", predict_request().about().payload());
   EXPECT_EQ(Vector3(got.dx_mm(), got.dy_mm(), got.dz_mm()), expected.error_B * to_mm(1));
   EXPECT_EQ(Vector3(got.sx_mm(), got.sy_mm(), got.sz_mm()), expected.stddev_B * to_mm(1));
   EXPECT_NE(got.dy_mm(), got.dz_mm());
@@ -309,7 +318,8 @@ TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
 
   auto another = submit_request("lt-07");
   another.header().request_id().sequence_number(6);
-  EXPECT_EQ(handlers_.answer(another)->job(), first->job()) << "whoever lost the receipt gets it again";
+  EXPECT_EQ(handlers_.answer(another)->job(), first->job())
+      << "whoever lost the receipt gets it again";
   another.csv(test::small_batch_csv(*backend_.cell, {.seed = 9}));
   EXPECT_EQ(refusal(another), Refusal("", {}, "batch").of(ErrorCode::kConflict).text("lt-07"));
   EXPECT_EQ(refusal(submit_request("")), Refusal("", {}, "batch_id"));
@@ -340,8 +350,8 @@ TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
 
 TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
   for (const int version : {1, 2}) {
-    ASSERT_TRUE(
-        backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, "by hand"));
+    ASSERT_TRUE(backend_.store->add_model(
+        "cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, "by hand"));
   }
   EXPECT_EQ(refusal(manage_request(wire::MANAGE_ROLLBACK)),
             Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-7"));
@@ -377,7 +387,8 @@ TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
 
 TEST_F(HandlersTest, AChangeHappensOnceUnderItsIdAndOnlyWhereTheExpectedVersionIsInForce) {
   for (const int version : {1, 2, 3}) {
-    ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, ""));
+    ASSERT_TRUE(backend_.store->add_model(
+        "cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, ""));
     ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, version)));
   }
   auto back = manage_request(wire::MANAGE_ROLLBACK);
@@ -388,10 +399,12 @@ TEST_F(HandlersTest, AChangeHappensOnceUnderItsIdAndOnlyWhereTheExpectedVersionI
   EXPECT_EQ(after_a_restart.answer(back)->version(), 2);
   EXPECT_EQ(backend_.registry.in_force("cell-7")->version, 2);
   back.change().id("r-2");
-  EXPECT_EQ(handlers_.answer(back).error().code, ErrorCode::kConflict) << "version 3 is not in force any more";
+  EXPECT_EQ(handlers_.answer(back).error().code, ErrorCode::kConflict)
+      << "version 3 is not in force any more";
   auto other = manage_request(wire::MANAGE_ACTIVATE, 3);
   other.change().id("r-1");
-  EXPECT_EQ(handlers_.answer(other).error().code, ErrorCode::kConflict) << "the id is of a rollback";
+  EXPECT_EQ(handlers_.answer(other).error().code, ErrorCode::kConflict)
+      << "the id is of a rollback";
   other.change().id("");
   other.change().expected_version(-2);
   EXPECT_EQ(handlers_.answer(other).error().code, ErrorCode::kUsage);
@@ -404,13 +417,15 @@ TEST_F(HandlersTest, AChangeHappensOnceUnderItsIdAndOnlyWhereTheExpectedVersionI
   const auto job = handlers_.answer(train);
   ASSERT_TRUE(job) << job.error().message;
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
-  EXPECT_EQ(after_a_restart.answer(train)->job(), job->job()) << "the repeat of what was done is no conflict";
+  EXPECT_EQ(after_a_restart.answer(train)->job(), job->job())
+      << "the repeat of what was done is no conflict";
   train.change().id("t-2");
   EXPECT_EQ(handlers_.answer(train).error().code, ErrorCode::kConflict);
 }
 
 TEST_F(HandlersTest, ToActivateWhatIsInForcePublishesNothing) {
-  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  ASSERT_TRUE(
+      backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
   const auto served = backend_.registry.in_force("cell-7");
   const auto again = handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1));
@@ -451,15 +466,16 @@ CompensatedModel model_with_play_and_heat(const std::shared_ptr<const Cell>& cel
     identified.value = value;
     parts.parameters.push_back(identified);
   }
-  parts.covariance = Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
+  parts.covariance =
+      Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
   parts.temperature_mean = 20;
   parts.temperature_stddev = 5;
   return CompensatedModel::make(std::move(parts)).value();
 }
 
 TEST_F(HandlersTest, TheSideAJointComesFromAndTheTemperatureReachThePhysics) {
-  backend_.registry.publish(
-      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
+  backend_.registry.publish(std::make_shared<const ServedModel>(
+      ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
   auto request = predict_request(4);
   request.poses()[1].approach().directions({0, 1, 0, 0, 0, 0});
   request.poses()[2].approach().directions({0, -1, 0, 0, 0, 0});
@@ -470,7 +486,8 @@ TEST_F(HandlersTest, TheSideAJointComesFromAndTheTemperatureReachThePhysics) {
   EXPECT_GT(std::abs(z(1) - z(2)), 0.5) << "a milliradian of play either way";
   EXPECT_NEAR((z(1) + z(2)) / 2, z(0), 1e-2) << "what is not said is neutral";
   EXPECT_GT(std::abs(z(3) - z(0)), 0.05);
-  EXPECT_GT(reply->predictions()[0].slz_mm(), reply->predictions()[1].slz_mm()) << "and stands in the deviation";
+  EXPECT_GT(reply->predictions()[0].slz_mm(), reply->predictions()[1].slz_mm())
+      << "and stands in the deviation";
 
   auto correct = correct_request();
   correct.targets().resize(3, correct.targets().front());
@@ -478,14 +495,16 @@ TEST_F(HandlersTest, TheSideAJointComesFromAndTheTemperatureReachThePhysics) {
   correct.targets()[2].approach().directions({0, -1, 0, 0, 0, 0});
   const auto corrected = handlers_.answer(correct);
   ASSERT_TRUE(corrected) << corrected.error().message;
-  const auto commanded = [&](std::size_t i) { return corrected->corrections()[i].commanded().z_mm(); };
+  const auto commanded = [&](std::size_t i) {
+    return corrected->corrections()[i].commanded().z_mm();
+  };
   EXPECT_GT(std::abs(commanded(1) - commanded(2)), 0.5);
   EXPECT_GT(std::abs(commanded(1) - commanded(0)), 0.2);
 }
 
 TEST_F(HandlersTest, ACorrectionTellsItsOrientationAndOneMeasurementBesideTheTruth) {
-  backend_.registry.publish(
-      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
+  backend_.registry.publish(std::make_shared<const ServedModel>(
+      ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
   auto request = correct_request();
   request.targets()[0].approach().directions({0, 1, 0, 0, 0, 0});
   const auto reply = handlers_.answer(request);
@@ -494,8 +513,8 @@ TEST_F(HandlersTest, ACorrectionTellsItsOrientationAndOneMeasurementBesideTheTru
   ASSERT_EQ(corrected.status(), wire::TARGET_OK) << corrected.message();
   EXPECT_NEAR(corrected.turn_before_rad(), 1e-3, 1e-4) << "the play turns the tool";
   EXPECT_LT(corrected.turn_after_rad(), 1e-6);
-  EXPECT_NEAR(corrected.sigma_measured_mm(), std::hypot(corrected.sigma_mm(), to_mm(backend_.cell->tracker.sigma)),
-              1e-9);
+  EXPECT_NEAR(corrected.sigma_measured_mm(),
+              std::hypot(corrected.sigma_mm(), to_mm(backend_.cell->tracker.sigma)), 1e-9);
 }
 
 TEST_F(HandlersTest, DiagnoseIsQueuedAndAnswersWhenItIsDone) {
@@ -524,7 +543,8 @@ TEST_F(HandlersTest, ACheckIsQueuedAgainstTheModelInForceAndRefusedWithoutOne) {
   request.batch_id("lt-07");
   request.tolerance_mm(0.05);
   EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kNotFound);
-  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  ASSERT_TRUE(
+      backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
   const auto queued = handlers_.answer(request);
   ASSERT_TRUE(queued) << queued.error().message;
@@ -567,7 +587,8 @@ TEST_F(HandlersTest, TheHealthOfACellIsItsChecksTheNextOneAndHowWhatIsInForceWas
   EXPECT_EQ(read("", 0).size(), 2u) << "every cell";
   EXPECT_TRUE(read("cell-7", 0).at(0).at("in_force").is_null());
   for (const double shift : {1e-4, 2e-4})
-    ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, shift), 0, false, ""));
+    ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, shift), 0,
+                                          false, ""));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 2)));
   const std::string model = backend_.registry.in_force("cell-7")->model.provenance().id;
@@ -581,8 +602,10 @@ TEST_F(HandlersTest, TheHealthOfACellIsItsChecksTheNextOneAndHowWhatIsInForceWas
     ASSERT_TRUE(backend_.store->store_findings(queued->job(), findings, ""));
     ASSERT_TRUE(backend_.store->set_job_done(queued->job(), "checked"));
   };
-  checked(fmt::format(R"({{"verdict": "healthy", "model": "{}", "due": "2026-12-01", "rms_mm": 0.02}})", model));
-  checked(fmt::format(R"({{"verdict": "changed", "model": "{}", "due": "", "due_because": "it changed"}})", model));
+  checked(fmt::format(
+      R"({{"verdict": "healthy", "model": "{}", "due": "2026-12-01", "rms_mm": 0.02}})", model));
+  checked(fmt::format(
+      R"({{"verdict": "changed", "model": "{}", "due": "", "due_because": "it changed"}})", model));
   auto health = read("cell-7", 0).at(0);
   ASSERT_EQ(health.at("checks").size(), 2u);
   EXPECT_EQ(health["checks"][0]["verdict"], "healthy");
@@ -593,7 +616,8 @@ TEST_F(HandlersTest, TheHealthOfACellIsItsChecksTheNextOneAndHowWhatIsInForceWas
   EXPECT_EQ(health.at("due_because"), "it changed");
   EXPECT_EQ(health.at("in_force").at("version"), 2);
   EXPECT_EQ(health["in_force"]["version_before"], 1);
-  EXPECT_NE(health["in_force"]["next"].get<std::string>().find("trammel rollback"), std::string::npos);
+  EXPECT_NE(health["in_force"]["next"].get<std::string>().find("trammel rollback"),
+            std::string::npos);
   EXPECT_EQ(read("cell-7", 1).at(0).at("checks").size(), 1u) << "the newest";
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ROLLBACK)));
   health = read("cell-7", 0).at(0);
@@ -613,7 +637,8 @@ TEST_F(HandlersTest, WhatWasLatelyAskedIsReplayedWithAnotherVersion) {
   ASSERT_TRUE(none) << none.error().message;
   EXPECT_EQ(nlohmann::json::parse(none->text()).at("poses"), 0);
   ASSERT_TRUE(handlers_.answer(predict_request(2)));
-  const auto version = backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 5e-4), 0, false, "");
+  const auto version =
+      backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 5e-4), 0, false, "");
   ASSERT_TRUE(version) << version.error().message;
   const auto beside = handlers_.answer(read_request(wire::READ_REPLAY, *version));
   ASSERT_TRUE(beside) << beside.error().message;
@@ -626,7 +651,8 @@ TEST_F(HandlersTest, WhatWasLatelyAskedIsReplayedWithAnotherVersion) {
   const auto alone = handlers_.answer(read_request(wire::READ_REPLAY));
   ASSERT_TRUE(alone);
   EXPECT_TRUE(nlohmann::json::parse(alone->text()).at("difference").is_null());
-  EXPECT_EQ(handlers_.answer(read_request(wire::READ_REPLAY, 77)).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(handlers_.answer(read_request(wire::READ_REPLAY, 77)).error().code,
+            ErrorCode::kNotFound);
 }
 
 TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
@@ -665,9 +691,11 @@ TEST_F(HandlersTest, BatchesAreListedAndReadAsTheyCame) {
 }
 
 TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
-  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  ASSERT_TRUE(
+      backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
   const auto is_unsupported = [](const auto& reply) {
-    return reply && reply->header().result() == wire::RESULT_UNSUPPORTED && reply->header().problems().size() == 1;
+    return reply && reply->header().result() == wire::RESULT_UNSUPPORTED &&
+           reply->header().problems().size() == 1;
   };
   EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
   auto forced = manage_request(wire::MANAGE_ROLLBACK);
@@ -727,7 +755,8 @@ TEST_F(HandlersTest, JobsAreListedWithStageReasonAndTimes) {
   StoredJob stored;
   stored.cell = "cell-7";
   stored.created_at = unix_now_s();
-  const auto first = backend_.store->add_batch({"cell-7", "lt-07", "csv", "hash", "client:1", 0, 1}, stored);
+  const auto first =
+      backend_.store->add_batch({"cell-7", "lt-07", "csv", "hash", "client:1", 0, 1}, stored);
   ASSERT_TRUE(first) << first.error().message;
   ASSERT_TRUE(backend_.store->set_job_running(first->id));
   ASSERT_TRUE(backend_.store->set_job_failed(first->id, "too \"few\" rows"));
@@ -757,8 +786,10 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
     parts.provenance.batch_id += "+";
     const CompensatedModel model = CompensatedModel::make(parts).value();
     const int version = backend_.store->add_model("cell-7", model, 0, true, "").value();
-    backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
-    const wire::ModelInfo listed = handlers_.answer(read_request(wire::READ_MODELS))->models().back();
+    backend_.registry.publish(
+        std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
+    const wire::ModelInfo listed =
+        handlers_.answer(read_request(wire::READ_MODELS))->models().back();
     const wire::ModelInfo served = handlers_.answer(predict_request())->model();
     EXPECT_EQ(listed.trained_at_unix_s(), now - 100);
     EXPECT_NEAR(listed.training_age_s(), 100, 5);
@@ -773,7 +804,8 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
 
 TEST_F(HandlersTest, EveryAnswerOfAModelAndTheListSayWhatAUserOfItShouldKnow) {
   const CompensatedModel model = test::shifted_model(backend_.cell, 1e-4);
-  for (const bool in_force : {false, true}) ASSERT_TRUE(backend_.store->add_model("cell-7", model, 0, in_force, ""));
+  for (const bool in_force : {false, true})
+    ASSERT_TRUE(backend_.store->add_model("cell-7", model, 0, in_force, ""));
   backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", 2, model}));
   const auto codes = [](const wire::ModelInfo& told) {
     std::vector<std::string> all;
@@ -865,7 +897,8 @@ TEST_F(HandlersTest, ARepeatIsNoConflictWhileSomethingElseUnderItsIdIsStillBeing
     request->header().request_id().sequence_number(8);
     request->about().cell("cell-7");
     request->content = content;
-    return std::make_unique<Call<wire::Train>>(context, std::move(request), ReplyAddress{}, "8", nullptr);
+    return std::make_unique<Call<wire::Train>>(context, std::move(request), ReplyAddress{}, "8",
+                                               nullptr);
   };
   {
     const auto first = call_for(kThis);
@@ -878,7 +911,8 @@ TEST_F(HandlersTest, ARepeatIsNoConflictWhileSomethingElseUnderItsIdIsStillBeing
   EXPECT_TRUE(call_for({3, 4})->is_answered_for_its_id());
   other->finish();
   ASSERT_EQ(kept.replies.size(), 4u);
-  EXPECT_EQ(kept.replies[0].header().result(), wire::RESULT_OK) << kept.replies[0].header().message();
+  EXPECT_EQ(kept.replies[0].header().result(), wire::RESULT_OK)
+      << kept.replies[0].header().message();
   EXPECT_EQ(kept.replies[1].header().result(), wire::RESULT_OK) << "the repeat of the first";
   EXPECT_EQ(kept.replies[1].job(), kept.replies[0].job());
   for (std::size_t i = 2; i < kept.replies.size(); ++i)
@@ -897,7 +931,8 @@ TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {
     EXPECT_TRUE(first.has_repeat());
     EXPECT_FALSE(other.has_repeat());
     EXPECT_FALSE(first.has_repeat());
-    EXPECT_TRUE(UnderWay::Piece(under_way, "a", kThis).is_first()) << "it is answered: another one begins anew";
+    EXPECT_TRUE(UnderWay::Piece(under_way, "a", kThis).is_first())
+        << "it is answered: another one begins anew";
   }
   EXPECT_TRUE(UnderWay::Piece(under_way, "b", kThis).is_first());
 }
@@ -909,7 +944,8 @@ TEST(UnderWay, SomethingElseUnderTheSameIdIsNoRepeat) {
     const UnderWay::Piece that(under_way, "a", kThat);
     EXPECT_TRUE(that.is_other());
     EXPECT_FALSE(that.is_first());
-    EXPECT_FALSE(UnderWay::Piece(under_way, "a", kThatElsewhere).is_other()) << "headers of other lengths";
+    EXPECT_FALSE(UnderWay::Piece(under_way, "a", kThatElsewhere).is_other())
+        << "headers of other lengths";
   }
   EXPECT_TRUE(first.has_repeat());
   EXPECT_FALSE(first.has_repeat()) << "only the repeat has the answer of the first";

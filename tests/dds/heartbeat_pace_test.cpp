@@ -12,12 +12,16 @@ using std::chrono::milliseconds;
 using test::Packet;
 using test::Prefix;
 
-constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
-constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kTheirReader = 0x000003c7;
+constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
+                 kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2,
+                        kTheirReader = 0x000003c7;
 constexpr std::uint32_t kUserReader = 0x00000104, kUserWriter = 0x00000103;
 const HeartbeatPace::Time kStart{std::chrono::hours(1)};
 
-Packet offer(std::uint32_t writer) { return Packet(kSelf).heartbeat(kTheirReader, writer, 1, 9, 1); }
+Packet offer(std::uint32_t writer) {
+  return Packet(kSelf).heartbeat(kTheirReader, writer, 1, 9, 1);
+}
 
 TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
   HeartbeatPace pace;
@@ -30,7 +34,8 @@ TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
 
 TEST(HeartbeatPace, WhatTheLibraryAppendsForItsStatisticsChangesNothing) {
   HeartbeatPace pace;
-  const auto message = offer(kPublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
+  const auto message =
+      offer(kPublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
   EXPECT_TRUE(pace.lets_out(message, kStart));
   EXPECT_FALSE(pace.lets_out(message, kStart + milliseconds(1)));
 }
@@ -45,7 +50,8 @@ TEST(HeartbeatPace, WritersAndReadersAreToldOfApart) {
 TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
-    const auto message = Packet(kSelf).to(kOther).heartbeat(kTheirReader, kPublications, 1, 9, 1).bytes();
+    const auto message =
+        Packet(kSelf).to(kOther).heartbeat(kTheirReader, kPublications, 1, 9, 1).bytes();
     EXPECT_TRUE(pace.lets_out(message, kStart));
   }
 }
@@ -62,18 +68,23 @@ TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
   EXPECT_LE(left, 15);
   EXPECT_GE(left, 10);
   const auto now = kStart + milliseconds(10'000);
-  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter), now + milliseconds(1500))) << "it is met again";
-  EXPECT_TRUE(pace.lets_out(question(kSelf, kUserWriter), now)) << "a writer of the same name elsewhere";
+  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter), now + milliseconds(1500)))
+      << "it is met again";
+  EXPECT_TRUE(pace.lets_out(question(kSelf, kUserWriter), now))
+      << "a writer of the same name elsewhere";
   EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter + 0x100), now));
-  EXPECT_TRUE(pace.lets_out(Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(), now));
-  EXPECT_TRUE(pace.lets_out(Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
+  EXPECT_TRUE(pace.lets_out(
+      Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(), now));
+  EXPECT_TRUE(pace.lets_out(
+      Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
 }
 
 /// What leaves of an offer that is made every 10 ms for so long.
 int offered(HeartbeatPace& pace, HeartbeatPace::Time from, int milliseconds_long) {
   int left = 0;
   for (int ms = 0; ms < milliseconds_long; ms += 10) {
-    const auto message = Packet(kSelf).to(kOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
+    const auto message =
+        Packet(kSelf).to(kOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
     left += pace.lets_out(message, from + milliseconds(ms)) ? 1 : 0;
   }
   return left;
@@ -86,7 +97,8 @@ TEST(HeartbeatPace, AReaderThatNeverConfirmsIsToldFiveTimesASecond) {
   const int left = offered(pace, then, 10'000);
   EXPECT_LE(left, 51);
   EXPECT_GE(left, 49);
-  EXPECT_EQ(offered(pace, then + milliseconds(12'000), 100), 10) << "something new is to be confirmed";
+  EXPECT_EQ(offered(pace, then + milliseconds(12'000), 100), 10)
+      << "something new is to be confirmed";
 }
 
 TEST(HeartbeatPace, WhoAnswersIsOfferedAtOnceWhatItLacks) {
@@ -95,9 +107,11 @@ TEST(HeartbeatPace, WhoAnswersIsOfferedAtOnceWhatItLacks) {
   const auto then = kStart + milliseconds(2000);
   pace.heard(Packet(kSelf).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then);
   EXPECT_LT(offered(pace, then, 300), 10) << "somebody else answers";
-  pace.heard(Packet(kOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then + milliseconds(300));
+  pace.heard(Packet(kOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(),
+             then + milliseconds(300));
   EXPECT_EQ(offered(pace, then + milliseconds(300), 400), 40);
-  pace.heard(Packet(kOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(), then + milliseconds(700));
+  pace.heard(Packet(kOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(),
+             then + milliseconds(700));
   EXPECT_EQ(offered(pace, then + milliseconds(700), 400), 40);
   pace.heard({}, then);
 }
@@ -109,8 +123,10 @@ TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
     data.writer = kPublications;
     EXPECT_TRUE(pace.lets_out(offer(kPublications).data(data).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out(Packet(kSelf).data(data).bytes(), kStart));
-    EXPECT_TRUE(pace.lets_out(Packet(kSelf).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes(), kStart));
-    EXPECT_TRUE(pace.lets_out(Packet(kSelf).acknack(kTheirReader, kPublications, 1, 0, 1).bytes(), kStart));
+    EXPECT_TRUE(
+        pace.lets_out(Packet(kSelf).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes(), kStart));
+    EXPECT_TRUE(
+        pace.lets_out(Packet(kSelf).acknack(kTheirReader, kPublications, 1, 0, 1).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out({}, kStart));
   }
 }

@@ -1,4 +1,5 @@
-// A service under load: what each client gets beside clients that flood, do not listen, or are too many.
+// A service under load: what each client gets beside clients that flood, do not listen, or are too
+// many.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,11 +43,13 @@ class LoadTest : public testing::Test {
     backend_.serve(1);
   }
   void start() {
-    if (const Status started = service().start(); !started) throw std::runtime_error(started.error().message);
+    if (const Status started = service().start(); !started)
+      throw std::runtime_error(started.error().message);
   }
   DdsService& service() {
     if (!service_) {
-      service_ = std::make_unique<DdsService>(options_, *backend_.trainer, *backend_.store, backend_.registry);
+      service_ = std::make_unique<DdsService>(options_, *backend_.trainer, *backend_.store,
+                                              backend_.registry);
     }
     return *service_;
   }
@@ -56,7 +59,8 @@ class LoadTest : public testing::Test {
 
   /// What the server says of itself once it has counted so many answers.
   [[nodiscard]] client::ServerStatus status_after(std::uint64_t requests) const {
-    const auto session = client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
+    const auto session =
+        client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
     client::ServerStatus status;
     for (int look = 0; status.requests < requests && look < 20000; ++look) {
       static_cast<void>((*session)->models("cell-7"));  // its status comes every second
@@ -98,7 +102,8 @@ TEST_F(LoadTest, EightClientsThatAskForMoreThanCanBeDoneAreAllAnsweredOrToldSo) 
     most = std::max(most, counted[wire::RESULT_OK]);
     busy += counted[wire::RESULT_BUSY];
     std::set<std::int64_t> numbers;
-    for (const auto& reply : replies) numbers.insert(reply.header().related_request_id().sequence_number());
+    for (const auto& reply : replies)
+      numbers.insert(reply.header().related_request_id().sequence_number());
     EXPECT_EQ(numbers.size(), kSent) << "one was answered twice, another not at all";
   }
   EXPECT_GT(busy, 0U);
@@ -140,10 +145,12 @@ TEST_F(LoadTest, RepliesThatNobodyReadsCostNobodyElseAnything) {
   ASSERT_TRUE(hostile->wait_until_matched());
   ASSERT_TRUE(honest->wait_until_matched());
   constexpr std::int64_t kInvented = 100;
-  for (std::int64_t i = 0; i < kInvented; ++i) hostile->send_for(fmt::format("nobody-{}", i), corrections(1), i);
+  for (std::int64_t i = 0; i < kInvented; ++i)
+    hostile->send_for(fmt::format("nobody-{}", i), corrections(1), i);
   for (std::int64_t i = 0; i < 20; ++i) {
     honest->send(corrections(1), i);
-    ASSERT_EQ(honest->wait_for_replies(static_cast<std::size_t>(i) + 1).size(), static_cast<std::size_t>(i) + 1);
+    ASSERT_EQ(honest->wait_for_replies(static_cast<std::size_t>(i) + 1).size(),
+              static_cast<std::size_t>(i) + 1);
   }
   hostile->send(corrections(1), kInvented);
   EXPECT_EQ(hostile->wait_for_replies(1).size(), 1U) << "its own channel has not been taken away";
@@ -247,7 +254,8 @@ class NarrowTest : public LoadTest {
 
 TEST_F(NarrowTest, ASessionThatIsToldToTryAgainLaterDoesSo) {
   start();
-  const auto session = client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
+  const auto session =
+      client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
   ASSERT_TRUE(session) << session.error().message;
   client::CallContext cell_7;
   cell_7.cell = "cell-7";
@@ -259,7 +267,8 @@ TEST_F(NarrowTest, ASessionThatIsToldToTryAgainLaterDoesSo) {
         client::TargetMm target;
         target.seed_rad = kJoints;
         target.joint_target = true;
-        const auto answer = (*session)->correct_targets(cell_7, std::vector<client::TargetMm>(200, target));
+        const auto answer =
+            (*session)->correct_targets(cell_7, std::vector<client::TargetMm>(200, target));
         EXPECT_TRUE(answer) << answer.error().message;
         answered += answer ? 1 : 0;
       }

@@ -23,7 +23,8 @@ bool is_silent(LostLeases& leases, std::uint64_t socket, LostLeases::Time now) {
 TEST(LostLeases, WhoIsHeardIsTalkedTo) {
   LostLeases leases(kLease);
   leases.announced(kOther, {kSocket}, kLease, kStart);
-  for (LostLeases::Time now = kStart; now < kStart + milliseconds(20000); now += milliseconds(1800)) {
+  for (LostLeases::Time now = kStart; now < kStart + milliseconds(20000);
+       now += milliseconds(1800)) {
     leases.awake(now);
     leases.awake(now + milliseconds(900));
     EXPECT_TRUE(leases.lets_in(kOther, now));
@@ -65,10 +66,12 @@ TEST(LostLeases, WhoSleptForgetsEverybodyAndIsForgotten) {
   const auto woken = kStart + milliseconds(3000);
   leases.awake(woken);
   EXPECT_FALSE(leases.lets_in(kOther, woken));
-  EXPECT_FALSE(leases.lets_in(kOther, kStart + milliseconds(10400))) << "until our side has lost it, too";
+  EXPECT_FALSE(leases.lets_in(kOther, kStart + milliseconds(10400)))
+      << "until our side has lost it, too";
   EXPECT_TRUE(is_silent(leases, kSocket, kStart + milliseconds(10400)));
   LostLeases::Time now = woken;
-  while (now < kStart + milliseconds(30000) && !leases.lets_in(kOther, now)) leases.awake(now += kStep);
+  while (now < kStart + milliseconds(30000) && !leases.lets_in(kOther, now))
+    leases.awake(now += kStep);
   EXPECT_LT(now, kStart + milliseconds(13000));
 }
 
@@ -90,8 +93,9 @@ TEST(LostLeases, WhoLeftIsNotMissed) {
   EXPECT_TRUE(leases.lets_in(kOther, kStart + milliseconds(2500)));
 }
 
-/// Two sides that announce themselves every 200 ms, packets lost one way for a while: whatever the moment and the
-/// length of that, in the end each has lost the other as often as it was lost, or they found each other after both had.
+/// Two sides that announce themselves every 200 ms, packets lost one way for a while: whatever the
+/// moment and the length of that, in the end each has lost the other as often as it was lost, or
+/// they found each other after both had.
 TEST(LostLeases, BothSidesFindEachOtherAgainAfterBothHaveLostEachOther) {
   struct Side {
     LostLeases leases{kLease};
@@ -104,8 +108,8 @@ TEST(LostLeases, BothSidesFindEachOtherAgainAfterBothHaveLostEachOther) {
       Side a, b;
       a.leases.announced(kOther, {kSocket}, kLease, kStart);
       b.leases.announced(kNext, {kElsewhere}, kLease, kStart);
-      const auto pass = [](Side& from, const LostLeases::Prefix& prefix, std::uint64_t socket, Side& to,
-                           std::uint64_t to_socket, LostLeases::Time now) {
+      const auto pass = [](Side& from, const LostLeases::Prefix& prefix, std::uint64_t socket,
+                           Side& to, std::uint64_t to_socket, LostLeases::Time now) {
         if (is_silent(from.leases, to_socket, now) || !to.leases.lets_in(prefix, now)) return;
         to.leases.announced(prefix, {socket}, kLease, now);
         if (!to.library_knows) ++to.found;

@@ -14,10 +14,12 @@ TEST(PacketReport, SaysWhatWasDroppedOnceAMinute) {
   counts->add(wire::Dropped::kStatistics);
   counts->add(wire::Dropped::kStatistics);
   counts->add(wire::Dropped::kSkipped);
-  EXPECT_EQ(report.due(begin), "packets were dropped unread: statistics submessage (2), numbers skipped (1)");
+  EXPECT_EQ(report.due(begin),
+            "packets were dropped unread: statistics submessage (2), numbers skipped (1)");
   counts->add(wire::Dropped::kHeader);
   EXPECT_FALSE(report.due(begin + std::chrono::seconds(59)));
-  EXPECT_EQ(report.due(begin + std::chrono::seconds(60)), "packets were dropped unread: no RTPS message (1)");
+  EXPECT_EQ(report.due(begin + std::chrono::seconds(60)),
+            "packets were dropped unread: no RTPS message (1)");
   EXPECT_FALSE(report.due(begin + std::chrono::seconds(200)));
 }
 
@@ -43,7 +45,8 @@ TEST(StrangerReport, ManyStrangersDoNotFillTheLog) {
   for (int i = 0; i < 1000; ++i) report.refused(fmt::format("says it is CN=name-{}", i), "01.02");
   const std::vector<std::string> told = report.due({});
   ASSERT_EQ(told.size(), StrangerReport::kTold + 1);
-  EXPECT_NE(told.front().find(fmt::format("others ({} tries", 1000 - StrangerReport::kTold)), std::string::npos)
+  EXPECT_NE(told.front().find(fmt::format("others ({} tries", 1000 - StrangerReport::kTold)),
+            std::string::npos)
       << told.front();
 }
 

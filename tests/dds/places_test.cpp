@@ -20,7 +20,8 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kNoTime{0};
 
-Place place(std::uint16_t port = 17500, const std::string& address = "10.1.0.3", std::uint32_t domain = 5) {
+Place place(std::uint16_t port = 17500, const std::string& address = "10.1.0.3",
+            std::uint32_t domain = 5) {
   Place result;
   result.at.address = address;
   result.at.port = port;
@@ -68,7 +69,8 @@ TEST(Places, OnlyAWholePlaceInItsOneSpellingIsBelieved) {
       " trammel.server=10.1.0.3:17500;domain=5;id=line-3",
       std::string(1 << 20, 'a'),
   };
-  for (const std::string& text : hostile) EXPECT_EQ(read_place(text), std::nullopt) << text.substr(0, 80);
+  for (const std::string& text : hostile)
+    EXPECT_EQ(read_place(text), std::nullopt) << text.substr(0, 80);
 }
 
 TEST(Places, ServersOfOtherDomainsAreNotFound) {
@@ -103,10 +105,12 @@ TEST(Places, FromAnotherHostALoopbackAddressIsNoPlace) {
 }
 
 TEST(Places, WithoutADiscoveryServerItIsSaidWhichWereAsked) {
-  const auto found = look_for_places({{"127.0.0.1", 11811}, {"127.0.0.1", 11812}}, 5, milliseconds(10));
+  const auto found =
+      look_for_places({{"127.0.0.1", 11811}, {"127.0.0.1", 11812}}, 5, milliseconds(10));
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().code, ErrorCode::kUnreachable);
-  EXPECT_NE(found.error().message.find("127.0.0.1:11811, 127.0.0.1:11812"), std::string::npos) << found.error().message;
+  EXPECT_NE(found.error().message.find("127.0.0.1:11811, 127.0.0.1:11812"), std::string::npos)
+      << found.error().message;
 }
 
 /// Fast DDS's own, as it is installed, by the shipped file on another port.
@@ -116,14 +120,17 @@ class DiscoveryServer {
 
   explicit DiscoveryServer(int number)
       : port_(static_cast<std::uint16_t>(test::own_ports() + number)),
-        process_({kProgram, "-i", std::to_string(number), "-x", folder_.write("discovery.xml", set_up(port_))}) {}
+        process_({kProgram, "-i", std::to_string(number), "-x",
+                  folder_.write("discovery.xml", set_up(port_))}) {}
   [[nodiscard]] HostPort place() const { return {"127.0.0.1", port_}; }
 
  private:
   static std::string set_up(std::uint16_t port) {
-    std::string text = read_text_file(TRAMMEL_SOURCE_DIR "/deploy/discovery-server.xml", 100'000).value();
+    std::string text =
+        read_text_file(TRAMMEL_SOURCE_DIR "/deploy/discovery-server.xml", 100'000).value();
     const std::string shipped = "<port>11811</port>";
-    return text.replace(text.find(shipped), shipped.size(), "<port>" + std::to_string(port) + "</port>");
+    return text.replace(text.find(shipped), shipped.size(),
+                        "<port>" + std::to_string(port) + "</port>");
   }
 
   test::TemporaryFolder folder_;
@@ -134,8 +141,8 @@ class DiscoveryServer {
 TEST(Places, ServersAreFoundByARealDiscoveryServerAlsoWhereAnotherIsMissing) {
   if (!std::filesystem::exists(DiscoveryServer::kProgram)) GTEST_SKIP() << "needs fastdds-tools";
   const DiscoveryServer discovery(0);
-  const std::vector<HostPort> both = {discovery.place(),
-                                      {"127.0.0.1", static_cast<std::uint16_t>(test::own_ports() + 1)}};
+  const std::vector<HostPort> both = {
+      discovery.place(), {"127.0.0.1", static_cast<std::uint16_t>(test::own_ports() + 1)}};
   const auto first = announce_place(place(17500, "127.0.0.1", 5), both);
   const auto second = announce_place(place(17502, "127.0.0.1", 5), both);
   const auto other = announce_place(place(17504, "127.0.0.1", 6), both);
@@ -144,7 +151,8 @@ TEST(Places, ServersAreFoundByARealDiscoveryServerAlsoWhereAnotherIsMissing) {
   for (int look = 0; look < 30 && found.size() < 2; ++look) {  // they need a moment to be known
     found = look_for_places(both, 5, milliseconds(2000)).value_or(std::vector<HostPort>());
   }
-  std::sort(found.begin(), found.end(), [](const HostPort& a, const HostPort& b) { return a.port < b.port; });
+  std::sort(found.begin(), found.end(),
+            [](const HostPort& a, const HostPort& b) { return a.port < b.port; });
   EXPECT_EQ(found, (std::vector<HostPort>{{"127.0.0.1", 17500}, {"127.0.0.1", 17502}}));
 }
 

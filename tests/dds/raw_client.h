@@ -53,25 +53,28 @@ class AnyBytesType final : public wire::dds::TopicDataType {
 
 /// A client that sends anything, and counts every reply that comes to its partition.
 template <typename Operation>
-class RawClient final : private wire::dds::DataWriterListener, private wire::dds::DataReaderListener {
+class RawClient final : private wire::dds::DataWriterListener,
+                        private wire::dds::DataReaderListener {
  public:
   using Request = typename Operation::Request::type;
   using Reply = typename Operation::Reply::type;
 
   /// `security`: the folder of its certificate; empty: none.
-  RawClient(std::uint32_t domain, std::uint16_t port, std::string partition, const std::string& security = "")
+  RawClient(std::uint32_t domain, std::uint16_t port, std::string partition,
+            const std::string& security = "")
       : partition_(std::move(partition)) {
     wire::ParticipantOptions options{"raw client", domain, "127.0.0.1", 0, {port}};
     if (!security.empty()) options.security = wire::read_security(security).value();
     participant_ = wire::make_participant(options).value();
     wire::dds::TypeSupport type(new AnyBytesType(typename Operation::Request().getName()));
     type.register_type(participant_.get());
-    auto* requests = participant_->create_topic(wire::topic_name(Operation::kName, "_Request"), type.get_type_name(),
-                                                wire::dds::TOPIC_QOS_DEFAULT);
+    auto* requests = participant_->create_topic(wire::topic_name(Operation::kName, "_Request"),
+                                                type.get_type_name(), wire::dds::TOPIC_QOS_DEFAULT);
     auto* replies = wire::make_reply_topic<Operation>(*participant_).value();
     participant_->create_subscriber(wire::subscriber_qos(partition_))
         ->create_datareader(replies, wire::call_reader_qos(1000), this,
-                            wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched());
+                            wire::dds::StatusMask::data_available()
+                                << wire::dds::StatusMask::subscription_matched());
     writer_ = participant_->create_publisher(wire::publisher_qos({}))
                   ->create_datawriter(requests, wire::call_writer_qos(1000), this,
                                       wire::dds::StatusMask::publication_matched());
@@ -84,7 +87,8 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kLimit, [this] { return matched_ > 0; });
   }
-  /// Until the server listens to the requests and its replies are matched too, as idl/README.md asks.
+  /// Until the server listens to the requests and its replies are matched too, as idl/README.md
+  /// asks.
   [[nodiscard]] bool wait_until_matched() {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kLimit, [this] { return matched_ > 0 && answers_ > 0; });
@@ -94,7 +98,9 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     return matched_ > 0 && answers_ > 0;
   }
   /// Its GUID; the first twelve are those of its participant.
-  [[nodiscard]] std::array<std::uint8_t, 16> writer_octets() const { return wire::octets_of(writer_->guid()); }
+  [[nodiscard]] std::array<std::uint8_t, 16> writer_octets() const {
+    return wire::octets_of(writer_->guid());
+  }
   void send(Bytes bytes) { writer_->write(&bytes); }
   void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
     header.request_id().writer_guid(wire::octets_of(writer_->guid()));
@@ -126,14 +132,16 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
  private:
   static constexpr std::chrono::seconds kLimit{20};
 
-  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
+  void on_publication_matched(wire::dds::DataWriter*,
+                              const wire::dds::PublicationMatchedStatus& status) override {
     {
       const std::lock_guard lock(mutex_);
       matched_ = status.current_count;
     }
     changed_.notify_all();
   }
-  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
+  void on_subscription_matched(wire::dds::DataReader*,
+                               const wire::dds::SubscriptionMatchedStatus& status) override {
     {
       const std::lock_guard lock(mutex_);
       answers_ = status.current_count;
@@ -143,7 +151,8 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
   void on_data_available(wire::dds::DataReader* reader) override {
     Reply reply;
     wire::dds::SampleInfo info;
-    while (reader->take_next_sample(&reply, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    while (reader->take_next_sample(&reply, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       const std::lock_guard lock(mutex_);
       if (info.valid_data) replies_.push_back(reply);
     }

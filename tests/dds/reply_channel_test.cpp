@@ -76,7 +76,8 @@ TEST_F(ParkedChannelsTest, AReplyThatTheWireCannotCarryIsAnsweredByAnError) {
   EXPECT_TRUE(ReplyWriter::make(*to->publisher(), *topic, [] {})->write(&reply));
   reply.model().level(std::string(wire::MAX_SPELLING + 1, 'x'));
   EXPECT_FALSE(ReplyWriter::make(*to->publisher(), *topic, [] {})->write(&reply));
-  const auto error = std::static_pointer_cast<wire::PredictErrorReply>(instead_of<wire::PredictErrorReply>(&reply));
+  const auto error = std::static_pointer_cast<wire::PredictErrorReply>(
+      instead_of<wire::PredictErrorReply>(&reply));
   EXPECT_EQ(error->header().result(), wire::RESULT_INTERNAL);
   EXPECT_EQ(error->header().related_request_id().sequence_number(), 7);
   EXPECT_TRUE(ReplyWriter::make(

@@ -30,7 +30,8 @@ class RequestRecorderTest : public testing::Test {
   }
   [[nodiscard]] static bool drops(const RequestRecorder& recorder, std::uint64_t number) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (recorder.dropped() < number && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+    while (recorder.dropped() < number && std::chrono::steady_clock::now() < until)
+      std::this_thread::yield();
     return recorder.dropped() == number;
   }
   [[nodiscard]] std::size_t bytes() const {
@@ -99,7 +100,8 @@ class FullDisk {
   rlimit before_{};
 };
 
-TEST_F(RequestRecorderTest, ADiskThatIsFullCostsNothingThatWasRecordedAndLaterRequestsAreRecordedAgain) {
+TEST_F(RequestRecorderTest,
+       ADiskThatIsFullCostsNothingThatWasRecordedAndLaterRequestsAreRecordedAgain) {
   const std::string large(100'000, 'x');
   for (int i = 0; i < 8; ++i) live_once(fmt::format("{}{}", large, i));
   const auto recorder = open();

@@ -32,7 +32,8 @@ PredictErrors_ good_question() {
 
 /// What a server makes of the bytes; empty: dropped.
 template <typename PubSubType>
-std::optional<wire::ReceivedMessage<typename PubSubType::type>> received(Bytes bytes, std::size_t limit = 1 << 20) {
+std::optional<wire::ReceivedMessage<typename PubSubType::type>> received(
+    Bytes bytes, std::size_t limit = 1 << 20) {
   const auto unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
   wire::ReceivedMessageType<PubSubType> type(limit, unreadable);
   eprosima::fastrtps::rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
@@ -60,7 +61,8 @@ wire::ReceivedMessage<Message> as_received(const Message& message) {
 std::string members_of(const std::string& text, const std::regex& member,
                        const std::map<std::string, std::string>& as) {
   std::string all;
-  for (auto at = std::sregex_iterator(text.begin(), text.end(), member); at != std::sregex_iterator(); ++at) {
+  for (auto at = std::sregex_iterator(text.begin(), text.end(), member);
+       at != std::sregex_iterator(); ++at) {
     const std::string type = (*at)[1];
     all += (as.contains(type) ? as.at(type) : type) + " " + (*at)[2].str() + "\n";
   }
@@ -70,20 +72,23 @@ std::string members_of(const std::string& text, const std::regex& member,
 TEST(Ros2Messages, AreThoseOfTheIdl) {
   const std::string folder = TRAMMEL_SOURCE_DIR "/idl/ros2/";
   const std::string idl = test::read_file(folder + "trammel_msgs.idl");
-  const std::map<std::string, std::string> as = {{"unsigned long", "uint32"},
-                                                 {"long", "int32"},
-                                                 {"sequence<double>", "float64[]"},
-                                                 {"sequence<octet>", "uint8[]"},
-                                                 {"sequence<boolean>", "bool[]"},
-                                                 {"sequence<string>", "string[]"},
-                                                 {"sequence<geometry_msgs::msg::dds_::Pose_>", "geometry_msgs/Pose[]"}};
-  for (const std::string name : {"PredictErrors", "PredictedErrors", "CorrectTargets", "CorrectedTargets"}) {
+  const std::map<std::string, std::string> as = {
+      {"unsigned long", "uint32"},
+      {"long", "int32"},
+      {"sequence<double>", "float64[]"},
+      {"sequence<octet>", "uint8[]"},
+      {"sequence<boolean>", "bool[]"},
+      {"sequence<string>", "string[]"},
+      {"sequence<geometry_msgs::msg::dds_::Pose_>", "geometry_msgs/Pose[]"}};
+  for (const std::string name :
+       {"PredictErrors", "PredictedErrors", "CorrectTargets", "CorrectedTargets"}) {
     const std::size_t begin = idl.find("struct " + name + "_ {"), end = idl.find("};", begin);
     ASSERT_NE(begin, std::string::npos) << name;
-    const std::string here =
-        members_of(idl.substr(begin, end - begin), std::regex("\n  ([a-z][A-Za-z_:<> 0-9]*) ([a-z_]+);"), as);
-    const std::string there = members_of("\n" + test::read_file(folder + "trammel_msgs/msg/" + name + ".msg"),
-                                         std::regex("\n([a-z][A-Za-z0-9_/\\[\\]]*) +([a-z_]+)(?= |\n)"), {});
+    const std::string here = members_of(idl.substr(begin, end - begin),
+                                        std::regex("\n  ([a-z][A-Za-z_:<> 0-9]*) ([a-z_]+);"), as);
+    const std::string there =
+        members_of("\n" + test::read_file(folder + "trammel_msgs/msg/" + name + ".msg"),
+                   std::regex("\n([a-z][A-Za-z0-9_/\\[\\]]*) +([a-z_]+)(?= |\n)"), {});
     EXPECT_EQ(here, there) << name;
     EXPECT_NE(here, "") << name;
   }
@@ -105,8 +110,8 @@ TEST(Ros2Messages, AreNeverBelievedWhereTheyEndTooEarly) {
   const Bytes whole = bytes_of(good_question());
   int told = 0;
   for (std::size_t length = 0; length < whole.size(); ++length) {
-    const auto message =
-        received<PredictType>(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)));
+    const auto message = received<PredictType>(
+        Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)));
     if (!message) continue;
     ++told;
     EXPECT_EQ(message->id(), "node-1/1") << length;

@@ -23,10 +23,11 @@ class Node final : private wire::dds::DataWriterListener, private wire::dds::Dat
  public:
   explicit Node(const DdsOptions& options, bool listens = true) {
     using Ros = wire::Ros2CorrectTargets;
-    participant_ = wire::make_participant({"node", options.domain, "127.0.0.1", 0, {options.port}}).value();
-    auto* questions =
-        wire::make_topic(*participant_, Ros::kRequestTopic, new wire::SafeType<Ros::Request>(wire::kMaxComputeSample))
-            .value();
+    participant_ =
+        wire::make_participant({"node", options.domain, "127.0.0.1", 0, {options.port}}).value();
+    auto* questions = wire::make_topic(*participant_, Ros::kRequestTopic,
+                                       new wire::SafeType<Ros::Request>(wire::kMaxComputeSample))
+                          .value();
     if (listens) listen();
     writer_ = participant_->create_publisher(wire::publisher_qos({}))
                   ->create_datawriter(questions, wire::call_writer_qos(1000), this,
@@ -38,12 +39,13 @@ class Node final : private wire::dds::DataWriterListener, private wire::dds::Dat
 
   void listen() {
     using Ros = wire::Ros2CorrectTargets;
-    auto* answers =
-        wire::make_topic(*participant_, Ros::kReplyTopic, new wire::SafeType<Ros::Reply>(wire::kMaxComputeSample))
-            .value();
+    auto* answers = wire::make_topic(*participant_, Ros::kReplyTopic,
+                                     new wire::SafeType<Ros::Reply>(wire::kMaxComputeSample))
+                        .value();
     participant_->create_subscriber(wire::subscriber_qos({}))
         ->create_datareader(answers, wire::call_reader_qos(1000), this,
-                            wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched());
+                            wire::dds::StatusMask::data_available()
+                                << wire::dds::StatusMask::subscription_matched());
   }
   [[nodiscard]] bool wait_until_matched() {
     return wait([this] { return readers_ > 0 && writers_ > 0; });
@@ -73,16 +75,19 @@ class Node final : private wire::dds::DataWriterListener, private wire::dds::Dat
     }
     changed_.notify_all();
   }
-  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
+  void on_publication_matched(wire::dds::DataWriter*,
+                              const wire::dds::PublicationMatchedStatus& status) override {
     change([&] { readers_ = status.current_count; });
   }
-  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
+  void on_subscription_matched(wire::dds::DataReader*,
+                               const wire::dds::SubscriptionMatchedStatus& status) override {
     change([&] { writers_ = status.current_count; });
   }
   void on_data_available(wire::dds::DataReader* reader) override {
     CorrectedTargets_ answer;
     wire::dds::SampleInfo info;
-    while (reader->take_next_sample(&answer, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    while (reader->take_next_sample(&answer, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       if (info.valid_data) change([&] { answers_.push_back(answer); });
     }
   }
@@ -134,13 +139,15 @@ TEST_F(Ros2Service, ARepeatIsAnsweredAgainAndSomethingElseUnderItsIdIsAConflict)
   static_cast<void>(node_.wait_for_answers(2));
   node_.ask(question("a", 4));
   const auto answers = node_.wait_for_answers(3);
-  EXPECT_EQ(answers[0].result(), static_cast<std::uint32_t>(wire::RESULT_OK)) << answers[0].message();
+  EXPECT_EQ(answers[0].result(), static_cast<std::uint32_t>(wire::RESULT_OK))
+      << answers[0].message();
   EXPECT_EQ(answers[0].status().size(), 3u);
   EXPECT_EQ(answers[1].error_before_m(), answers[0].error_before_m());
   EXPECT_EQ(answers[2].result(), static_cast<std::uint32_t>(wire::RESULT_CONFLICT));
 }
 
-// The two are never matched at once: what is written before the node's reader is known, nobody gets.
+// The two are never matched at once: what is written before the node's reader is known, nobody
+// gets.
 TEST_F(Ros2Service, ANodeWhoseReaderIsMatchedAfterItsQuestionIsAnswered) {
   Node late(options_, false);
   ASSERT_TRUE(late.wait_until_heard());

@@ -33,14 +33,17 @@ bool reads(Bytes bytes, std::size_t limit = kMaxComputeSample) {
   return type.deserialize(&payload, &sample);
 }
 
-Bytes bytes_of(const CorrectTargetRequest& request) { return test::to_bytes<CorrectTarget::Request>(request); }
+Bytes bytes_of(const CorrectTargetRequest& request) {
+  return test::to_bytes<CorrectTarget::Request>(request);
+}
 
 TEST(SafeType, ReadsAGoodSample) { EXPECT_TRUE(reads(bytes_of(good_request()))); }
 
 TEST(SafeType, DropsEveryTruncation) {
   const Bytes whole = bytes_of(good_request());
   for (std::size_t length = 0; length < whole.size(); ++length) {
-    EXPECT_FALSE(reads(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)))) << length;
+    EXPECT_FALSE(reads(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length))))
+        << length;
   }
 }
 
@@ -83,9 +86,11 @@ void expect_shape(const typename PubSubType::type& sample) {
   using Sample = typename PubSubType::type;
   const Bytes whole = test::to_bytes<PubSubType>(sample);
   const auto fault = find_fault<Sample>(whole);
-  EXPECT_FALSE(fault) << PubSubType().getName() << ": " << fault->what << " (" << fault->field << ")";
+  EXPECT_FALSE(fault) << PubSubType().getName() << ": " << fault->what << " (" << fault->field
+                      << ")";
   for (std::size_t length = 0; length < whole.size(); ++length) {
-    EXPECT_TRUE(find_fault<Sample>(std::span(whole).first(length))) << PubSubType().getName() << " " << length;
+    EXPECT_TRUE(find_fault<Sample>(std::span(whole).first(length)))
+        << PubSubType().getName() << " " << length;
   }
   Bytes longer = whole;
   longer.resize(whole.size() + 4);
@@ -204,7 +209,8 @@ TEST(SafeType, AHostileLengthIsRefusedBeforeMemoryIsAskedFor) {
   bytes.resize(kMaxComputeSample);  // room for a million elements of a few octets
   const std::size_t length_at = test::to_bytes<PredictError::Request>(request).size() - 4;
   for (const std::uint32_t count : {MAX_TARGETS + 1, 1'000'000U, 0xffffffffU}) {
-    for (std::size_t i = 0; i < 4; ++i) bytes[length_at + i] = static_cast<unsigned char>(count >> (8 * i));
+    for (std::size_t i = 0; i < 4; ++i)
+      bytes[length_at + i] = static_cast<unsigned char>(count >> (8 * i));
     const auto fault = find_fault<PredictErrorRequest>(bytes);
     ASSERT_TRUE(fault);
     EXPECT_EQ(fault->code, RESULT_TOO_LARGE);
@@ -219,7 +225,8 @@ TEST(SafeType, DoesNotBelieveAHostileLength) {
   const std::size_t tail = bytes.size() - 2 * 120;
   for (std::size_t i = 4; i + 4 <= tail; i += 4) {
     Bytes hostile = bytes;
-    std::fill_n(hostile.begin() + static_cast<std::ptrdiff_t>(i), 4, static_cast<unsigned char>(0xff));
+    std::fill_n(hostile.begin() + static_cast<std::ptrdiff_t>(i), 4,
+                static_cast<unsigned char>(0xff));
     static_cast<void>(reads(hostile));  // neither throws nor runs out of memory
   }
 }

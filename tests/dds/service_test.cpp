@@ -44,8 +44,8 @@ std::vector<wire::CommandedJoints> poses(std::size_t count) {
   return std::vector<wire::CommandedJoints>(count, pose);
 }
 
-std::unique_ptr<client::Session> open_session(const DdsOptions& options,
-                                              std::chrono::milliseconds timeout = std::chrono::seconds(10)) {
+std::unique_ptr<client::Session> open_session(
+    const DdsOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10)) {
   auto session = client::Session::open({options.domain, {options.port}, timeout});
   if (!session) throw std::runtime_error(session.error().message);
   return std::move(*session);
@@ -55,11 +55,13 @@ std::unique_ptr<client::Session> open_session(const DdsOptions& options,
 class Server {
  public:
   explicit Server(DdsOptions options) : options_(std::move(options)) {
-    backend_.trainer->set_listeners([this](const JobProgress& progress) { service_.publish_progress(progress); },
-                                    [this](const ServedModel& model, bool in_force) {
-                                      if (in_force) service_.publish_model(model.cell);
-                                    });
-    if (const auto taken = backend_.trainer->take_up(); !taken) throw std::runtime_error(taken.error().message);
+    backend_.trainer->set_listeners(
+        [this](const JobProgress& progress) { service_.publish_progress(progress); },
+        [this](const ServedModel& model, bool in_force) {
+          if (in_force) service_.publish_model(model.cell);
+        });
+    if (const auto taken = backend_.trainer->take_up(); !taken)
+      throw std::runtime_error(taken.error().message);
   }
   void start() {
     const Status started = service_.start();
@@ -98,7 +100,8 @@ TEST_F(ServiceTest, AnswersAClientThatCameLater) {
 TEST_F(ServiceTest, AnswersAClientThatCameFirst) {
   server_.backend().serve(4);
   const auto session = open_session(server_.options());
-  auto answer = std::async(std::launch::async, [&] { return session->predict_error(kCell7, {kJoints}); });
+  auto answer =
+      std::async(std::launch::async, [&] { return session->predict_error(kCell7, {kJoints}); });
   server_.start();
   const auto got = answer.get();
   EXPECT_TRUE(got) << got.error().message;
@@ -121,8 +124,8 @@ TEST_F(ServiceTest, NobodyThereIsUnreachable) {
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().code, ErrorCode::kUnreachable);
   EXPECT_EQ(answer.error().field, "server");
-  EXPECT_EQ(answer.error().text, fmt::format("300 ms, looking at 127.0.0.1:{} in domain {}", server_.options().port,
-                                             server_.options().domain));
+  EXPECT_EQ(answer.error().text, fmt::format("300 ms, looking at 127.0.0.1:{} in domain {}",
+                                             server_.options().port, server_.options().domain));
   EXPECT_FALSE(session->servers());
 }
 
@@ -130,21 +133,25 @@ TEST_F(ServiceTest, WhatTheServerRefusesArrivesWithItsCode) {
   server_.backend().serve(1);
   server_.start();
   const auto session = open_session(server_.options());
-  EXPECT_EQ(session->predict_error(context_of("cell-9"), {kJoints}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(session->predict_error(context_of("cell-9"), {kJoints}).error().code,
+            ErrorCode::kNotFound);
   client::CallContext compensating = kCell7;
   compensating.controller_compensates = true;
   EXPECT_EQ(session->predict_error(compensating, {kJoints}).error().code, ErrorCode::kRefused);
   EXPECT_EQ(session->predict_error(kCell7, {{1, 2}}).error().code, ErrorCode::kRefused);
-  EXPECT_EQ(session->submit_measurements("cell-7", "lt-07", "no csv").error().code, ErrorCode::kRefused);
+  EXPECT_EQ(session->submit_measurements("cell-7", "lt-07", "no csv").error().code,
+            ErrorCode::kRefused);
   EXPECT_EQ(session->activate("cell-7", 9).error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(session->submit_measurements("cell-7", "lt-07", std::string(33u << 20, 'x')).error().code,
-            ErrorCode::kTooLarge);
+  EXPECT_EQ(
+      session->submit_measurements("cell-7", "lt-07", std::string(33u << 20, 'x')).error().code,
+      ErrorCode::kTooLarge);
 }
 
 TEST_F(ServiceTest, ATextThatANulWouldCutShortIsNotSent) {
   server_.start();
   const auto session = open_session(server_.options());
-  const std::string torn = test::small_batch_csv(*server_.backend().cell, {}) + std::string(100, '\0');
+  const std::string torn =
+      test::small_batch_csv(*server_.backend().cell, {}) + std::string(100, '\0');
   const auto submitted = session->submit_measurements("cell-7", "lt-07", torn);
   ASSERT_FALSE(submitted) << "the rows before the NUL were taken for the batch";
   EXPECT_EQ(submitted.error().code, ErrorCode::kRefused);
@@ -163,12 +170,14 @@ TEST_F(ServiceTest, AModelWhoseTextsNoReplyCanCarryAnswersAndIsListed) {
   parts.provenance.measured_at = std::numeric_limits<std::int64_t>::max();
   const CompensatedModel model = CompensatedModel::make(parts).value();
   const int version = backend.store->add_model("cell-7", model, 0, true, "").value();
-  backend.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
+  backend.registry.publish(
+      std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
   const auto session = open_session(server_.options());
   const auto answer = session->predict_error(kCell7, {kJoints});
   ASSERT_TRUE(answer) << answer.error().message;
   EXPECT_EQ(answer->model.level, std::string(wire::MAX_SPELLING, 'L'));
-  EXPECT_TRUE(answer->model.batch_id.starts_with("\\u001b[31mBBB")) << answer->model.batch_id.substr(0, 30);
+  EXPECT_TRUE(answer->model.batch_id.starts_with("\\u001b[31mBBB"))
+      << answer->model.batch_id.substr(0, 30);
   const auto listed = session->models("cell-7");
   EXPECT_TRUE(listed) << listed.error().message;
 }
@@ -193,7 +202,8 @@ TEST_F(ServiceTest, LongCallsGoInParts) {
 TEST_F(ServiceTest, TheLargestRequestAndItsReplyFit) {
   server_.backend().serve(2);
   server_.start();
-  test::RawClient<wire::CorrectTarget> client(server_.options().domain, server_.options().port, "raw-1");
+  test::RawClient<wire::CorrectTarget> client(server_.options().domain, server_.options().port,
+                                              "raw-1");
   ASSERT_TRUE(client.wait_for_server());
   wire::CorrectTargetRequest request;
   request.about().cell("cell-7");
@@ -215,7 +225,8 @@ TEST_F(ServiceTest, TheLargestRequestAndItsReplyFit) {
 TEST_F(ServiceTest, ARequestThatIsSentOnceMoreIsNotComputedAgain) {
   server_.backend().serve(1);
   server_.start();
-  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port,
+                                             "raw-1");
   ASSERT_TRUE(client.wait_for_server());
   wire::PredictErrorRequest request;
   request.about().cell("cell-7");
@@ -239,8 +250,8 @@ TEST_F(ServiceTest, ClientsThatUseTheSameRequestIdsGetTheirOwnAnswers) {
   const std::vector<std::string> names = {"raw-1", "raw-2"};
   std::vector<std::unique_ptr<test::RawClient<wire::PredictError>>> clients;
   for (std::size_t k = 0; k < names.size(); ++k) {
-    clients.push_back(std::make_unique<test::RawClient<wire::PredictError>>(server_.options().domain,
-                                                                            server_.options().port, names[k]));
+    clients.push_back(std::make_unique<test::RawClient<wire::PredictError>>(
+        server_.options().domain, server_.options().port, names[k]));
     ASSERT_TRUE(clients[k]->wait_for_server());
     wire::PredictErrorRequest request;
     request.about().cell("cell-7");
@@ -265,14 +276,17 @@ TEST_F(ServiceTest, AProgramIsCorrectedByOneModelThoughAnotherIsPutInForceMeanwh
   ASSERT_TRUE(corrected) << corrected.error().message;
   EXPECT_EQ(corrected->model.version, 2);
   ASSERT_EQ(corrected->items.size(), targets.size());
-  for (const client::CorrectedTarget& item : corrected->items) EXPECT_NEAR(item.error_before_mm, 0.2, 1e-6);
+  for (const client::CorrectedTarget& item : corrected->items)
+    EXPECT_NEAR(item.error_before_mm, 0.2, 1e-6);
 }
 
 TEST_F(ServiceTest, EveryRequestHasExactlyOneAnswer) {
   server_.backend().serve(1);
   server_.start();
-  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
-  test::RawClient<wire::PredictError> other(server_.options().domain, server_.options().port, "raw-2");
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port,
+                                             "raw-1");
+  test::RawClient<wire::PredictError> other(server_.options().domain, server_.options().port,
+                                            "raw-2");
   ASSERT_TRUE(client.wait_for_server());
   ASSERT_TRUE(other.wait_for_server());
   wire::PredictErrorRequest request;
@@ -317,7 +331,8 @@ TEST_F(ServiceTest, TheLogTellsWhatWasChangedOrRefusedUnderTheClientsTrace) {
   });
   server_.backend().serve(1);
   server_.start();
-  test::RawClient<wire::ManageModels> client(server_.options().domain, server_.options().port, "raw-1");
+  test::RawClient<wire::ManageModels> client(server_.options().domain, server_.options().port,
+                                             "raw-1");
   ASSERT_TRUE(client.wait_until_matched());
   wire::ManageModelsRequest request;
   request.header().trace_id("shift-3/program-17");
@@ -346,7 +361,8 @@ TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatC
   victim.fill_in(forged.header(), 1);
   forged.about().cell("cell-7");
   forged.poses(poses(3));
-  thief.send(test::to_bytes<wire::PredictError::Request>(forged));  // name, number and partition of the victim
+  thief.send(test::to_bytes<wire::PredictError::Request>(
+      forged));  // name, number and partition of the victim
   forged.header().reply_partition("thief");
   thief.send(test::to_bytes<wire::PredictError::Request>(forged));  // name and number only
   const auto told = thief.wait_for_replies(1);
@@ -359,7 +375,8 @@ TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatC
   const auto answered = victim.wait_for_replies(1);
   ASSERT_EQ(answered.size(), 1U);
   EXPECT_EQ(answered[0].header().result(), wire::RESULT_OK) << answered[0].header().message();
-  EXPECT_EQ(answered[0].predictions().size(), 1U) << "the thief's poses came as the victim's answer";
+  EXPECT_EQ(answered[0].predictions().size(), 1U)
+      << "the thief's poses came as the victim's answer";
   const auto session = open_session(server_.options());
   std::uint64_t misdirected = 0;
   for (int look = 0; misdirected == 0 && look < 20000; ++look) {
@@ -372,10 +389,13 @@ TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatC
 TEST_F(ServiceTest, AServerOfAnotherContractIsNamedByTheClientThatFindsNoOther) {
   for (const std::uint32_t contract : {1U, 3U}) {
     const DdsOptions options = server_.options();
-    auto other = wire::make_participant({"another server", options.domain, options.address, options.port, {}}).value();
+    auto other = wire::make_participant(
+                     {"another server", options.domain, options.address, options.port, {}})
+                     .value();
     wire::dds::DataWriter* writer =
         other->create_publisher(wire::publisher_qos({}))
-            ->create_datawriter(wire::make_contract_topic(*other).value(), wire::service_status_writer_qos());
+            ->create_datawriter(wire::make_contract_topic(*other).value(),
+                                wire::service_status_writer_qos());
     wire::SpokenContract status;
     status.server("elder");
     status.contract_version(contract);
@@ -384,7 +404,8 @@ TEST_F(ServiceTest, AServerOfAnotherContractIsNamedByTheClientThatFindsNoOther) 
     const auto session = open_session(options, std::chrono::milliseconds(3000));
     const auto servers = session->servers();
     ASSERT_FALSE(servers);
-    EXPECT_EQ(refusal_of(servers), Refusal("", {}, "contract_version").beyond(contract, wire::CONTRACT_VERSION));
+    EXPECT_EQ(refusal_of(servers),
+              Refusal("", {}, "contract_version").beyond(contract, wire::CONTRACT_VERSION));
     EXPECT_NE(servers.error().message.find("elder"), std::string::npos);
     EXPECT_EQ(servers.error().next, contract == 1 ? "update the server" : "update this program");
     EXPECT_EQ(session->predict_error(kCell7, {kJoints}).error().field, "contract_version");
@@ -395,7 +416,8 @@ TEST_F(ServiceTest, AServerOfAnotherContractIsNamedByTheClientThatFindsNoOther) 
 TEST_F(ServiceTest, HostileSamplesDoNotStopAReader) {
   server_.backend().serve(1);
   server_.start();
-  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port,
+                                             "raw-1");
   ASSERT_TRUE(client.wait_for_server());
   wire::PredictErrorRequest request;
   request.about().cell("cell-7");
@@ -420,7 +442,8 @@ TEST_F(ServiceTest, HostileSamplesDoNotStopAReader) {
   ASSERT_EQ(replies.size(), 20u);
   std::map<wire::ResultCode, int> counts;
   for (const auto& reply : replies) ++counts[reply.header().result()];
-  EXPECT_EQ(counts, (std::map<wire::ResultCode, int>{{wire::RESULT_OK, 10}, {wire::RESULT_MALFORMED, 10}}));
+  EXPECT_EQ(counts,
+            (std::map<wire::ResultCode, int>{{wire::RESULT_OK, 10}, {wire::RESULT_MALFORMED, 10}}));
 }
 
 TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
@@ -429,8 +452,8 @@ TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
   hashes[1] = server_.backend().serve(1)->model.provenance().hash;
   std::vector<std::shared_ptr<const ServedModel>> models;
   for (int version = 2; version <= kSwaps; ++version) {
-    models.push_back(std::make_shared<const ServedModel>(
-        ServedModel{"cell-7", version, test::shifted_model(server_.backend().cell, version * 1e-4)}));
+    models.push_back(std::make_shared<const ServedModel>(ServedModel{
+        "cell-7", version, test::shifted_model(server_.backend().cell, version * 1e-4)}));
     hashes[version] = models.back()->model.provenance().hash;
   }
   server_.start();
@@ -443,14 +466,16 @@ TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
     const auto session = open_session(server_.options());
     int wrong = 0;
     while (!enough) {
-      const auto answer = session->predict_error(kCell7, std::vector<std::vector<double>>(50, kJoints));
+      const auto answer =
+          session->predict_error(kCell7, std::vector<std::vector<double>>(50, kJoints));
       if (!answer) {
         ADD_FAILURE() << answer.error().message;
         enough = true;
       } else {
         const int version = answer->model.version;
         if (answer->model.hash != hashes.at(version)) ++wrong;
-        for (const auto& item : answer->items) wrong += std::abs(item.dx_mm - 0.1 * version) > 1e-9 ? 1 : 0;
+        for (const auto& item : answer->items)
+          wrong += std::abs(item.dx_mm - 0.1 * version) > 1e-9 ? 1 : 0;
         const std::lock_guard lock(mutex);
         newest[index] = version;
       }
@@ -462,7 +487,8 @@ TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
   auto second = std::async(std::launch::async, load, 1);
   const auto wait_until_served = [&](int version) {
     std::unique_lock lock(mutex);
-    return answered.wait_for(lock, kLimit, [&] { return enough || (newest[0] >= version && newest[1] >= version); });
+    return answered.wait_for(
+        lock, kLimit, [&] { return enough || (newest[0] >= version && newest[1] >= version); });
   };
   EXPECT_TRUE(wait_until_served(1));
   for (const auto& model : models) {
@@ -482,7 +508,8 @@ TEST_F(ServiceTest, TwoSessionsAndTheirThreadsDoNotMixTheirAnswers) {
   const auto two = open_session(server_.options());
   const auto load = [](client::Session& session, std::size_t count) {
     for (int i = 0; i < 50; ++i) {
-      const auto answer = session.predict_error(kCell7, std::vector<std::vector<double>>(count, kJoints));
+      const auto answer =
+          session.predict_error(kCell7, std::vector<std::vector<double>>(count, kJoints));
       if (!answer || answer->items.size() != count) return false;
     }
     return true;
@@ -520,10 +547,12 @@ TEST_F(ServiceTest, ASubmittedBatchIsTrainedWatchedAndPutInForce) {
   server_.start();
   server_.start_trainer();
   const auto session = open_session(server_.options());
-  const auto job = session->submit_measurements("cell-7", "lt-07", test::small_batch_csv(*server_.backend().cell, {}));
+  const auto job = session->submit_measurements("cell-7", "lt-07",
+                                                test::small_batch_csv(*server_.backend().cell, {}));
   ASSERT_TRUE(job) << job.error().message;
   int heard = 0;
-  const auto status = session->wait_for_job(*job, kLimit, [&](const client::JobStatus&) { ++heard; });
+  const auto status =
+      session->wait_for_job(*job, kLimit, [&](const client::JobStatus&) { ++heard; });
   ASSERT_TRUE(status) << status.error().message;
   EXPECT_EQ(status->stage, "done") << status->what;
   EXPECT_GT(heard, 0);
@@ -554,7 +583,8 @@ TEST_F(ServiceTest, ASentBatchIsDiagnosedAndThePageComesAlong) {
   server_.start();
   server_.start_trainer();
   const auto session = open_session(server_.options());
-  const auto job = session->diagnose("cell-7", "", test::small_batch_csv(*server_.backend().cell, {}), false);
+  const auto job =
+      session->diagnose("cell-7", "", test::small_batch_csv(*server_.backend().cell, {}), false);
   ASSERT_TRUE(job) << job.error().message;
   const auto status = session->wait_for_job(*job, kLimit, nullptr);
   ASSERT_TRUE(status) << status.error().message;
@@ -570,7 +600,8 @@ TEST_F(ServiceTest, ASentBatchIsDiagnosedAndThePageComesAlong) {
 TEST_F(ServiceTest, ABatchInQuarantineIsShownAndReleased) {
   server_.start();
   const auto session = open_session(server_.options());
-  ASSERT_TRUE(session->submit_measurements("cell-7", "lt-07", test::small_batch_csv(*server_.backend().cell, {})));
+  ASSERT_TRUE(session->submit_measurements("cell-7", "lt-07",
+                                           test::small_batch_csv(*server_.backend().cell, {})));
   ASSERT_TRUE(server_.backend().store->set_quarantine("cell-7", "lt-07", "another tool"));
   const auto apart = session->quarantine("");
   ASSERT_TRUE(apart) << apart.error().message;
@@ -607,7 +638,8 @@ TEST_F(ServiceTest, AnotherServerAnswersWhenOneHasGone) {
   other.backend().serve(2);
   server_.start();
   other.start();
-  auto session = client::Session::open({options.domain, {server_.options().port, options.port}, kLimit});
+  auto session =
+      client::Session::open({options.domain, {server_.options().port, options.port}, kLimit});
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ((*session)->servers().value().size(), 2u);
   EXPECT_TRUE((*session)->predict_error(kCell7, {kJoints}));

@@ -19,7 +19,9 @@ constexpr milliseconds kLimit{5000};
 struct Parts {
   Mark discovery = 0, replying;
   Stillness watched{
-      {{"discovery", [this] { return discovery; }}, {"replying", [this] { return replying; }}}, kTick, kLimit};
+      {{"discovery", [this] { return discovery; }}, {"replying", [this] { return replying; }}},
+      kTick,
+      kLimit};
   /// What `ticks` looks end with.
   std::string after(int ticks, milliseconds each = kTick) {
     std::string names;
@@ -35,7 +37,9 @@ TEST(Stillness, APartThatStopsIsNamedAfterItsLimit) {
 }
 
 TEST(Stillness, APartIsToldBeforeItsLimitAndOneThatEndsNothingIsOnlyTold) {
-  Stillness watched({{"status", [] { return Mark(1); }}, {"computing", [] { return Mark(2); }, false}}, kTick, kLimit);
+  Stillness watched(
+      {{"status", [] { return Mark(1); }}, {"computing", [] { return Mark(2); }, false}}, kTick,
+      kLimit);
   for (int i = 0; i < 1 + 7; ++i) EXPECT_TRUE(watched.look(kTick).empty());
   EXPECT_EQ(watched.still_for(milliseconds(1750)), 3u) << "a bit each";
   EXPECT_EQ(watched.still_for(milliseconds(2000)), 0u);
@@ -67,7 +71,8 @@ TEST(Stillness, APartWithNothingToDoHasNotStopped) {
 TEST(Stillness, AProcessThatWasStoppedAndGoesOnHasNotStopped) {
   Parts parts;
   EXPECT_EQ(parts.after(3), "");
-  EXPECT_EQ(parts.after(1, std::chrono::hours(1)), "") << "an hour in which nobody ran, the watcher neither";
+  EXPECT_EQ(parts.after(1, std::chrono::hours(1)), "")
+      << "an hour in which nobody ran, the watcher neither";
   ++*parts.discovery;
   EXPECT_EQ(parts.after(10), "");
 }

@@ -1,4 +1,5 @@
-// Who is served next, and what is not taken in: with a clock that stands still until somebody works.
+// Who is served next, and what is not taken in: with a clock that stands still until somebody
+// works.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -69,7 +70,8 @@ struct Wish {
 bool ask(Shop& shop, const std::string& client, const Wish& wish) {
   const auto job = std::make_shared<Work>(shop, client, wish.items, wish.each);
   const SteadyTime by = shop.now + wish.within;
-  const auto shed = shop.lane.submit(job, {client, wish.cell, "work of " + wish.cell, wish.items, 1000, by, by});
+  const auto shed =
+      shop.lane.submit(job, {client, wish.cell, "work of " + wish.cell, wish.items, 1000, by, by});
   if (shed) job->shed(*shed);
   return !shed;
 }
@@ -168,7 +170,8 @@ TEST(Turns, WhoComesBackAfterAFloodHasNotLostItsPlaceButNotGainedOneEither) {
   const Cost early = shop.served["early"], steady = shop.served["steady"];
   for (int i = 0; i < 60; ++i) ASSERT_TRUE(ask(shop, "early", {10}));
   work_until_answered(shop, "early", 120);
-  EXPECT_NEAR((shop.served["early"] - early).count(), (shop.served["steady"] - steady).count(), 0.020);
+  EXPECT_NEAR((shop.served["early"] - early).count(), (shop.served["steady"] - steady).count(),
+              0.020);
 }
 
 TEST(Turns, SixtyFourRequestsOfAClientWaitAndTheNextIsToldWhenToTryAgain) {
@@ -196,7 +199,8 @@ TEST(Turns, EveryRequestIsAnsweredOrShedExactlyOnceWhateverComes) {
   std::map<std::string, int> sent;
   for (int i = 0; i < 5000; ++i) {
     const std::string client = "client " + std::to_string(draw(12));
-    const Wish wish{draw(40), milliseconds(draw(4)), milliseconds(draw(400)), "cell-" + std::to_string(draw(3))};
+    const Wish wish{draw(40), milliseconds(draw(4)), milliseconds(draw(400)),
+                    "cell-" + std::to_string(draw(3))};
     ++sent[client];
     static_cast<void>(ask(shop, client, wish));
     for (std::uint64_t k = draw(6); k > 0; --k) static_cast<void>(shop.lane.step());
@@ -221,10 +225,12 @@ TEST(Turns, WhatCannotBeDoneInTimeIsShedAtOnceAndWhatCanIsDone) {
   ASSERT_TRUE(ask(shop, "a", {100}));  // 1 ms an item is known now
   work_all(shop);
   ASSERT_TRUE(ask(shop, "a", {1000}));
-  EXPECT_FALSE(ask(shop, "b", {1000, milliseconds(1), milliseconds(1500)})) << "they take turns: 2 s";
+  EXPECT_FALSE(ask(shop, "b", {1000, milliseconds(1), milliseconds(1500)}))
+      << "they take turns: 2 s";
   EXPECT_GE(shop.told, milliseconds(450));
   EXPECT_LE(shop.told, milliseconds(1000));
-  EXPECT_TRUE(ask(shop, "b", {400, milliseconds(1), milliseconds(1500)})) << "400 ms of b, 400 ms of a meanwhile";
+  EXPECT_TRUE(ask(shop, "b", {400, milliseconds(1), milliseconds(1500)}))
+      << "400 ms of b, 400 ms of a meanwhile";
   work_all(shop);
   EXPECT_EQ(shop.answered["b"], 1);
 }
@@ -241,7 +247,8 @@ TEST(Turns, ALongRequestOfAnotherDoesNotShedAShortOne) {
 
 TEST(Turns, NobodyWorksForAClientThatNoLongerWaits) {
   Shop shop;
-  ASSERT_TRUE(ask(shop, "gone", {1000, milliseconds(1), milliseconds(100)})) << "nothing is known of its cost yet";
+  ASSERT_TRUE(ask(shop, "gone", {1000, milliseconds(1), milliseconds(100)}))
+      << "nothing is known of its cost yet";
   work_all(shop);
   EXPECT_EQ(shop.shed["gone"], 1);
   EXPECT_LE(shop.served["gone"].count(), 0.110);
@@ -344,7 +351,8 @@ struct Held {
   void add(const std::string& client, const std::string& cell, std::size_t items = 1) {
     const SteadyTime by = SteadyTime() + std::chrono::hours(1);
     EXPECT_FALSE(turns.add(std::make_shared<Work>(shop, client, items, milliseconds(1)),
-                           {client, cell, "", items, 1, by, by}, *room.take(client, cell, 1), SteadyTime()));
+                           {client, cell, "", items, 1, by, by}, *room.take(client, cell, 1),
+                           SteadyTime()));
   }
   [[nodiscard]] std::optional<Turns::Portion> next() { return turns.next(SteadyTime()); }
 };
@@ -363,12 +371,14 @@ TEST(Turns, ALongRequestGoesToAllWorkersWhenNobodyElseWaits) {
   held.add("b", "cell-7");
   const auto third = held.next();
   ASSERT_TRUE(third);
-  EXPECT_NE(third->entry, first->entry) << "whoever waits comes before a third worker for the same request";
+  EXPECT_NE(third->entry, first->entry)
+      << "whoever waits comes before a third worker for the same request";
 }
 
 TEST(Turns, AnExpressWorkerTakesUpShortRequestsOnly) {
   Shop shop;
-  for (const char* client : {"long", "short"}) ASSERT_TRUE(ask(shop, client, {1}));  // 1 ms an item is known now
+  for (const char* client : {"long", "short"})
+    ASSERT_TRUE(ask(shop, client, {1}));  // 1 ms an item is known now
   work_all(shop);
   ASSERT_TRUE(ask(shop, "long", {500}));
   EXPECT_FALSE(shop.lane.step(Turns::Which::kShort));

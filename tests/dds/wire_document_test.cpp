@@ -53,36 +53,37 @@ TEST(WireDocument, WhatModelFilesMayHoldTheWireCanCarry) {
 }
 
 TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
-  const std::map<std::string, long long> constants = {{"kFirstPort", kFirstPort},
-                                                      {"kDiscoveryPort", kDiscoveryPort},
-                                                      {"kMostDiscoveryServers", kMostDiscoveryServers},
-                                                      {"kMostPlaces", kMostPlaces},
-                                                      {"kOtherPlaces", kOtherPlaces.count()},
-                                                      {"kLease", kLease.count()},
-                                                      {"kAnnouncement", kAnnouncement.count()},
-                                                      {"kStatusPeriod", kStatusPeriod.count()},
-                                                      {"kStatusLost", kStatusLost.count()},
-                                                      {"MAX_TARGETS", MAX_TARGETS},
-                                                      {"kTargetsPerRequest", kTargetsPerRequest},
-                                                      {"MAX_JOINTS", MAX_JOINTS},
-                                                      {"MAX_NAME", MAX_NAME},
-                                                      {"MAX_ID", MAX_ID},
-                                                      {"MAX_SPELLING", MAX_SPELLING},
-                                                      {"MAX_SENTENCE", MAX_SENTENCE},
-                                                      {"MAX_JOBS", MAX_JOBS},
-                                                      {"MAX_ERRORS", MAX_ERRORS},
-                                                      {"kMaxText", kMaxText},
-                                                      {"MAX_BATCHES", MAX_BATCHES},
-                                                      {"MAX_VERSIONS", MAX_VERSIONS},
-                                                      {"MAX_CELLS", MAX_CELLS},
-                                                      {"kMaxComputeSample", kMaxComputeSample},
-                                                      {"kMaxTextSample", kMaxTextSample},
-                                                      {"kMaxStateSample", kMaxStateSample},
-                                                      {"kRequestDepth", kRequestDepth},
-                                                      {"kReplyDepth", kReplyDepth},
-                                                      {"client_requests", DdsOptions().client_requests},
-                                                      {"queued_requests", DdsOptions().queued_requests},
-                                                      {"max_clients", DdsOptions().max_clients}};
+  const std::map<std::string, long long> constants = {
+      {"kFirstPort", kFirstPort},
+      {"kDiscoveryPort", kDiscoveryPort},
+      {"kMostDiscoveryServers", kMostDiscoveryServers},
+      {"kMostPlaces", kMostPlaces},
+      {"kOtherPlaces", kOtherPlaces.count()},
+      {"kLease", kLease.count()},
+      {"kAnnouncement", kAnnouncement.count()},
+      {"kStatusPeriod", kStatusPeriod.count()},
+      {"kStatusLost", kStatusLost.count()},
+      {"MAX_TARGETS", MAX_TARGETS},
+      {"kTargetsPerRequest", kTargetsPerRequest},
+      {"MAX_JOINTS", MAX_JOINTS},
+      {"MAX_NAME", MAX_NAME},
+      {"MAX_ID", MAX_ID},
+      {"MAX_SPELLING", MAX_SPELLING},
+      {"MAX_SENTENCE", MAX_SENTENCE},
+      {"MAX_JOBS", MAX_JOBS},
+      {"MAX_ERRORS", MAX_ERRORS},
+      {"kMaxText", kMaxText},
+      {"MAX_BATCHES", MAX_BATCHES},
+      {"MAX_VERSIONS", MAX_VERSIONS},
+      {"MAX_CELLS", MAX_CELLS},
+      {"kMaxComputeSample", kMaxComputeSample},
+      {"kMaxTextSample", kMaxTextSample},
+      {"kMaxStateSample", kMaxStateSample},
+      {"kRequestDepth", kRequestDepth},
+      {"kReplyDepth", kReplyDepth},
+      {"client_requests", DdsOptions().client_requests},
+      {"queued_requests", DdsOptions().queued_requests},
+      {"max_clients", DdsOptions().max_clients}};
   std::map<std::string, long long> told;
   for (const Row& row : rows()) {
     if (row.size() == 3 && constants.contains(row[2])) told[row[2]] = std::stoll(row[1]);
@@ -115,11 +116,16 @@ Row told_of(const std::string& topic, const std::string& writer, const dds::Data
 
 TEST(WireDocument, TellsTheQosOfEveryTopic) {
   const std::vector<Row> expected = {
-      told_of("<Operation>_2_Request", "client", call_writer_qos(kReplyDepth), call_reader_qos(kRequestDepth)),
-      told_of("<Operation>_2_Reply", "server", call_writer_qos(kReplyDepth), call_reader_qos(kReplyDepth)),
-      told_of(topic_name(ServiceStatusTopic::kName), "server", service_status_writer_qos(), state_reader_qos()),
-      told_of(topic_name(ModelStatusTopic::kName), "server", state_writer_qos(), state_reader_qos()),
-      told_of(topic_name(TrainingProgressTopic::kName), "server", progress_writer_qos(), progress_reader_qos())};
+      told_of("<Operation>_2_Request", "client", call_writer_qos(kReplyDepth),
+              call_reader_qos(kRequestDepth)),
+      told_of("<Operation>_2_Reply", "server", call_writer_qos(kReplyDepth),
+              call_reader_qos(kReplyDepth)),
+      told_of(topic_name(ServiceStatusTopic::kName), "server", service_status_writer_qos(),
+              state_reader_qos()),
+      told_of(topic_name(ModelStatusTopic::kName), "server", state_writer_qos(),
+              state_reader_qos()),
+      told_of(topic_name(TrainingProgressTopic::kName), "server", progress_writer_qos(),
+              progress_reader_qos())};
   std::vector<Row> told;
   for (const Row& row : rows()) {
     if (row.size() == 6 && (row[1] == "client" || row[1] == "server")) told.push_back(row);
@@ -159,9 +165,10 @@ TEST(WireDocument, TellsEveryResultCodeOfTheIdlAndWhatToDo) {
 }
 
 TEST(WireDocument, TellsTheRoleOfEveryOperation) {
-  const std::set<std::string> operations = {PredictError::kName, CorrectTarget::kName, SubmitMeasurements::kName,
-                                            Train::kName,        Diagnose::kName,      CheckHealth::kName,
-                                            ReadModels::kName,   ManageModels::kName,  ReleaseBatches::kName};
+  const std::set<std::string> operations = {
+      PredictError::kName, CorrectTarget::kName, SubmitMeasurements::kName,
+      Train::kName,        Diagnose::kName,      CheckHealth::kName,
+      ReadModels::kName,   ManageModels::kName,  ReleaseBatches::kName};
   const std::set<std::string> roles = {"read", "submit", "change", "release"};
   std::set<std::string> told;
   for (const Row& row : rows()) {

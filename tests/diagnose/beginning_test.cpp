@@ -22,11 +22,14 @@ using Eigen::VectorXd;
 class Beginning : public testing::Test {
  protected:
   Beginning()
-      : batch_(test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell_), 80, 3), *cell_)).rows()),
+      : batch_(test::demand(
+                   check_against_cell(test::measured(test::chapter_5_robot(cell_), 80, 3), *cell_))
+                   .rows()),
         calibration_(test::demand(calibrate(cell_, cell_->model.error_sources, batch_, {}))) {
     std::vector<Parameter> priors;
     for (const IdentifiedParameter& one : calibration_.parameters) priors.push_back(one.parameter);
-    problem_.emplace(calibration_.model, batch_, priors, candidate_sources(*cell_, batch_, nullptr));
+    problem_.emplace(calibration_.model, batch_, priors,
+                     candidate_sources(*cell_, batch_, nullptr));
     families_ = make_families(*problem_);
   }
   const Family& family(const std::string& kind) const {
@@ -36,8 +39,8 @@ class Beginning : public testing::Test {
     });
   }
 
-  /// Of steps of that squared length outside the model's own parameters: how many sets hold the pose at which it
-  /// began, and how many poses they hold in all.
+  /// Of steps of that squared length outside the model's own parameters: how many sets hold the
+  /// pose at which it began, and how many poses they hold in all.
   struct Held {
     int steps = 0, held = 0, poses = 0;
   };
@@ -54,12 +57,14 @@ class Beginning : public testing::Test {
       Best truth = one.typical();
       truth.pose = static_cast<Index>(8 + random() % 64);
       const Eigen::MatrixXd columns = one.columns(truth);
-      const VectorXd direction = VectorXd::NullaryExpr(columns.cols(), [&] { return normal(random); });
+      const VectorXd direction =
+          VectorXd::NullaryExpr(columns.cols(), [&] { return normal(random); });
       VectorXd step = columns * direction;
       step *= std::sqrt(lambda / step.dot(rest.project(step).col(0)));
       const VectorXd data = noise.col(k) + step;
       const Index found = one.scan({rest}, rest.project(data)).front().pose;
-      const std::vector<Index> possible = possible_beginnings(*problem_, one.columns(always), rest, data, found);
+      const std::vector<Index> possible =
+          possible_beginnings(*problem_, one.columns(always), rest, data, found);
       EXPECT_TRUE(std::is_sorted(possible.begin(), possible.end()));
       EXPECT_EQ(std::count(possible.begin(), possible.end(), found), 1);
       ++held.steps;
@@ -97,11 +102,13 @@ TEST(BeginningFound, IsToldWithTheFinding) {
   options.draws = 200;
   options.next_poses = 0;
   options.recovery = false;
-  const hidden::HiddenCase hidden = hidden::hide({.kind = "joint_slip", .seed = 1, .lambda = 80, .poses = 100});
+  const hidden::HiddenCase hidden =
+      hidden::hide({.kind = "joint_slip", .seed = 1, .lambda = 80, .poses = 100});
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, options));
   ASSERT_EQ(diagnosis.findings.size(), 1U) << test::told(diagnosis);
   const Finding& finding = diagnosis.findings[0];
-  for (const std::string& id : {finding.cause.pose_id, fmt::format("p{}", hidden.truth.causes[0].first + 1)}) {
+  for (const std::string& id :
+       {finding.cause.pose_id, fmt::format("p{}", hidden.truth.causes[0].first + 1)}) {
     EXPECT_TRUE(std::any_of(finding.may_begin_at.begin(), finding.may_begin_at.end(),
                             [&](const PossibleBeginning& place) { return place.pose_id == id; }))
         << id << "\n"

@@ -32,7 +32,8 @@ TEST(BestShape, IsSaidSoAndStillCompensated) {
   const Unexplained nothing;
   const std::vector<Cause> found = {coupling};
   const auto judged = [&](bool more_than_noise, bool in_both_halves) {
-    return cause_search::judge(coupling, {1e-4, in_both_halves}, {}, {found, nothing, {}, recorded, more_than_noise});
+    return cause_search::judge(coupling, {1e-4, in_both_halves}, {},
+                               {found, nothing, {}, recorded, more_than_noise});
   };
   EXPECT_TRUE(judged(false, true).could_also_be.empty());
   EXPECT_TRUE(judged(false, true).whole);
@@ -47,9 +48,11 @@ TEST(BestShape, OfARealRobotNothingIsSureThatLeavesMoreThanNoiseNorASmallStep) {
   const std::string file = TRAMMEL_SOURCE_DIR "/../shared/data/ur10_series_c.csv";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   MeasurementBatch batch = test::demand(read_batch(file));
-  for (std::size_t i = 0; 9 * i < batch.measurements.size(); ++i) batch.measurements[i] = batch.measurements[9 * i];
+  for (std::size_t i = 0; 9 * i < batch.measurements.size(); ++i)
+    batch.measurements[i] = batch.measurements[9 * i];
   batch.measurements.resize((batch.measurements.size() + 8) / 9);
-  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
   const Diagnosis real = test::demand(diagnose(cell, batch, quick()));
   EXPECT_NE(real.verdict, Verdict::kNamed) << real.sentence;
   bool maps = false;
@@ -61,9 +64,10 @@ TEST(BestShape, OfARealRobotNothingIsSureThatLeavesMoreThanNoiseNorASmallStep) {
   }
   EXPECT_TRUE(maps);
   const auto& after = real.sources_after;
-  EXPECT_TRUE(std::any_of(after.begin(), after.end(), [](const auto& one) { return one.starts_with("joint_map:2@"); }));
-  EXPECT_TRUE(
-      std::none_of(after.begin(), after.end(), [](const auto& one) { return one.starts_with("tool_changed"); }));
+  EXPECT_TRUE(std::any_of(after.begin(), after.end(),
+                          [](const auto& one) { return one.starts_with("joint_map:2@"); }));
+  EXPECT_TRUE(std::none_of(after.begin(), after.end(),
+                           [](const auto& one) { return one.starts_with("tool_changed"); }));
 }
 
 }  // namespace

@@ -14,7 +14,8 @@
 namespace trammel {
 namespace {
 
-Diagnosis diagnosis_of(const std::shared_ptr<const Cell>& cell, std::vector<MeasurementBatch> sessions) {
+Diagnosis diagnosis_of(const std::shared_ptr<const Cell>& cell,
+                       std::vector<MeasurementBatch> sessions) {
   std::vector<CheckedBatch> batches;
   for (MeasurementBatch& session : sessions) {
     session.id = fmt::format("day-{}", batches.size() + 1);
@@ -29,8 +30,8 @@ Diagnosis diagnosis_of(const std::shared_ptr<const Cell>& cell, std::vector<Meas
 Diagnosis diagnosis_of(const std::vector<VirtualRobot>& robots, std::uint64_t seed) {
   std::vector<MeasurementBatch> sessions;
   for (std::size_t s = 0; s < robots.size(); ++s)
-    sessions.push_back(
-        test::measured_on(robots[s], {.poses = 50, .seed = seed + 31 * s, .set_up_anew = s + 1 < robots.size()}));
+    sessions.push_back(test::measured_on(
+        robots[s], {.poses = 50, .seed = seed + 31 * s, .set_up_anew = s + 1 < robots.size()}));
   return diagnosis_of(robots.front().truth.cell, std::move(sessions));
 }
 
@@ -53,9 +54,10 @@ TEST(BetweenSessions, AZeroThatWasLostIsToldWithItsSessionAndIsNoNoise) {
   EXPECT_NEAR(zero.at("value").get<double>(), 0.5, 2 * zero.at("u95").get<double>());
   EXPECT_EQ(zero.at("unit"), "mrad");
   EXPECT_TRUE(json.at("rests_on_order").get<bool>()) << "no row has a time";
-  EXPECT_TRUE(std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), [](const std::string& limit) {
-    return limit.find("in which they were given") != std::string::npos;
-  }));
+  EXPECT_TRUE(
+      std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), [](const std::string& limit) {
+        return limit.find("in which they were given") != std::string::npos;
+      }));
   EXPECT_TRUE(good.between_sessions.empty());
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
 }
@@ -66,18 +68,23 @@ TEST(BetweenSessions, AReflectorThatSatElsewhereForADayIsToldAndIsNoNoise) {
   other.truth.tools.at("spindle").translation() += Vector3(2e-4, 0, 1e-4);
   const Diagnosis good = diagnosis_of({robot, robot, robot, robot}, 60);
   const Diagnosis diagnosis = diagnosis_of({robot, other, robot, robot}, 60);
-  EXPECT_NE(diagnosis.sentence.find("in session day-2 alone"), std::string::npos) << diagnosis.sentence;
+  EXPECT_NE(diagnosis.sentence.find("in session day-2 alone"), std::string::npos)
+      << diagnosis.sentence;
   ASSERT_EQ(diagnosis.between_sessions.size(), 1u);
   EXPECT_EQ(diagnosis.between_sessions.front().course, SessionChange::Course::kThatAlone);
-  EXPECT_EQ(diagnosis.between_sessions.front().sizes.size(), 6u) << "where it sits, and how it is turned";
+  EXPECT_EQ(diagnosis.between_sessions.front().sizes.size(), 6u)
+      << "where it sits, and how it is turned";
   EXPECT_TRUE(diagnosis.findings.empty()) << diagnosis.sentence;
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
 }
 
 /// The robot with a further source, its numbers as given.
-VirtualRobot with_source(VirtualRobot robot, const std::string& source, const std::vector<double>& values) {
-  const Eigen::Index first = add_source(robot.truth, test::demand(make_error_source(source, *robot.truth.cell)));
-  for (std::size_t k = 0; k < values.size(); ++k) robot.truth.values(first + static_cast<Eigen::Index>(k)) = values[k];
+VirtualRobot with_source(VirtualRobot robot, const std::string& source,
+                         const std::vector<double>& values) {
+  const Eigen::Index first =
+      add_source(robot.truth, test::demand(make_error_source(source, *robot.truth.cell)));
+  for (std::size_t k = 0; k < values.size(); ++k)
+    robot.truth.values(first + static_cast<Eigen::Index>(k)) = values[k];
   return robot;
 }
 
@@ -85,7 +92,8 @@ VirtualRobot with_source(VirtualRobot robot, const std::string& source, const st
 VirtualRobot softer(VirtualRobot robot, int joint, double times) {
   const std::vector<Parameter> parameters = robot.truth.parameters();
   for (std::size_t k = 0; k < parameters.size(); ++k)
-    if (parameters[k].name == fmt::format("C{}", joint)) robot.truth.values(static_cast<Eigen::Index>(k)) *= times;
+    if (parameters[k].name == fmt::format("C{}", joint))
+      robot.truth.values(static_cast<Eigen::Index>(k)) *= times;
   return robot;
 }
 
@@ -104,12 +112,15 @@ VirtualRobot grown(VirtualRobot robot, double share) {
 }
 
 bool is_sure(const Diagnosis& diagnosis) {
-  const auto sure = [](const auto& one) { return !one.source.empty() && one.could_also_be.empty(); };
+  const auto sure = [](const auto& one) {
+    return !one.source.empty() && one.could_also_be.empty();
+  };
   return std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(), sure) ||
          std::any_of(diagnosis.between_sessions.begin(), diagnosis.between_sessions.end(), sure);
 }
 
-/// What no cause of the list does that begins with a session: no name is sure, and what is left is not called noise.
+/// What no cause of the list does that begins with a session: no name is sure, and what is left is
+/// not called noise.
 void expect_no_sure_name(const VirtualRobot& later, std::uint64_t seed) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   const Diagnosis told = diagnosis_of({robot, later, later}, seed);
@@ -124,8 +135,9 @@ TEST(BetweenSessions, AGearboxThatGotSofterIsNoPayloadForSure) {
 
 TEST(BetweenSessions, ANewRippleIsNoLostZeroAndNoPayloadForSure) {
   for (const std::uint64_t seed : {110, 111})
-    expect_no_sure_name(
-        with_source(test::chapter_5_robot(test::cell_7()), "gear_transmission:2@31.7", {31.7, 1.5e-4, 5e-5}), seed);
+    expect_no_sure_name(with_source(test::chapter_5_robot(test::cell_7()),
+                                    "gear_transmission:2@31.7", {31.7, 1.5e-4, 5e-5}),
+                        seed);
 }
 
 TEST(BetweenSessions, AWarmArmWithoutAThermometerIsNoOtherToolForSure) {
@@ -136,9 +148,10 @@ TEST(BetweenSessions, AWarmArmWithoutAThermometerIsNoOtherToolForSure) {
   }
 }
 
-/// 50 poses, every joint approached from that side, or from either by chance where it is 0; the tracker `turned` by so
-/// many rad, and moved.
-MeasurementBatch approached(const VirtualRobot& robot, int side, double turned, std::uint64_t seed) {
+/// 50 poses, every joint approached from that side, or from either by chance where it is 0; the
+/// tracker `turned` by so many rad, and moved.
+MeasurementBatch approached(const VirtualRobot& robot, int side, double turned,
+                            std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<PoseContext> poses;
   for (const Measurement& m : test::measured_on(robot, {.poses = 50, .seed = seed}).measurements) {
@@ -159,19 +172,23 @@ MeasurementBatch approached(const VirtualRobot& robot, int side, double turned, 
 }
 
 void expect_play(int joint, const std::vector<int>& sides, std::uint64_t seed) {
-  const VirtualRobot robot = with_source(test::chapter_5_robot(test::cell_7()), fmt::format("backlash:{}", joint),
-                                         {3e-4, from_rad_per_nmm(1e-10)});
+  const VirtualRobot robot =
+      with_source(test::chapter_5_robot(test::cell_7()), fmt::format("backlash:{}", joint),
+                  {3e-4, from_rad_per_nmm(1e-10)});
   std::vector<MeasurementBatch> sessions;
   for (const int side : sides) {
     const auto later = static_cast<double>(sides.size() - 1 - sessions.size());
     sessions.push_back(approached(robot, side, 0.3 * later, seed + sessions.size()));
   }
   const Diagnosis told = diagnosis_of(robot.truth.cell, std::move(sessions));
-  const auto is_play = [&](const Cause& cause) { return cause.cause == "backlash" && cause.joint == joint - 1; };
+  const auto is_play = [&](const Cause& cause) {
+    return cause.cause == "backlash" && cause.joint == joint - 1;
+  };
   EXPECT_TRUE(std::any_of(told.findings.begin(), told.findings.end(), [&](const Finding& one) {
     return is_play(one.cause);
   })) << told.sentence;
-  for (const Finding& one : told.findings) EXPECT_TRUE(is_play(one.cause)) << to_string(one.cause) << told.sentence;
+  for (const Finding& one : told.findings)
+    EXPECT_TRUE(is_play(one.cause)) << to_string(one.cause) << told.sentence;
   EXPECT_TRUE(told.between_sessions.empty()) << told.sentence;
   EXPECT_NE(told.noise_from.find("alone gives 22.5 um"), std::string::npos) << told.noise_from;
 }
@@ -184,7 +201,8 @@ TEST(BetweenSessions, PlayIsPlayAndNoPayloadFromWhicheverSideEachDayCame) {
 }
 
 TEST(BetweenSessions, RepeatsThatScatterFarBeyondWhatIsStatedVouchForNoNoise) {
-  const VirtualRobot robot = with_source(test::chapter_5_robot(test::cell_7()), "backlash:2", {3e-4, 0});
+  const VirtualRobot robot =
+      with_source(test::chapter_5_robot(test::cell_7()), "backlash:2", {3e-4, 0});
   std::vector<MeasurementBatch> sessions;
   for (const std::uint64_t seed : {160, 161, 162}) {
     // Every pose from either side, and nobody recorded which.
@@ -200,8 +218,10 @@ TEST(BetweenSessions, RepeatsThatScatterFarBeyondWhatIsStatedVouchForNoNoise) {
   EXPECT_NE(told.verdict, Verdict::kNothing) << told.sentence;
   EXPECT_FALSE(is_sure(told)) << told.sentence;
   EXPECT_TRUE(told.unexplained.present);
-  EXPECT_NE(told.sentence.find("approached from different sides"), std::string::npos) << told.sentence;
-  EXPECT_NE(told.noise_from.find("alone gives 15.9 um"), std::string::npos) << told.noise_from << ": of two each";
+  EXPECT_NE(told.sentence.find("approached from different sides"), std::string::npos)
+      << told.sentence;
+  EXPECT_NE(told.noise_from.find("alone gives 15.9 um"), std::string::npos)
+      << told.noise_from << ": of two each";
 }
 
 TEST(BetweenSessions, ANoisySessionIsNotVouchedForByItself) {

@@ -11,8 +11,9 @@
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/heavy_arm.h"
 
-// Arms whose joint 3 is commanded against level, by a controller that counts so or by bars, each with one thing wrong
-// at a gear. The second simulation moves them: its gears are those of this file.
+// Arms whose joint 3 is commanded against level, by a controller that counts so or by bars, each
+// with one thing wrong at a gear. The second simulation moves them: its gears are those of this
+// file.
 
 namespace trammel {
 namespace {
@@ -42,22 +43,37 @@ Joints at(int joint, double off) {
 
 const World kWorlds[] = {
     {"ALostZeroOfJoint2", "joint_slip", 2,
-     [](const MeasuringPose& p, const Joints&, const Joints&) { return at(2, p.index < kSlipsAt ? 0 : 1e-3); }},
+     [](const MeasuringPose& p, const Joints&, const Joints&) {
+       return at(2, p.index < kSlipsAt ? 0 : 1e-3);
+     }},
     {"ALostZeroOfJoint3", "joint_slip", 3,
-     [](const MeasuringPose& p, const Joints&, const Joints&) { return at(3, p.index < kSlipsAt ? 0 : 1e-3); }},
+     [](const MeasuringPose& p, const Joints&, const Joints&) {
+       return at(3, p.index < kSlipsAt ? 0 : 1e-3);
+     }},
     {"RippleOfJoint2", "gear_transmission", 2,
-     [](const MeasuringPose&, const Joints& g, const Joints&) { return at(2, 1.5e-4 * std::sin(47.3 * g(1) + 0.4)); }},
+     [](const MeasuringPose&, const Joints& g, const Joints&) {
+       return at(2, 1.5e-4 * std::sin(47.3 * g(1) + 0.4));
+     }},
     {"RippleOfJoint3", "gear_transmission", 3,
-     [](const MeasuringPose&, const Joints& g, const Joints&) { return at(3, 1.5e-4 * std::sin(61.7 * g(2) + 0.4)); }},
+     [](const MeasuringPose&, const Joints& g, const Joints&) {
+       return at(3, 1.5e-4 * std::sin(61.7 * g(2) + 0.4));
+     }},
     {"PlayOfJoint2", "backlash", 2,
-     [](const MeasuringPose& p, const Joints&, const Joints&) { return at(2, -2e-4 * p.direction[1]); }},
+     [](const MeasuringPose& p, const Joints&, const Joints&) {
+       return at(2, -2e-4 * p.direction[1]);
+     }},
     {"PlayOfJoint3", "backlash", 3,
-     [](const MeasuringPose& p, const Joints&, const Joints&) { return at(3, -2e-4 * p.direction[2]); }},
+     [](const MeasuringPose& p, const Joints&, const Joints&) {
+       return at(3, -2e-4 * p.direction[2]);
+     }},
     {"AnEncoderOfJoint3", "encoder_eccentricity", 3,
-     [](const MeasuringPose&, const Joints& g, const Joints&) { return at(3, 4e-4 * std::sin(g(2) + 1)); }},
+     [](const MeasuringPose&, const Joints& g, const Joints&) {
+       return at(3, 4e-4 * std::sin(g(2) + 1));
+     }},
     {"AnAngleErrorOfJoint3", "joint_map", 3,
      [](const MeasuringPose&, const Joints& g, const Joints&) {
-       return at(3, 2e-4 * std::sin(3 * g(2)) + 2e-4 * std::cos(5 * g(2) + 1) + 1e-4 * std::sin(8 * g(2)));
+       return at(3, 2e-4 * std::sin(3 * g(2)) + 2e-4 * std::cos(5 * g(2) + 1) +
+                        1e-4 * std::sin(8 * g(2)));
      }},
 };
 
@@ -74,8 +90,8 @@ World loaded_play(int joint, hidden::Approach approach) {
           approach};
 }
 
-/// The arm with the joints where its gears, which are off, put them. The angle of the forearm against level is
-/// commanded; gearboxes give way under what their gears carry.
+/// The arm with the joints where its gears, which are off, put them. The angle of the forearm
+/// against level is commanded; gearboxes give way under what their gears carry.
 void put(const MeasuringPose& p, CouplingKind kind, const World& world, Moment& m) {
   const bool bars = kind == CouplingKind::kParallelogram;
   Joints gears = p.q;
@@ -106,9 +122,11 @@ HeavyArm coupled_arm(CouplingKind kind, const World& world, std::uint64_t seed) 
   cell->joint_ranges.clear();
   arm.cell = cell;
   arm.world.effects.push_back(
-      {{"unknown", 0, "", -1, {}, 0}, {}, Eigen::VectorXd(), {}, [=](const MeasuringPose& p, const auto&, Moment& m) {
-         put(p, kind, world, m);
-       }});
+      {{"unknown", 0, "", -1, {}, 0},
+       {},
+       Eigen::VectorXd(),
+       {},
+       [=](const MeasuringPose& p, const auto&, Moment& m) { put(p, kind, world, m); }});
   return arm;
 }
 
@@ -116,14 +134,16 @@ Diagnosis diagnosed(CouplingKind kind, const World& world, std::uint64_t seed) {
   const HeavyArm arm = coupled_arm(kind, world, seed);
   hidden::Random random(seed);
   std::vector<MeasuringPose> poses = hidden::draw_poses(
-      {.count = kPoses, .approach = world.approach, .constant_temperature = true, .loads = 2}, random);
+      {.count = kPoses, .approach = world.approach, .constant_temperature = true, .loads = 2},
+      random);
   for (MeasuringPose& pose : poses) pose.q(2) += pose.q(1);
   DiagnoseOptions quick;
   quick.draws = 200;
   quick.next_poses = 0;
   quick.recovery = false;
   const MeasurementBatch batch = test::measured_at(arm, poses, seed + 40);
-  return test::demand(diagnose(arm.cell, test::demand(check_against_cell(batch, *arm.cell)), quick));
+  return test::demand(
+      diagnose(arm.cell, test::demand(check_against_cell(batch, *arm.cell)), quick));
 }
 
 struct Coupled {
@@ -135,7 +155,9 @@ class CoupledJoints : public testing::TestWithParam<Coupled> {};
 
 TEST_P(CoupledJoints, AreDiagnosedAtTheGearThatIsWrong) {
   const World& world = GetParam().world;
-  const auto is_true = [&](const Cause& cause) { return cause.cause == world.cause && cause.joint == world.joint - 1; };
+  const auto is_true = [&](const Cause& cause) {
+    return cause.cause == world.cause && cause.joint == world.joint - 1;
+  };
   const Diagnosis diagnosis = diagnosed(GetParam().kind, world, 1);
   const std::string shown = test::told(diagnosis);
   bool named = false;
@@ -154,7 +176,8 @@ TEST(LoadedPlay, OfACoupledJointIsNoOtherCauseForSure) {
     for (const int joint : {2, 3}) {
       for (const auto approach : {hidden::Approach::kBothSides, hidden::Approach::kFromBelow}) {
         const Diagnosis diagnosis = diagnosed(kind, loaded_play(joint, approach), 1);
-        const std::string shown = fmt::format("{} {}: {}", to_string(kind), joint, test::told(diagnosis));
+        const std::string shown =
+            fmt::format("{} {}: {}", to_string(kind), joint, test::told(diagnosis));
         for (const Finding& finding : diagnosis.findings) {
           const bool sure = !finding.source.empty() && finding.could_also_be.empty();
           const bool right = finding.cause.cause == "backlash" && finding.cause.joint == joint - 1;

@@ -17,7 +17,8 @@ namespace {
 
 using Eigen::MatrixXd;
 
-MatrixXd drawn(Eigen::Index rows, Eigen::Index columns, std::mt19937_64& random, bool normal = true) {
+MatrixXd drawn(Eigen::Index rows, Eigen::Index columns, std::mt19937_64& random,
+               bool normal = true) {
   std::normal_distribution<double> bell;
   std::uniform_real_distribution<double> flat(-1, 1);
   MatrixXd m(rows, columns);
@@ -42,7 +43,8 @@ TEST(Dependence, WhatDoesNotDependHasEveryPValueAsOften) {
 
 MatrixXd centred_distances(const MatrixXd& rows) {
   MatrixXd d(rows.rows(), rows.rows());
-  for (Eigen::Index i = 0; i < rows.rows(); ++i) d.col(i) = (rows.rowwise() - rows.row(i)).rowwise().norm();
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    d.col(i) = (rows.rowwise() - rows.row(i)).rowwise().norm();
   const Eigen::VectorXd mean = d.rowwise().mean();
   const double whole = mean.mean();
   d = ((d.colwise() - mean).rowwise() - mean.transpose()).eval();
@@ -50,8 +52,10 @@ MatrixXd centred_distances(const MatrixXd& rows) {
   return d;
 }
 
-/// The share of very many permutations that are as large; empty where even these are too few to know.
-std::optional<double> by_many_permutations(const MatrixXd& x, const MatrixXd& y, std::mt19937_64& random) {
+/// The share of very many permutations that are as large; empty where even these are too few to
+/// know.
+std::optional<double> by_many_permutations(const MatrixXd& x, const MatrixXd& y,
+                                           std::mt19937_64& random) {
   constexpr int kDraws = 40000;
   constexpr int kEnough = 12;
   const MatrixXd a = centred_distances(x);
@@ -79,7 +83,8 @@ TEST(Dependence, TheTailIsThatOfManyMorePermutations) {
     const std::optional<double> exact = by_many_permutations(x, y, random);
     if (!exact) continue;
     ++compared;
-    EXPECT_LT(std::abs(std::log(p / *exact)), std::log(3.0)) << seed << ": " << p << " and " << *exact;
+    EXPECT_LT(std::abs(std::log(p / *exact)), std::log(3.0))
+        << seed << ": " << p << " and " << *exact;
   }
   EXPECT_GE(compared, 3);
 }
@@ -116,7 +121,8 @@ TEST(Dependence, TheTableOfADiagnosisSaysYesWhereNoiseGrowsWithAJoint) {
 
 TEST(Dependence, TheTableOfNoiseAloneSaysNo) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    for (const Dependence& one : left_of(test::measured(test::chapter_5_robot(test::cell_7()), 80, seed)))
+    for (const Dependence& one :
+         left_of(test::measured(test::chapter_5_robot(test::cell_7()), 80, seed)))
       EXPECT_GT(one.p_value, 0.01) << seed << " " << one.on;
   }
 }

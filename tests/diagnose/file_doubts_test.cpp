@@ -24,7 +24,8 @@ std::shared_ptr<const Cell> cell_with(const std::string& was, const std::string&
   const std::size_t at = robot.find(was);
   EXPECT_NE(at, std::string::npos) << robot;
   robot.replace(at, was.size(), is);
-  return std::make_shared<const Cell>(test::demand(parse_cell(cell->cell_yaml, robot, "cell.yaml")));
+  return std::make_shared<const Cell>(
+      test::demand(parse_cell(cell->cell_yaml, robot, "cell.yaml")));
 }
 
 VirtualRobot with_value(VirtualRobot robot, const std::string& name, double by) {
@@ -44,10 +45,12 @@ Diagnosis diagnosed(const std::shared_ptr<const Cell>& cell, const MeasurementBa
 
 TEST(FileDoubts, ALinkThatIsWrongInTheFileLeadsThoughTheListOfCausesExplainsIt) {
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
-  for (const auto& [file, off] : {std::pair("a_mm: 1292", "a2 by -1"), std::pair("a_mm: 1275", "a2 by ")}) {
+  for (const auto& [file, off] :
+       {std::pair("a_mm: 1292", "a2 by -1"), std::pair("a_mm: 1275", "a2 by ")}) {
     const auto cell = cell_with("a_mm: 1280", file);
     const Diagnosis found = diagnosed(cell, batch);
-    EXPECT_TRUE(found.sentence.starts_with("No robot is so far off its drawing: ")) << found.sentence;
+    EXPECT_TRUE(found.sentence.starts_with("No robot is so far off its drawing: "))
+        << found.sentence;
     EXPECT_NE(found.sentence.find(off), std::string::npos) << found.sentence;
     ASSERT_FALSE(found.notes.empty());
     EXPECT_EQ(found.notes.front().code, kOffDrawing);
@@ -67,7 +70,8 @@ TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
   for (const double tilt : {4e-4, 1.5e-3}) {
     const VirtualRobot robot = with_value(test::chapter_5_robot(test::cell_7()), "beta2", tilt);
     const Diagnosis found = diagnosed(cell, test::measured(robot, 80, 5));
-    EXPECT_NE(found.sentence.find("joint 2 of the robot file has no `hayati: true`"), std::string::npos)
+    EXPECT_NE(found.sentence.find("joint 2 of the robot file has no `hayati: true`"),
+              std::string::npos)
         << found.sentence;
     ASSERT_FALSE(found.notes.empty());
     EXPECT_EQ(found.notes.back().code, "hayati_missing");
@@ -81,7 +85,8 @@ TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
 TEST(RowsThatDoNotFit, AreNamedAsATrainingNamesThemWhereAllTogetherLeadToNoArm) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   MeasurementBatch batch = test::measured(robot, 80, 5);
-  // A tracker that did not see the reflector tells where it was last: 30 rows, some behind each other.
+  // A tracker that did not see the reflector tells where it was last: 30 rows, some behind each
+  // other.
   std::vector<int> stale;
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     const std::size_t since = i % 8;
@@ -97,7 +102,8 @@ TEST(RowsThatDoNotFit, AreNamedAsATrainingNamesThemWhereAllTogetherLeadToNoArm) 
   EXPECT_EQ(named, stale) << found.sentence;
   ASSERT_FALSE(found.notes.empty()) << found.sentence;
   EXPECT_EQ(found.notes.front().code, "rows_do_not_fit");
-  EXPECT_TRUE(found.sentence.starts_with("30 of the measured rows do not fit the others")) << found.sentence;
+  EXPECT_TRUE(found.sentence.starts_with("30 of the measured rows do not fit the others"))
+      << found.sentence;
   TrainOptions options;
   options.bias = "none";
   const auto stop = stop_of(test::demand(train(test::cell_7(), batch, options)));

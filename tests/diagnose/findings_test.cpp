@@ -15,7 +15,8 @@ TEST(FindingOfAJointMap, SaysHowMuchTheAngleIsOffFromPeakToPeak) {
   options.draws = 200;
   options.next_poses = 0;
   options.recovery = false;
-  const hidden::HiddenCase hidden = hidden::hide({.kind = "joint_map", .seed = 3, .lambda = 3000, .poses = 160});
+  const hidden::HiddenCase hidden =
+      hidden::hide({.kind = "joint_map", .seed = 3, .lambda = 3000, .poses = 160});
   const hidden::Effect& effect = hidden.world.effects.at(0);
   const auto joint = static_cast<Eigen::Index>(effect.cause.joint - 1);
   double low = 1;

@@ -13,8 +13,9 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
-// An effect is hidden by a simulation that shares nothing with the server's; the diagnosis sees a batch, a cell and a
-// robot file and must find it, or say that it cannot. A bounded part of what diagnose_benchmark does at length.
+// An effect is hidden by a simulation that shares nothing with the server's; the diagnosis sees a
+// batch, a cell and a robot file and must find it, or say that it cannot. A bounded part of what
+// diagnose_benchmark does at length.
 
 namespace trammel {
 namespace {
@@ -75,10 +76,11 @@ TEST_P(HiddenEffect, IsNamedAndNothingElseIs) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Causes, HiddenEffect,
-                         testing::Values("gear_transmission", "encoder_eccentricity", "joint_map", "backlash",
-                                         "wrist_coupling", "thermal_growth", "tracker_moved", "joint_slip",
-                                         "tool_changed", "payload", "tool", "time_lag", "outlier", "geometry",
-                                         "compliance", "backlash+outlier", "axis_runout", "base_compliance",
+                         testing::Values("gear_transmission", "encoder_eccentricity", "joint_map",
+                                         "backlash", "wrist_coupling", "thermal_growth",
+                                         "tracker_moved", "joint_slip", "tool_changed", "payload",
+                                         "tool", "time_lag", "outlier", "geometry", "compliance",
+                                         "backlash+outlier", "axis_runout", "base_compliance",
                                          "joint_coupling", "early_reading", "instrument_scale"),
                          test_name);
 
@@ -91,7 +93,8 @@ TEST_P(HiddenNothing, GetsNoName) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Nulls, HiddenNothing, testing::Values("null_white", "null_structured", "null_permuted"),
+INSTANTIATE_TEST_SUITE_P(Nulls, HiddenNothing,
+                         testing::Values("null_white", "null_structured", "null_permuted"),
                          test_name);
 
 class HiddenUnknown : public testing::TestWithParam<const char*> {};
@@ -102,7 +105,8 @@ TEST_P(HiddenUnknown, IsCalledUnknownWithTheJointsItDependsOn) {
   EXPECT_TRUE(answer.diagnosis.findings.empty()) << answer.shown;
 }
 
-INSTANTIATE_TEST_SUITE_P(Unknowns, HiddenUnknown, testing::Values("unknown_q4", "unknown_q2q3"), test_name);
+INSTANTIATE_TEST_SUITE_P(Unknowns, HiddenUnknown, testing::Values("unknown_q4", "unknown_q2q3"),
+                         test_name);
 
 class HiddenUndecidable : public testing::TestWithParam<const char*> {};
 
@@ -113,21 +117,24 @@ TEST_P(HiddenUndecidable, IsAmongWhatCannotBeToldAndIsNotNamedAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Undecidables, HiddenUndecidable,
-                         testing::Values("backlash_one_side", "payload_alone", "tool_or_link", "tool_absorbed",
-                                         "joint1_or_tracker", "joint6_or_tool", "constant_warmth"),
+                         testing::Values("backlash_one_side", "payload_alone", "tool_or_link",
+                                         "tool_absorbed", "joint1_or_tracker", "joint6_or_tool",
+                                         "constant_warmth"),
                          test_name);
 
 class HiddenTwin : public testing::TestWithParam<const char*> {};
 
 TEST_P(HiddenTwin, IsNotNamedAloneHoweverStrongItIs) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Answer answer = answer_to({.kind = GetParam(), .seed = seed, .lambda = 600, .poses = 120});
+    const Answer answer =
+        answer_to({.kind = GetParam(), .seed = seed, .lambda = 600, .poses = 120});
     EXPECT_TRUE(answer.judgement.set_holds_truth) << answer.shown;
     EXPECT_FALSE(answer.judgement.over_confident) << answer.shown;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Twins, HiddenTwin, testing::Values("tool_or_link", "joint1_or_tracker", "joint6_or_tool"),
+INSTANTIATE_TEST_SUITE_P(Twins, HiddenTwin,
+                         testing::Values("tool_or_link", "joint1_or_tracker", "joint6_or_tool"),
                          test_name);
 
 TEST(HiddenEffectInterval, IsOfTwoStandardUncertaintiesAsInATraining) {
@@ -154,14 +161,14 @@ TEST(WhatCannotBeTold, IsListedOnceAPair) {
 }
 
 TEST(HiddenEffectOnPositions, IsNamedWithoutOrientations) {
-  const Answer answer =
-      answer_to({.kind = "gear_transmission", .seed = 4, .lambda = 150, .poses = 160, .orientation = false});
+  const Answer answer = answer_to(
+      {.kind = "gear_transmission", .seed = 4, .lambda = 150, .poses = 160, .orientation = false});
   EXPECT_TRUE(answer.judgement.exact) << answer.shown;
 }
 
 TEST(HiddenEffectInASmallRange, IsNamedOrLeftOpenButNotMistaken) {
-  const Answer answer =
-      answer_to({.kind = "encoder_eccentricity", .seed = 2, .lambda = 100, .poses = 160, .ranges = "6dim-l"});
+  const Answer answer = answer_to(
+      {.kind = "encoder_eccentricity", .seed = 2, .lambda = 100, .poses = 160, .ranges = "6dim-l"});
   EXPECT_EQ(answer.judgement.wrong, 0) << answer.shown;
 }
 
@@ -170,11 +177,14 @@ TEST(HiddenHole28, IsTheOnlyPoseThatDoesNotBelong) {
   ASSERT_EQ(answer.diagnosis.findings.size(), 1u) << answer.shown;
   EXPECT_EQ(answer.diagnosis.findings[0].cause.cause, "outlier");
   EXPECT_EQ(answer.diagnosis.findings[0].cause.pose_id, "p28");
-  EXPECT_EQ(answer.diagnosis.findings[0].action, "single pose, cause not separable: repeat it and its neighbours");
+  EXPECT_EQ(answer.diagnosis.findings[0].action,
+            "single pose, cause not separable: repeat it and its neighbours");
 }
 
 TEST(HiddenEffectExtended, PredictsPosesHeldOutAsWellAsWhoKnowsTheTruth) {
-  test::Trial trial{"test", {.kind = "backlash", .seed = 6, .lambda = 300, .poses = 240, .validation_share = 0.4}};
+  test::Trial trial{
+      "test",
+      {.kind = "backlash", .seed = 6, .lambda = 300, .poses = 240, .validation_share = 0.4}};
   trial.compare_with_oracle = true;
   const test::TrialResult result = run_trial(trial, quick());
   ASSERT_EQ(result.error, "");
@@ -185,12 +195,13 @@ TEST(HiddenEffectExtended, PredictsPosesHeldOutAsWellAsWhoKnowsTheTruth) {
 TEST(HiddenByOneProcess, IsFoundByAnother) {
   const test::TemporaryFolder folder;
   const std::string binary = TRAMMEL_BINARY_DIR;
-  const test::Finished hide = test::run({binary + "/tests/trammel_hide", "--kind", "gear_transmission", "--seed", "12",
-                                         "--lambda", "150", "--poses", "160", "-o", folder.path().string()});
+  const test::Finished hide =
+      test::run({binary + "/tests/trammel_hide", "--kind", "gear_transmission", "--seed", "12",
+                 "--lambda", "150", "--poses", "160", "-o", folder.path().string()});
   ASSERT_EQ(hide.exit_code, 0) << hide.err;
   const test::Finished diagnose =
-      test::run({binary + "/clients/trammel", "diagnose", "--cell", folder.file("cell.yaml"), "--batch",
-                 folder.file("batch.csv"), "--json", folder.file("diagnosis.json")},
+      test::run({binary + "/clients/trammel", "diagnose", "--cell", folder.file("cell.yaml"),
+                 "--batch", folder.file("batch.csv"), "--json", folder.file("diagnosis.json")},
                 std::chrono::seconds(120));
   ASSERT_EQ(diagnose.exit_code, 0) << diagnose.err;
   const auto truth = nlohmann::json::parse(test::read_file(folder.file("truth.json")))["causes"][0];
@@ -199,12 +210,13 @@ TEST(HiddenByOneProcess, IsFoundByAnother) {
   ASSERT_EQ(said["findings"].size(), 1u) << said.dump(1);
   EXPECT_EQ(said["findings"][0]["cause"], truth["cause"]);
   EXPECT_EQ(said["findings"][0]["joint"], truth["joint"]);
-  EXPECT_NEAR(said["findings"][0]["parameters"]["order"]["value"].get<double>(), truth["values"]["order"].get<double>(),
-              0.1);
+  EXPECT_NEAR(said["findings"][0]["parameters"]["order"]["value"].get<double>(),
+              truth["values"]["order"].get<double>(), 0.1);
 }
 
 TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnotherOrder) {
-  hidden::HiddenCase hidden = hidden::hide({.kind = "tracker_moved", .seed = 3, .lambda = 150, .poses = 160});
+  hidden::HiddenCase hidden =
+      hidden::hide({.kind = "tracker_moved", .seed = 3, .lambda = 150, .poses = 160});
   const Diagnosis in_order = test::demand(test::diagnose_files(hidden, quick()));
   hidden.batch_csv = backwards(hidden.batch_csv);
   const Diagnosis moved = test::demand(test::diagnose_files(hidden, quick()));
@@ -215,16 +227,18 @@ TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnoth
   EXPECT_EQ(moved.sources_after, moved.sources_before);
 }
 
-/// How a cause is judged beside `found` and an unknown dependence of that size (m), with everything recorded.
-cause_search::Judgement judged(const Cause& cause, double effect_rms, const std::vector<Cause>& found,
-                               double unexplained_rms) {
+/// How a cause is judged beside `found` and an unknown dependence of that size (m), with everything
+/// recorded.
+cause_search::Judgement judged(const Cause& cause, double effect_rms,
+                               const std::vector<Cause>& found, double unexplained_rms) {
   const Unexplained unexplained{unexplained_rms > 0, {"q2"}, unexplained_rms, 1e-6};
   MeasurementBatch recorded = test::measured(test::chapter_5_robot(test::cell_7()), 20, 1);
   for (Measurement& m : recorded.measurements) {
     m.context.time = m.context.index;
     m.context.temperature = 20;
   }
-  return cause_search::judge(cause, {effect_rms}, {}, {found, unexplained, {}, recorded, unexplained.present});
+  return cause_search::judge(cause, {effect_rms}, {},
+                             {found, unexplained, {}, recorded, unexplained.present});
 }
 
 std::vector<Cause> doubts(const Cause& cause, double effect_rms, const std::vector<Cause>& found) {
@@ -234,7 +248,8 @@ std::vector<Cause> doubts(const Cause& cause, double effect_rms, const std::vect
 TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
   const Cause coupling{"wrist_coupling"};
   for (const double effect : {4e-6, 12e-6}) {
-    EXPECT_EQ(judged(coupling, effect, {coupling}, 33e-6).could_also_be, std::vector<Cause>{{"unknown"}});
+    EXPECT_EQ(judged(coupling, effect, {coupling}, 33e-6).could_also_be,
+              std::vector<Cause>{{"unknown"}});
   }
   EXPECT_TRUE(judged(coupling, 4e-6, {coupling}, 33e-6).whole) << "no shape for the model";
   EXPECT_FALSE(judged(coupling, 12e-6, {coupling}, 33e-6).whole);
@@ -269,38 +284,48 @@ TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) 
   lacking.model.error_sources = {"base"};
   const auto cell = std::make_shared<const Cell>(lacking);
   const double q2 = -5e-4;
-  const Diagnosis several = test::demand(
-      diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}, {"d4", -3e-5}, {"a2", 4e-5}, {"q3", 4e-5}}, 120), quick()));
+  const Diagnosis several = test::demand(diagnose(
+      cell, with_wrong_geometry(cell, {{"q2", q2}, {"d4", -3e-5}, {"a2", 4e-5}, {"q3", 4e-5}}, 120),
+      quick()));
   ASSERT_EQ(several.findings.size(), 1U) << several.sentence;
   EXPECT_EQ(several.findings[0].cause.parameter, "") << "not it alone";
   const auto& numbers = several.findings[0].parameters;
-  const auto of_q2 = std::find_if(numbers.begin(), numbers.end(), [](const Estimate& e) { return e.name == "q2"; });
+  const auto of_q2 = std::find_if(numbers.begin(), numbers.end(),
+                                  [](const Estimate& e) { return e.name == "q2"; });
   ASSERT_NE(of_q2, numbers.end());
   EXPECT_NEAR(of_q2->value, q2, 2 * of_q2->u95);
-  const Diagnosis alone = test::demand(diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}}, 120), quick()));
+  const Diagnosis alone =
+      test::demand(diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}}, 120), quick()));
   ASSERT_EQ(alone.findings.size(), 1U) << alone.sentence;
   EXPECT_EQ(alone.findings[0].cause.parameter, "q2");
 }
 
 TEST(TheOnlyCauseOfARobot, IsNamedForCertainWhereThePosesHeldOutGainByIt) {
-  const hidden::HiddenCase hidden = hidden::hide({.kind = "base", .seed = 1001, .lambda = 120, .poses = 300});
+  const hidden::HiddenCase hidden =
+      hidden::hide({.kind = "base", .seed = 1001, .lambda = 120, .poses = 300});
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
   ASSERT_EQ(diagnosis.findings.size(), 1U) << test::told(diagnosis);
   const Finding& base = diagnosis.findings.front();
   EXPECT_EQ(base.cause.cause, "base");
   EXPECT_TRUE(base.could_also_be.empty()) << test::told(diagnosis);
-  EXPECT_NEAR(base.held_out_gain, diagnosis.held_out_before->rms - diagnosis.held_out_after->rms, 1e-9)
+  EXPECT_NEAR(base.held_out_gain, diagnosis.held_out_before->rms - diagnosis.held_out_after->rms,
+              1e-9)
       << "there is nothing else in the model";
 }
 
 TEST(Doubt, WhatOnlySomePosesRecordIsNotLookedForAndSaid) {
-  hidden::HiddenCase hidden = hidden::hide({.kind = "thermal_growth", .seed = 2, .lambda = 300, .poses = 120});
+  hidden::HiddenCase hidden =
+      hidden::hide({.kind = "thermal_growth", .seed = 2, .lambda = 300, .poses = 120});
   MeasurementBatch batch = test::demand(parse_batch_csv(hidden.batch_csv, "batch"));
-  for (std::size_t i = 0; i < batch.measurements.size(); i += 2) batch.measurements[i].context.temperature.reset();
+  for (std::size_t i = 0; i < batch.measurements.size(); i += 2)
+    batch.measurements[i].context.temperature.reset();
   hidden.batch_csv = to_csv(batch);
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
-  const auto says = [](const std::string& limit) { return limit.find("temperatures of 60 of 120 poses") == 0; };
-  EXPECT_TRUE(std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), says)) << test::told(diagnosis);
+  const auto says = [](const std::string& limit) {
+    return limit.find("temperatures of 60 of 120 poses") == 0;
+  };
+  EXPECT_TRUE(std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), says))
+      << test::told(diagnosis);
   for (const Finding& finding : diagnosis.findings)
     EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
 }
@@ -309,7 +334,8 @@ TEST(MapsOfJoints, AreOneFindingAJointAlsoWhereFineDetailShowsOnlyBesideAllElse)
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
   for (const char* spec : {"joint_map:2@20", "joint_map:3@20", "joint_map:5@20"}) {
-    const Eigen::Index first = add_source(robot.truth, test::demand(make_error_source(spec, *cell)));
+    const Eigen::Index first =
+        add_source(robot.truth, test::demand(make_error_source(spec, *cell)));
     for (Eigen::Index k = 0; k < 40; ++k) {
       const double size = k < 12 ? 3e-4 : 2e-5;
       robot.truth.values(first + k) = size * std::sin(static_cast<double>(k * k + first));
@@ -332,15 +358,17 @@ TEST(FormOfACompliance, IsChosenAgainBesideWhatIsFoundLaterSoThatNothingElseIsNa
     lacking.model.error_sources =
         own ? std::vector<std::string>{"base", "compliance"} : std::vector<std::string>{"base"};
     const auto cell = std::make_shared<const Cell>(lacking);
-    const Diagnosis diagnosis =
-        test::demand(diagnose(cell, test::measured(test::chapter_5_robot(shipped), 200, 5), quick()));
+    const Diagnosis diagnosis = test::demand(
+        diagnose(cell, test::measured(test::chapter_5_robot(shipped), 200, 5), quick()));
     std::set<std::string> causes;
     for (const Finding& finding : diagnosis.findings) causes.insert(finding.cause.cause);
-    EXPECT_EQ(causes, own ? std::set<std::string>{"geometry"} : (std::set<std::string>{"compliance", "geometry"}))
+    EXPECT_EQ(causes, own ? std::set<std::string>{"geometry"}
+                          : (std::set<std::string>{"compliance", "geometry"}))
         << diagnosis.sentence;
     EXPECT_FALSE(diagnosis.unexplained.present) << diagnosis.sentence;
     if (own) {
-      EXPECT_EQ(diagnosis.sources_after, (std::vector<std::string>{"base", "compliance_linear", "geometry"}));
+      EXPECT_EQ(diagnosis.sources_after,
+                (std::vector<std::string>{"base", "compliance_linear", "geometry"}));
     }
   }
 }

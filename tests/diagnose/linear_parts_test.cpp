@@ -26,15 +26,19 @@ MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
   return m;
 }
 
-/// The chapter 5 robot in cell 7, calibrated by the list of the cell, and a linear problem about it.
+/// The chapter 5 robot in cell 7, calibrated by the list of the cell, and a linear problem about
+/// it.
 struct Calibrated {
   explicit Calibrated(int poses) : batch(test::measured(test::chapter_5_robot(cell), poses, 3)) {
     batch = MeasurementBatch(check_against_cell(batch, *cell)->rows());
     const CalibrationResult calibration = *calibrate(cell, cell->model.error_sources, batch, {});
     model.model = calibration.model;
-    for (const IdentifiedParameter& one : calibration.parameters) model.priors.push_back(one.parameter);
+    for (const IdentifiedParameter& one : calibration.parameters)
+      model.priors.push_back(one.parameter);
   }
-  LinearProblem problem() const { return {model.model, batch, model.priors, candidate_sources(*cell, batch, nullptr)}; }
+  LinearProblem problem() const {
+    return {model.model, batch, model.priors, candidate_sources(*cell, batch, nullptr)};
+  }
   std::shared_ptr<const Cell> cell = test::cell_7();
   MeasurementBatch batch;
   PriorModel model;
@@ -50,10 +54,12 @@ LinearProblem of_three_reflectors(const MeasurementBatch& batch) {
 }
 
 TEST(LinearProblem, ReflectorsThatShareWhatIsLeftOfAPoseWeighAndCountAsOne) {
-  const MeasurementBatch shared = test::seen_by_three(70, 60e-6, 0, 6), apart = test::seen_by_three(70, 0, 60e-6, 6);
+  const MeasurementBatch shared = test::seen_by_three(70, 60e-6, 0, 6),
+                         apart = test::seen_by_three(70, 0, 60e-6, 6);
   const LinearProblem one = of_three_reflectors(shared), three = of_three_reflectors(apart);
   EXPECT_NEAR(one.noise(), three.noise(), 0.15 * three.noise()) << "a row is off by as much";
-  const double weight = one.weight().mean() * one.noise(), weight_apart = three.weight().mean() * three.noise();
+  const double weight = one.weight().mean() * one.noise(),
+               weight_apart = three.weight().mean() * three.noise();
   EXPECT_LT(weight, 0.72) << "as one of three";
   EXPECT_GT(weight_apart, 0.85);
   EXPECT_LT(one.position_spread().freedom, 0.55 * three.position_spread().freedom);
@@ -65,7 +71,8 @@ TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
   const MatrixXd S = MatrixXd::Identity(40, 40) + Z * Z.transpose();
   const Background background(Z);
   EXPECT_LT((background.project(y) - S.llt().solve(y)).cwiseAbs().maxCoeff(), 1e-10);
-  EXPECT_LT((background.estimate(y) - Z.transpose() * S.llt().solve(y)).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LT((background.estimate(y) - Z.transpose() * S.llt().solve(y)).cwiseAbs().maxCoeff(),
+            1e-10);
 }
 
 TEST(LogEvidence, IsInvertedByStrengthFor) {
@@ -84,7 +91,9 @@ TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
   VectorXd moved = problem.residual();
   moved.segment(problem.first_row(7), problem.row_count(7)).array() += 50;
   const VectorXd change = folds.held_out_residual(moved) - left;
-  EXPECT_LT((change.segment(problem.first_row(7), problem.row_count(7)).array() - 50).abs().maxCoeff(), 1e-6);
+  EXPECT_LT(
+      (change.segment(problem.first_row(7), problem.row_count(7)).array() - 50).abs().maxCoeff(),
+      1e-6);
   EXPECT_GT((change.array().abs() > 1e-3).count(), 20);
 }
 
@@ -101,11 +110,13 @@ TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRowsHoweverManyTeethMesh) {
   const FamilyPtr gear = make_order_family(problem, {"gear_transmission", 2});
   ASSERT_NE(gear, nullptr);
   const Background background(problem.nuisance());
-  for (const double order : {2.7, 37.3, 202.0, 320.0}) {  // two waves a motor turn at ratios of 101 and of 160
+  for (const double order :
+       {2.7, 37.3, 202.0, 320.0}) {  // two waves a motor turn at ratios of 101 and of 160
     Best planted = gear->typical();
     planted.order = order;
     const VectorXd effect = gear->columns(planted) * Eigen::Vector2d(0.03, -0.04);
-    const Best found = gear->scan({background}, background.project(problem.residual() + effect)).front();
+    const Best found =
+        gear->scan({background}, background.project(problem.residual() + effect)).front();
     EXPECT_NEAR(found.order, order, 0.1);
     const double strength = effect.dot(background.project(effect).col(0));
     EXPECT_NEAR(found.strength, strength, 5 * std::sqrt(strength)) << order;
@@ -117,7 +128,8 @@ TEST(Refine, LeavesACalibratedModelWhereItIs) {
   const VectorXd before = calibrated.model.model.values;
   refine(calibrated.model, calibrated.batch, {});
   VectorXd moved = calibrated.model.model.values - before;
-  for (Index k = 0; k < moved.size(); ++k) moved(k) /= calibrated.model.priors[static_cast<std::size_t>(k)].prior_scale;
+  for (Index k = 0; k < moved.size(); ++k)
+    moved(k) /= calibrated.model.priors[static_cast<std::size_t>(k)].prior_scale;
   EXPECT_LT(moved.cwiseAbs().maxCoeff(), 0.05);
 }
 
@@ -127,7 +139,8 @@ TEST(Refine, AddsAndRemovesASourceWithItsPriors) {
   const std::size_t priors = calibrated.model.priors.size();
   ASSERT_TRUE(add_to(calibrated.model, "encoder_eccentricity:2"));
   EXPECT_EQ(calibrated.model.priors.size(), priors + 2);
-  EXPECT_EQ(calibrated.model.priors.size(), static_cast<std::size_t>(calibrated.model.model.parameter_count()));
+  EXPECT_EQ(calibrated.model.priors.size(),
+            static_cast<std::size_t>(calibrated.model.model.parameter_count()));
   remove_from(calibrated.model, "encoder_eccentricity:2");
   EXPECT_EQ(calibrated.model.model.values, before);
   EXPECT_EQ(calibrated.model.priors.size(), priors);
@@ -141,7 +154,8 @@ TEST(Chance, LetsTheBestOfAllPassThreeTimesInAThousand) {
   const Chance chance = chance_of(families, background, 300, 1);
   const Winners fresh = winners(families, background, draw_null(background, 300, 99), chance);
   const auto above = [&](double limit) {
-    return std::count_if(fresh.score.begin(), fresh.score.end(), [&](double score) { return score > limit; });
+    return std::count_if(fresh.score.begin(), fresh.score.end(),
+                         [&](double score) { return score > limit; });
   };
   EXPECT_LE(above(chance.limit), 5);            // 0.9 expected, 5 in 1 of 400
   EXPECT_GE(above(chance.limit_at(0.09)), 10);  // 27 expected

@@ -12,8 +12,10 @@
 namespace trammel::cause_search {
 namespace {
 
-/// cell-7's virtual robot, whose errors are those of the cell's error sources, with noise so many times as stated.
-MeasurementBatch with_noise(double times, double times_rotation, std::uint64_t seed, int poses = 120) {
+/// cell-7's virtual robot, whose errors are those of the cell's error sources, with noise so many
+/// times as stated.
+MeasurementBatch with_noise(double times, double times_rotation, std::uint64_t seed,
+                            int poses = 120) {
   MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -21,7 +23,9 @@ MeasurementBatch with_noise(double times, double times_rotation, std::uint64_t s
   const Tracker& tracker = test::cell_7()->tracker;
   for (Measurement& m : batch.measurements) {
     m.p_W += tracker.sigma * std::sqrt(times * times - 1) * vector();
-    m.R_WT = rotation_exp(tracker.sigma_rotation * std::sqrt(times_rotation * times_rotation - 1) * vector()) * *m.R_WT;
+    m.R_WT = rotation_exp(tracker.sigma_rotation * std::sqrt(times_rotation * times_rotation - 1) *
+                          vector()) *
+             *m.R_WT;
   }
   return batch;
 }
@@ -49,8 +53,10 @@ TEST(MoreThanNoise, NoiseFarBeyondWhatWasStatedIsUnknownWithBothFigures) {
     EXPECT_LT(noisy.unexplained.p_value, 1e-3);
     EXPECT_NEAR(noisy.left_position.left / noisy.left_position.stated, times, 0.1 * times);
     EXPECT_NE(noisy.sentence.find("More than noise"), std::string::npos) << noisy.sentence;
-    EXPECT_NE(noisy.sentence.find("times the stated noise in position"), std::string::npos) << noisy.sentence;
-    EXPECT_NE(noisy.sentence.find("Measure some poses repeatedly"), std::string::npos) << noisy.sentence;
+    EXPECT_NE(noisy.sentence.find("times the stated noise in position"), std::string::npos)
+        << noisy.sentence;
+    EXPECT_NE(noisy.sentence.find("Measure some poses repeatedly"), std::string::npos)
+        << noisy.sentence;
     EXPECT_EQ(noisy.sentence.find("Nothing"), std::string::npos) << noisy.sentence;
   }
 }
@@ -58,7 +64,8 @@ TEST(MoreThanNoise, NoiseFarBeyondWhatWasStatedIsUnknownWithBothFigures) {
 TEST(MoreThanNoise, OrientationsAreJudgedLikePositions) {
   const Diagnosis noisy = diagnosed(with_noise(1, 2.5, 5));
   EXPECT_EQ(noisy.verdict, Verdict::kUnknown) << noisy.sentence;
-  EXPECT_NE(noisy.sentence.find("times the stated noise in orientation"), std::string::npos) << noisy.sentence;
+  EXPECT_NE(noisy.sentence.find("times the stated noise in orientation"), std::string::npos)
+      << noisy.sentence;
 }
 
 TEST(MoreThanNoise, ATenthMoreIsANoteAndThreeTenthsAreUnknown) {
@@ -69,7 +76,8 @@ TEST(MoreThanNoise, ATenthMoreIsANoteAndThreeTenthsAreUnknown) {
       return limit.starts_with("a little more than noise");
     })) << note.left_position.left / note.left_position.stated;
     const Diagnosis more = diagnosed(with_noise(1.3, 1, seed, 300));
-    EXPECT_EQ(more.verdict, Verdict::kUnknown) << more.left_position.left / more.left_position.stated;
+    EXPECT_EQ(more.verdict, Verdict::kUnknown)
+        << more.left_position.left / more.left_position.stated;
     EXPECT_TRUE(more.unexplained.depends_on.empty()) << more.sentence;
     EXPECT_TRUE(more.findings.empty()) << more.sentence;
   }
@@ -97,8 +105,8 @@ TEST(MoreThanNoise, OrientationsInXyzwOrderAreRefused) {
   EXPECT_EQ(refused.error().text, "as xyzw") << sentence(refused.error());
 }
 
-/// cell-7's virtual robot with play in joint 3 that grows with the torque on it more than the gear gives way, every
-/// pose approached from below or from either side.
+/// cell-7's virtual robot with play in joint 3 that grows with the torque on it more than the gear
+/// gives way, every pose approached from below or from either side.
 Diagnosis with_loaded_play(bool both_sides) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
@@ -120,7 +128,8 @@ Diagnosis with_loaded_play(bool both_sides) {
 TEST(MoreThanNoise, PlayThatGrowsWithTheLoadIsPlayFromBothSidesAndNothingForSureFromOne) {
   const Diagnosis one_side = with_loaded_play(false);
   EXPECT_TRUE(one_side.unexplained.present) << one_side.sentence;
-  for (const Finding& finding : one_side.findings) EXPECT_FALSE(finding.could_also_be.empty()) << one_side.sentence;
+  for (const Finding& finding : one_side.findings)
+    EXPECT_FALSE(finding.could_also_be.empty()) << one_side.sentence;
   const Diagnosis both = with_loaded_play(true);
   ASSERT_EQ(both.findings.size(), 1U) << both.sentence;
   EXPECT_EQ(both.findings.front().cause.cause, "backlash") << both.sentence;

@@ -48,7 +48,8 @@ Eigen::MatrixXd narrow(const Cell& cell) {
   Eigen::MatrixXd q = latin_hypercube(ranges, 60, 3);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
     const auto [lower, upper] = ranges[static_cast<std::size_t>(j)];
-    q.col(j).array() = 0.55 * lower + 0.45 * upper + 0.1 * (q.col(j).array() - 0.5 * (lower + upper));
+    q.col(j).array() =
+        0.55 * lower + 0.45 * upper + 0.1 * (q.col(j).array() - 0.5 * (lower + upper));
   }
   return q;
 }
@@ -59,8 +60,11 @@ SearchResult in_doubt(const std::shared_ptr<const Cell>& cell) {
   found.before.model = test::demand(make_physical_model(cell, {"base", "geometry"}));
   found.before.priors = found.before.model.parameters();
   found.after = found.before;
-  const VirtualRobot robot{found.before.model, cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
-  found.all = test::demand(check_against_cell(test::demand(simulate(robot, narrow(*cell), {})), *cell)).rows();
+  const VirtualRobot robot{
+      found.before.model, cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
+  found.all =
+      test::demand(check_against_cell(test::demand(simulate(robot, narrow(*cell), {})), *cell))
+          .rows();
   found.batch = found.all;
   Accepted one;
   one.cause = {"encoder_eccentricity", 1};
@@ -85,7 +89,8 @@ Result<Plan> planned(const std::vector<JointVector>& q, const Cell& cell) {
     list.poses.push_back({fmt::format("n{}", list.poses.size() + 1), {}, 0});
     list.poses.back().context.q = one;
   }
-  Result<JointList> read = check_against_cell(test::demand(parse_joint_csv(to_csv(list), "next.csv")), cell);
+  Result<JointList> read =
+      check_against_cell(test::demand(parse_joint_csv(to_csv(list), "next.csv")), cell);
   if (!read) return tl::make_unexpected(read.error());
   return plan_of(cell, *read);
 }
@@ -99,7 +104,8 @@ TEST(NextPoses, APlanTakesWhatIsSuggestedForEveryShippedRobot) {
       const Result<Plan> plan = planned(q, *cell);
       ASSERT_TRUE(plan) << robot << (odd ? " (odd): " : ": ") << plan.error().message;
       for (std::size_t i = 0; i < q.size(); ++i)
-        EXPECT_LT((plan->poses[i].context.q - q[i]).cwiseAbs().maxCoeff(), 1e-12) << "measured as suggested";
+        EXPECT_LT((plan->poses[i].context.q - q[i]).cwiseAbs().maxCoeff(), 1e-12)
+            << "measured as suggested";
     }
   }
 }
@@ -114,7 +120,8 @@ TEST(NextPoses, StayInTheWorkspaceAndInSightOnTheWayToo) {
   const Result<Plan> plan = planned(q, *cell);
   ASSERT_TRUE(plan) << plan.error().message;
   for (const PlannedPose& pose : plan->poses) {
-    const Vector3 p_BT = cell->robot.flange_pose(pose.context.q) * cell->tools["probe"]->translation();
+    const Vector3 p_BT =
+        cell->robot.flange_pose(pose.context.q) * cell->tools["probe"]->translation();
     EXPECT_TRUE((p_BT.array() >= cell->workspace->lower.array()).all() &&
                 (p_BT.array() <= cell->workspace->upper.array()).all());
   }

@@ -23,14 +23,15 @@ DiagnoseOptions quick() {
   return options;
 }
 
-/// cell-7's virtual robot with play in some joints (b, rad, and its growth with torque, rad/Nm), approached from either
-/// side by turns.
-MeasurementBatch with_play(const std::map<int, std::pair<double, double>>& play, std::uint64_t seed) {
+/// cell-7's virtual robot with play in some joints (b, rad, and its growth with torque, rad/Nm),
+/// approached from either side by turns.
+MeasurementBatch with_play(const std::map<int, std::pair<double, double>>& play,
+                           std::uint64_t seed) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
   for (const auto& [joint, values] : play) {
-    const Eigen::Index at =
-        add_source(robot.truth, test::demand(make_error_source(fmt::format("backlash:{}", joint), *cell)));
+    const Eigen::Index at = add_source(
+        robot.truth, test::demand(make_error_source(fmt::format("backlash:{}", joint), *cell)));
     robot.truth.values(at) = values.first;
     robot.truth.values(at + 1) = values.second;
   }
@@ -57,7 +58,8 @@ bool holds(const std::vector<std::string>& list, const char* word) {
 }
 
 TEST(PlaySign, PlayOfItsOwnSignIsNamed) {
-  const Diagnosis found = test::demand(diagnose(test::cell_7(), with_play({{3, {1e-4, 0}}}, 1), quick()));
+  const Diagnosis found =
+      test::demand(diagnose(test::cell_7(), with_play({{3, {1e-4, 0}}}, 1), quick()));
   ASSERT_EQ(found.findings.size(), 1u) << found.sentence;
   EXPECT_EQ(found.findings[0].cause.cause, "backlash");
   EXPECT_FALSE(found.unexplained.present) << found.sentence;
@@ -65,7 +67,8 @@ TEST(PlaySign, PlayOfItsOwnSignIsNamed) {
 
 TEST(PlaySign, TheOtherSignIsNoPlayButUnknownAndDependsOnTheSideOfThatJoint) {
   for (const auto& [b, k] : {std::pair(-1e-4, 0.0), {0.0, -4e-8}}) {
-    const Diagnosis open = test::demand(diagnose(test::cell_7(), with_play({{3, {b, k}}}, 2), quick()));
+    const Diagnosis open =
+        test::demand(diagnose(test::cell_7(), with_play({{3, {b, k}}}, 2), quick()));
     EXPECT_FALSE(names_backlash(open)) << open.sentence;
     EXPECT_EQ(open.verdict, Verdict::kUnknown) << open.sentence;
     EXPECT_TRUE(open.unexplained.present);
@@ -75,23 +78,26 @@ TEST(PlaySign, TheOtherSignIsNoPlayButUnknownAndDependsOnTheSideOfThatJoint) {
     EXPECT_NE(open.sentence.find("before they stood still"), std::string::npos) << open.sentence;
     EXPECT_NE(open.sentence.find("dir3 column"), std::string::npos) << open.sentence;
     EXPECT_EQ(open.sentence.find("gear adjusted"), std::string::npos) << open.sentence;
-    for (const std::string& source : open.sources_after) EXPECT_FALSE(source.starts_with("backlash")) << source;
+    for (const std::string& source : open.sources_after)
+      EXPECT_FALSE(source.starts_with("backlash")) << source;
     for (const Unseen& unseen : open.could_not_have_seen)
       EXPECT_FALSE(unseen.cause.cause == "backlash" && unseen.cause.joint == 2) << unseen.needs;
-    for (const std::string& limit : open.limits) EXPECT_EQ(limit.find("beside what is unexplained"), std::string::npos);
+    for (const std::string& limit : open.limits)
+      EXPECT_EQ(limit.find("beside what is unexplained"), std::string::npos);
   }
 }
 
 TEST(PlaySign, NegativeInEveryJointAsksWhetherTheDirectionsAreReversed) {
-  MeasurementBatch batch =
-      with_play({{1, {8e-5, 0}}, {2, {6e-5, 0}}, {3, {1e-4, 0}}, {4, {1.5e-4, 0}}, {5, {1.5e-4, 0}}}, 3);
+  MeasurementBatch batch = with_play(
+      {{1, {8e-5, 0}}, {2, {6e-5, 0}}, {3, {1e-4, 0}}, {4, {1.5e-4, 0}}, {5, {1.5e-4, 0}}}, 3);
   for (Measurement& m : batch.measurements) {
     for (int& side : m.context.direction) side = -side;
   }
   const Diagnosis open = test::demand(diagnose(test::cell_7(), batch, quick()));
   EXPECT_FALSE(names_backlash(open)) << open.sentence;
   EXPECT_EQ(open.verdict, Verdict::kUnknown) << open.sentence;
-  EXPECT_NE(open.sentence.find("are the dir columns reversed?"), std::string::npos) << open.sentence;
+  EXPECT_NE(open.sentence.find("are the dir columns reversed?"), std::string::npos)
+      << open.sentence;
 }
 
 TEST(PlaySign, ARealRobotWhoseDirectionsAreItsMovesIsNotToldToAdjustItsGears) {
@@ -107,9 +113,11 @@ TEST(PlaySign, ARealRobotWhoseDirectionsAreItsMovesIsNotToldToAdjustItsGears) {
                                                                                        : 0;
     last = &m.context.q;
   }
-  for (std::size_t i = 0; 12 * i < batch.measurements.size(); ++i) batch.measurements[i] = batch.measurements[12 * i];
+  for (std::size_t i = 0; 12 * i < batch.measurements.size(); ++i)
+    batch.measurements[i] = batch.measurements[12 * i];
   batch.measurements.resize((batch.measurements.size() + 11) / 12);
-  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
   const Diagnosis real = test::demand(diagnose(cell, batch, quick()));
   for (const Finding& finding : real.findings) {
     if (finding.cause.cause != "backlash") continue;

@@ -22,11 +22,13 @@ std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
 SearchResult accepting(const std::string& source, double ripple) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
-  const Eigen::Index at = add_source(robot.truth, test::demand(make_error_source("gear_transmission:3@40", *cell)));
+  const Eigen::Index at =
+      add_source(robot.truth, test::demand(make_error_source("gear_transmission:3@40", *cell)));
   robot.truth.values(at + 1) = ripple;
   SearchResult found;
   found.all = found.batch = test::measured(robot, 120, 5);
-  const CalibrationResult calibration = test::demand(calibrate(cell, cell->model.error_sources, found.batch, {}));
+  const CalibrationResult calibration =
+      test::demand(calibrate(cell, cell->model.error_sources, found.batch, {}));
   found.before = {calibration.model, priors_of(calibration)};
   found.after = found.before;
   EXPECT_TRUE(add_to(found.after, source));

@@ -19,26 +19,31 @@ std::shared_ptr<const Cell> cell_on_rail() {
       "version: 1\ncell: on-rail\nrobot: {}/models/abb_irb6640-205-275-on-rail.yaml\n"
       "base: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\ngravity: [0, 0, -1]\n"
       "tools: {{probe: {{xyz_mm: [60, 0, 140], q_wxyz: [1, 0, 0, 0]}}}}\n"
-      "payloads: {{probe: {{mass_kg: 60, cog_mm: [20, 0, 90]}}}}\ntracker: {{sigma_mm: 0.02, sigma_deg: 0.004}}\n"
+      "payloads: {{probe: {{mass_kg: 60, cog_mm: [20, 0, 90]}}}}\ntracker: {{sigma_mm: 0.02, "
+      "sigma_deg: 0.004}}\n"
       "model: {{error_sources: [base, geometry, compliance], bias: none}}\n",
       TRAMMEL_SOURCE_DIR);
   return std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
 }
 
-/// What is said where the robot is as drawn but for that source, its parameters at so much of their prior scales.
+/// What is said where the robot is as drawn but for that source, its parameters at so much of their
+/// prior scales.
 Diagnosis diagnosed(const std::string& source, double share, std::uint64_t seed) {
   const auto cell = cell_on_rail();
   VirtualRobot robot{
-      test::demand(make_physical_model(cell, source.empty() ? std::vector<std::string>{"base"} : std::vector{source})),
+      test::demand(make_physical_model(
+          cell, source.empty() ? std::vector<std::string>{"base"} : std::vector{source})),
       20e-6,
       7e-5,
       {}};
   const std::vector<Parameter> parameters = robot.truth.parameters();
   for (std::size_t k = 0; k < parameters.size() && !source.empty(); ++k)
-    robot.truth.values(static_cast<Eigen::Index>(k)) = (k % 2 == 0 ? share : -share) * parameters[k].prior_scale;
+    robot.truth.values(static_cast<Eigen::Index>(k)) =
+        (k % 2 == 0 ? share : -share) * parameters[k].prior_scale;
   SimulateOptions options;
   options.seed = seed;
-  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {150, seed})), options));
+  const MeasurementBatch batch =
+      test::demand(simulate(robot, test::demand(plan_poses(*cell, {150, seed})), options));
   DiagnoseOptions quick;
   quick.draws = 200;
   quick.next_poses = 0;

@@ -32,7 +32,8 @@ std::shared_ptr<const Cell> cell_of_two_tools() {
   return cell;
 }
 
-std::set<std::string> ids_of(const std::vector<SuspectedPose>& suspects, const std::string& reason) {
+std::set<std::string> ids_of(const std::vector<SuspectedPose>& suspects,
+                             const std::string& reason) {
   std::set<std::string> ids;
   for (const SuspectedPose& suspect : suspects) {
     if (suspect.reason.find(reason) != std::string::npos) ids.insert(suspect.pose_id);
@@ -49,8 +50,9 @@ std::set<std::size_t> some_places(std::size_t size, std::size_t count, std::uint
 }
 
 bool says(const Diagnosis& diagnosis, const std::string& words) {
-  return std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(),
-                     [&](const std::string& limit) { return limit.find(words) != std::string::npos; });
+  return std::any_of(
+      diagnosis.limits.begin(), diagnosis.limits.end(),
+      [&](const std::string& limit) { return limit.find(words) != std::string::npos; });
 }
 
 TEST(RowMistakes, ExchangedRowsAreLocatedAndSaidToBeExchanged) {
@@ -58,9 +60,10 @@ TEST(RowMistakes, ExchangedRowsAreLocatedAndSaidToBeExchanged) {
   Measurement& one = batch.measurements[40];
   Measurement& other = batch.measurements[93];
   std::swap(one.p_W, other.p_W);
-  const Diagnosis found =
-      test::demand(diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
-  EXPECT_EQ(ids_of(found.suspects, "were rows exchanged"), (std::set<std::string>{one.pose_id, other.pose_id}))
+  const Diagnosis found = test::demand(
+      diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+  EXPECT_EQ(ids_of(found.suspects, "were rows exchanged"),
+            (std::set<std::string>{one.pose_id, other.pose_id}))
       << found.sentence;
   EXPECT_TRUE(says(found, "joints of another row"));
 }
@@ -68,7 +71,8 @@ TEST(RowMistakes, ExchangedRowsAreLocatedAndSaidToBeExchanged) {
 /// cell-7's poses with the second tool at every third.
 MeasurementBatch with_two_tools(int poses, std::uint64_t seed) {
   const auto cell = cell_of_two_tools();
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed, false);
+  MeasurementBatch batch =
+      test::measured(test::chapter_5_robot(test::cell_7()), poses, seed, false);
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (std::size_t i = 0; i < batch.measurements.size(); i += 3) {
     Measurement& m = batch.measurements[i];
@@ -88,10 +92,12 @@ TEST(RowMistakes, WrongToolIdsAmongRightOnesAreLocated) {
     wrong.insert(batch.measurements[i].pose_id);
   }
   const auto cell = cell_of_two_tools();
-  const Diagnosis found = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
+  const Diagnosis found =
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
   EXPECT_EQ(ids_of(found.suspects, "is its tool_id wrong"), wrong) << found.sentence;
   EXPECT_TRUE(says(found, "not their tool_id"));
-  for (const Finding& finding : found.findings) EXPECT_EQ(finding.cause.cause, "outlier") << found.sentence;
+  for (const Finding& finding : found.findings)
+    EXPECT_EQ(finding.cause.cause, "outlier") << found.sentence;
 }
 
 TEST(RowMistakes, AToolIdThatIsNeverRightIsSaidToBeWrong) {
@@ -102,7 +108,8 @@ TEST(RowMistakes, AToolIdThatIsNeverRightIsSaidToBeWrong) {
     wrong.insert(batch.measurements[i].pose_id);
   }
   const auto cell = cell_of_two_tools();
-  const Diagnosis found = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
+  const Diagnosis found =
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
   EXPECT_EQ(ids_of(found.suspects, "fits tool 'spindle'"), wrong) << found.sentence;
   EXPECT_TRUE(says(found, "tool 'probe' is found where tool 'spindle' is"));
   EXPECT_NE(found.verdict, Verdict::kNamed) << found.sentence;
@@ -112,7 +119,8 @@ TEST(RowMistakes, AToolIdThatIsNeverRightIsSaidToBeWrong) {
 MeasurementBatch with_play(int poses, std::uint64_t seed) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
-  const Eigen::Index at = add_source(robot.truth, test::demand(make_error_source("backlash:2", *cell)));
+  const Eigen::Index at =
+      add_source(robot.truth, test::demand(make_error_source("backlash:2", *cell)));
   robot.truth.values(at) = 2e-4;
   MeasurementBatch batch = test::measured(robot, poses, seed);
   std::mt19937_64 random(seed);
@@ -135,15 +143,18 @@ TEST(RowMistakes, WrongMarksOfTheSideOfApproachAreLocatedAndThePlayIsNotSure) {
       for (int& side : batch.measurements[i].context.direction) side = -side;
       wrong.insert(batch.measurements[i].pose_id);
     }
-    const Diagnosis found =
-        test::demand(diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
-    const auto play = std::find_if(found.findings.begin(), found.findings.end(),
-                                   [](const Finding& one) { return one.cause.cause == "backlash"; });
+    const Diagnosis found = test::demand(diagnose(
+        test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+    const auto play =
+        std::find_if(found.findings.begin(), found.findings.end(),
+                     [](const Finding& one) { return one.cause.cause == "backlash"; });
     ASSERT_NE(play, found.findings.end()) << share << ' ' << found.sentence;
     EXPECT_EQ(play->could_also_be.empty(), share < 0.1) << found.sentence;
-    const std::set<std::string> located = ids_of(found.suspects, "other side of joint 2 than dir2 says");
+    const std::set<std::string> located =
+        ids_of(found.suspects, "other side of joint 2 than dir2 says");
     EXPECT_TRUE(std::includes(wrong.begin(), wrong.end(), located.begin(), located.end())) << share;
-    EXPECT_GE(static_cast<double>(located.size()), 0.9 * static_cast<double>(wrong.size())) << share;
+    EXPECT_GE(static_cast<double>(located.size()), 0.9 * static_cast<double>(wrong.size()))
+        << share;
     for (const std::string& source : found.sources_after)
       EXPECT_TRUE(share < 0.1 || !source.starts_with("backlash")) << source;
   }
@@ -161,12 +172,14 @@ TEST(RowMistakes, TimesThatDoNotRiseAreLocated) {
   EXPECT_TRUE(cause_search::rows_against_time(batch).empty());
 
   batch = test::measured(test::chapter_5_robot(test::cell_7()), 60, 6);
-  for (std::size_t i = 0; i < 60; ++i) batch.measurements[i].context.time = 30.0 * static_cast<double>(i);
+  for (std::size_t i = 0; i < 60; ++i)
+    batch.measurements[i].context.time = 30.0 * static_cast<double>(i);
   std::swap(batch.measurements[12].context.time, batch.measurements[45].context.time);
-  const Diagnosis found =
-      test::demand(diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
-  EXPECT_EQ(ids_of(found.suspects, "time_s"),
-            (std::set<std::string>{batch.measurements[12].pose_id, batch.measurements[45].pose_id}));
+  const Diagnosis found = test::demand(
+      diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+  EXPECT_EQ(
+      ids_of(found.suspects, "time_s"),
+      (std::set<std::string>{batch.measurements[12].pose_id, batch.measurements[45].pose_id}));
   EXPECT_TRUE(says(found, "time_s does not rise"));
 }
 

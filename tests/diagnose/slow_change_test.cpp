@@ -21,8 +21,8 @@ Diagnosis diagnosed(const std::function<double(double)>& zero, std::uint64_t see
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     Measurement& m = batch.measurements[i];
     m.context.time = 30.0 * static_cast<double>(i);
-    const VirtualRobot off =
-        test::with_zero_off(robot, 3, zero(static_cast<double>(i) / static_cast<double>(batch.measurements.size())));
+    const VirtualRobot off = test::with_zero_off(
+        robot, 3, zero(static_cast<double>(i) / static_cast<double>(batch.measurements.size())));
     const Pose moved = off.truth.pose_W(m.context) * robot.truth.pose_W(m.context).inverse();
     m.p_W = moved * m.p_W;
     m.R_WT = moved.linear() * *m.R_WT;
@@ -36,11 +36,11 @@ Diagnosis diagnosed(const std::function<double(double)>& zero, std::uint64_t see
 
 TEST(SlowChange, ThreeLostZerosAreNoWarmingUp) {
   for (const std::uint64_t seed : {1, 2}) {
-    const Diagnosis slips =
-        diagnosed([](double t) { return t < 0.25   ? 0
-                                        : t < 0.5  ? 1.4e-3
-                                        : t < 0.75 ? 3.5e-3
-                                                   : 7e-3; }, seed);
+    const Diagnosis slips = diagnosed(
+        [](double t) { return t < 0.25   ? 0
+                              : t < 0.5  ? 1.4e-3
+                              : t < 0.75 ? 3.5e-3
+                                         : 7e-3; }, seed);
     EXPECT_EQ(slips.sentence.find("warm up"), std::string::npos) << slips.sentence;
     EXPECT_NE(slips.sentence.find("in steps"), std::string::npos) << slips.sentence;
     EXPECT_NE(slips.sentence.find("joint 3"), std::string::npos) << slips.sentence;
@@ -49,7 +49,8 @@ TEST(SlowChange, ThreeLostZerosAreNoWarmingUp) {
 
 TEST(SlowChange, AZeroThatCreepsByAFewHundredthsOfAMillimetreMayBeWarmingUp) {
   const Diagnosis warm = diagnosed([](double t) { return 2e-4 * std::sin(5 * t) * t; }, 3);
-  EXPECT_NE(warm.sentence.find("The zero of joint 3 moved slowly"), std::string::npos) << warm.sentence;
+  EXPECT_NE(warm.sentence.find("The zero of joint 3 moved slowly"), std::string::npos)
+      << warm.sentence;
   EXPECT_NE(warm.sentence.find("as parts do that warm up"), std::string::npos) << warm.sentence;
 }
 
@@ -66,7 +67,8 @@ Diagnosis with_creeping_tool(double size, std::uint64_t seed) {
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     Measurement& m = batch.measurements[i];
     m.context.time = 30.0 * static_cast<double>(i);
-    const double gone = size * std::sin(3.1 * static_cast<double>(i) / static_cast<double>(batch.measurements.size()));
+    const double gone = size * std::sin(3.1 * static_cast<double>(i) /
+                                        static_cast<double>(batch.measurements.size()));
     m.p_W += robot.truth.pose_W(m.context).linear() * Vector3(gone, 0, 0);
   }
   DiagnoseOptions options;

@@ -30,30 +30,35 @@ TEST_P(SlowTime, IsNotNamedAStepAndNothingOfItGoesIntoTheCell) {
       const hidden::HiddenCase hidden =
           hidden::hide({.kind = GetParam(), .seed = seed, .lambda = lambda, .poses = 200});
       const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
-      const std::string shown = fmt::format("seed {} lambda {}: {}", seed, lambda, diagnosis.sentence);
+      const std::string shown =
+          fmt::format("seed {} lambda {}: {}", seed, lambda, diagnosis.sentence);
       for (const Finding& finding : diagnosis.findings)
         EXPECT_FALSE(begins(finding.cause) && finding.could_also_be.empty()) << shown;
       for (const std::string& source : diagnosis.sources_after)
         EXPECT_EQ(source.find('@'), std::string::npos) << source << ' ' << shown;
       const auto& on = diagnosis.unexplained.depends_on;
       const bool slow = std::find(on.begin(), on.end(), "time") != on.end();
-      const bool steady = std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
-                                      [](const Finding& f) { return f.cause.cause == "tracker_drift"; });
+      const bool steady =
+          std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                      [](const Finding& f) { return f.cause.cause == "tracker_drift"; });
       const bool open = !diagnosis.findings.empty() && !diagnosis.findings[0].could_also_be.empty();
       EXPECT_TRUE(slow || steady || open) << shown;
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Effects, SlowTime, testing::Values("slow_zero", "slow_stand", "slow_growth"),
+INSTANTIATE_TEST_SUITE_P(Effects, SlowTime,
+                         testing::Values("slow_zero", "slow_stand", "slow_growth"),
                          [](const auto& kind) { return std::string(kind.param).substr(5); });
 
 TEST(SlowTime, AStepIsStillAStep) {
   for (const char* kind : {"joint_slip", "tracker_moved", "tool_changed"}) {
     for (const std::uint64_t seed : {21, 22, 23}) {
-      const hidden::HiddenCase hidden = hidden::hide({.kind = kind, .seed = seed, .lambda = 150, .poses = 200});
+      const hidden::HiddenCase hidden =
+          hidden::hide({.kind = kind, .seed = seed, .lambda = 150, .poses = 200});
       const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
-      EXPECT_TRUE(test::judge(diagnosis, hidden).exact) << kind << seed << ' ' << diagnosis.sentence;
+      EXPECT_TRUE(test::judge(diagnosis, hidden).exact)
+          << kind << seed << ' ' << diagnosis.sentence;
     }
   }
 }
@@ -65,7 +70,8 @@ TEST(SlowTime, NoiseOfLongTailsOrThatLastsIsNoCause) {
       spec.noise = noise;
       const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden::hide(spec), quick()));
       for (const Finding& finding : diagnosis.findings)
-        EXPECT_TRUE(finding.cause.cause == "outlier" || !finding.could_also_be.empty()) << diagnosis.sentence;
+        EXPECT_TRUE(finding.cause.cause == "outlier" || !finding.could_also_be.empty())
+            << diagnosis.sentence;
     }
   }
 }

@@ -27,8 +27,8 @@ TEST(Unrecorded, CauseIsNeverNamedForCertainButAmongWhatItMayBe) {
                                 {"thermal_growth", "temperature_c"},
                                 {"tracker_drift", "time_s"},
                                 {"time_lag", "time_s"}}) {
-    const hidden::HiddenCase hidden =
-        hidden::hide({.kind = one.kind, .seed = 1, .lambda = 300, .poses = 160, .withheld = {one.column}});
+    const hidden::HiddenCase hidden = hidden::hide(
+        {.kind = one.kind, .seed = 1, .lambda = 300, .poses = 160, .withheld = {one.column}});
     const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
     for (const Finding& finding : diagnosis.findings) {
       EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
@@ -39,13 +39,14 @@ TEST(Unrecorded, CauseIsNeverNamedForCertainButAmongWhatItMayBe) {
       EXPECT_EQ(m.context.temperature.has_value(), std::string(one.column) != "temperature_c");
       EXPECT_EQ(m.context.time.has_value(), std::string(one.column) != "time_s");
     }
-    EXPECT_TRUE(test::judge(diagnosis, hidden).unrecorded_rightly) << one.kind << "\n" << test::told(diagnosis);
+    EXPECT_TRUE(test::judge(diagnosis, hidden).unrecorded_rightly) << one.kind << "\n"
+                                                                   << test::told(diagnosis);
   }
 }
 
 TEST(Unrecorded, LagAlongAPathWithoutTimesIsNoStepForCertain) {
-  const hidden::HiddenCase hidden =
-      hidden::hide({.kind = "time_lag", .seed = 313, .lambda = 120, .poses = 300, .withheld = {"time_s"}});
+  const hidden::HiddenCase hidden = hidden::hide(
+      {.kind = "time_lag", .seed = 313, .lambda = 120, .poses = 300, .withheld = {"time_s"}});
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
   for (const Finding& finding : diagnosis.findings) {
     EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
@@ -54,8 +55,8 @@ TEST(Unrecorded, LagAlongAPathWithoutTimesIsNoStepForCertain) {
 }
 
 TEST(Unrecorded, SidesDrawnAtRandomAreNoCause) {
-  const hidden::HiddenCase hidden =
-      hidden::hide({.kind = "backlash", .seed = 4, .lambda = 300, .poses = 160, .withheld = {"dir"}});
+  const hidden::HiddenCase hidden = hidden::hide(
+      {.kind = "backlash", .seed = 4, .lambda = 300, .poses = 160, .withheld = {"dir"}});
   ASSERT_TRUE(hidden.truth.untraceable);
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
   EXPECT_TRUE(diagnosis.findings.empty()) << test::told(diagnosis);
@@ -90,7 +91,8 @@ TEST(Unrecorded, DirectionOfAPoseIsKnownWhereTheOneBeforeWasSetAside) {
   part.measurements.erase(part.measurements.begin() + 1);
   const Surrogates put = put_in_surrogates(whole);
   take_over_surrogates(put, whole, part);
-  EXPECT_EQ(part.measurements.at(1).context.direction, std::vector<int>{-1}) << "0.2 is above 0.1, but came from 0.4";
+  EXPECT_EQ(part.measurements.at(1).context.direction, std::vector<int>{-1})
+      << "0.2 is above 0.1, but came from 0.4";
 }
 
 }  // namespace

@@ -13,27 +13,32 @@
 namespace trammel {
 namespace {
 
-/// The shipped cell with a model in force, and what its robot would measure after something happened to it.
+/// The shipped cell with a model in force, and what its robot would measure after something
+/// happened to it.
 class TriageTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     TrainOptions options;
     options.bias = "none";
     const auto cell = test::cell_7();
-    const auto batch =
-        test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), 150, 1), *cell, drawn(0.2, 1)));
+    const auto batch = test::demand(check_against_cell(
+        test::measured(test::chapter_5_robot(cell), 150, 1), *cell, drawn(0.2, 1)));
     model_ = std::make_unique<CompensatedModel>(test::demand(train(cell, batch, options)));
   }
   static void TearDownTestSuite() { model_.reset(); }
 
-  static MeasurementBatch batch_of(const VirtualRobot& robot, std::uint64_t seed = 20, int poses = 90) {
-    return test::demand(check_against_cell(test::measured(robot, poses, seed), *robot.truth.cell)).rows();
+  static MeasurementBatch batch_of(const VirtualRobot& robot, std::uint64_t seed = 20,
+                                   int poses = 90) {
+    return test::demand(check_against_cell(test::measured(robot, poses, seed), *robot.truth.cell))
+        .rows();
   }
   /// The robot with an error source more, whose parameters are `values`.
   static VirtualRobot robot_with(const std::string& spec, const std::vector<double>& values) {
     VirtualRobot robot = robot_as_it_was();
-    const Eigen::Index at = add_source(robot.truth, test::demand(make_error_source(spec, *robot.truth.cell)));
-    for (std::size_t k = 0; k < values.size(); ++k) robot.truth.values(at + static_cast<Eigen::Index>(k)) = values[k];
+    const Eigen::Index at =
+        add_source(robot.truth, test::demand(make_error_source(spec, *robot.truth.cell)));
+    for (std::size_t k = 0; k < values.size(); ++k)
+      robot.truth.values(at + static_cast<Eigen::Index>(k)) = values[k];
     return robot;
   }
   static VirtualRobot robot_as_it_was() { return test::chapter_5_robot(test::cell_7()); }
@@ -41,8 +46,9 @@ class TriageTest : public testing::Test {
     return triage(*model_, test::demand(check_against_cell(batch, model_->cell())));
   }
   static bool could_be(const Triage& triage, const std::string& cause) {
-    return triage.cause.cause == cause || std::any_of(triage.could_also_be.begin(), triage.could_also_be.end(),
-                                                      [&](const Cause& other) { return other.cause == cause; });
+    return triage.cause.cause == cause ||
+           std::any_of(triage.could_also_be.begin(), triage.could_also_be.end(),
+                       [&](const Cause& other) { return other.cause == cause; });
   }
 
   static std::unique_ptr<CompensatedModel> model_;
@@ -61,7 +67,8 @@ TEST_F(TriageTest, ATrackerSetUpElsewhereIsHarmlessHoweverFar) {
   for (const double metres : {0.0005, 1.0}) {
     MeasurementBatch batch = batch_of(robot_as_it_was());
     // Trackers are levelled: gravity stays where it was.
-    const Pose X = Eigen::Translation3d(metres, -metres, 0.3 * metres) * Eigen::AngleAxisd(metres, Vector3::UnitZ());
+    const Pose X = Eigen::Translation3d(metres, -metres, 0.3 * metres) *
+                   Eigen::AngleAxisd(metres, Vector3::UnitZ());
     for (Measurement& m : batch.measurements) {
       m.p_W = X * m.p_W;
       m.R_WT = X.linear() * *m.R_WT;
@@ -71,7 +78,8 @@ TEST_F(TriageTest, ATrackerSetUpElsewhereIsHarmlessHoweverFar) {
     EXPECT_TRUE(moved.cause.pose_id.empty());
     EXPECT_TRUE(moved.learn);
     EXPECT_LT(moved.misfit_after, 1.3);
-    EXPECT_EQ(moved.sentence.find(" mm"), std::string::npos) << "two set-ups apart is no error: " << moved.sentence;
+    EXPECT_EQ(moved.sentence.find(" mm"), std::string::npos)
+        << "two set-ups apart is no error: " << moved.sentence;
   }
 }
 
@@ -101,7 +109,8 @@ TEST_F(TriageTest, AnotherPayloadIsToldAndKeptApart) {
 
 TEST_F(TriageTest, AJointThatLostItsZeroIsTold) {
   for (int joint = 2; joint <= 5; ++joint) {
-    const Triage slip = triaged(batch_of(robot_with(fmt::format("joint_slip:{}@1", joint), {1e-3})));
+    const Triage slip =
+        triaged(batch_of(robot_with(fmt::format("joint_slip:{}@1", joint), {1e-3})));
     EXPECT_EQ(slip.cause.cause, "joint_slip") << joint << ": " << slip.sentence;
     EXPECT_EQ(slip.cause.joint, joint - 1);
     EXPECT_TRUE(slip.cause.pose_id.empty());
@@ -127,7 +136,8 @@ TEST_F(TriageTest, OneBadPoseIsNamedAndTheBatchLearnedFrom) {
 
 TEST_F(TriageTest, ATrackerThatMovedInTheMiddleIsDatedAndTheBatchKeptApart) {
   MeasurementBatch batch = batch_of(robot_as_it_was());
-  for (std::size_t i = 57; i < batch.measurements.size(); ++i) batch.measurements[i].p_W += Vector3(3e-4, 2e-4, -4e-4);
+  for (std::size_t i = 57; i < batch.measurements.size(); ++i)
+    batch.measurements[i].p_W += Vector3(3e-4, 2e-4, -4e-4);
   const Triage moved = triaged(batch);
   EXPECT_EQ(moved.cause.cause, "tracker_moved") << moved.sentence;
   EXPECT_EQ(moved.cause.pose_id, batch.measurements[57].pose_id);
@@ -151,7 +161,8 @@ TEST_F(TriageTest, WhatNothingExplainsIsPoisoned) {
   MeasurementBatch batch = batch_of(robot_as_it_was());
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 1e-3);
-  for (Measurement& m : batch.measurements) m.p_W += Vector3(noise(random), noise(random), noise(random));
+  for (Measurement& m : batch.measurements)
+    m.p_W += Vector3(noise(random), noise(random), noise(random));
   const Triage poisoned = triaged(batch);
   EXPECT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
   EXPECT_FALSE(poisoned.learn);
@@ -177,11 +188,13 @@ void put_in_xyzw_order(Measurement& m) {
 TEST_F(TriageTest, OrientationsInXyzwOrderAreKeptApartWithTheQuestion) {
   for (const std::size_t every : {1u, 3u}) {
     MeasurementBatch batch = batch_of(robot_as_it_was());
-    for (std::size_t i = 0; i < batch.measurements.size(); i += every) put_in_xyzw_order(batch.measurements[i]);
+    for (std::size_t i = 0; i < batch.measurements.size(); i += every)
+      put_in_xyzw_order(batch.measurements[i]);
     const Triage poisoned = triaged(batch);
     EXPECT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
     EXPECT_FALSE(poisoned.learn);
-    EXPECT_NE(poisoned.sentence.find("read as xyzw they would fit to 0."), std::string::npos) << poisoned.sentence;
+    EXPECT_NE(poisoned.sentence.find("read as xyzw they would fit to 0."), std::string::npos)
+        << poisoned.sentence;
     EXPECT_NE(poisoned.sentence.find("xyzw order?"), std::string::npos) << poisoned.sentence;
   }
 }
@@ -206,7 +219,8 @@ TEST_F(TriageTest, OrientationsThatScatterFarMoreThanTheModelExpectsArePoison) {
     m.R_WT = rotation_exp({noise(random), noise(random), noise(random)}) * *m.R_WT;
   const Triage poisoned = triaged(batch);
   EXPECT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
-  EXPECT_NE(poisoned.sentence.find("deg rms off the model"), std::string::npos) << poisoned.sentence;
+  EXPECT_NE(poisoned.sentence.find("deg rms off the model"), std::string::npos)
+      << poisoned.sentence;
 }
 
 TEST_F(TriageTest, OneBadOrientationIsNamedAndTheBatchLearnedFrom) {

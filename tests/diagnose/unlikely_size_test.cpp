@@ -20,7 +20,8 @@ TEST(UnlikelySize, AnEncoderOffByMoreThanRobotsHaveItMayBeTheArmsOwnWeight) {
   const auto cell = test::cell_7();
   for (const double amplitude : {2e-4, 1.5e-3}) {
     VirtualRobot robot = test::chapter_5_robot(cell);
-    const Eigen::Index at = add_source(robot.truth, test::demand(make_error_source("encoder_eccentricity:3", *cell)));
+    const Eigen::Index at =
+        add_source(robot.truth, test::demand(make_error_source("encoder_eccentricity:3", *cell)));
     robot.truth.values(at + 1) = amplitude;
     DiagnoseOptions options;
     options.draws = 200;
@@ -31,10 +32,12 @@ TEST(UnlikelySize, AnEncoderOffByMoreThanRobotsHaveItMayBeTheArmsOwnWeight) {
     const Finding& finding = found.findings[0];
     EXPECT_EQ(finding.cause, (Cause{.cause = "encoder_eccentricity", .joint = 2}));
     const bool large = amplitude > 1e-3;
-    EXPECT_FALSE(holds(finding.could_also_be, {"self_weight"})) << "these poses tell: " << found.sentence;
+    EXPECT_FALSE(holds(finding.could_also_be, {"self_weight"}))
+        << "these poses tell: " << found.sentence;
     EXPECT_EQ(holds(finding.could_also_be, {"balancer"}), large) << found.sentence;
     EXPECT_EQ(found.sources_after.size() > found.sources_before.size(), !large);
-    EXPECT_EQ(finding.action.find("larger than robots have it") != std::string::npos, large) << finding.action;
+    EXPECT_EQ(finding.action.find("larger than robots have it") != std::string::npos, large)
+        << finding.action;
   }
 }
 
@@ -42,7 +45,8 @@ TEST(UnlikelySize, OfAPayloadItsCentreOfGravityTellsAndNotItsMass) {
   using cause_search::is_unlikely;
   EXPECT_FALSE(is_unlikely({"payload"}, Eigen::Vector4d(12, 1, -3, 2)));
   EXPECT_TRUE(is_unlikely({"payload"}, Eigen::Vector4d(0, 1, -11.4, 2)));
-  EXPECT_FALSE(is_unlikely({.cause = "payload_changed", .pose_id = "p7"}, Eigen::Vector4d(0, 0, 11, 0)));
+  EXPECT_FALSE(
+      is_unlikely({.cause = "payload_changed", .pose_id = "p7"}, Eigen::Vector4d(0, 0, 11, 0)));
   EXPECT_FALSE(is_unlikely({.cause = "backlash", .joint = 1}, Eigen::Vector2d(9, 0)));
 }
 

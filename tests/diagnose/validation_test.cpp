@@ -20,7 +20,8 @@ DiagnoseOptions quick() {
 }
 
 hidden::HiddenCase with_validation(std::uint64_t seed) {
-  return hidden::hide({.kind = "backlash", .seed = seed, .lambda = 200, .poses = 160, .validation_share = 0.3});
+  return hidden::hide(
+      {.kind = "backlash", .seed = seed, .lambda = 200, .poses = 160, .validation_share = 0.3});
 }
 
 std::vector<std::string> held_out_suspects(const Diagnosis& diagnosis) {
@@ -47,10 +48,13 @@ TEST(Validation, ListsAHeldOutPoseThatFitsNeitherModelAndDropsItFromNoFigure) {
 TEST(Validation, SuspectsAGoodPoseInOneOfAHundredBatches) {
   const auto cell = test::cell_7();
   const auto batch = [&](int poses, std::uint64_t seed) {
-    return test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), poses, seed), *cell)).rows();
+    return test::demand(
+               check_against_cell(test::measured(test::chapter_5_robot(cell), poses, seed), *cell))
+        .rows();
   };
   const MeasurementBatch seen = batch(80, 3);
-  const CalibrationResult calibration = test::demand(calibrate(cell, cell->model.error_sources, seen, {}));
+  const CalibrationResult calibration =
+      test::demand(calibrate(cell, cell->model.error_sources, seen, {}));
   std::vector<Parameter> priors;
   for (const IdentifiedParameter& one : calibration.parameters) priors.push_back(one.parameter);
   const LinearProblem problem(calibration.model, seen, priors, {});

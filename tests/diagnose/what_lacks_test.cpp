@@ -32,7 +32,8 @@ TEST(ToolThatSags, GoesWithItsAttitudeAndIsNoRunOutOfAWristAxis) {
       m.p_W += R_WT * (sag * Vector3(1, 1, 0.2).cwiseProduct(-R_WT.transpose() * Vector3::UnitZ()));
     }
     const Diagnosis found = diagnosed(batch);
-    EXPECT_TRUE(std::none_of(found.findings.begin(), found.findings.end(), is_sure)) << found.sentence;
+    EXPECT_TRUE(std::none_of(found.findings.begin(), found.findings.end(), is_sure))
+        << found.sentence;
     EXPECT_TRUE(found.unexplained.present) << found.sentence;
     EXPECT_NE(found.sentence.find("how it stands to gravity"), std::string::npos) << found.sentence;
   }
@@ -48,7 +49,8 @@ TEST(CausesThatGrow, AnEncoderWhoseErrorComesWithTheDayIsNotSure) {
       const double share = static_cast<double>(i) / static_cast<double>(batch.measurements.size());
       ArmState arm = robot.truth.state(m.context);
       const Pose still = ArmKinematics(arm).tool_pose_W();
-      arm.add_to_joint(2, 3e-4 * (at_first + (1 - at_first) * 2 * share) * std::cos(m.context.q(2)));
+      arm.add_to_joint(2,
+                       3e-4 * (at_first + (1 - at_first) * 2 * share) * std::cos(m.context.q(2)));
       const Pose moved = ArmKinematics(arm).tool_pose_W() * still.inverse();
       m.p_W = moved * m.p_W;
       m.R_WT = moved.linear() * *m.R_WT;
@@ -56,21 +58,26 @@ TEST(CausesThatGrow, AnEncoderWhoseErrorComesWithTheDayIsNotSure) {
     return diagnosed(batch);
   };
   const Diagnosis grows = found_with(0);
-  EXPECT_TRUE(std::none_of(grows.findings.begin(), grows.findings.end(), is_sure)) << grows.sentence;
+  EXPECT_TRUE(std::none_of(grows.findings.begin(), grows.findings.end(), is_sure))
+      << grows.sentence;
   const Diagnosis stays = found_with(1);
   EXPECT_FALSE(stays.findings.empty()) << stays.sentence;
   EXPECT_EQ(stays.sentence.find("its size changed"), std::string::npos) << stays.sentence;
 }
 
-/// The virtual robot with something that no cause of the list makes, and that grows fast with the arm's reach.
+/// The virtual robot with something that no cause of the list makes, and that grows fast with the
+/// arm's reach.
 MeasurementBatch stretched(std::uint64_t seed) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   MeasurementBatch batch = test::measured(robot, 90, seed);
   double farthest = 0;
-  const auto reach = [&](const Measurement& m) { return robot.truth.pose_W(m.context).translation().norm(); };
+  const auto reach = [&](const Measurement& m) {
+    return robot.truth.pose_W(m.context).translation().norm();
+  };
   for (const Measurement& m : batch.measurements) farthest = std::max(farthest, reach(m));
   for (Measurement& m : batch.measurements)
-    m.p_W += 1.5e-3 * std::pow(reach(m) / farthest, 24) * std::sin(9 * m.context.q(0)) * Vector3::UnitZ();
+    m.p_W += 1.5e-3 * std::pow(reach(m) / farthest, 24) * std::sin(9 * m.context.q(0)) *
+             Vector3::UnitZ();
   return batch;
 }
 

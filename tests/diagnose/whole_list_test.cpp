@@ -24,7 +24,8 @@ std::shared_ptr<const Cell> cell_on_rail() {
   const std::string text = fmt::format(
       "version: 1\ncell: on-rail\nrobot: {}/models/abb_irb6640-205-275-on-rail.yaml\n"
       "base: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
-      "tools: {{probe: {{xyz_mm: [60, 0, 140], q_wxyz: [1, 0, 0, 0]}}}}\ntracker: {{sigma_mm: 0.03}}\n"
+      "tools: {{probe: {{xyz_mm: [60, 0, 140], q_wxyz: [1, 0, 0, 0]}}}}\ntracker: {{sigma_mm: "
+      "0.03}}\n"
       "model: {{error_sources: [base], bias: none}}\n",
       TRAMMEL_SOURCE_DIR);
   return std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
@@ -42,7 +43,8 @@ Diagnosis diagnosed(double sideways, double upwards, std::uint64_t seed) {
   SimulateOptions options;
   options.seed = seed;
   options.orientation = false;
-  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, seed})), options));
+  const MeasurementBatch batch =
+      test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, seed})), options));
   DiagnoseOptions quick;
   quick.draws = 200;
   quick.next_poses = 0;
@@ -70,7 +72,8 @@ Diagnosis about_one_point(double zero) {
       "tools: {{tip: {{xyz_mm: [40, 10, 160], q_wxyz: [1, 0, 0, 0]}}}}\n"
       "tracker: {{sigma_mm: 0.02}}\nmodel: {{error_sources: [base], bias: none}}\n",
       TRAMMEL_SOURCE_DIR);
-  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
   VirtualRobot robot{test::demand(make_physical_model(cell, {"joint_slip:5@1"})), 20e-6, 0, {}};
   const Vector3 p_FT = robot.truth.tools.at("tip").translation();
   robot.truth.values(0) = zero;
@@ -81,7 +84,8 @@ Diagnosis about_one_point(double zero) {
   const Pose X_BF = cell->robot.flange_pose(seed);
   const Vector3 tip = X_BF * p_FT;
   while (poses.size() < 30) {
-    const Matrix3 R = rotation_exp(Vector3(turn(random), turn(random), 2 * turn(random))) * X_BF.linear();
+    const Matrix3 R =
+        rotation_exp(Vector3(turn(random), turn(random), 2 * turn(random))) * X_BF.linear();
     const InverseResult found = inverse_kinematics(cell->robot, make_pose(R, tip - R * p_FT), seed);
     if (found.status != InverseStatus::kOk) continue;
     poses.emplace_back();
@@ -104,7 +108,8 @@ TEST(WholeList, AboutOnePointBaseToolAndZerosAreNotToldApartAndOtherPosesAreGive
   const Finding& one = told.findings.front();
   EXPECT_EQ(one.cause.cause, "geometry");
   for (const char* rival : {"base", "tool"})
-    EXPECT_NE(std::find(one.could_also_be.begin(), one.could_also_be.end(), Cause{rival}), one.could_also_be.end())
+    EXPECT_NE(std::find(one.could_also_be.begin(), one.could_also_be.end(), Cause{rival}),
+              one.could_also_be.end())
         << rival;
   EXPECT_NE(one.action.find("other places"), std::string::npos) << one.action;
   EXPECT_FALSE(told.next_poses.q.empty()) << told.next_poses.none_because;
@@ -114,14 +119,16 @@ TEST(WholeList, AboutOnePointBaseToolAndZerosAreNotToldApartAndOtherPosesAreGive
 }
 
 TEST(WholeList, AboutOnePointAToolThatIsOffIsTheToolWhereNobodySaidWhereTheRobotStands) {
-  const auto cell = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: [], bias: none}");
+  const auto cell =
+      test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: [], bias: none}");
   const Pose X_WB = Eigen::Translation3d(0.4, -0.2, 0.1) * Eigen::AngleAxisd(0.7, Vector3::UnitZ());
   const MeasurementBatch batch = test::one_point(*cell, Vector3(4e-3, -3e-3, 6e-3), X_WB, 30, 3);
   DiagnoseOptions quick;
   quick.draws = 200;
   quick.recovery = false;
   quick.next_poses = 0;
-  const Diagnosis told = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+  const Diagnosis told =
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
   ASSERT_EQ(told.findings.size(), 1U) << told.sentence;
   EXPECT_EQ(told.findings.front().cause, Cause{"tool"}) << told.sentence;
   EXPECT_TRUE(told.findings.front().could_also_be.empty()) << told.sentence;
@@ -130,25 +137,30 @@ TEST(WholeList, AboutOnePointAToolThatIsOffIsTheToolWhereNobodySaidWhereTheRobot
 TEST(WholeList, AWristCouplingTooLargeForADerivativeIsFound) {
   const test::TemporaryFolder folder;
   const std::string text = fmt::format(
-      "version: 1\ncell: wrist\nrobot: {}/models/yaskawa_gp25.yaml\nbase: null\ntools: {{t1: null}}\n"
+      "version: 1\ncell: wrist\nrobot: {}/models/yaskawa_gp25.yaml\nbase: null\ntools: {{t1: "
+      "null}}\n"
       "tracker: {{sigma_mm: 0.03}}\nmodel: {{error_sources: [base, tool, geometry], bias: none}}\n",
       TRAMMEL_SOURCE_DIR);
-  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
   VirtualRobot robot{test::demand(make_physical_model(cell, {"wrist_coupling"})), 30e-6, 0, {}};
   robot.truth.tools.at("t1").translation() = Vector3(0.12, 0.03, 0.2);
   robot.truth.values(2) = -1.0 / 50;  // joint 6 follows joint 5
   SimulateOptions options;
   options.orientation = false;
-  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, 3})), options));
+  const MeasurementBatch batch =
+      test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, 3})), options));
   DiagnoseOptions quick;
   quick.draws = 200;
   quick.next_poses = 0;
   quick.recovery = false;
-  const Diagnosis found = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+  const Diagnosis found =
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
   ASSERT_FALSE(found.findings.empty()) << found.sentence;
   const Finding& one = found.findings.front();
   const auto is_coupling = [](const Cause& cause) { return cause.cause == "wrist_coupling"; };
-  EXPECT_TRUE(is_coupling(one.cause) || std::any_of(one.could_also_be.begin(), one.could_also_be.end(), is_coupling))
+  EXPECT_TRUE(is_coupling(one.cause) ||
+              std::any_of(one.could_also_be.begin(), one.could_also_be.end(), is_coupling))
       << found.sentence;
 }
 

@@ -40,12 +40,12 @@ MeasurementBatch with_temperatures(bool have) {
 }
 
 TEST(Wording, SaysOneDoubtOnceFromWhicheverSideItIsSeen) {
-  EXPECT_EQ(sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
-            "Found, but these poses leave open what it is: tracker drift or thermal growth (20 um rms).");
   EXPECT_EQ(
-      sentence_for(with({found(kDrift, {unknown_cause()}), found(kWarm, {unknown_cause()})})),
-      "Found, but these poses leave open what it is: perhaps tracker drift (20 um rms); and perhaps thermal growth "
-      "(20 um rms).");
+      sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
+      "Found, but these poses leave open what it is: tracker drift or thermal growth (20 um rms).");
+  EXPECT_EQ(sentence_for(with({found(kDrift, {unknown_cause()}), found(kWarm, {unknown_cause()})})),
+            "Found, but these poses leave open what it is: perhaps tracker drift (20 um rms); and "
+            "perhaps thermal growth (20 um rms).");
 }
 
 TEST(Wording, SaysWhatIsMissingThenTheGainThenWhatToDo) {
@@ -53,23 +53,25 @@ TEST(Wording, SaysWhatIsMissingThenTheGainThenWhatToDo) {
   gear.action = "have it looked at";
   Diagnosis named = with({gear, found(kBacklash)});
   named.before.rms = 50e-6;
-  EXPECT_EQ(
-      sentence_for(named),
-      "Missing from the simulation: gear ripple in joint 3, 53.20 cycles a turn (20 um rms); and backlash in joint 2 "
-      "(20 um rms). With that corrected, the error falls from 50 to 12 um rms. What to do about gear ripple in "
-      "joint 3: have it looked at.");
+  EXPECT_EQ(sentence_for(named),
+            "Missing from the simulation: gear ripple in joint 3, 53.20 cycles a turn (20 um rms); "
+            "and backlash in joint 2 (20 um rms). With that corrected, the error falls from 50 to "
+            "12 um rms. What to do about gear ripple in joint 3: have it looked at.");
 }
 
 TEST(Wording, SaysWithWhatTheRestChanges) {
   EXPECT_EQ(circumstances_in_words({"q2"}), "the position of joint 2");
-  EXPECT_EQ(circumstances_in_words({"q2", "q3", "time"}), "the positions of joints 2 and 3, and time");
-  EXPECT_EQ(circumstances_in_words({"q5", "dir5"}), "the position of joint 5 and the side of approach of joint 5");
+  EXPECT_EQ(circumstances_in_words({"q2", "q3", "time"}),
+            "the positions of joints 2 and 3, and time");
+  EXPECT_EQ(circumstances_in_words({"q5", "dir5"}),
+            "the position of joint 5 and the side of approach of joint 5");
   EXPECT_EQ(circumstances_in_words({"dir1", "dir5"}), "the sides of approach of joints 1 and 5");
   EXPECT_EQ(circumstances_in_words({"torque", "temperature"}), "the torque and the temperature");
   Diagnosis unknown = with({});
   unknown.unexplained = {true, {"q2", "q3"}, 36e-6, 1e-6};
   EXPECT_EQ(sentence_for(unknown),
-            "The error changes with the positions of joints 2 and 3 (36 um rms), as it would by no known cause.");
+            "The error changes with the positions of joints 2 and 3 (36 um rms), as it would by no "
+            "known cause.");
 }
 
 TEST(Wording, AsksForNoColumnThatTheBatchHas) {
@@ -84,17 +86,19 @@ TEST(Wording, LeavesManyDoubtfulFindingsToTheTable) {
   std::vector<Finding> many;
   for (int joint = 0; joint < 6; ++joint) many.push_back(found({"backlash", joint}, {kWarm}));
   const std::string sentence = sentence_for(with(many));
-  EXPECT_NE(sentence.find("; and 3 smaller ones, which the findings list."), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("; and 3 smaller ones, which the findings list."), std::string::npos)
+      << sentence;
 }
 
 TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
   EXPECT_EQ(sentence_for(with({found(kPose6)})),
-            "Pose 6 (0.02 mm) fits none of the others, and a single pose does not tell why: measure it and its "
-            "neighbours again. Nothing else was found in 80 poses: 12 um rms are left, which looks like noise.");
-  EXPECT_EQ(
-      sentence_for(with({found(kPose6), found(kPose9), found(kBacklash)})),
-      "Missing from the simulation: backlash in joint 2 (20 um rms). Pose 6 (0.02 mm) and pose 9 (0.02 mm) fit none "
-      "of the others, and single poses do not tell why: measure them and their neighbours again.");
+            "Pose 6 (0.02 mm) fits none of the others, and a single pose does not tell why: "
+            "measure it and its neighbours again. Nothing else was found in 80 poses: 12 um rms "
+            "are left, which looks like noise.");
+  EXPECT_EQ(sentence_for(with({found(kPose6), found(kPose9), found(kBacklash)})),
+            "Missing from the simulation: backlash in joint 2 (20 um rms). Pose 6 (0.02 mm) and "
+            "pose 9 (0.02 mm) fit none of the others, and single poses do not tell why: measure "
+            "them and their neighbours again.");
 }
 
 TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
@@ -103,7 +107,8 @@ TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
   Diagnosis real = with({});
   real.unexplained = {true, {}, 1.2e-4, 1e-12, "more than noise is left: 4 times"};
   EXPECT_EQ(sentence_for(real),
-            "More than noise is left: 4 times. No single joint, torque or time was found with which it changes.");
+            "More than noise is left: 4 times. No single joint, torque or time was found with "
+            "which it changes.");
 }
 
 TEST(Wording, SaysThatPositionsWereComputedWhereTheyAreBetterThanTheInstrument) {
@@ -119,9 +124,12 @@ TEST(Wording, SaysThatPositionsWereComputedWhereTheyAreBetterThanTheInstrument) 
 TEST(Wording, KnowsWhatWasLookedForByTheOrderOfThePoses) {
   const Unseen growth = {kWarm, 0, {}, {}, "temperatures"};
   EXPECT_TRUE(is_looked_for_by_order(growth, with_temperatures(false)));
-  EXPECT_FALSE(is_looked_for_by_order(growth, with_temperatures(true))) << "recorded, but constant: not looked for";
-  EXPECT_FALSE(is_looked_for_by_order({{"payload"}, 0, {}, {}, "a payload"}, with_temperatures(false)));
-  EXPECT_FALSE(is_looked_for_by_order({kWarm, 0.5, 1e-5, {}, ""}, with_temperatures(false))) << "it could be seen";
+  EXPECT_FALSE(is_looked_for_by_order(growth, with_temperatures(true)))
+      << "recorded, but constant: not looked for";
+  EXPECT_FALSE(
+      is_looked_for_by_order({{"payload"}, 0, {}, {}, "a payload"}, with_temperatures(false)));
+  EXPECT_FALSE(is_looked_for_by_order({kWarm, 0.5, 1e-5, {}, ""}, with_temperatures(false)))
+      << "it could be seen";
 }
 
 }  // namespace

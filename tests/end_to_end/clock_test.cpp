@@ -28,7 +28,8 @@ class ClockTest : public testing::Test {
     start();
   }
   void start() {
-    std::vector<std::string> argv = {"/usr/bin/env", "LD_PRELOAD=" TRAMMEL_MOVED_CLOCK, "TRAMMEL_TEST_CLOCK=" + file_};
+    std::vector<std::string> argv = {"/usr/bin/env", "LD_PRELOAD=" TRAMMEL_MOVED_CLOCK,
+                                     "TRAMMEL_TEST_CLOCK=" + file_};
     const std::vector<std::string> daemon = daemon_.command_line();
     argv.insert(argv.end(), daemon.begin(), daemon.end());
     process_ = std::make_unique<test::Process>(argv);
@@ -48,7 +49,8 @@ class ClockTest : public testing::Test {
     const auto servers = demand(session.servers_when(
         [&](const std::vector<client::ServerStatus>& all) {
           return all.size() == 1 &&
-                 (wanted.empty() ? all[0].trouble.empty() : all[0].trouble.find(wanted) != std::string::npos);
+                 (wanted.empty() ? all[0].trouble.empty()
+                                 : all[0].trouble.find(wanted) != std::string::npos);
         },
         kLimit));
     return servers.at(0).trouble;
@@ -89,7 +91,8 @@ TEST_F(ClockTest, AServiceThatStartsBehindItsLastChangeSaysSo) {
   ASSERT_EQ(process_->wait(kLimit), 0);
   set_clock(-kHour);
   start();
-  EXPECT_NE(trouble(*client(), "behind").find("s behind the last change in the store"), std::string::npos);
+  EXPECT_NE(trouble(*client(), "behind").find("s behind the last change in the store"),
+            std::string::npos);
 }
 
 }  // namespace

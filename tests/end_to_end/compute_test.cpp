@@ -1,4 +1,5 @@
-// The process that computes for a daemon: what happens to it, and what happens to the daemon meanwhile.
+// The process that computes for a daemon: what happens to it, and what happens to the daemon
+// meanwhile.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -22,7 +23,8 @@ class ComputeTest : public testing::Test {
   void SetUp() override {
     daemon_.start();
     session_ = std::move(client::Session::open(daemon_.session_options()).value());
-    const auto first = session_->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
+    const auto first =
+        session_->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
     ASSERT_TRUE(session_->wait_for_job(first.value(), kLimit, nullptr)->in_force);
     context_.cell = "cell-7";
     // A job is told to be over a moment before its process is.
@@ -49,7 +51,8 @@ class ComputeTest : public testing::Test {
 };
 
 TEST_F(ComputeTest, ADaemonWhoseComputingIsKilledAnswersAndFinishesTheJob) {
-  const auto job = session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2));
+  const auto job =
+      session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2));
   ASSERT_TRUE(job);
   const std::optional<pid_t> computing = computing_now();
   ASSERT_TRUE(computing);
@@ -64,7 +67,8 @@ TEST_F(ComputeTest, ADaemonWhoseComputingIsKilledAnswersAndFinishesTheJob) {
 }
 
 TEST_F(ComputeTest, ADaemonThatIsKilledTakesItsComputingWithIt) {
-  ASSERT_TRUE(session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2)));
+  ASSERT_TRUE(
+      session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2)));
   const std::optional<pid_t> computing = computing_now();
   ASSERT_TRUE(computing);
   const test::Watched watched(*computing);
@@ -73,7 +77,8 @@ TEST_F(ComputeTest, ADaemonThatIsKilledTakesItsComputingWithIt) {
 }
 
 TEST_F(ComputeTest, ADaemonWhoseComputingHangsStopsWhenItIsTold) {
-  ASSERT_TRUE(session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2)));
+  ASSERT_TRUE(
+      session_->submit_measurements("cell-7", "large", test::virtual_batch_csv(kLargeBatch, 2)));
   const std::optional<pid_t> computing = computing_now();
   ASSERT_TRUE(computing);
   const test::Watched watched(*computing);

@@ -36,12 +36,15 @@ class CrashTest : public testing::Test {
     EXPECT_TRUE(job) << job.error().message;
     return job.value_or(0);
   }
-  JobStatus wait_for(std::int64_t job, const std::function<void(const JobStatus&)>& listener = nullptr) {
+  JobStatus wait_for(std::int64_t job,
+                     const std::function<void(const JobStatus&)>& listener = nullptr) {
     const auto over = session_->wait_for_job(job, kLimit, listener);
     EXPECT_TRUE(over) << over.error().message;
     return over.value_or(JobStatus{});
   }
-  JobStatus train(const std::string& id, const std::string& csv) { return wait_for(submit(id, csv)); }
+  JobStatus train(const std::string& id, const std::string& csv) {
+    return wait_for(submit(id, csv));
+  }
   client::ModelInfo model() {
     const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
     EXPECT_TRUE(answer) << answer.error().message;
@@ -52,7 +55,9 @@ class CrashTest : public testing::Test {
     daemon_.start();
   }
   /// Of the store of a service that is not running.
-  StoredJob stored(std::int64_t job) { return Store::open(daemon_.store_path()).value()->job(job).value(); }
+  StoredJob stored(std::int64_t job) {
+    return Store::open(daemon_.store_path()).value()->job(job).value();
+  }
   /// The first model, or the second once it was put in force: nothing else ever answers.
   void expect_a_whole_model() {
     const client::ModelInfo now = model();
@@ -93,7 +98,9 @@ struct Moment {
 
   [[nodiscard]] bool reached(const JobStatus& job) const {
     static const std::vector<std::string> order = {"queued", "training", "storing", "done"};
-    const auto rank = [](const std::string& s) { return std::find(order.begin(), order.end(), s) - order.begin(); };
+    const auto rank = [](const std::string& s) {
+      return std::find(order.begin(), order.end(), s) - order.begin();
+    };
     return rank(job.stage) > rank(stage) || (job.stage == stage && job.share >= share);
   }
 };
@@ -108,7 +115,8 @@ TEST_P(CrashMomentTest, NoAcceptedBatchIsLostAndAWholeModelIsServed) {
     crashed = true;
     daemon_.kill();
     if (GetParam().surely_unfinished) {
-      EXPECT_EQ(stored(job).state, JobState::kRunning) << "the crash came too late to show anything";
+      EXPECT_EQ(stored(job).state, JobState::kRunning)
+          << "the crash came too late to show anything";
     }
     daemon_.start();
     expect_a_whole_model();
@@ -125,7 +133,8 @@ INSTANTIATE_TEST_SUITE_P(Moments, CrashMomentTest,
                                          Moment{"BiasBegins", "training", 0.3, true},
                                          Moment{"BiasHalfDone", "training", 0.55, true},
                                          Moment{"BiasNearlyDone", "training", 0.8, false},
-                                         Moment{"Storing", "storing", 0, false}, Moment{"Done", "done", 0, false}),
+                                         Moment{"Storing", "storing", 0, false},
+                                         Moment{"Done", "done", 0, false}),
                          [](const auto& moment) { return moment.param.name; });
 
 TEST_F(CrashTest, ABatchIsSafeAsSoonAsItIsAcknowledged) {

@@ -1,7 +1,7 @@
-/* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction,
- * has the nominal pose of these joints corrected, and prints all three. POSES: asks for the prediction as often, in one
- * request. Usage: cyclone_client DOMAIN CELL [LIMIT_S [POSES]].
- * The network is set by CYCLONEDDS_URI. */
+/* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it
+ * for one prediction, has the nominal pose of these joints corrected, and prints all three. POSES:
+ * asks for the prediction as often, in one request. Usage: cyclone_client DOMAIN CELL [LIMIT_S
+ * [POSES]]. The network is set by CYCLONEDDS_URI. */
 #include <dds/dds.h>
 #include <math.h>
 #include <stdio.h>
@@ -61,12 +61,14 @@ static void* take_one(dds_entity_t participant, dds_entity_t reader) {
 /* Until both endpoints are matched with the server. */
 static int wait_for_server(dds_entity_t participant, dds_entity_t writer, dds_entity_t reader) {
   dds_publication_matched_status_t there;
-  if (dds_get_publication_matched_status(writer, &there) != DDS_RETCODE_OK) return fail("no match status");
+  if (dds_get_publication_matched_status(writer, &there) != DDS_RETCODE_OK)
+    return fail("no match status");
   if (there.current_count == 0 && !wait_for(participant, writer, DDS_PUBLICATION_MATCHED_STATUS)) {
     return fail("no server reads requests");
   }
   dds_subscription_matched_status_t back;
-  if (dds_get_subscription_matched_status(reader, &back) != DDS_RETCODE_OK) return fail("no match status");
+  if (dds_get_subscription_matched_status(reader, &back) != DDS_RETCODE_OK)
+    return fail("no match status");
   if (back.current_count == 0 && !wait_for(participant, reader, DDS_SUBSCRIPTION_MATCHED_STATUS)) {
     return fail("no server writes replies");
   }
@@ -74,8 +76,8 @@ static int wait_for_server(dds_entity_t participant, dds_entity_t writer, dds_en
 }
 
 /* The header and the context of a request by `writer`. */
-static void begin(trammel_wire_v2_RequestHeader* header, trammel_wire_v2_Context* about, const dds_guid_t* writer,
-                  const char* server, char* cell) {
+static void begin(trammel_wire_v2_RequestHeader* header, trammel_wire_v2_Context* about,
+                  const dds_guid_t* writer, const char* server, char* cell) {
   static char empty[1] = "";
   memcpy(header->request_id.writer_guid, writer->v, sizeof header->request_id.writer_guid);
   header->request_id.sequence_number = SEQUENCE_NUMBER;
@@ -91,16 +93,19 @@ static void begin(trammel_wire_v2_RequestHeader* header, trammel_wire_v2_Context
 }
 
 /* What must be commanded so that the tool lands on `wanted`, on the branch of the joints. */
-static int correct(dds_entity_t participant, dds_entity_t subscriber, const char* server, char* cell,
-                   const trammel_wire_v2_PoseMm* wanted, const trammel_wire_v2_CommandedJoints* near) {
+static int correct(dds_entity_t participant, dds_entity_t subscriber, const char* server,
+                   char* cell, const trammel_wire_v2_PoseMm* wanted,
+                   const trammel_wire_v2_CommandedJoints* near) {
   const dds_entity_t request_topic =
-      dds_create_topic(participant, &trammel_wire_v2_CorrectTargetRequest_desc, "CorrectTarget_2_Request", NULL, NULL);
-  const dds_entity_t reply_topic =
-      dds_create_topic(participant, &trammel_wire_v2_CorrectTargetReply_desc, "CorrectTarget_2_Reply", NULL, NULL);
+      dds_create_topic(participant, &trammel_wire_v2_CorrectTargetRequest_desc,
+                       "CorrectTarget_2_Request", NULL, NULL);
+  const dds_entity_t reply_topic = dds_create_topic(
+      participant, &trammel_wire_v2_CorrectTargetReply_desc, "CorrectTarget_2_Reply", NULL, NULL);
   const dds_entity_t reader = dds_create_reader(subscriber, reply_topic, call_qos(), NULL);
   const dds_entity_t writer = dds_create_writer(participant, request_topic, call_qos(), NULL);
   dds_guid_t guid;
-  if (reader < 0 || writer < 0 || dds_get_guid(writer, &guid) != DDS_RETCODE_OK) return fail("no endpoints");
+  if (reader < 0 || writer < 0 || dds_get_guid(writer, &guid) != DDS_RETCODE_OK)
+    return fail("no endpoints");
   if (wait_for_server(participant, writer, reader) != 0) return 1;
 
   trammel_wire_v2_Target target;
@@ -120,7 +125,8 @@ static int correct(dds_entity_t participant, dds_entity_t subscriber, const char
   if (reply->corrections._length != 1) return fail("no correction");
   const trammel_wire_v2_CorrectedTarget* corrected = &reply->corrections._buffer[0];
   printf("status=%d x_mm=%+.3f before_mm=%.3f after_mm=%.3f\n", (int)corrected->status,
-         corrected->commanded.x_mm - wanted->x_mm, corrected->error_before_mm, corrected->error_after_mm);
+         corrected->commanded.x_mm - wanted->x_mm, corrected->error_before_mm,
+         corrected->error_after_mm);
   return 0;
 }
 
@@ -128,32 +134,39 @@ int main(int argc, char** argv) {
   if (argc < 3 || argc > 5) return fail("usage: cyclone_client DOMAIN CELL [LIMIT_S [POSES]]");
   if (argc > 3) limit = DDS_SECS(atoi(argv[3]));
   const uint32_t poses = argc > 4 ? (uint32_t)atoi(argv[4]) : 1;
-  /* Without it Cyclone DDS would speak on every interface; with it, on the loopback profile that it holds. */
-  if (getenv("CYCLONEDDS_URI") == NULL) return fail("CYCLONEDDS_URI must hold the loopback profile");
-  const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
+  /* Without it Cyclone DDS would speak on every interface; with it, on the loopback profile that it
+   * holds. */
+  if (getenv("CYCLONEDDS_URI") == NULL)
+    return fail("CYCLONEDDS_URI must hold the loopback profile");
+  const dds_entity_t participant =
+      dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
   if (participant < 0) return fail("no participant");
 
-  const dds_entity_t status_topic =
-      dds_create_topic(participant, &trammel_wire_v2_ServiceStatus_desc, "ServiceStatus_2", NULL, NULL);
+  const dds_entity_t status_topic = dds_create_topic(
+      participant, &trammel_wire_v2_ServiceStatus_desc, "ServiceStatus_2", NULL, NULL);
   const dds_entity_t model_topic =
       dds_create_topic(participant, &trammel_wire_v2_ModelStatus_desc, "ModelStatus_2", NULL, NULL);
-  const dds_entity_t request_topic =
-      dds_create_topic(participant, &trammel_wire_v2_PredictErrorRequest_desc, "PredictError_2_Request", NULL, NULL);
-  const dds_entity_t reply_topic =
-      dds_create_topic(participant, &trammel_wire_v2_PredictErrorReply_desc, "PredictError_2_Reply", NULL, NULL);
-  const dds_entity_t status_reader = dds_create_reader(participant, status_topic, state_qos(), NULL);
+  const dds_entity_t request_topic = dds_create_topic(
+      participant, &trammel_wire_v2_PredictErrorRequest_desc, "PredictError_2_Request", NULL, NULL);
+  const dds_entity_t reply_topic = dds_create_topic(
+      participant, &trammel_wire_v2_PredictErrorReply_desc, "PredictError_2_Reply", NULL, NULL);
+  const dds_entity_t status_reader =
+      dds_create_reader(participant, status_topic, state_qos(), NULL);
   const dds_entity_t model_reader = dds_create_reader(participant, model_topic, state_qos(), NULL);
   const char* partitions[1] = {PARTITION};
   dds_qos_t* subscriber_qos = dds_create_qos();
   dds_qset_partition(subscriber_qos, 1, partitions);
   const dds_entity_t subscriber = dds_create_subscriber(participant, subscriber_qos, NULL);
   const dds_entity_t reply_reader = dds_create_reader(subscriber, reply_topic, call_qos(), NULL);
-  const dds_entity_t request_writer = dds_create_writer(participant, request_topic, call_qos(), NULL);
-  if (status_reader < 0 || model_reader < 0 || reply_reader < 0 || request_writer < 0) return fail("no endpoints");
+  const dds_entity_t request_writer =
+      dds_create_writer(participant, request_topic, call_qos(), NULL);
+  if (status_reader < 0 || model_reader < 0 || reply_reader < 0 || request_writer < 0)
+    return fail("no endpoints");
 
   const trammel_wire_v2_ServiceStatus* status = take_one(participant, status_reader);
   if (status == NULL) return fail("no ServiceStatus");
-  printf("server=%s contract=%u cells=%u\n", status->server, status->contract_version, status->cells._length);
+  printf("server=%s contract=%u cells=%u\n", status->server, status->contract_version,
+         status->cells._length);
   const trammel_wire_v2_ModelStatus* in_force = take_one(participant, model_reader);
   if (in_force == NULL) return fail("no ModelStatus");
   printf("cell=%s version=%d\n", in_force->cell, in_force->model.version);
@@ -174,18 +187,22 @@ int main(int argc, char** argv) {
   request.poses._maximum = request.poses._length = poses;
   request.poses._buffer = dds_alloc(poses * sizeof pose);
   for (uint32_t i = 0; i < poses; ++i) request.poses._buffer[i] = pose;
-  if (dds_write(request_writer, &request) != DDS_RETCODE_OK) return fail("cannot write the request");
+  if (dds_write(request_writer, &request) != DDS_RETCODE_OK)
+    return fail("cannot write the request");
 
   const trammel_wire_v2_PredictErrorReply* reply = take_one(participant, reply_reader);
   if (reply == NULL) return fail("no reply");
-  const int is_ours = memcmp(reply->header.related_request_id.writer_guid, guid.v, sizeof guid.v) == 0;
-  printf("result=%d id=%lld ours=%d trace=%s model=%s version=%d items=%u\n", (int)reply->header.result,
-         (long long)reply->header.related_request_id.sequence_number, is_ours, reply->header.trace_id,
-         reply->model.hash, reply->model.version, reply->predictions._length);
+  const int is_ours =
+      memcmp(reply->header.related_request_id.writer_guid, guid.v, sizeof guid.v) == 0;
+  printf("result=%d id=%lld ours=%d trace=%s model=%s version=%d items=%u\n",
+         (int)reply->header.result, (long long)reply->header.related_request_id.sequence_number,
+         is_ours, reply->header.trace_id, reply->model.hash, reply->model.version,
+         reply->predictions._length);
   if (reply->predictions._length != poses) return fail("not as many predictions as poses");
   const trammel_wire_v2_PredictedError* predicted = &reply->predictions._buffer[0];
   printf("dx_mm=%.6f\n", predicted->dx_mm);
-  const int failed = correct(participant, subscriber, status->server, argv[2], &predicted->nominal, &pose);
+  const int failed =
+      correct(participant, subscriber, status->server, argv[2], &predicted->nominal, &pose);
   dds_delete(participant);
   return failed;
 }

@@ -37,7 +37,8 @@ class DaemonTest : public testing::Test {
     EXPECT_TRUE(job) << job.error().message;
     return job.value_or(0);
   }
-  JobStatus wait_for(std::int64_t job, const std::function<void(const JobStatus&)>& listener = nullptr) {
+  JobStatus wait_for(std::int64_t job,
+                     const std::function<void(const JobStatus&)>& listener = nullptr) {
     const auto over = session_->wait_for_job(job, kLimit, listener);
     EXPECT_TRUE(over) << over.error().message;
     return over.value_or(JobStatus{});
@@ -76,8 +77,8 @@ TEST_F(DaemonTest, JobsBatchesAndVersionsAreListedShownAndFetched) {
   wait_for(submit("lt-07", 60));
   const auto asked = [this](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
-    for (const std::string& more : {std::string("--port"), std::to_string(daemon_.port()), std::string("--domain"),
-                                    std::to_string(daemon_.domain())})
+    for (const std::string& more : {std::string("--port"), std::to_string(daemon_.port()),
+                                    std::string("--domain"), std::to_string(daemon_.domain())})
       arguments.push_back(more);
     return test::run(arguments);
   };
@@ -90,7 +91,8 @@ TEST_F(DaemonTest, JobsBatchesAndVersionsAreListedShownAndFetched) {
   EXPECT_EQ(batches[0]["batch"], "lt-07");
   EXPECT_EQ(batches[0]["poses"], 60);
   EXPECT_FALSE(batches[0]["in_quarantine"].get<bool>());
-  EXPECT_EQ(asked({"batches", "--cell", "cell-7", "--batch", "lt-07", "-o", "-"}).out, test::virtual_batch_csv(60, 1));
+  EXPECT_EQ(asked({"batches", "--cell", "cell-7", "--batch", "lt-07", "-o", "-"}).out,
+            test::virtual_batch_csv(60, 1));
   EXPECT_EQ(asked({"batches", "--cell", "cell-7", "--batch", "lt-08", "-o", "-"}).exit_code, 3);
   const auto shown = asked({"show", "--model", "cell-7@1"});
   EXPECT_EQ(shown.exit_code, 0) << shown.err;
@@ -102,9 +104,10 @@ TEST_F(DaemonTest, TheHistoryOfACellIsAPageWithItsVersionsTrainingsAndEvents) {
   wait_for(submit("lt-07", 60));
   ASSERT_TRUE(session_->activate("cell-7", 1));
   test::TemporaryFolder folder;
-  const test::Finished told = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "history", "--cell", "cell-7", "--port",
-                                         std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain()),
-                                         "-o", folder.file("history.html"), "--json", "-"});
+  const test::Finished told =
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "history", "--cell", "cell-7", "--port",
+                 std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain()), "-o",
+                 folder.file("history.html"), "--json", "-"});
   ASSERT_EQ(told.exit_code, 0) << told.err;
   const auto json = nlohmann::json::parse(told.out);
   ASSERT_EQ(json["versions"].size(), 1u);
@@ -113,7 +116,8 @@ TEST_F(DaemonTest, TheHistoryOfACellIsAPageWithItsVersionsTrainingsAndEvents) {
   ASSERT_EQ(json["trainings"].size(), 1u);
   EXPECT_EQ(json["trainings"][0]["batches"], "lt-07");
   EXPECT_GT(json["events"].size(), 1u);
-  EXPECT_NE(test::read_file(folder.file("history.html")).find("Version 1 is in force"), std::string::npos);
+  EXPECT_NE(test::read_file(folder.file("history.html")).find("Version 1 is in force"),
+            std::string::npos);
 }
 
 TEST_F(DaemonTest, ServesTheSameModelAfterARestart) {
@@ -132,12 +136,13 @@ TEST_F(DaemonTest, WhatItKeepsIsForItsOwnUserOnly) {
   wait_for(submit("lt-07", 60));
   int files = 0;
   const std::string name = std::filesystem::path(daemon_.store_path()).filename();
-  for (const auto& entry :
-       std::filesystem::recursive_directory_iterator(std::filesystem::path(daemon_.store_path()).parent_path())) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+           std::filesystem::path(daemon_.store_path()).parent_path())) {
     if (!entry.is_regular_file() || entry.path().string().find(name) == std::string::npos) continue;
     ++files;
     const auto for_others = std::filesystem::perms::others_all | std::filesystem::perms::group_all;
-    EXPECT_EQ(entry.status().permissions() & for_others, std::filesystem::perms::none) << entry.path();
+    EXPECT_EQ(entry.status().permissions() & for_others, std::filesystem::perms::none)
+        << entry.path();
   }
   EXPECT_GE(files, 2) << "the store and the copy of its model";
 }
@@ -170,7 +175,8 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortOrOfTheSameNameIsRefused) {
   same_store[4] = std::to_string(daemon_.port() + 2);
   const auto second = test::run(same_store);
   EXPECT_EQ(second.exit_code, 3);
-  EXPECT_NE(second.err.find(std::to_string(daemon_.process().pid())), std::string::npos) << second.err;
+  EXPECT_NE(second.err.find(std::to_string(daemon_.process().pid())), std::string::npos)
+      << second.err;
 
   auto same_port = daemon_.command_line();
   same_port.insert(same_port.end(), {"--store", daemon_.store_path() + "2"});
@@ -190,11 +196,13 @@ TEST_F(DaemonTest, AnImportOfAnyBytesIsRefusedAndTheDaemonGoesOn) {
   wait_for(submit("lt-07", 60));
   const client::ModelInfo before = model();
   const std::string head = R"({"trammel_model":2,"content":)";
-  for (const std::string& text : {head + std::string(1'000'000, '['), std::string(30'000'000, '['), std::string("{}"),
-                                  head + "{\"a\":" + std::string(20'000'000, '7') + "}}"}) {
+  for (const std::string& text :
+       {head + std::string(1'000'000, '['), std::string(30'000'000, '['), std::string("{}"),
+        head + "{\"a\":" + std::string(20'000'000, '7') + "}}"}) {
     const auto imported = session_->import_model("cell-7", text);
     ASSERT_FALSE(imported);
-    EXPECT_EQ(imported.error().message.find("no server"), std::string::npos) << imported.error().message;
+    EXPECT_EQ(imported.error().message.find("no server"), std::string::npos)
+        << imported.error().message;
     EXPECT_EQ(imported.error().file, "imported model") << imported.error().message;
   }
   EXPECT_EQ(model().hash, before.hash);
@@ -229,22 +237,25 @@ TEST_F(DaemonTest, ARollbackThatIsRepeatedAfterACrashGoesBackOnce) {
   EXPECT_EQ(*repeated, *back);
   EXPECT_EQ(model().version, *back) << "it went back twice";
   once.id = "another-one";
-  EXPECT_EQ(session_->rollback("cell-7", once).error().code, ErrorCode::kConflict) << "another version is in force";
+  EXPECT_EQ(session_->rollback("cell-7", once).error().code, ErrorCode::kConflict)
+      << "another version is in force";
   once.id = "rollback-of-this-test";
-  EXPECT_EQ(session_->activate("cell-7", last, once).error().code, ErrorCode::kConflict) << "the id is of a rollback";
+  EXPECT_EQ(session_->activate("cell-7", last, once).error().code, ErrorCode::kConflict)
+      << "the id is of a rollback";
   EXPECT_EQ(model().version, *back);
 }
 
 TEST_F(DaemonTest, AClientOfAnotherDomainIsNotAnswered) {
   const std::string trammel = TRAMMEL_BINARY_DIR "/clients/trammel";
   const auto status = [&](std::uint32_t domain) {
-    return test::run({trammel, "status", "--service", "--port", std::to_string(daemon_.port()), "--domain",
-                      std::to_string(domain), "--timeout", "3"});
+    return test::run({trammel, "status", "--service", "--port", std::to_string(daemon_.port()),
+                      "--domain", std::to_string(domain), "--timeout", "3"});
   };
   EXPECT_EQ(status(daemon_.domain()).exit_code, 0);
   const auto other = status(daemon_.domain() + 65);
   EXPECT_EQ(other.exit_code, 4) << other.out << other.err;
-  EXPECT_NE(other.err.find(fmt::format("domain {}", daemon_.domain() + 65)), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find(fmt::format("domain {}", daemon_.domain() + 65)), std::string::npos)
+      << other.err;
   EXPECT_EQ(status(daemon_.domain()).exit_code, 0);
 }
 
@@ -304,7 +315,8 @@ TEST(DaemonCommandLine, RefusesTheSameMistakesWhenCheckedAndWhenStarted) {
   folder.write("cell.yaml", "version: 1\ncell: a\nrobot: " TRAMMEL_SOURCE_DIR
                             "/models/abb_irb6640-205-275.yaml\ntools: {t: null}\n"
                             "model: {error_sources: [base, complience], bias: rbf}\n");
-  const std::string file = folder.write("server.yaml", "version: 1\nserver: a\ncells: [cell.yaml]\nstore: t.db\n");
+  const std::string file =
+      folder.write("server.yaml", "version: 1\nserver: a\ncells: [cell.yaml]\nstore: t.db\n");
   for (const bool check : {true, false}) {
     std::vector<std::string> command = {test::trammeld_path(), "--config", file};
     if (check) command.emplace_back("--check");
@@ -317,8 +329,8 @@ TEST(DaemonCommandLine, RefusesTheSameMistakesWhenCheckedAndWhenStarted) {
 }
 
 TEST(DaemonCommandLine, ChecksWhatShipsWithoutServing) {
-  const auto checked =
-      test::run({test::trammeld_path(), "--config", TRAMMEL_SOURCE_DIR "/config/server.yaml", "--check"});
+  const auto checked = test::run(
+      {test::trammeld_path(), "--config", TRAMMEL_SOURCE_DIR "/config/server.yaml", "--check"});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
   EXPECT_FALSE(std::filesystem::exists(TRAMMEL_SOURCE_DIR "/config/trammel.db"));
 }

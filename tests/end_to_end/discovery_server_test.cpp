@@ -36,8 +36,10 @@ class DiscoveryServer {
  public:
   explicit DiscoveryServer(int number)
       : port_(static_cast<std::uint16_t>(test::own_ports() + 4 + number)),
-        process_({kProgram, "-i", std::to_string(number), "-x", folder_.write("discovery.xml", set_up(port_))}) {
-    EXPECT_TRUE(process_.wait_for_line("Server is running", kLimit) || process_.wait_for_line("Server GUID", kLimit))
+        process_({kProgram, "-i", std::to_string(number), "-x",
+                  folder_.write("discovery.xml", set_up(port_))}) {
+    EXPECT_TRUE(process_.wait_for_line("Server is running", kLimit) ||
+                process_.wait_for_line("Server GUID", kLimit))
         << process_.standard_output() << process_.standard_error();
   }
   void kill() {
@@ -84,11 +86,12 @@ class DiscoveryServerTest : public testing::Test {
     for (const HostPort& one : discovery_servers)
       list += fmt::format("{}'{}'", list.empty() ? "" : ", ", to_string(one));
     const std::string text = test::read_file(daemon.config_path());
-    ASSERT_TRUE(write_text_file(daemon.config_path(), text + fmt::format("dds: {{discovery_servers: [{}]}}\n", list)));
+    ASSERT_TRUE(write_text_file(daemon.config_path(),
+                                text + fmt::format("dds: {{discovery_servers: [{}]}}\n", list)));
   }
   /// Asks the discovery servers only.
-  static Result<std::unique_ptr<client::Session>> open(const test::Daemon& daemon,
-                                                       const std::vector<HostPort>& discovery_servers) {
+  static Result<std::unique_ptr<client::Session>> open(
+      const test::Daemon& daemon, const std::vector<HostPort>& discovery_servers) {
     client::SessionOptions options = daemon.session_options();
     options.server_ports = {};
     options.discovery_servers = discovery_servers;
@@ -110,8 +113,9 @@ TEST_F(DiscoveryServerTest, AClientFindsAServerWithoutBeingToldItsPort) {
   const auto session = open(first_, {discovery.place()});
   ASSERT_TRUE(session) << sentence(session.error());
   EXPECT_EQ(servers_of(**session, 1), 1u);
-  const test::Finished status = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--discovery-server",
-                                           to_string(discovery.place()), "--domain", std::to_string(first_.domain())});
+  const test::Finished status =
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--discovery-server",
+                 to_string(discovery.place()), "--domain", std::to_string(first_.domain())});
   EXPECT_EQ(status.exit_code, 0) << status.err;
   EXPECT_NE(status.out.find(first_.name()), std::string::npos) << status.out;
 }
@@ -148,7 +152,8 @@ TEST_F(DiscoveryServerTest, ASessionOutlivesItsDiscoveryServer) {
   ASSERT_TRUE(session) << sentence(session.error());
   ASSERT_EQ(servers_of(**session, 1), 1u);
   discovery.kill();
-  const auto lease_over = std::chrono::steady_clock::now() + seconds(5);  // longer than any lease here
+  const auto lease_over =
+      std::chrono::steady_clock::now() + seconds(5);  // longer than any lease here
   while (std::chrono::steady_clock::now() < lease_over) {
     const auto began = std::chrono::steady_clock::now();
     const auto models = (*session)->models("cell-7");

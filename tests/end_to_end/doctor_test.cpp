@@ -18,8 +18,8 @@ using test::Finished;
 class Doctor : public testing::Test {
  protected:
   [[nodiscard]] Finished examine(std::vector<std::string> words) const {
-    words.insert(words.begin(), {"/usr/bin/env", "-C", folder_.path(),
-                                 "TRAMMEL_DEFAULTS=", TRAMMEL_BINARY_DIR "/clients/trammel", "doctor", "--json", "-"});
+    words.insert(words.begin(), {"/usr/bin/env", "-C", folder_.path(), "TRAMMEL_DEFAULTS=",
+                                 TRAMMEL_BINARY_DIR "/clients/trammel", "doctor", "--json", "-"});
     return test::run(words);
   }
   /// The check of this name; null where none is.
@@ -38,7 +38,8 @@ TEST_F(Doctor, SaysOfAMachineWithoutAServerHowToStartOne) {
   EXPECT_EQ(finished.exit_code, 0) << finished.err;
   EXPECT_EQ(check(finished, "network").at("state"), "good");
   EXPECT_EQ(check(finished, "port 17891").at("state"), "note");
-  EXPECT_NE(check(finished, "port 17891").at("next").get<std::string>().find("trammeld"), std::string::npos);
+  EXPECT_NE(check(finished, "port 17891").at("next").get<std::string>().find("trammeld"),
+            std::string::npos);
   EXPECT_EQ(check(finished, "leftovers").at("state"), "good");
 }
 
@@ -60,7 +61,8 @@ TEST_F(Doctor, FindsAPortThatAnotherProgramHasAStoreWithoutAFolderAndLeftovers) 
   EXPECT_EQ(check(finished, "leftovers").at("state"), "note");
   const json all = json::parse(finished.out);
   for (const json& one : all.at("checks"))
-    EXPECT_EQ(one.at("state") == "good", one.at("next") == "") << one << " has nothing to do about it";
+    EXPECT_EQ(one.at("state") == "good", one.at("next") == "")
+        << one << " has nothing to do about it";
 }
 
 }  // namespace

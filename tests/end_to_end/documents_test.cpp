@@ -48,7 +48,8 @@ std::vector<Block> blocks_of(const std::string& document) {
 
 std::vector<std::string> documents() {
   std::vector<std::string> all;
-  const test::Finished listed = test::run({"/usr/bin/env", "git", "-C", TRAMMEL_SOURCE_DIR, "ls-files", "*.md"});
+  const test::Finished listed =
+      test::run({"/usr/bin/env", "git", "-C", TRAMMEL_SOURCE_DIR, "ls-files", "*.md"});
   std::istringstream in(listed.out);
   for (std::string line; std::getline(in, line);) all.push_back(line);
   return all;
@@ -56,16 +57,18 @@ std::vector<std::string> documents() {
 
 /// What is no line for a shell: other languages, tables, formulas, drawings.
 bool is_command(const std::string& line) {
-  static constexpr std::array<std::string_view, 12> kPrograms = {"trammel ", "trammeld ", "deploy/",    "cmake ",
-                                                                 "apt ",     "promtool ", "tests/",     "export ",
-                                                                 "python3 ", "kill ",     "systemctl ", "ctest "};
-  return std::any_of(kPrograms.begin(), kPrograms.end(), [&](std::string_view one) { return line.starts_with(one); });
+  static constexpr std::array<std::string_view, 12> kPrograms = {
+      "trammel ", "trammeld ", "deploy/",  "cmake ", "apt ",       "promtool ",
+      "tests/",   "export ",   "python3 ", "kill ",  "systemctl ", "ctest "};
+  return std::any_of(kPrograms.begin(), kPrograms.end(),
+                     [&](std::string_view one) { return line.starts_with(one); });
 }
 
 /// Lines that are not typed here, by their beginnings, and why.
 const std::map<std::string, std::string>& not_typed() {
   static const std::map<std::string, std::string> kReasons = {
-      {"deploy/supervise trammeld", "runs until it is stopped; the daemon of this test stands for it"},
+      {"deploy/supervise trammeld",
+       "runs until it is stopped; the daemon of this test stands for it"},
       {"trammel cpa ", "MeasurementCommands"},
       {"trammel deflection ", "MeasurementCommands"},
       {"apt install", "deploy/try-packages"},
@@ -134,14 +137,16 @@ class Desk {
  public:
   Desk() {
     for (const char* shipped : {"config", "models", "deploy"})
-      fs::copy(fs::path(TRAMMEL_SOURCE_DIR) / shipped, folder_.path() / shipped, fs::copy_options::recursive);
+      fs::copy(fs::path(TRAMMEL_SOURCE_DIR) / shipped, folder_.path() / shipped,
+               fs::copy_options::recursive);
     const test::Finished made = typed(kFiles);
     EXPECT_EQ(made.exit_code, 0) << made.out << made.err;
   }
 
   test::Finished typed(const std::string& line) const {
-    const std::string script = "cd '" + folder_.path().string() + "'\nexport TRAMMEL_DEFAULTS='" + defaults_ +
-                               "' PATH=" TRAMMEL_BINARY_DIR "/clients:" TRAMMEL_BINARY_DIR "/server:$PATH\n" + line;
+    const std::string script =
+        "cd '" + folder_.path().string() + "'\nexport TRAMMEL_DEFAULTS='" + defaults_ +
+        "' PATH=" TRAMMEL_BINARY_DIR "/clients:" TRAMMEL_BINARY_DIR "/server:$PATH\n" + line;
     return test::run({"/bin/bash", "-c", script}, kLimit);
   }
 
@@ -149,11 +154,13 @@ class Desk {
   void start_daemon() {
     daemon_.emplace();
     daemon_->start();
-    defaults_ = folder_.write("defaults", "port = " + std::to_string(daemon_->port()) +
-                                              "\ndomain = " + std::to_string(daemon_->domain()) + "\n");
+    defaults_ =
+        folder_.write("defaults", "port = " + std::to_string(daemon_->port()) +
+                                      "\ndomain = " + std::to_string(daemon_->domain()) + "\n");
     fs::create_symlink(daemon_->store_path(), folder_.path() / "config/trammel.db");
     for (const std::string batch : {"b1", "b2"}) {
-      const test::Finished sent = typed("trammel submit --service --cell cell-7 --batch " + batch + ".csv --watch");
+      const test::Finished sent =
+          typed("trammel submit --service --cell cell-7 --batch " + batch + ".csv --watch");
       EXPECT_LE(sent.exit_code.value_or(9), 1) << sent.err;
     }
   }
@@ -173,7 +180,8 @@ int type_lines(const std::string& document, Desk& desk) {
       if (!is_command(line) || is_left_out(line)) continue;
       ++typed;
       const test::Finished done = desk.typed(line);
-      EXPECT_LE(done.exit_code.value_or(9), 1) << document << ": " << line << "\n" << done.out << done.err;
+      EXPECT_LE(done.exit_code.value_or(9), 1) << document << ": " << line << "\n"
+                                               << done.out << done.err;
     }
   }
   return typed;
@@ -188,7 +196,8 @@ TEST(Documents, WhatEveryOtherDocumentHasSomebodyTypeRuns) {
   Desk desk;
   int typed = 0;
   for (const std::string& document : documents()) {
-    if (!is_run_elsewhere(document) && document != "config/README.md") typed += type_lines(document, desk);
+    if (!is_run_elsewhere(document) && document != "config/README.md")
+      typed += type_lines(document, desk);
   }
   EXPECT_GE(typed, 7);
 }
@@ -213,17 +222,21 @@ std::string text_of(const Block& block) {
   return text;
 }
 
-/// What reads config/shown.yaml as what it is: a cell, a robot, a part of a cell, or the truth of a virtual robot.
+/// What reads config/shown.yaml as what it is: a cell, a robot, a part of a cell, or the truth of a
+/// virtual robot.
 std::string reader_of(const std::string& yaml) {
   const auto has = [&](const char* key) { return yaml.find(key) != std::string::npos; };
   const std::string plan = "trammel plan --count 5 -o shown.csv --cell config/";
   if (has("cell:")) return plan + "shown.yaml";
   if (has("joints:"))
-    return "sed 's|^robot: .*|robot: shown.yaml|; /^joint_ranges_deg/d' config/cell-7.yaml > config/c.yaml; " + plan +
-           "c.yaml";
-  if (has("anchors:")) return "cat config/cell-7.yaml config/shown.yaml > config/c.yaml; " + plan + "c.yaml";
-  return "sed 's/^  spindle: {xyz_mm: .*q_wxyz.*/  probe: null/; s/^base: .*/base: null/' config/cell-7.yaml > "
-         "config/c.yaml; trammel simulate --cell config/c.yaml --truth config/shown.yaml --plan bare.csv -o shown.csv";
+    return "sed 's|^robot: .*|robot: shown.yaml|; /^joint_ranges_deg/d' config/cell-7.yaml > "
+           "config/c.yaml; " +
+           plan + "c.yaml";
+  if (has("anchors:"))
+    return "cat config/cell-7.yaml config/shown.yaml > config/c.yaml; " + plan + "c.yaml";
+  return "sed 's/^  spindle: {xyz_mm: .*q_wxyz.*/  probe: null/; s/^base: .*/base: null/' "
+         "config/cell-7.yaml > config/c.yaml; trammel simulate --cell config/c.yaml --truth "
+         "config/shown.yaml --plan bare.csv -o shown.csv";
 }
 
 TEST(Documents, TheYamlFilesThatTheyShowAreRead) {
@@ -234,7 +247,8 @@ TEST(Documents, TheYamlFilesThatTheyShowAreRead) {
       if (block.language != "yaml") continue;
       ++read;
       const std::string text = text_of(block);
-      const test::Finished done = desk.typed("cat > config/shown.yaml <<'END'\n" + text + "END\n" + reader_of(text));
+      const test::Finished done =
+          desk.typed("cat > config/shown.yaml <<'END'\n" + text + "END\n" + reader_of(text));
       EXPECT_EQ(done.exit_code, 0) << document << "\n" << text << done.out << done.err;
     }
   }

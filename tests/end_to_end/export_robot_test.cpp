@@ -12,7 +12,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_cell.h"
 
-// The exported robot is read by kinematics that shares nothing with ours: plain matrices, from the URDF's text.
+// The exported robot is read by kinematics that shares nothing with ours: plain matrices, from the
+// URDF's text.
 namespace trammel {
 namespace {
 
@@ -55,12 +56,15 @@ struct UrdfJoint {
 /// The joints of a URDF, by their child links.
 std::map<std::string, UrdfJoint> read_urdf(const std::string& text) {
   static const std::regex kJoint(R"re(<joint name="([^"]+)" type="([^"]+)">([\s\S]*?)</joint>)re");
-  static const std::regex kParent(R"re(<parent link="([^"]+)"/>)re"), kChild(R"re(<child link="([^"]+)"/>)re");
-  static const std::regex kOrigin(R"re(<origin xyz="(\S+) (\S+) (\S+)" rpy="(\S+) (\S+) (\S+)"/>)re");
+  static const std::regex kParent(R"re(<parent link="([^"]+)"/>)re"),
+      kChild(R"re(<child link="([^"]+)"/>)re");
+  static const std::regex kOrigin(
+      R"re(<origin xyz="(\S+) (\S+) (\S+)" rpy="(\S+) (\S+) (\S+)"/>)re");
   static const std::regex kAxis(R"re(<axis xyz="0 0 (\S+)"/>)re");
   static const std::regex kMimic(R"re(<mimic joint="([^"]+)" multiplier="(\S+)"/>)re");
   std::map<std::string, UrdfJoint> joints;
-  for (auto at = std::sregex_iterator(text.begin(), text.end(), kJoint); at != std::sregex_iterator(); ++at) {
+  for (auto at = std::sregex_iterator(text.begin(), text.end(), kJoint);
+       at != std::sregex_iterator(); ++at) {
     const std::string body = (*at)[3];
     UrdfJoint joint{(*at)[1], (*at)[2], "", "", "", {}, 1, 1};
     std::smatch found;
@@ -70,7 +74,8 @@ std::map<std::string, UrdfJoint> read_urdf(const std::string& text) {
       for (std::size_t k = 0; k < 6; ++k) joint.origin[k] = std::stod(found[k + 1]);
     }
     if (std::regex_search(body, found, kAxis)) joint.axis_z = std::stod(found[1]);
-    if (std::regex_search(body, found, kMimic)) joint.leader = found[1], joint.multiplier = std::stod(found[2]);
+    if (std::regex_search(body, found, kMimic))
+      joint.leader = found[1], joint.multiplier = std::stod(found[2]);
     joints[joint.child] = joint;
   }
   return joints;
@@ -85,12 +90,15 @@ Matrix4 pose_of(const std::map<std::string, UrdfJoint>& joints, const std::strin
   Matrix4 m = product(pose_of(joints, joint.parent, q), shift(o[0], o[1], o[2]));
   m = product(product(product(m, turn(2, o[5])), turn(1, o[4])), turn(0, o[3]));
   if (joint.type == "fixed") return m;
-  const double value = joint.axis_z * (joint.leader.empty() ? q.at(joint.name) : joint.multiplier * q.at(joint.leader));
+  const double value =
+      joint.axis_z *
+      (joint.leader.empty() ? q.at(joint.name) : joint.multiplier * q.at(joint.leader));
   return product(m, joint.type == "prismatic" ? shift(0, 0, value) : turn(2, value));
 }
 
 /// The tool's position in the base that the controller believes, m.
-std::array<double, 3> tool_in_base(const std::map<std::string, UrdfJoint>& joints, const std::string& tool,
+std::array<double, 3> tool_in_base(const std::map<std::string, UrdfJoint>& joints,
+                                   const std::string& tool,
                                    const std::map<std::string, double>& q) {
   const Matrix4 base = pose_of(joints, "controller_base", q), t = pose_of(joints, tool, q);
   std::array<double, 3> p{};
@@ -108,26 +116,30 @@ class ExportRobot : public testing::Test {
     ASSERT_EQ(finished.exit_code, 0) << finished.err;
   }
 
-  /// Plans, measures and trains; the model is in cell.model, the predictions at the plan in where.csv.
+  /// Plans, measures and trains; the model is in cell.model, the predictions at the plan in
+  /// where.csv.
   void train(const std::string& robot, const std::string& truth, const std::string& level,
              const std::string& more_tools = "") {
-    folder_.write("cell.yaml",
-                  "version: 1\ncell: c\nrobot: " TRAMMEL_SOURCE_DIR "/models/" + robot +
-                      "\nbase: {xyz_mm: [100, -200, 300], q_wxyz: [0.8, 0, 0, 0.6]}\ngravity: [0, 0, -1]\n"
-                      "tools: {" +
-                      more_tools +
-                      "drill: {xyz_mm: [100, 0, 150], q_wxyz: [0.8, 0, 0.6, 0]}}\n"
-                      "payloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\ntracker: {sigma_mm: 0.01}\n");
-    folder_.write("truth.yaml", "version: 1\nerror_sources:\n" + truth + "noise: {sigma_mm: 0.01}\n");
-    must({"plan", "--cell", file("cell.yaml"), "--count", "60", "--tool", "drill", "-o", file("plan.csv")});
-    must({"simulate", "--cell", file("cell.yaml"), "--truth", file("truth.yaml"), "--plan", file("plan.csv"), "--tool",
-          "drill", "-o", file("batch.csv")});
-    must({"train", "--cell", file("cell.yaml"), "--batch", file("batch.csv"), "--level", level, "--bias", "none", "-o",
-          file("cell.model")});
-    must({"predict", "--model", file("cell.model"), "--joints", file("plan.csv"), "--tool", "drill", "-o",
-          file("where.csv")});
-    must({"export-robot", "--model", file("cell.model"), "-o", file("robot.urdf"), "--table", file("robot.csv"),
-          "--json", file("robot.json")});
+    folder_.write(
+        "cell.yaml",
+        "version: 1\ncell: c\nrobot: " TRAMMEL_SOURCE_DIR "/models/" + robot +
+            "\nbase: {xyz_mm: [100, -200, 300], q_wxyz: [0.8, 0, 0, 0.6]}\ngravity: [0, 0, -1]\n"
+            "tools: {" +
+            more_tools +
+            "drill: {xyz_mm: [100, 0, 150], q_wxyz: [0.8, 0, 0.6, 0]}}\n"
+            "payloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\ntracker: {sigma_mm: 0.01}\n");
+    folder_.write("truth.yaml",
+                  "version: 1\nerror_sources:\n" + truth + "noise: {sigma_mm: 0.01}\n");
+    must({"plan", "--cell", file("cell.yaml"), "--count", "60", "--tool", "drill", "-o",
+          file("plan.csv")});
+    must({"simulate", "--cell", file("cell.yaml"), "--truth", file("truth.yaml"), "--plan",
+          file("plan.csv"), "--tool", "drill", "-o", file("batch.csv")});
+    must({"train", "--cell", file("cell.yaml"), "--batch", file("batch.csv"), "--level", level,
+          "--bias", "none", "-o", file("cell.model")});
+    must({"predict", "--model", file("cell.model"), "--joints", file("plan.csv"), "--tool", "drill",
+          "-o", file("where.csv")});
+    must({"export-robot", "--model", file("cell.model"), "-o", file("robot.urdf"), "--table",
+          file("robot.csv"), "--json", file("robot.json")});
   }
 
   /// How far the URDF's tool is from ours at each pose of the plan, mm.
@@ -138,15 +150,18 @@ class ExportRobot : public testing::Test {
     std::vector<double> distances;
     for (std::size_t row = 0; row < plan.size(); ++row) {
       std::map<std::string, double> q;
-      for (int j = 1; plan.find(fmt::format("q{}_deg", j)) || plan.find(fmt::format("q{}_mm", j)); ++j) {
+      for (int j = 1; plan.find(fmt::format("q{}_deg", j)) || plan.find(fmt::format("q{}_mm", j));
+           ++j) {
         const auto rail = plan.find(fmt::format("q{}_mm", j));
         const std::size_t column = rail ? *rail : *plan.find(fmt::format("q{}_deg", j));
-        q[fmt::format("joint_{}", j)] = plan.number(row, column).value() * (rail ? 1e-3 : std::acos(-1.0) / 180);
+        q[fmt::format("joint_{}", j)] =
+            plan.number(row, column).value() * (rail ? 1e-3 : std::acos(-1.0) / 180);
       }
       const auto p = tool_in_base(joints, "tool_drill", q);
       double squares = 0;
       for (std::size_t k = 0; k < 3; ++k) {
-        const double ours = where.number(row, where.require(std::array{"x_mm", "y_mm", "z_mm"}[k]).value()).value();
+        const double ours =
+            where.number(row, where.require(std::array{"x_mm", "y_mm", "z_mm"}[k]).value()).value();
         squares += (1e3 * p[k] - ours) * (1e3 * p[k] - ours);
       }
       distances.push_back(std::sqrt(squares));
@@ -159,12 +174,12 @@ class ExportRobot : public testing::Test {
 };
 
 const std::string kRigid =
-    "  base: {x0_mm: 1.5, gamma0_rad: 2e-3}\n  geometry: {q2_rad: 1e-3, a2_mm: -0.4, alpha2_rad: 3e-4, q4_rad: "
-    "-8e-4}\n";
+    "  base: {x0_mm: 1.5, gamma0_rad: 2e-3}\n  geometry: {q2_rad: 1e-3, a2_mm: -0.4, alpha2_rad: "
+    "3e-4, q4_rad: -8e-4}\n";
 
 TEST_F(ExportRobot, AsUrdfHasTheToolWhereOursIsWithinAMicrometre) {
-  for (const char* robot : {"abb_irb6640-205-275.yaml", "fanuc_m-20ia.yaml", "abb_irb6640-205-275-on-rail.yaml",
-                            "universal-robots_ur10.yaml"}) {
+  for (const char* robot : {"abb_irb6640-205-275.yaml", "fanuc_m-20ia.yaml",
+                            "abb_irb6640-205-275-on-rail.yaml", "universal-robots_ur10.yaml"}) {
     SCOPED_TRACE(robot);
     train(robot, kRigid, "M2");
     const std::vector<double> distances = distances_mm();
@@ -176,8 +191,8 @@ TEST_F(ExportRobot, AsUrdfHasTheToolWhereOursIsWithinAMicrometre) {
 
 TEST_F(ExportRobot, ToolsWhoseNamesAreAlikeInUrdfStayTwo) {
   train("fanuc_m-20ia.yaml", kRigid, "M2",
-        "\"a b\": {xyz_mm: [1, 0, 0], q_wxyz: [1, 0, 0, 0]}, a_b: {xyz_mm: [2, 0, 0], "
-        "q_wxyz: [1, 0, 0, 0]}, ");
+        "\"a b\": {xyz_mm: [1, 0, 0], q_wxyz: [1, 0, 0, 0]}, a_b: {xyz_mm: [2, 0, 0], q_wxyz: [1, "
+        "0, 0, 0]}, ");
   const auto joints = read_urdf(test::read_file(file("robot.urdf")));
   EXPECT_EQ(joints.at("tool_a_b").origin[0], 0.001);
   EXPECT_EQ(joints.at("tool_a_b_2").origin[0], 0.002);
@@ -186,8 +201,8 @@ TEST_F(ExportRobot, ToolsWhoseNamesAreAlikeInUrdfStayTwo) {
 TEST_F(ExportRobot, SaysInMillimetresWhatUrdfCannotCarry) {
   train("abb_irb6640-205-275.yaml",
         kRigid +
-            "  compliance_linear: {C1_rad_per_nmm: 0, C2_rad_per_nmm: 1e-9, C3_rad_per_nmm: 4e-9, C4_rad_per_nmm: 0,"
-            " C5_rad_per_nmm: 0, C6_rad_per_nmm: 0}\n",
+            "  compliance_linear: {C1_rad_per_nmm: 0, C2_rad_per_nmm: 1e-9, C3_rad_per_nmm: 4e-9, "
+            "C4_rad_per_nmm: 0, C5_rad_per_nmm: 0, C6_rad_per_nmm: 0}\n",
         "M3");
   const json said = json::parse(test::read_file(file("robot.json")));
   ASSERT_EQ(said["left_out"].size(), 1u);
@@ -197,7 +212,8 @@ TEST_F(ExportRobot, SaysInMillimetresWhatUrdfCannotCarry) {
   for (const double distance : distances) squares += distance * distance;
   const double rms = std::sqrt(squares / static_cast<double>(distances.size()));
   EXPECT_GT(rms, 1e-2);
-  EXPECT_NEAR(said["left_out_rms_mm"].get<double>(), rms, 0.3 * rms) << "poses drawn elsewhere in the same ranges";
+  EXPECT_NEAR(said["left_out_rms_mm"].get<double>(), rms, 0.3 * rms)
+      << "poses drawn elsewhere in the same ranges";
   EXPECT_NE(test::read_file(file("robot.urdf")).find("gearboxes give way"), std::string::npos);
 }
 
@@ -209,16 +225,19 @@ TEST_F(ExportRobot, AsRobotFileIsReadBackAsTheSameRobot) {
   std::smatch base, tool;
   ASSERT_TRUE(std::regex_search(yaml, base, std::regex("#   (base: .*)\n")));
   ASSERT_TRUE(std::regex_search(yaml, tool, std::regex("#   (tools: .*)\n")));
-  folder_.write("again.yaml", "version: 1\ncell: c\nrobot: robot.yaml\n" + base[1].str() + "\ngravity: [0, 0, -1]\n" +
-                                  tool[1].str() + "\npayloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\n");
-  must({"evaluate", "--model", file("cell.model"), "--batch", file("batch.csv"), "--json", file("ours.json")});
-  must({"train", "--cell", file("again.yaml"), "--batch", file("batch.csv"), "--level", "M0", "--bias", "none", "-o",
-        file("again.model"), "--json", file("again.json")});
-  must({"evaluate", "--model", file("again.model"), "--batch", file("batch.csv"), "--json", file("again.json")});
+  folder_.write("again.yaml", "version: 1\ncell: c\nrobot: robot.yaml\n" + base[1].str() +
+                                  "\ngravity: [0, 0, -1]\n" + tool[1].str() +
+                                  "\npayloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\n");
+  must({"evaluate", "--model", file("cell.model"), "--batch", file("batch.csv"), "--json",
+        file("ours.json")});
+  must({"train", "--cell", file("again.yaml"), "--batch", file("batch.csv"), "--level", "M0",
+        "--bias", "none", "-o", file("again.model"), "--json", file("again.json")});
+  must({"evaluate", "--model", file("again.model"), "--batch", file("batch.csv"), "--json",
+        file("again.json")});
   const json ours = json::parse(test::read_file(file("ours.json")));
   const json again = json::parse(test::read_file(file("again.json")));
-  EXPECT_NEAR(again["levels"]["nominal"]["rms_mm"].get<double>(), ours["levels"]["calibrated"]["rms_mm"].get<double>(),
-              1e-4);
+  EXPECT_NEAR(again["levels"]["nominal"]["rms_mm"].get<double>(),
+              ours["levels"]["calibrated"]["rms_mm"].get<double>(), 1e-4);
 }
 
 TEST_F(ExportRobot, AsTableHasNominalAndCalibratedParametersWithTheirUncertainty) {
@@ -227,7 +246,9 @@ TEST_F(ExportRobot, AsTableHasNominalAndCalibratedParametersWithTheirUncertainty
   EXPECT_EQ(table.size(), 6u + 24u + 6u);
   int with_uncertainty = 0;
   for (std::size_t row = 0; row < table.size(); ++row) {
-    const auto number = [&](const char* column) { return table.number(row, table.require(column).value()).value(); };
+    const auto number = [&](const char* column) {
+      return table.number(row, table.require(column).value()).value();
+    };
     EXPECT_NEAR(number("calibrated") - number("nominal"), number("correction"),
                 1e-5 + 1e-5 * std::abs(number("correction")));
     with_uncertainty += table.field(row, table.require("u95").value()).empty() ? 0 : 1;

@@ -12,19 +12,23 @@ namespace {
 const std::string kFigures = std::string(TRAMMEL_SOURCE_DIR) + "/tests/benchmarks/figures";
 
 TEST(Figures, AreAsTheTableSays) {
-  const test::Finished asked = test::run(
-      {"/usr/bin/env", "TRAMMEL_BUILD=" TRAMMEL_BINARY_DIR, kFigures, "1dim, M2, mm"}, std::chrono::minutes(4));
+  const test::Finished asked =
+      test::run({"/usr/bin/env", "TRAMMEL_BUILD=" TRAMMEL_BINARY_DIR, kFigures, "1dim, M2, mm"},
+                std::chrono::minutes(4));
   EXPECT_EQ(asked.exit_code, 0) << asked.out << asked.err;
   EXPECT_NE(asked.out.find("1 figures checked, 0 missed"), std::string::npos) << asked.out;
 }
 
 /// A table of one row, of a figure that its command prints as 0.0233.
-test::Finished checked(const std::string& figure, const std::string& check, const std::string& aim) {
+test::Finished checked(const std::string& figure, const std::string& check,
+                       const std::string& aim) {
   const test::TemporaryFolder folder;
   const std::string table =
-      "| name | figure | check | aim | printed as | time | command |\n|---|---|---|---|---|---|---|\n| gap, mm | " +
+      "| name | figure | check | aim | printed as | time | command "
+      "|\n|---|---|---|---|---|---|---|\n| gap, mm | " +
       figure + " | " + check + " | " + aim + " | | s | `echo figure gap, mm: 0.0233` |\n";
-  return test::run({"/usr/bin/env", "TRAMMEL_FIGURES=" + folder.write("table.md", table), kFigures});
+  return test::run(
+      {"/usr/bin/env", "TRAMMEL_FIGURES=" + folder.write("table.md", table), kFigures});
 }
 
 TEST(Figures, ThatAreMissedEndWith1AndAreNamed) {
@@ -44,9 +48,10 @@ TEST(Figures, WhoseAimIsNotReachedMustSaySo) {
 
 TEST(Figures, ThatACommandDoesNotPrintAreMissed) {
   const test::TemporaryFolder folder;
-  const std::string table = folder.write(
-      "table.md",
-      "| name | figure | check | aim | printed as | time | command |\n| gap, mm | 1 | within 1 | | | s | `false` |\n");
+  const std::string table =
+      folder.write("table.md",
+                   "| name | figure | check | aim | printed as | time | command |\n| gap, mm | 1 | "
+                   "within 1 | | | s | `false` |\n");
   EXPECT_EQ(test::run({"/usr/bin/env", "TRAMMEL_FIGURES=" + table, kFigures}).exit_code, 1);
 }
 

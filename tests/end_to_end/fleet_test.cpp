@@ -49,8 +49,8 @@ class Fleet : public testing::Test {
     ASSERT_TRUE(write_text_file(daemon.config_path(), text + keys));
     daemon.start();
   }
-  static std::unique_ptr<client::Session> session_with(std::initializer_list<const test::Daemon*> daemons,
-                                                       milliseconds patience = seconds(30)) {
+  static std::unique_ptr<client::Session> session_with(
+      std::initializer_list<const test::Daemon*> daemons, milliseconds patience = seconds(30)) {
     client::SessionOptions options = (*daemons.begin())->session_options();
     options.timeout = patience;
     options.server_ports.clear();
@@ -59,8 +59,10 @@ class Fleet : public testing::Test {
     EXPECT_TRUE(opened) << sentence(opened.error());
     return std::move(*opened);
   }
-  static std::int64_t submit(client::Session& session, const std::string& batch, std::uint64_t seed, int poses = 60) {
-    const auto job = session.submit_measurements("cell-7", batch, test::virtual_batch_csv(poses, seed));
+  static std::int64_t submit(client::Session& session, const std::string& batch, std::uint64_t seed,
+                             int poses = 60) {
+    const auto job =
+        session.submit_measurements("cell-7", batch, test::virtual_batch_csv(poses, seed));
     EXPECT_TRUE(job) << sentence(job.error());
     return job.value_or(0);
   }
@@ -86,7 +88,9 @@ class Fleet : public testing::Test {
   static std::string with_pages(const test::Daemon& daemon) {
     return fmt::format("http: {{port: {}}}\n", pages_of(daemon));
   }
-  static std::uint16_t pages_of(const test::Daemon& daemon) { return static_cast<std::uint16_t>(daemon.port() + 1); }
+  static std::uint16_t pages_of(const test::Daemon& daemon) {
+    return static_cast<std::uint16_t>(daemon.port() + 1);
+  }
   static test::HttpAnswer page(const test::Daemon& daemon, const std::string& path) {
     return test::http_get(pages_of(daemon), path);
   }
@@ -128,8 +132,9 @@ class Fleet : public testing::Test {
     ASSERT_NE(at, std::string::npos);
     robot.insert(at + 6, "1");
     ASSERT_TRUE(write_text_file(cell_file_of(daemon).parent_path() / "robot.yaml", robot));
-    ASSERT_TRUE(write_text_file(cell_file_of(daemon),
-                                std::regex_replace(cell, std::regex("\nrobot: \\S+"), "\nrobot: robot.yaml")));
+    ASSERT_TRUE(write_text_file(
+        cell_file_of(daemon),
+        std::regex_replace(cell, std::regex("\nrobot: \\S+"), "\nrobot: robot.yaml")));
   }
 
   test::Postgres database_;
@@ -170,7 +175,8 @@ TEST_F(Fleet, TheJobOfATrainingHostThatIsKilledIsDoneByAnother) {
   start(second_, "serves: false\n");
   const auto session = session_with({&first_});
   const std::int64_t job = submit(*session, "b1", 1, 400);
-  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit)) << "it works on the job";
+  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit))
+      << "it works on the job";
   start(third_, "serves: false\n");
   second_.kill();
   const auto over = end_of(*session, job);
@@ -183,7 +189,8 @@ TEST_F(Fleet, AHostThatWasStoppedWhileAnotherDidItsJobStoresNothingWhenItGoesOn)
   start(second_, "serves: false\n");
   const auto session = session_with({&first_});
   const std::int64_t job = submit(*session, "b1", 1, 400);
-  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit)) << "it works on the job";
+  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit))
+      << "it works on the job";
   second_.process().signal(SIGSTOP);
   start(third_, "serves: false\n");
   EXPECT_EQ(end_of(*session, job).model_version, 1);
@@ -196,7 +203,8 @@ TEST_F(Fleet, AHostThatWasStoppedWhileAnotherDidItsJobStoresNothingWhenItGoesOn)
 
 class FleetOfDyingServers : public Fleet {
  protected:
-  /// Two servers that answer, and two versions: 1 in force, a rollback leads to 2, another one to 1.
+  /// Two servers that answer, and two versions: 1 in force, a rollback leads to 2, another one
+  /// to 1.
   void SetUp() override {
     url_ = held_.url();
     start(first_, "trains: false\n");
@@ -210,8 +218,8 @@ class FleetOfDyingServers : public Fleet {
     forced.force = true;
     for (const int version : {2, 1}) ASSERT_TRUE(session_->activate("cell-7", version, forced));
   }
-  /// What the session is told of a change whose server is killed once the transaction with `statement` is committed,
-  /// before it hears of it. The server is started again.
+  /// What the session is told of a change whose server is killed once the transaction with
+  /// `statement` is committed, before it hears of it. The server is started again.
   template <typename Ask>
   auto told_by_another(const std::string& statement, const Ask& ask) -> decltype(ask()) {
     held_.hold(statement);
@@ -225,7 +233,9 @@ class FleetOfDyingServers : public Fleet {
     dead.start();
     return told;
   }
-  std::string counted(const std::string& rows) { return database_.sql(direct_, "SELECT count(*) FROM " + rows); }
+  std::string counted(const std::string& rows) {
+    return database_.sql(direct_, "SELECT count(*) FROM " + rows);
+  }
 
   const std::string direct_ = url_;
   test::HeldAnswer held_{direct_};
@@ -236,15 +246,22 @@ TEST_F(FleetOfDyingServers, AChangeThatIsCommittedAndNotAnsweredIsToldByAnotherS
   const char* const change = "INSERT INTO changes";
   EXPECT_EQ(told_by_another(change, [&] { return session_->rollback("cell-7"); }).value_or(0), 2);
   EXPECT_EQ(counted("audit WHERE what = 'rollback'"), "1\n");
-  wait_until([&] { return served(*session_with({&first_})) == 2 && served(*session_with({&second_})) == 2; }, "served");
+  wait_until(
+      [&] {
+        return served(*session_with({&first_})) == 2 && served(*session_with({&second_})) == 2;
+      },
+      "served");
 
   client::ChangeOptions forced;
   forced.force = true;
   const std::string before = counted("activations");
-  EXPECT_EQ(told_by_another(change, [&] { return session_->activate("cell-7", 1, forced); }).value_or(0), 1);
+  EXPECT_EQ(
+      told_by_another(change, [&] { return session_->activate("cell-7", 1, forced); }).value_or(0),
+      1);
   EXPECT_EQ(std::stoi(counted("activations")), std::stoi(before) + 1);
 
-  const auto job = told_by_another(change, [&] { return session_->train("cell-7", {"b1"}, "", ""); });
+  const auto job =
+      told_by_another(change, [&] { return session_->train("cell-7", {"b1"}, "", ""); });
   ASSERT_TRUE(job);
   EXPECT_EQ(counted("jobs WHERE state = 'queued'"), "1\n");
   EXPECT_EQ(counted(fmt::format("jobs WHERE id = {}", *job)), "1\n");
@@ -315,8 +332,11 @@ TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {
   const auto refused = hasty->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2));
   EXPECT_FALSE(refused) << "nothing is acknowledged that is not in the record";
   database_.start();
-  wait_until([&] { return one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3)).has_value(); },
-             "batches are taken again");
+  wait_until(
+      [&] {
+        return one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3)).has_value();
+      },
+      "batches are taken again");
   const auto known = batches(*other);
   EXPECT_TRUE(known.contains("b1"));
   EXPECT_TRUE(known.contains("b3"));
@@ -347,26 +367,36 @@ TEST_F(Fleet, EachServerShowsTheSameFleetAndOneThatIsKilledIsSaidToBeGone) {
   const auto jobs = one->jobs("cell-7");
   ASSERT_TRUE(jobs);
   EXPECT_TRUE(fleet.contains(jobs->front().worker)) << jobs->front().worker;
-  const std::string shown = command(
-      {"status", "--service", "--port", std::to_string(first_.port()), "--domain", std::to_string(first_.domain())});
+  const std::string shown = command({"status", "--service", "--port", std::to_string(first_.port()),
+                                     "--domain", std::to_string(first_.domain())});
   for (const test::Daemon* daemon : {&first_, &second_, &third_}) {
     EXPECT_NE(shown.find(daemon->name() + " on "), std::string::npos) << shown;
-    EXPECT_NE(page(*daemon, "/fleet").body.find("All 3 servers are there."), std::string::npos) << "also the last one";
+    EXPECT_NE(page(*daemon, "/fleet").body.find("All 3 servers are there."), std::string::npos)
+        << "also the last one";
   }
 
   third_.kill();
   wait_until([&] { return is_gone(*one, third_); }, "it is said to be gone");
   wait_until([&] { return is_gone(*other, third_); }, "also by the other one");
   wait_until(
-      [&] { return page(second_, "/fleet").body.find("1 of 3 servers gone: " + third_.name()) != std::string::npos; },
+      [&] {
+        return page(second_, "/fleet").body.find("1 of 3 servers gone: " + third_.name()) !=
+               std::string::npos;
+      },
       "the page");
-  wait_until([&] { return page(first_, "/readyz").body.find(third_.name() + " on ") != std::string::npos; }, "/readyz");
+  wait_until(
+      [&] {
+        return page(first_, "/readyz").body.find(third_.name() + " on ") != std::string::npos;
+      },
+      "/readyz");
   const std::string metrics = page(first_, "/metrics").body;
-  EXPECT_TRUE(std::regex_search(metrics, std::regex("trammel_server_there\\{[^}]*" + third_.name() + "[^}]*\\} 0")))
+  EXPECT_TRUE(std::regex_search(
+      metrics, std::regex("trammel_server_there\\{[^}]*" + third_.name() + "[^}]*\\} 0")))
       << metrics;
   EXPECT_NE(metrics.find("trammel_record_reachable 1"), std::string::npos);
   EXPECT_EQ(second_.stop(), 0);
-  wait_until([&] { return !fleet_of(*one).contains(second_.name()); }, "one that ends takes its leave");
+  wait_until([&] { return !fleet_of(*one).contains(second_.name()); },
+             "one that ends takes its leave");
 }
 
 TEST_F(Fleet, ACellThatAServerDescribesOtherwiseIsNotServedThereUntilTheyAgree) {
@@ -379,12 +409,16 @@ TEST_F(Fleet, ACellThatAServerDescribesOtherwiseIsNotServedThereUntilTheyAgree) 
   const auto other = session_with({&second_}, seconds(4));
   const auto refused = other->predict_error(kContext, test::virtual_joints(1, 7));
   ASSERT_FALSE(refused);
-  for (const std::string& said : {sentence(refused.error()), page(second_, "/readyz?cell=cell-7").body,
-                                  second_.process().standard_error(), page(second_, "/fleet").body})
-    EXPECT_NE(said.find(second_.name() + " has another robot file than " + first_.name()), std::string::npos) << said;
+  for (const std::string& said :
+       {sentence(refused.error()), page(second_, "/readyz?cell=cell-7").body,
+        second_.process().standard_error(), page(second_, "/fleet").body})
+    EXPECT_NE(said.find(second_.name() + " has another robot file than " + first_.name()),
+              std::string::npos)
+        << said;
   EXPECT_EQ(page(second_, "/readyz?cell=cell-7").code, 503);
   EXPECT_EQ(page(first_, "/readyz?cell=cell-7").code, 200);
-  EXPECT_FALSE(other->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2))) << "it is not its cell now";
+  EXPECT_FALSE(other->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2)))
+      << "it is not its cell now";
   const auto both = session_with({&second_, &first_});
   EXPECT_TRUE(both->predict_error(kContext, test::virtual_joints(1, 7))) << "the other one answers";
 
@@ -394,7 +428,8 @@ TEST_F(Fleet, ACellThatAServerDescribesOtherwiseIsNotServedThereUntilTheyAgree) 
   };
   wait_until(has_former_files, "now it is the first one that has another file");
   EXPECT_EQ(served(*one), 1) << "it goes on with the model that it has";
-  EXPECT_FALSE(one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3))) << "and changes nothing";
+  EXPECT_FALSE(one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3)))
+      << "and changes nothing";
   command({"store", "describe", url_, "--cell", "cell-7", "--as", first_.name()});
   wait_until([&] { return !has_former_files(); }, "a person has said whose files count");
   EXPECT_EQ(served(*one), 1);
@@ -415,7 +450,8 @@ TEST_F(Fleet, AJobIsCancelledOnAnyServerWhetherItWaitsOrRunsElsewhere) {
   EXPECT_EQ(end_of(*one, waits).stage, "cancelled");
   start(third_, "serves: false\n");
   const std::int64_t runs = submit(*one, "b2", 2, 400);
-  ASSERT_TRUE(third_.process().wait_for_line(fmt::format("job {}: ", runs), kLimit)) << "it works on the job";
+  ASSERT_TRUE(third_.process().wait_for_line(fmt::format("job {}: ", runs), kLimit))
+      << "it works on the job";
   ASSERT_TRUE(other->cancel(runs));
   const auto over = end_of(*one, runs);
   EXPECT_EQ(over.stage, "cancelled") << over.what;

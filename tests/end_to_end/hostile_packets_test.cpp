@@ -1,5 +1,5 @@
-// Packets that end, stop or flood the library, each sent from a plain socket to a participant with the guard and to one
-// without it.
+// Packets that end, stop or flood the library, each sent from a plain socket to a participant with
+// the guard and to one without it.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -63,7 +63,11 @@ PacketBytes words(const std::vector<std::uint32_t>& values) {
 Attack announces(std::uint16_t parameter, const PacketBytes& value) {
   return [=](RawParticipant& attacker) {
     attacker.send(attacker.packet()
-                      .data({0, test::kAnnouncerId, 2, {}, attacker.announcement().add(parameter, value).payload()})
+                      .data({0,
+                             test::kAnnouncerId,
+                             2,
+                             {},
+                             attacker.announcement().add(parameter, value).payload()})
                       .bytes());
     return true;
   };
@@ -74,7 +78,9 @@ Attack announces_writer(std::uint16_t parameter, const PacketBytes& value) {
   return [=](RawParticipant& attacker) {
     const auto list = attacker.endpoint(kWriter, "Topic", "Type").add(parameter, value);
     attacker.send(
-        attacker.packet().data({test::kPublicationsReader, test::kPublicationsId, 1, {}, list.payload()}).bytes());
+        attacker.packet()
+            .data({test::kPublicationsReader, test::kPublicationsId, 1, {}, list.payload()})
+            .bytes());
     return true;
   };
 }
@@ -90,19 +96,24 @@ Attack writes(const std::function<test::Packet&(test::Packet&)>& what) {
 
 TEST(HostilePackets, AStatisticsSubmessageThatIsNotTheLast) {
   expect_only_the_library_is_harmed_by([](RawParticipant& attacker) {
-    attacker.send(test::Packet(attacker.prefix()).submessage(0x80, 1, PacketBytes(56)).submessage(0x01, 1, {}).bytes());
+    attacker.send(test::Packet(attacker.prefix())
+                      .submessage(0x80, 1, PacketBytes(56))
+                      .submessage(0x01, 1, {})
+                      .bytes());
     return true;
   });
 }
 
 TEST(HostilePackets, AGapOver2To62Numbers) {
-  expect_only_the_library_is_harmed_by(
-      writes([](test::Packet& p) -> test::Packet& { return p.gap(0, kWriter, 1, std::int64_t{1} << 62); }));
+  expect_only_the_library_is_harmed_by(writes([](test::Packet& p) -> test::Packet& {
+    return p.gap(0, kWriter, 1, std::int64_t{1} << 62);
+  }));
 }
 
 TEST(HostilePackets, AGapOver2To46Numbers) {
-  expect_only_the_library_is_harmed_by(
-      writes([](test::Packet& p) -> test::Packet& { return p.gap(0, kWriter, 1, std::int64_t{1} << 46); }));
+  expect_only_the_library_is_harmed_by(writes([](test::Packet& p) -> test::Packet& {
+    return p.gap(0, kWriter, 1, std::int64_t{1} << 46);
+  }));
 }
 
 TEST(HostilePackets, AHeartbeatThatSkips2To46Numbers) {
@@ -158,7 +169,8 @@ std::string answers_of(const test::Daemon& daemon) {
   context.cell = "cell-7";
   const auto error = (*session)->predict_error(context, {{0.1, 0.2, 0.3, 0.4, 0.5, 0.6}});
   return fmt::format("{} models, {} jobs, {}", models ? static_cast<int>(models->size()) : -1,
-                     jobs ? static_cast<int>(jobs->size()) : -1, error ? "a model" : error.error().message);
+                     jobs ? static_cast<int>(jobs->size()) : -1,
+                     error ? "a model" : error.error().message);
 }
 
 TEST(HostilePackets, ADaemonIsAliveAndRightAfter300000MutatedOnes) {
@@ -171,22 +183,26 @@ TEST(HostilePackets, ADaemonIsAliveAndRightAfter300000MutatedOnes) {
     packets.send(100'000);
   }
   EXPECT_EQ(answers_of(daemon), before);
-  EXPECT_TRUE(daemon.process().wait_for_line("packets were dropped unread", kLimit)) << "and says what it met";
+  EXPECT_TRUE(daemon.process().wait_for_line("packets were dropped unread", kLimit))
+      << "and says what it met";
   EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
 }
 
-/// Announces participants that are not there, twice each, sixteen from a socket, with leases of 4 s.
+/// Announces participants that are not there, twice each, sixteen from a socket, with leases of 4
+/// s.
 void invent(const test::Daemon& daemon, int participants) {
   std::unique_ptr<RawParticipant> from;
   for (int i = 0; i < participants; ++i) {
     if (i % 16 == 0)
-      from = std::make_unique<RawParticipant>(daemon.port(), daemon.domain(), static_cast<unsigned>(i + 1));
+      from = std::make_unique<RawParticipant>(daemon.port(), daemon.domain(),
+                                              static_cast<unsigned>(i + 1));
     test::Prefix prefix = from->prefix();
     prefix[11] = static_cast<unsigned char>(i % 16);
     from->set_prefix(prefix);
     const ParameterList announced = from->announcement().add(0x0002, words({4, 0}));
     for (int k = 0; k < 2; ++k)
-      from->send(test::Packet(prefix).data({0, test::kAnnouncerId, 1, {}, announced.payload()}).bytes());
+      from->send(
+          test::Packet(prefix).data({0, test::kAnnouncerId, 1, {}, announced.payload()}).bytes());
   }
 }
 
@@ -214,7 +230,9 @@ TEST(HostilePackets, AnAnnouncementThatNamesSocketsOfOthersSendsThemNextToNothin
   RawParticipant stranger(daemon.port(), daemon.domain(), 99);
   ParameterList names = stranger.announcement();
   for (const auto& other : others) names.locator(0x0032, other->own_port());
-  stranger.send(test::Packet(stranger.prefix()).data({0, test::kAnnouncerId, 1, {}, names.payload()}).bytes());
+  stranger.send(test::Packet(stranger.prefix())
+                    .data({0, test::kAnnouncerId, 1, {}, names.payload()})
+                    .bytes());
   int datagrams = 0;
   const auto session = client::Session::open(daemon.session_options()).value();
   for (int i = 0; i < 3; ++i) {

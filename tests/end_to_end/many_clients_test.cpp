@@ -15,7 +15,8 @@ class HeldPorts {
  public:
   explicit HeldPorts(std::uint32_t domain) {
     const std::uint32_t first = 7400 + 250 * domain + 10;
-    for (std::uint32_t port = first; port < first + 2 * 115; ++port) hold(static_cast<std::uint16_t>(port));
+    for (std::uint32_t port = first; port < first + 2 * 115; ++port)
+      hold(static_cast<std::uint16_t>(port));
   }
   HeldPorts(const HeldPorts&) = delete;
   HeldPorts& operator=(const HeldPorts&) = delete;
@@ -37,7 +38,8 @@ class HeldPorts {
   std::vector<int> sockets_;
 };
 
-// The library looks for free ports as often as it is told, and then makes a participant that hears nothing.
+// The library looks for free ports as often as it is told, and then makes a participant that hears
+// nothing.
 TEST(ManyClients, TheHundredAndSixteenthOfAHostIsAnsweredAsTheFirst) {
   test::Daemon daemon;
   daemon.start();

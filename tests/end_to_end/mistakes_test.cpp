@@ -9,8 +9,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_cell.h"
 
-// A walk of mistakes that people make at the command line: each is refused with its kind, says where it is as data, and
-// what to do next.
+// A walk of mistakes that people make at the command line: each is refused with its kind, says
+// where it is as data, and what to do next.
 namespace trammel {
 namespace {
 
@@ -30,23 +30,51 @@ struct Mistake {
 const std::vector<Mistake>& mistakes() {
   static const std::vector<Mistake> all = {
       // Commands and options.
-      {"misspelled command", {"pln", "--cell", "${CELL}"}, 2, "", "command", 0, "trammel plan --help"},
+      {"misspelled command",
+       {"pln", "--cell", "${CELL}"},
+       2,
+       "",
+       "command",
+       0,
+       "trammel plan --help"},
       {"no such command", {"frobnicate"}, 2, "", "command", 0, "trammel help"},
       {"option before its command", {"--count", "5"}, 2, "", "--count", 0, "trammel help"},
-      {"misspelled option", {"plan", "--cel", "${CELL}", "--count", "5", "-o", "p"}, 2, "", "--cel", 0, "plan --help"},
+      {"misspelled option",
+       {"plan", "--cel", "${CELL}", "--count", "5", "-o", "p"},
+       2,
+       "",
+       "--cel",
+       0,
+       "plan --help"},
       {"begun option", {"train", "--cell", "${CELL}", "--bat", "b.csv", "-o", "m"}, 2, "", "--bat"},
       {"option of another command", {"evaluate", "--count", "5"}, 2, "", "--count"},
       {"option left out", {"train", "--cell", "${CELL}", "-o", "m"}, 2, "", "--batch"},
       {"output left out", {"train", "--cell", "${CELL}", "--batch", "${BATCH}"}, 2, "", "--output"},
-      {"a word for a number", {"plan", "--cell", "${CELL}", "--count", "five", "-o", "p"}, 2, "", "--count"},
-      {"a number out of range", {"plan", "--cell", "${CELL}", "--count", "0", "-o", "p"}, 2, "", "--count"},
+      {"a word for a number",
+       {"plan", "--cell", "${CELL}", "--count", "five", "-o", "p"},
+       2,
+       "",
+       "--count"},
+      {"a number out of range",
+       {"plan", "--cell", "${CELL}", "--count", "0", "-o", "p"},
+       2,
+       "",
+       "--count"},
       {"a unit behind a number",
        {"correct", "--model", "${MODEL}", "--tolerance", "0.2mm", "${TARGETS}", "-o", "c"},
        2,
        "",
        "--tolerance"},
-      {"an option twice", {"plan", "--cell", "${CELL}", "--count", "5", "--count", "6", "-o", "p"}, 2, "", "--count"},
-      {"a word too many", {"plan", "--cell", "${CELL}", "--count", "5", "-o", "p", "more"}, 2, "", ""},
+      {"an option twice",
+       {"plan", "--cell", "${CELL}", "--count", "5", "--count", "6", "-o", "p"},
+       2,
+       "",
+       "--count"},
+      {"a word too many",
+       {"plan", "--cell", "${CELL}", "--count", "5", "-o", "p", "more"},
+       2,
+       "",
+       ""},
       {"a port that is none", {"status", "--port", "abc"}, 2, "", "--port"},
       {"a port out of range", {"status", "--port", "99999"}, 2, "", "--port"},
       {"a domain out of range", {"status", "--domain", "300"}, 2, "", "--domain"},
@@ -109,7 +137,13 @@ const std::vector<Mistake>& mistakes() {
        "",
        0,
        "mkdir"},
-      {"onto a folder", {"plan", "--cell", "${CELL}", "--count", "5", "-o", "folder"}, 3, "folder", "", 0, "file"},
+      {"onto a folder",
+       {"plan", "--cell", "${CELL}", "--count", "5", "-o", "folder"},
+       3,
+       "folder",
+       "",
+       0,
+       "file"},
       {"cell and batch swapped",
        {"train", "--cell", "${BATCH}", "--batch", "${CELL}", "-o", "m"},
        3,
@@ -145,10 +179,27 @@ const std::vector<Mistake>& mistakes() {
        "",
        0,
        "--service"},
-      {"an empty file", {"train", "--cell", "${CELL}", "--batch", "empty.csv", "-o", "m"}, 3, "empty.csv", ""},
-      {"an empty model", {"evaluate", "--model", "empty.csv", "--batch", "${BATCH}"}, 3, "empty.csv", ""},
-      {"a model that was cut off", {"evaluate", "--model", "cut.model", "--batch", "${BATCH}"}, 3, "cut.model", ""},
-      {"random bytes", {"train", "--cell", "${CELL}", "--batch", "random.csv", "-o", "m"}, 3, "random.csv", "", 1},
+      {"an empty file",
+       {"train", "--cell", "${CELL}", "--batch", "empty.csv", "-o", "m"},
+       3,
+       "empty.csv",
+       ""},
+      {"an empty model",
+       {"evaluate", "--model", "empty.csv", "--batch", "${BATCH}"},
+       3,
+       "empty.csv",
+       ""},
+      {"a model that was cut off",
+       {"evaluate", "--model", "cut.model", "--batch", "${BATCH}"},
+       3,
+       "cut.model",
+       ""},
+      {"random bytes",
+       {"train", "--cell", "${CELL}", "--batch", "random.csv", "-o", "m"},
+       3,
+       "random.csv",
+       "",
+       1},
       {"a spreadsheet",
        {"train", "--cell", "${CELL}", "--batch", "batch.xlsx", "-o", "m"},
        3,
@@ -170,7 +221,11 @@ const std::vector<Mistake>& mistakes() {
        "",
        0,
        "CSV UTF-8"},
-      {"a program of no known kind", {"correct", "--model", "${MODEL}", "plan.xyz", "-o", "c"}, 2, "plan.xyz", ""},
+      {"a program of no known kind",
+       {"correct", "--model", "${MODEL}", "plan.xyz", "-o", "c"},
+       2,
+       "plan.xyz",
+       ""},
       {"a page of a table",
        {"correct", "--model", "${MODEL}", "${TARGETS}", "-o", "c", "--report", "r.html"},
        2,
@@ -199,7 +254,11 @@ const std::vector<Mistake>& mistakes() {
        "",
        2,
        "';'"},
-      {"a column left out", {"train", "--cell", "${CELL}", "--batch", "no-z.csv", "-o", "m"}, 3, "no-z.csv", "z_mm"},
+      {"a column left out",
+       {"train", "--cell", "${CELL}", "--batch", "no-z.csv", "-o", "m"},
+       3,
+       "no-z.csv",
+       "z_mm"},
       {"a column in metres",
        {"train", "--cell", "${CELL}", "--batch", "metres.csv", "-o", "m"},
        3,
@@ -220,9 +279,24 @@ const std::vector<Mistake>& mistakes() {
        "word.csv",
        "q2_deg",
        3},
-      {"a gap in a column", {"train", "--cell", "${CELL}", "--batch", "gap.csv", "-o", "m"}, 3, "gap.csv", "q2_deg", 3},
-      {"a row cut short", {"train", "--cell", "${CELL}", "--batch", "short.csv", "-o", "m"}, 3, "short.csv", "", 3},
-      {"a pose twice", {"train", "--cell", "${CELL}", "--batch", "twice.csv", "-o", "m"}, 3, "twice.csv", "pose_id", 3},
+      {"a gap in a column",
+       {"train", "--cell", "${CELL}", "--batch", "gap.csv", "-o", "m"},
+       3,
+       "gap.csv",
+       "q2_deg",
+       3},
+      {"a row cut short",
+       {"train", "--cell", "${CELL}", "--batch", "short.csv", "-o", "m"},
+       3,
+       "short.csv",
+       "",
+       3},
+      {"a pose twice",
+       {"train", "--cell", "${CELL}", "--batch", "twice.csv", "-o", "m"},
+       3,
+       "twice.csv",
+       "pose_id",
+       3},
       {"a joint beyond its limit",
        {"train", "--cell", "${CELL}", "--batch", "beyond.csv", "-o", "m"},
        3,
@@ -253,7 +327,11 @@ const std::vector<Mistake>& mistakes() {
        "rbf.yaml",
        "*",
        -1},
-      {"too few poses to diagnose", {"diagnose", "--cell", "${CELL}", "--batch", "few.csv"}, 3, "*", ""},
+      {"too few poses to diagnose",
+       {"diagnose", "--cell", "${CELL}", "--batch", "few.csv"},
+       3,
+       "*",
+       ""},
       // Found on a second walk.
       {"numbers without names above them",
        {"train", "--cell", "${CELL}", "--batch", "nohead.csv", "-o", "m"},
@@ -283,7 +361,13 @@ const std::vector<Mistake>& mistakes() {
        "q1_deg",
        0,
        "q1_rad"},
-      {"a joint too few", {"train", "--cell", "${CELL}", "--batch", "five.csv", "-o", "m"}, 3, "five.csv", "*", 0, ""},
+      {"a joint too few",
+       {"train", "--cell", "${CELL}", "--batch", "five.csv", "-o", "m"},
+       3,
+       "five.csv",
+       "*",
+       0,
+       ""},
       {"a quaternion of another length",
        {"train", "--cell", "${CELL}", "--batch", "quat.csv", "-o", "m"},
        3,
@@ -376,7 +460,8 @@ const std::vector<Mistake>& mistakes() {
        0,
        "another file"},
       {"a blank between sources",
-       {"train", "--cell", "${CELL}", "--batch", "${BATCH}", "--level", "M2 gear_transmission:3", "-o", "m"},
+       {"train", "--cell", "${CELL}", "--batch", "${BATCH}", "--level", "M2 gear_transmission:3",
+        "-o", "m"},
        2,
        "",
        "",
@@ -390,7 +475,8 @@ const std::vector<Mistake>& mistakes() {
        0,
        "M0 to M3"},
       {"a share that is no number",
-       {"train", "--cell", "${CELL}", "--batch", "${BATCH}", "--validation-share", "nan", "-o", "m"},
+       {"train", "--cell", "${CELL}", "--batch", "${BATCH}", "--validation-share", "nan", "-o",
+        "m"},
        2,
        "",
        "--validation-share"},
@@ -416,7 +502,13 @@ const std::vector<Mistake>& mistakes() {
        "--host",
        0,
        "line-3:17500"},
-      {"no such store", {"backup", "--store", "nothing.db", "-o", "m"}, 3, "nothing.db", "", 0, "server file"},
+      {"no such store",
+       {"backup", "--store", "nothing.db", "-o", "m"},
+       3,
+       "nothing.db",
+       "",
+       0,
+       "server file"},
       {"neither a cell nor models", {"history", "-o", "m"}, 2, "", "--cell"},
       {"a check of nothing", {"check", "--model", "${MODEL}"}, 2, "", "--batch", 0, "plan --check"},
       {"two results on standard output",
@@ -490,15 +582,28 @@ const std::vector<Mistake>& mistakes() {
        "",
        0,
        "--model"},
-      {"a cell that is an empty word", {"plan", "--cell", "", "--count", "5", "-o", "p"}, 2, "", "--cell", 0, "script"},
+      {"a cell that is an empty word",
+       {"plan", "--cell", "", "--count", "5", "-o", "p"},
+       2,
+       "",
+       "--cell",
+       0,
+       "script"},
       {"limits the wrong way round",
-       {"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml", "--plan", "plan.csv", "-o", "b"},
+       {"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml", "--plan", "plan.csv", "-o",
+        "b"},
        3,
        "turned.yaml",
        "*",
        -1},
       // Services.
-      {"no daemon", {"status", "--port", "17999", "--timeout", "0.3"}, 4, "", "*", 0, "trammel doctor"},
+      {"no daemon",
+       {"status", "--port", "17999", "--timeout", "0.3"},
+       4,
+       "",
+       "*",
+       0,
+       "trammel doctor"},
       {"a batch that is not there, for a daemon",
        {"submit", "--cell", "cell-7", "--batch", "btach.csv", "--timeout", "0.3"},
        3,
@@ -515,13 +620,15 @@ class Mistakes : public testing::Test {
   Mistakes() {
     folder_.write("batch.csv", kRows);
     folder_.write("plan.csv", kRows);
-    folder_.write("cell-7.yaml", with(test::read_file(test::shipped_cell_file()), "../models", kModels));
+    folder_.write("cell-7.yaml",
+                  with(test::read_file(test::shipped_cell_file()), "../models", kModels));
     std::filesystem::create_directory(folder_.file("folder"));
     folder_.write("empty.csv", "");
     folder_.write("empty.mod", "");
     folder_.write("random.src", "\x8f\x01\xe3\xff\x10\n\x99,\x02");
-    folder_.write("turned.yaml", with(test::read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"),
-                                      "[-170, 170]", "[170, -170]"));
+    folder_.write("turned.yaml",
+                  with(test::read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"),
+                       "[-170, 170]", "[170, -170]"));
     folder_.write("cut.model", "{\"format\": 3, \"content\": {\"cell");
     folder_.write("random.csv", "\x8f\x01\xe3\xff\x10\n\x99,\x02");
     folder_.write("batch.xlsx", std::string("PK\x03\x04\0\0\0", 7));
@@ -537,15 +644,19 @@ class Mistakes : public testing::Test {
     folder_.write("beyond.csv", with(kRows, "b,10.5,20.5", "b,10.5,200.5"));
     folder_.write("gripper.csv", with(with(kRows, "note", "tool_id"), "cold", "gripper"));
     folder_.write("few.csv", kRows);
-    folder_.write("misspelled.yaml", with(test::read_file(folder_.file("cell-7.yaml")), "gravity:", "gravty:"));
+    folder_.write("misspelled.yaml",
+                  with(test::read_file(folder_.file("cell-7.yaml")), "gravity:", "gravty:"));
     folder_.write("rbf.yaml", std::regex_replace(test::read_file(folder_.file("cell-7.yaml")),
                                                  std::regex("bias: [a-z]+"), "bias: rbf"));
-    const auto with_column = [&](const std::string& names, const std::string& first, const std::string& second) {
-      const std::string named = with(with(kRows, ",note\n", "," + names + "\n"), "1500.5,\n", "1500.5," + first + "\n");
+    const auto with_column = [&](const std::string& names, const std::string& first,
+                                 const std::string& second) {
+      const std::string named =
+          with(with(kRows, ",note\n", "," + names + "\n"), "1500.5,\n", "1500.5," + first + "\n");
       return with(named, "cold", second);
     };
     folder_.write("nohead.csv", kRows.substr(kRows.find('\n') + 1));
-    folder_.write("page.csv", "<!DOCTYPE html><html><table><tr><td>q1_deg</td></tr></table></html>\n");
+    folder_.write("page.csv",
+                  "<!DOCTYPE html><html><table><tr><td>q1_deg</td></tr></table></html>\n");
     folder_.write("rad.csv", with(kRows, "_deg", "_rad"));
     folder_.write("five.csv", with(with(kRows, ",q6_deg", ""), "20.5,0.5,1500.5", "20.5,1500.5"));
     folder_.write("quat.csv", with_column("qw,qx,qy,qz", "1,0,0,0", "1,1,0,0"));
@@ -563,8 +674,10 @@ class Mistakes : public testing::Test {
                                        "import zipfile; z = zipfile.ZipFile('real.xlsx', 'w'); "
                                        "z.writestr('xl/workbook.xml', '<workbook/>'); z.close()"});
     EXPECT_EQ(zipped.exit_code, 0) << zipped.err;
-    const std::string on_rail = with(test::read_file(folder_.file("cell-7.yaml")), "-275.yaml", "-275-on-rail.yaml");
-    folder_.write("rail.yaml", std::regex_replace(on_rail, std::regex("joint_ranges_deg:.*\n"), ""));
+    const std::string on_rail =
+        with(test::read_file(folder_.file("cell-7.yaml")), "-275.yaml", "-275-on-rail.yaml");
+    folder_.write("rail.yaml",
+                  std::regex_replace(on_rail, std::regex("joint_ranges_deg:.*\n"), ""));
     files_ = {{"${CELL}", folder_.file("cell-7.yaml")},
               {"${BATCH}", folder_.file("batch.csv")},
               {"${MODEL}", folder_.file("cut.model")},
@@ -634,30 +747,40 @@ TEST_F(Mistakes, EachIsRefusedWithWhatWhereAndTheNextStep) {
 }
 
 TEST_F(Mistakes, NearMissesNameWhatWasMeant) {
-  const auto said = [&](std::vector<std::string> words) { return run({"", std::move(words), 2, "", "", 0, ""}).err; };
+  const auto said = [&](std::vector<std::string> words) {
+    return run({"", std::move(words), 2, "", "", 0, ""}).err;
+  };
   EXPECT_NE(said({"pln"}).find("did you mean plan?"), std::string::npos);
   EXPECT_NE(said({"plan", "--cel", "x"}).find("did you mean --cell?"), std::string::npos);
-  EXPECT_NE(said({"train", "--validation", "0.1"}).find("did you mean --validation-share?"), std::string::npos);
-  EXPECT_NE(said({"plan", "--cell", "cell-7.yaml", "--count", "5", "--criterion", "observabilty", "-o", "p"})
+  EXPECT_NE(said({"train", "--validation", "0.1"}).find("did you mean --validation-share?"),
+            std::string::npos);
+  EXPECT_NE(said({"plan", "--cell", "cell-7.yaml", "--count", "5", "--criterion", "observabilty",
+                  "-o", "p"})
                 .find("did you mean observability?"),
             std::string::npos);
   EXPECT_NE(said({"help", "formts"}).find("did you mean formats?"), std::string::npos);
-  EXPECT_NE(
-      said({"train", "--cell", "misspelled.yaml", "--batch", "batch.csv", "-o", "m"}).find("did you mean gravity?"),
-      std::string::npos);
+  EXPECT_NE(said({"train", "--cell", "misspelled.yaml", "--batch", "batch.csv", "-o", "m"})
+                .find("did you mean gravity?"),
+            std::string::npos);
 }
 
 TEST_F(Mistakes, WordsSayWhatIsWrongInTheUnitsOfTheUser) {
-  const auto said = [&](std::vector<std::string> words) { return run({"", std::move(words), 2, "", "", 0, ""}).err; };
-  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const auto said = [&](std::vector<std::string> words) {
+    return run({"", std::move(words), 2, "", "", 0, ""}).err;
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
   const std::string count = said({"plan", "--cell", "cell-7.yaml", "--count", "abc", "-o", "p"});
   EXPECT_TRUE(has(count, "--count: abc is no whole number")) << count;
-  const std::string large = said({"plan", "--cell", "cell-7.yaml", "--count", "9999999", "-o", "p"});
+  const std::string large =
+      said({"plan", "--cell", "cell-7.yaml", "--count", "9999999", "-o", "p"});
   EXPECT_TRUE(has(large, "9999999 not in range 1 to 1000000")) << large;
-  const std::string model = said({"train", "--cell", "cell-7.yaml", "--batch", "cut.model", "-o", "m"});
+  const std::string model =
+      said({"train", "--cell", "cell-7.yaml", "--batch", "cut.model", "-o", "m"});
   EXPECT_TRUE(has(model, "this is a model file, not a batch")) << model;
-  const std::string limits =
-      said({"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml", "--plan", "plan.csv", "-o", "b"});
+  const std::string limits = said({"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml",
+                                   "--plan", "plan.csv", "-o", "b"});
   EXPECT_TRUE(has(limits, "lower limit 170 deg is not below upper limit -170 deg")) << limits;
   EXPECT_TRUE(has(limits, "row ")) << limits;
   const std::string cell = said({"plan", "--cell", "", "--count", "5", "-o", "p"});
@@ -666,28 +789,37 @@ TEST_F(Mistakes, WordsSayWhatIsWrongInTheUnitsOfTheUser) {
 
 TEST_F(Mistakes, AnOutputThatIsRefusedLeavesEveryFileAsItWas) {
   const std::string before = test::read_file(folder_.file("plan.csv"));
-  EXPECT_EQ(run({"", {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "plan.csv"}, 2}).exit_code, 2);
+  EXPECT_EQ(run({"", {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "plan.csv"}, 2})
+                .exit_code,
+            2);
   EXPECT_EQ(test::read_file(folder_.file("plan.csv")), before);
   EXPECT_EQ(
-      run({"", {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "p", "--krl", "no/p.src"}, 3}).exit_code,
+      run({"",
+           {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "p", "--krl", "no/p.src"},
+           3})
+          .exit_code,
       3);
   EXPECT_FALSE(std::filesystem::exists(folder_.file("p")));
 }
 
 TEST_F(Mistakes, AnOptionalColumnThatIsNearlyAKnownOneIsTold) {
   folder_.write("near.csv", with(kRows, "pose_id", "pose_ids"));
-  const std::string said = run({"", {"train", "--cell", "cell-7.yaml", "--batch", "near.csv", "-o", "m"}, 3}).err;
-  EXPECT_NE(said.find("near.csv: column pose_ids is not known and is left aside; pose_id was meant?"),
-            std::string::npos)
+  const std::string said =
+      run({"", {"train", "--cell", "cell-7.yaml", "--batch", "near.csv", "-o", "m"}, 3}).err;
+  EXPECT_NE(
+      said.find("near.csv: column pose_ids is not known and is left aside; pose_id was meant?"),
+      std::string::npos)
       << said;
 }
 
 TEST_F(Mistakes, ACheckOfAServerFileFindsWhatAStartOrAFirstTrainingWouldRefuse) {
-  folder_.write("complience.yaml", with(test::read_file(folder_.file("cell-7.yaml")), "compliance", "complience"));
+  folder_.write("complience.yaml",
+                with(test::read_file(folder_.file("cell-7.yaml")), "compliance", "complience"));
   folder_.write("server.yaml",
-                "version: 1\nserver: here\ncells: [rbf.yaml, complience.yaml]\nstore: no/such/folder/store.db\n");
-  const Finished checked =
-      test::run({TRAMMEL_BINARY_DIR "/server/trammeld", "--config", folder_.file("server.yaml"), "--check"});
+                "version: 1\nserver: here\ncells: [rbf.yaml, complience.yaml]\nstore: "
+                "no/such/folder/store.db\n");
+  const Finished checked = test::run(
+      {TRAMMEL_BINARY_DIR "/server/trammeld", "--config", folder_.file("server.yaml"), "--check"});
   EXPECT_EQ(checked.exit_code, 3);
   for (const char* part : {"rbf", "complience", "no/such/folder"})
     EXPECT_NE(checked.err.find(part), std::string::npos) << checked.err;

@@ -25,15 +25,16 @@ class NetworkTest : public testing::Test {
 
   void start(const std::string& dds) {
     const std::string text = test::read_file(daemon_.config_path());
-    ASSERT_TRUE(write_text_file(daemon_.config_path(), fmt::format("{}dds: {{address: {}, allow_network: true, {}}}\n",
-                                                                   text, hosts_.address(0), dds)));
+    ASSERT_TRUE(write_text_file(daemon_.config_path(),
+                                fmt::format("{}dds: {{address: {}, allow_network: true, {}}}\n",
+                                            text, hosts_.address(0), dds)));
     service_ = std::make_unique<test::Process>(hosts_.on(0, daemon_.command_line()));
     ASSERT_TRUE(service_->wait_for_line("ready", kLimit)) << service_->standard_error();
   }
   [[nodiscard]] std::vector<std::string> command(std::vector<std::string> words) const {
     words.insert(words.begin(), {TRAMMEL_BINARY_DIR "/clients/trammel"});
-    words.insert(words.end(), {"--host", fmt::format("{}:{}", hosts_.address(0), daemon_.port()), "--domain",
-                               std::to_string(daemon_.domain())});
+    words.insert(words.end(), {"--host", fmt::format("{}:{}", hosts_.address(0), daemon_.port()),
+                               "--domain", std::to_string(daemon_.domain())});
     return hosts_.on(1, std::move(words));
   }
   /// A command of the other host.
@@ -53,30 +54,35 @@ TEST_F(NetworkTest, AnotherHostSubmitsABatchAndHasItsTargetsCorrected) {
   const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
   ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
   const auto corrected = elsewhere({"correct", "--service", "--model", "cell-7",
-                                    TRAMMEL_SOURCE_DIR "/config/drill-panel.csv", "-o", folder_.file("corrected.csv")});
+                                    TRAMMEL_SOURCE_DIR "/config/drill-panel.csv", "-o",
+                                    folder_.file("corrected.csv")});
   EXPECT_EQ(corrected.exit_code, 0) << corrected.out << corrected.err;
 }
 
 #ifdef TRAMMEL_CYCLONE_CLIENT
-// As its maker ships it Cyclone DDS sends datagrams of up to 14720 bytes, which IP cuts into frames; ours are of 1400.
+// As its maker ships it Cyclone DDS sends datagrams of up to 14720 bytes, which IP cuts into
+// frames; ours are of 1400.
 TEST_F(NetworkTest, ACycloneClientAsItsMakerShipsItIsAnsweredHoweverMuchItAsks) {
   start("without_security: true");
   const std::string batch = folder_.write("batch.csv", test::virtual_batch_csv(120, 3));
   const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
   ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
-  for (const char* sizes : {"", "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"}) {
+  for (const char* sizes :
+       {"", "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"}) {
     const std::string uri = fmt::format(
         "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"{}\" "
-        "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>{}</General><Discovery>"
-        "<ParticipantIndex>none</ParticipantIndex><Peers><Peer address=\"{}:{}\"/></Peers></Discovery></Domain>"
-        "</CycloneDDS>",
+        "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>{}</"
+        "General><Discovery><ParticipantIndex>none</ParticipantIndex><Peers><Peer "
+        "address=\"{}:{}\"/></Peers></Discovery></Domain></CycloneDDS>",
         hosts_.address(1), sizes, hosts_.address(0), daemon_.port());
     for (const char* poses : {"100", "2000"}) {
-      const auto client = test::run(hosts_.on(1, {"/usr/bin/env", uri, TRAMMEL_CYCLONE_CLIENT,
-                                                  std::to_string(daemon_.domain()), "cell-7", "10", poses}),
-                                    kLimit);
+      const auto client =
+          test::run(hosts_.on(1, {"/usr/bin/env", uri, TRAMMEL_CYCLONE_CLIENT,
+                                  std::to_string(daemon_.domain()), "cell-7", "10", poses}),
+                    kLimit);
       EXPECT_EQ(client.exit_code, 0) << client.out << client.err;
-      EXPECT_NE(client.out.find(fmt::format("items={}\n", poses)), std::string::npos) << client.out << client.err;
+      EXPECT_NE(client.out.find(fmt::format("items={}\n", poses)), std::string::npos)
+          << client.out << client.err;
     }
   }
 }
@@ -94,7 +100,8 @@ TEST_F(NetworkTest, AfterItsInterfaceWasGoneTheServiceAnswersAgain) {
 }
 
 TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
-  const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder_.file("plant");
+  const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys",
+                    plant = folder_.file("plant");
   ASSERT_EQ(test::run({keys, "init", plant}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "server", "line-3"}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "observer", "office"}).exit_code, 0);
@@ -103,21 +110,24 @@ TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
   EXPECT_EQ(plain.exit_code, 4) << plain.out << plain.err;
   const auto known = elsewhere({"status", "--security", plant + "/participants/office"});
   EXPECT_EQ(known.exit_code, 0) << known.out << known.err;
-  const auto forbidden = elsewhere({"rollback", "--cell", "cell-7", "--security", plant + "/participants/office"});
+  const auto forbidden =
+      elsewhere({"rollback", "--cell", "cell-7", "--security", plant + "/participants/office"});
   EXPECT_EQ(forbidden.exit_code, 3) << forbidden.out << forbidden.err;
 }
 
 TEST_F(NetworkTest, WhatSomebodyOnTheLineSendsAgainHappensOnce) {
-  const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder_.file("plant");
+  const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys",
+                    plant = folder_.file("plant");
   ASSERT_EQ(test::run({keys, "init", plant}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "server", "line-3"}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "engineer", "office"}).exit_code, 0);
   start("security: " + plant + "/participants/line-3");
   const std::string office = plant + "/participants/office";
   for (const char* id : {"first", "second"}) {
-    const std::string batch = folder_.write(std::string(id) + ".csv", test::virtual_batch_csv(80, id[0]));
-    const auto submitted =
-        elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--id", id, "--watch", "--security", office});
+    const std::string batch =
+        folder_.write(std::string(id) + ".csv", test::virtual_batch_csv(80, id[0]));
+    const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--id", id,
+                                      "--watch", "--security", office});
     ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
   }
   const auto changes = [&] {
@@ -139,35 +149,41 @@ std::string many_targets(int count) {
   return text;
 }
 
-/// A line that loses every twentieth frame, holds each back for 50 ms and lets them overtake each other.
+/// A line that loses every twentieth frame, holds each back for 50 ms and lets them overtake each
+/// other.
 class BadLineTest : public NetworkTest {
  protected:
-  BadLineTest() : NetworkTest({0.05, std::chrono::milliseconds(50), std::chrono::milliseconds(20)}) {}
+  BadLineTest()
+      : NetworkTest({0.05, std::chrono::milliseconds(50), std::chrono::milliseconds(20)}) {}
 
   /// A model is learned from a batch that comes over the line.
   void learn() {
     const std::string batch = folder_.write("batch.csv", test::virtual_batch_csv(120, 3));
     const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
     ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
-    const auto fetched = elsewhere({"export", "--model", "cell-7", "-o", folder_.file("cell.model")});
+    const auto fetched =
+        elsewhere({"export", "--model", "cell-7", "-o", folder_.file("cell.model")});
     ASSERT_EQ(fetched.exit_code, 0) << fetched.out << fetched.err;
   }
   /// What this host makes of the program with the model's file.
   [[nodiscard]] std::string corrected_here(const std::string& program) const {
-    const auto done = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "correct", "--model",
-                                 folder_.file("cell.model"), program, "-o", folder_.file("here.csv")});
+    const auto done =
+        test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "correct", "--model",
+                   folder_.file("cell.model"), program, "-o", folder_.file("here.csv")});
     EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
     return test::read_file(folder_.file("here.csv"));
   }
   [[nodiscard]] std::vector<std::string> correct(const std::string& program) const {
-    return {"correct", "--service", "--model", "cell-7", program, "-o", folder_.file("there.csv"), "--timeout", "20"};
+    return {"correct",   "--service", "--model", "cell-7", program, "-o", folder_.file("there.csv"),
+            "--timeout", "20"};
   }
 };
 
 TEST_F(BadLineTest, EveryAnswerOverItIsTheRightOne) {
   start("without_security: true");
   learn();
-  const std::string program = TRAMMEL_SOURCE_DIR "/config/drill-panel.csv", wanted = corrected_here(program);
+  const std::string program = TRAMMEL_SOURCE_DIR "/config/drill-panel.csv",
+                    wanted = corrected_here(program);
   for (int i = 0; i < 5; ++i) {
     const auto corrected = elsewhere(correct(program));
     ASSERT_EQ(corrected.exit_code, 0) << corrected.out << corrected.err;
@@ -178,7 +194,8 @@ TEST_F(BadLineTest, EveryAnswerOverItIsTheRightOne) {
 TEST_F(BadLineTest, ALongProgramOutlastsACutOfFiveSeconds) {
   start("without_security: true");
   learn();
-  const std::string program = folder_.write("long.csv", many_targets(3000)), wanted = corrected_here(program);
+  const std::string program = folder_.write("long.csv", many_targets(3000)),
+                    wanted = corrected_here(program);
   const std::uint64_t before = hosts_.carried();
   test::Process correcting(command(correct(program)));
   hosts_.wait_until_carried(before + 200);  // some parts are answered

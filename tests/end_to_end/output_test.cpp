@@ -55,9 +55,9 @@ std::vector<std::string> with_errors_to(int descriptor, const std::vector<std::s
 }
 
 bool answers(const test::Daemon& daemon) {
-  const auto status =
-      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--service", "--port", std::to_string(daemon.port()),
-                 "--domain", std::to_string(daemon.domain()), "--timeout", "20"});
+  const auto status = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--service",
+                                 "--port", std::to_string(daemon.port()), "--domain",
+                                 std::to_string(daemon.domain()), "--timeout", "20"});
   return status.exit_code == 0;
 }
 
@@ -94,8 +94,8 @@ TEST(OutputTest, AFileThatMayGrowNoFurtherRefusesChangesAndEndsNothing) {
   ASSERT_TRUE(session) << session.error().message;
   std::optional<Error> refused;
   for (int i = 0; i < 40 && !refused; ++i) {
-    const auto job =
-        (*session)->submit_measurements("cell-7", "lt-" + std::to_string(i), test::virtual_batch_csv(200, 1));
+    const auto job = (*session)->submit_measurements("cell-7", "lt-" + std::to_string(i),
+                                                     test::virtual_batch_csv(200, 1));
     if (!job) refused = job.error();
   }
   ASSERT_TRUE(refused);

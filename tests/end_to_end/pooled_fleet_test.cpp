@@ -1,5 +1,5 @@
-// Servers whose record is behind a pooler that shares connections by transaction: a longer run, in which all of them
-// change something all the time.
+// Servers whose record is behind a pooler that shares connections by transaction: a longer run, in
+// which all of them change something all the time.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -44,9 +44,9 @@ class PooledFleet : public testing::Test {
     std::set<std::int64_t> jobs;
     for (int i = 0; i < kDecisions; ++i) {
       if (i % (kDecisions / kBatches) == 0 && jobs.size() < std::size_t{kBatches}) {
-        const auto job =
-            session->submit_measurements("cell-7", fmt::format("{}-{}", seed, i),
-                                         test::virtual_batch_csv(40, 100 * seed + static_cast<std::uint64_t>(i)));
+        const auto job = session->submit_measurements(
+            "cell-7", fmt::format("{}-{}", seed, i),
+            test::virtual_batch_csv(40, 100 * seed + static_cast<std::uint64_t>(i)));
         EXPECT_TRUE(job) << sentence(job.error());
         jobs.insert(job.value_or(0));
       }
@@ -71,8 +71,8 @@ class PooledFleet : public testing::Test {
 TEST_F(PooledFleet, ChangesAllTheTimeAndLosesNothing) {
   const auto session = session_with(first_), other = session_with(second_);
   for (const std::uint64_t seed : {1, 2}) {
-    const auto job =
-        session->submit_measurements("cell-7", fmt::format("b{}", seed), test::virtual_batch_csv(60, seed));
+    const auto job = session->submit_measurements("cell-7", fmt::format("b{}", seed),
+                                                  test::virtual_batch_csv(60, seed));
     ASSERT_TRUE(job) << sentence(job.error());
     ASSERT_TRUE(session->wait_for_job(*job, kLimit, nullptr));
   }
@@ -89,15 +89,19 @@ TEST_F(PooledFleet, ChangesAllTheTimeAndLosesNothing) {
     EXPECT_GT(over->model_version, 0) << over->what;
   }
   const auto in_force = [&] {
-    return std::stoi(database_.sql(direct_, "SELECT version FROM activations ORDER BY number DESC LIMIT 1"));
+    return std::stoi(
+        database_.sql(direct_, "SELECT version FROM activations ORDER BY number DESC LIMIT 1"));
   };
   const auto until = std::chrono::steady_clock::now() + seconds(20);
-  while ((served(*session) != in_force() || served(*other) != in_force()) && std::chrono::steady_clock::now() < until)
+  while ((served(*session) != in_force() || served(*other) != in_force()) &&
+         std::chrono::steady_clock::now() < until)
     continue;
   EXPECT_EQ(served(*session), in_force());
   EXPECT_EQ(served(*other), in_force());
-  EXPECT_EQ(database_.sql(direct_, "SELECT count(*) FROM batches"), fmt::format("{}\n", 2 + 2 * kBatches));
-  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", direct_}).exit_code, 0);
+  EXPECT_EQ(database_.sql(direct_, "SELECT count(*) FROM batches"),
+            fmt::format("{}\n", 2 + 2 * kBatches));
+  EXPECT_EQ(
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", direct_}).exit_code, 0);
 }
 
 }  // namespace

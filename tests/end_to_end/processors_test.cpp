@@ -1,4 +1,5 @@
-// The command line on machines other than this one: older processors, another library of linear algebra.
+// The command line on machines other than this one: older processors, another library of linear
+// algebra.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -22,17 +23,20 @@ class Processors : public testing::Test {
     return finished;
   }
   void measure() {
-    run("TRAMMEL_NUMERICS=", {"plan", "--cell", kCell, "--count", "100", "-o", folder_.file("plan.csv")});
     run("TRAMMEL_NUMERICS=",
-        {"simulate", "--cell", kCell, "--truth", kTruth, "--plan", folder_.file("plan.csv"), "-o", batch_});
+        {"plan", "--cell", kCell, "--count", "100", "-o", folder_.file("plan.csv")});
+    run("TRAMMEL_NUMERICS=", {"simulate", "--cell", kCell, "--truth", kTruth, "--plan",
+                              folder_.file("plan.csv"), "-o", batch_});
   }
   /// What the model leaves that is trained there.
   [[nodiscard]] double left_mm(const std::string& setting) const {
-    run(setting, {"train", "--cell", kCell, "--batch", batch_, "--level", "M2", "--bias", "se", "-o", model_});
+    run(setting, {"train", "--cell", kCell, "--batch", batch_, "--level", "M2", "--bias", "se",
+                  "-o", model_});
     return evaluated_mm(setting);
   }
   [[nodiscard]] double evaluated_mm(const std::string& setting) const {
-    const auto printed = run(setting, {"evaluate", "--model", model_, "--batch", batch_, "--json", "-"}).out;
+    const auto printed =
+        run(setting, {"evaluate", "--model", model_, "--batch", batch_, "--json", "-"}).out;
     return nlohmann::json::parse(printed).at("rms_mm").get<double>();
   }
 
@@ -52,14 +56,16 @@ TEST_F(Processors, EachTrainsAModelThatIsAsGood) {
 }
 
 TEST_F(Processors, WithAnotherLibraryOfLinearAlgebraTheModelIsAsGoodAndBothReadIt) {
-  const std::string libraries = "/usr/lib/x86_64-linux-gnu/", of_netlib = libraries + "blas:" + libraries + "lapack",
+  const std::string libraries = "/usr/lib/x86_64-linux-gnu/",
+                    of_netlib = libraries + "blas:" + libraries + "lapack",
                     openblas = libraries + "openblas-pthread";
   for (const std::string& file : {libraries + "blas/libblas.so.3", openblas + "/libblas.so.3"})
     ASSERT_TRUE(std::filesystem::exists(file)) << file << ": deploy/dependencies installs it";
   measure();
   const double there_mm = left_mm("LD_LIBRARY_PATH=" + of_netlib);
   EXPECT_NEAR(left_mm("LD_LIBRARY_PATH=" + openblas), there_mm, 1e-4);
-  EXPECT_NEAR(evaluated_mm("LD_LIBRARY_PATH=" + of_netlib), there_mm, 1e-4) << "the other one's model";
+  EXPECT_NEAR(evaluated_mm("LD_LIBRARY_PATH=" + of_netlib), there_mm, 1e-4)
+      << "the other one's model";
 }
 
 }  // namespace

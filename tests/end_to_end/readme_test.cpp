@@ -24,8 +24,8 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-/// The blocks of commands (lines that are indented by four blanks) below `heading` of the README; "" is what stands
-/// before the first.
+/// The blocks of commands (lines that are indented by four blanks) below `heading` of the README;
+/// "" is what stands before the first.
 std::vector<std::vector<std::string>> commands_below(const std::string& heading) {
   std::ifstream readme(fs::path(TRAMMEL_SOURCE_DIR) / "README.md");
   std::vector<std::vector<std::string>> blocks;
@@ -64,7 +64,8 @@ TEST(Readme, TheFiveLinesRunAsTheyStandOnABuiltClone) {
   const std::string corrected = text_of(clone / "build/corrected.csv");
   std::istringstream lines(corrected);
   int holes = 0;
-  for (std::string line; std::getline(lines, line);) holes += line.find(",ok,") != std::string::npos ? 1 : 0;
+  for (std::string line; std::getline(lines, line);)
+    holes += line.find(",ok,") != std::string::npos ? 1 : 0;
   EXPECT_EQ(holes, 35) << corrected;
 }
 
@@ -85,19 +86,23 @@ TEST(Readme, TheWorkflowThatItNamesIsThere) {
                     workflow = "cmake --workflow --preset ";
   const auto at = readme.find(workflow);
   ASSERT_NE(at, std::string::npos);
-  const std::string name = readme.substr(at + workflow.size(), readme.find('`', at) - at - workflow.size());
-  const auto presets = nlohmann::json::parse(text_of(fs::path(TRAMMEL_SOURCE_DIR) / "CMakePresets.json"));
+  const std::string name =
+      readme.substr(at + workflow.size(), readme.find('`', at) - at - workflow.size());
+  const auto presets =
+      nlohmann::json::parse(text_of(fs::path(TRAMMEL_SOURCE_DIR) / "CMakePresets.json"));
   const auto& known = presets.at("workflowPresets");
-  EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const auto& preset) { return preset.at("name") == name; }))
-      << name;
+  EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const auto& preset) {
+    return preset.at("name") == name;
+  })) << name;
 }
 
 /// Every file that a page of the project links to or names as a place to look.
 TEST(Readme, EveryLinkOfEveryPageLeadsToAFile) {
   const fs::path root = TRAMMEL_SOURCE_DIR;
   std::vector<fs::path> pages;
-  for (const fs::path& entry : {root, root / "server", root / "idl", root / "config", root / "models", root / "tests",
-                                root / "clients", root / "deploy"}) {
+  for (const fs::path& entry :
+       {root, root / "server", root / "idl", root / "config", root / "models", root / "tests",
+        root / "clients", root / "deploy"}) {
     if (!fs::exists(entry)) continue;
     if (entry == root) {
       for (const auto& file : fs::directory_iterator(root)) {

@@ -19,15 +19,16 @@ class ReplayTest : public testing::Test {
  protected:
   void SetUp() override {
     const std::string text = test::read_file(daemon_.config_path());
-    ASSERT_TRUE(write_text_file(daemon_.config_path(),
-                                text + fmt::format("record: {{folder: {}, max_mb: 8}}\n", folder_.file("records"))));
+    ASSERT_TRUE(write_text_file(
+        daemon_.config_path(),
+        text + fmt::format("record: {{folder: {}, max_mb: 8}}\n", folder_.file("records"))));
     daemon_.start();
     auto opened = client::Session::open(daemon_.session_options());
     ASSERT_TRUE(opened) << sentence(opened.error());
     session_ = std::move(*opened);
     for (const std::uint64_t seed : {1, 2}) {
-      const auto job =
-          session_->submit_measurements("cell-7", fmt::format("b{}", seed), test::virtual_batch_csv(60, seed));
+      const auto job = session_->submit_measurements("cell-7", fmt::format("b{}", seed),
+                                                     test::virtual_batch_csv(60, seed));
       ASSERT_TRUE(job) << sentence(job.error());
       ASSERT_TRUE(session_->wait_for_job(*job, kLimit, nullptr));
     }
@@ -56,13 +57,14 @@ class ReplayTest : public testing::Test {
     return folder_.file(fmt::format("cell-7-{}.model", version));
   }
   [[nodiscard]] test::Finished replay(int version, const std::string& records) const {
-    return test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model", model_file(version), records,
-                      "--strict", "--json", "-"},
+    return test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model",
+                      model_file(version), records, "--strict", "--json", "-"},
                      kLimit);
   }
   [[nodiscard]] std::string only_record() const {
     std::string path;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_.file("records"))) path = entry.path();
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.file("records")))
+      path = entry.path();
     return path;
   }
 
@@ -99,21 +101,26 @@ TEST_F(ReplayTest, ANumberThatWasChangedAfterwardsIsNamedAndHalfALastLineIsLeftO
   EXPECT_EQ(changed.exit_code, 1) << changed.out << changed.err;
   const json told = json::parse(changed.out);
   EXPECT_EQ(told.at("different"), 1);
-  EXPECT_NE(told.at("largest").at(0).at("what").get<std::string>().find("row 3 item 1"), std::string::npos)
+  EXPECT_NE(told.at("largest").at(0).at("what").get<std::string>().find("row 3 item 1"),
+            std::string::npos)
       << told.dump();
   ASSERT_EQ(told.at("half_lines").size(), 1u);
-  EXPECT_TRUE(told.at("half_lines").at(0).get<std::string>().ends_with("changed.jsonl row 4")) << told.dump();
+  EXPECT_TRUE(told.at("half_lines").at(0).get<std::string>().ends_with("changed.jsonl row 4"))
+      << told.dump();
 }
 
 TEST_F(ReplayTest, HalfALastLineAndAnEmptyFileAreSaid) {
   const auto replayed = [&](const std::string& name, const std::string& text) {
-    return test::run(
-        {TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model", model_file(1), folder_.write(name, text)}, kLimit);
+    return test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model", model_file(1),
+                      folder_.write(name, text)},
+                     kLimit);
   };
   const std::string text = test::read_file(only_record());
   const auto half = replayed("half.jsonl", text + text.substr(0, 100));
   EXPECT_EQ(half.exit_code, 0) << half.err;
-  EXPECT_NE(half.out.find("half.jsonl row 4: the last line is half and is left out"), std::string::npos) << half.out;
+  EXPECT_NE(half.out.find("half.jsonl row 4: the last line is half and is left out"),
+            std::string::npos)
+      << half.out;
   const auto empty = replayed("empty.jsonl", "");
   EXPECT_EQ(empty.out, "no requests recorded there\n");
   EXPECT_EQ(empty.exit_code, 0) << empty.err;
@@ -124,7 +131,8 @@ TEST_F(ReplayTest, AnotherDomainAnotherBranchAndAnErrorThatWasNotKnownAreDiffere
   const auto differs = [&](const std::string& now, const std::string& then) {
     const std::size_t at = text.find(now);
     EXPECT_NE(at, std::string::npos) << now;
-    const auto replayed = replay(1, folder_.write("then.jsonl", std::string(text).replace(at, now.size(), then)));
+    const auto replayed =
+        replay(1, folder_.write("then.jsonl", std::string(text).replace(at, now.size(), then)));
     EXPECT_EQ(replayed.exit_code, 1) << replayed.err;
     return json::parse(replayed.out).at("different");
   };
@@ -142,7 +150,8 @@ TEST_F(ReplayTest, ADamagedLineIsLeftOutAndSaidWithItsPlace) {
   EXPECT_EQ(told.at("requests"), 3);
   EXPECT_EQ(told.at("different"), 0);
   EXPECT_EQ(told.at("damaged_lines"), 1);
-  EXPECT_NE(told.at("first_damaged").get<std::string>().find("row 2"), std::string::npos) << told.dump();
+  EXPECT_NE(told.at("first_damaged").get<std::string>().find("row 2"), std::string::npos)
+      << told.dump();
 }
 
 TEST_F(ReplayTest, OfTheRecordsOfSeveralCellsThoseOfTheModelsCellAreAskedAgain) {

@@ -1,5 +1,5 @@
-// An update that goes from server to server: programs of two schemas on one record. The newer ones are built for this
-// test (tests/CMakeLists.txt).
+// An update that goes from server to server: programs of two schemas on one record. The newer ones
+// are built for this test (tests/CMakeLists.txt).
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -20,7 +20,8 @@ namespace {
 using std::chrono::seconds;
 constexpr seconds kLimit{180};
 
-const std::string kOlder = test::trammeld_path(), kNewer = TRAMMEL_BINARY_DIR "/tests/trammeld_next";
+const std::string kOlder = test::trammeld_path(),
+                  kNewer = TRAMMEL_BINARY_DIR "/tests/trammeld_next";
 
 /// A server whose program may become another one.
 class Server {
@@ -61,7 +62,8 @@ class RollingUpdate : public testing::Test {
   /// The version that a batch given to this server leads to.
   static int made_from(const Server& daemon, const std::string& batch, std::uint64_t seed) {
     const auto session = session_with(daemon);
-    const auto job = session->submit_measurements("cell-7", batch, test::virtual_batch_csv(60, seed));
+    const auto job =
+        session->submit_measurements("cell-7", batch, test::virtual_batch_csv(60, seed));
     EXPECT_TRUE(job) << sentence(job.error());
     const auto over = session->wait_for_job(job.value_or(0), kLimit, nullptr);
     EXPECT_TRUE(over) << sentence(over.error());
@@ -98,7 +100,8 @@ class RollingUpdate : public testing::Test {
 };
 
 TEST_F(RollingUpdate, GoesFromServerToServerWhileBothProgramsTakeChangesTrainAndServe) {
-  EXPECT_NE(why_not(first_, kNewer).find("trammel store init"), std::string::npos) << "the record comes first";
+  EXPECT_NE(why_not(first_, kNewer).find("trammel store init"), std::string::npos)
+      << "the record comes first";
   first_.start(kOlder);
   second_.start(kOlder);
   ASSERT_EQ(made_from(first_, "b1", 1), 1);
@@ -123,7 +126,8 @@ TEST_F(RollingUpdate, GoesFromServerToServerWhileBothProgramsTakeChangesTrainAnd
   second_.start(kNewer);
   EXPECT_EQ(made_from(second_, "b5", 5), 5);
   put_in_force(second_, 3);
-  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", url_}).exit_code, 0);
+  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", url_}).exit_code,
+            0);
 
   // What a release says after that which needs it: older ones are let in no more.
   database_.sql(url_, "UPDATE trammel_schema SET works_from = 4");

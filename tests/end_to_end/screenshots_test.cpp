@@ -28,8 +28,8 @@ constexpr std::size_t kHeaviest = 1'500'000;              // bytes of a page
 constexpr std::chrono::minutes kLimit{2};
 const fs::path kPictures = TRAMMEL_BINARY_DIR "/tests/screenshots";
 
-/// Of a page: what stands out of its window, what is drawn on each canvas, where its links lead. A canvas that holds
-/// few coloured points, or all of them in a corner, as axes stand, is empty.
+/// Of a page: what stands out of its window, what is drawn on each canvas, where its links lead. A
+/// canvas that holds few coloured points, or all of them in a corner, as axes stand, is empty.
 constexpr const char* kLook = R"(
   const coloured = canvas => {
     const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -77,7 +77,8 @@ trammel correct --model cell.model "$PROGRAM" -o corrected.mod --tolerance 0.2 -
 
 std::string spelled(const std::string& text) {
   std::string name;
-  for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+  for (const char c : text)
+    name += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
   return name;
 }
 
@@ -107,7 +108,8 @@ class Screenshots : public testing::Test {
       const json seen = browser_->run(kLook);
       expect_sound(seen, width);
       if (!seen.is_object()) return links;
-      for (const json& link : seen.value("links", json::array())) links.insert(link.get<std::string>());
+      for (const json& link : seen.value("links", json::array()))
+        links.insert(link.get<std::string>());
       keep_picture(page, width, seen.value("height", 900));
     }
     EXPECT_EQ(browser_->complaints(), std::vector<std::string>());
@@ -124,7 +126,8 @@ class Screenshots : public testing::Test {
       EXPECT_GT(points.get<int>(), 60) << canvas << " is empty";
     const std::string text = seen["text"];
     for (const char* wrong : {"undefined", "NaN", "{{", "[object", " um ", "[nan]"})
-      EXPECT_EQ(text.find(wrong), std::string::npos) << wrong << " at " << text.substr(text.find(wrong) - 20, 60);
+      EXPECT_EQ(text.find(wrong), std::string::npos)
+          << wrong << " at " << text.substr(text.find(wrong) - 20, 60);
     static const std::regex kDay("20[0-9]{2}-[01][0-9]-[0-3][0-9]");
     EXPECT_TRUE(std::regex_search(text, kDay)) << "no date at " << width;
   }
@@ -133,7 +136,8 @@ class Screenshots : public testing::Test {
     const std::string picture = browser_->screenshot();
     ASSERT_GT(picture.size(), 4000u);
     EXPECT_EQ(picture.substr(1, 3), "PNG");
-    std::ofstream(kPictures / fmt::format("{}-{}.png", page.name, width), std::ios::binary) << picture;
+    std::ofstream(kPictures / fmt::format("{}-{}.png", page.name, width), std::ios::binary)
+        << picture;
   }
 
   std::optional<test::WebBrowser> browser_;
@@ -146,10 +150,13 @@ class PagesOfFiles : public Screenshots {
     if (IsSkipped()) return;
     std::string cell = test::read_file(test::shipped_cell_file());
     cell.replace(cell.find("../models"), 9, TRAMMEL_SOURCE_DIR "/models");
-    folder_.write("cell.yaml",
-                  cell + "serial_number: 66-40123\ninstrument: AT960\noperator: I. Newton\ntolerance_mm: 0.2\n");
+    folder_.write(
+        "cell.yaml",
+        cell +
+            "serial_number: 66-40123\ninstrument: AT960\noperator: I. Newton\ntolerance_mm: 0.2\n");
     const test::Finished made = test::run(
-        {"/usr/bin/env", "-C", folder_.path(), "TRAMMEL_DEFAULTS=", "PATH=" TRAMMEL_BINARY_DIR "/clients:/usr/bin:/bin",
+        {"/usr/bin/env", "-C", folder_.path(),
+         "TRAMMEL_DEFAULTS=", "PATH=" TRAMMEL_BINARY_DIR "/clients:/usr/bin:/bin",
          "TRUTH=" TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml",
          "PROGRAM=" TRAMMEL_SOURCE_DIR "/config/programs/drill.mod", "/bin/bash", "-c", kRun},
         kLimit);
@@ -160,7 +167,8 @@ class PagesOfFiles : public Screenshots {
 
 TEST_F(PagesOfFiles, AreWholeAtEverySizeDatedAndLinkedToEachOther) {
   std::map<std::string, std::set<std::string>> links;
-  for (const char* page : {"diagnosis", "model", "model-and-batch", "health", "history", "fleet", "program"}) {
+  for (const char* page :
+       {"diagnosis", "model", "model-and-batch", "health", "history", "fleet", "program"}) {
     const std::string file = folder_.file(std::string(page) + ".html");
     links[page] = look_at({"file://" + file, page, fs::file_size(file)});
     for (const std::string& link : links[page]) {
@@ -169,7 +177,8 @@ TEST_F(PagesOfFiles, AreWholeAtEverySizeDatedAndLinkedToEachOther) {
     }
   }
   EXPECT_TRUE(links["model"].contains("./diagnosis.html"));
-  for (const char* beside : {"./model.html", "./diagnosis.html", "./health.html", "./history.html", "./fleet.html"})
+  for (const char* beside :
+       {"./model.html", "./diagnosis.html", "./health.html", "./history.html", "./fleet.html"})
     EXPECT_TRUE(links["program"].contains(beside)) << beside;
   for (const char* page : {"model", "health", "history", "program", "diagnosis"}) {
     const std::string text = test::read_file(folder_.file(std::string(page) + ".html"));
@@ -184,8 +193,9 @@ class PagesOfAService : public Screenshots {
     Screenshots::SetUp();
     if (IsSkipped()) return;
     port_ = static_cast<std::uint16_t>(daemon_.port() + 1);
-    ASSERT_TRUE(write_text_file(daemon_.config_path(),
-                                test::read_file(daemon_.config_path()) + fmt::format("http: {{port: {}}}\n", port_)));
+    ASSERT_TRUE(write_text_file(
+        daemon_.config_path(),
+        test::read_file(daemon_.config_path()) + fmt::format("http: {{port: {}}}\n", port_)));
     daemon_.start();
     folder_.write("batch.csv", test::virtual_batch_csv(60, 1));
     folder_.write("few.csv", test::virtual_batch_csv(12, 5));
@@ -199,8 +209,8 @@ class PagesOfAService : public Screenshots {
     std::vector<std::string> argv = {"/usr/bin/env", "-C", folder_.path(),
                                      "TRAMMEL_DEFAULTS=", TRAMMEL_BINARY_DIR "/clients/trammel"};
     argv.insert(argv.end(), words.begin(), words.end());
-    argv.insert(argv.end(), {"--port", std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain()),
-                             "--timeout", "60"});
+    argv.insert(argv.end(), {"--port", std::to_string(daemon_.port()), "--domain",
+                             std::to_string(daemon_.domain()), "--timeout", "60"});
     const test::Finished done = test::run(argv, kLimit);
     EXPECT_LE(done.exit_code.value_or(9), 1) << words[0] << ": " << done.out << done.err;
   }
@@ -222,8 +232,10 @@ TEST_F(PagesOfAService, AreWholeAtEverySizeAndEveryLinkLeadsToOneOfThem) {
     const test::HttpAnswer answer = test::http_get(port_, path);
     EXPECT_EQ(answer.code, 200) << path;
     if (answer.headers.at("Content-Type").starts_with("application/json")) continue;
-    EXPECT_EQ(answer.headers.at("Content-Security-Policy").find("unsafe"), std::string::npos) << path;
-    const std::set<std::string> links = look_at({address(path), "service" + spelled(path), answer.body.size()});
+    EXPECT_EQ(answer.headers.at("Content-Security-Policy").find("unsafe"), std::string::npos)
+        << path;
+    const std::set<std::string> links =
+        look_at({address(path), "service" + spelled(path), answer.body.size()});
     if (path == "/cells/cell-7") {
       for (const char* found : {"/jobs/2/findings", "/jobs/3/findings", "/cells/cell-7/models/1"})
         EXPECT_TRUE(links.contains(found)) << "the cell does not lead to " << found;
@@ -233,8 +245,9 @@ TEST_F(PagesOfAService, AreWholeAtEverySizeAndEveryLinkLeadsToOneOfThem) {
       left.insert(link);
     }
   }
-  for (const char* path : {"/jobs", "/jobs/1", "/jobs/2/findings", "/jobs/3/findings", "/cells/cell-7",
-                           "/cells/cell-7/models/1", "/cells/cell-7/history", "/fleet"})
+  for (const char* path :
+       {"/jobs", "/jobs/1", "/jobs/2/findings", "/jobs/3/findings", "/cells/cell-7",
+        "/cells/cell-7/models/1", "/cells/cell-7/history", "/fleet"})
     EXPECT_TRUE(seen.contains(path)) << path << " is not reached";
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
 }

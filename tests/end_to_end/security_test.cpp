@@ -1,4 +1,5 @@
-// Who may do what: a daemon and clients with certificates and permissions as deploy/security/keys makes them.
+// Who may do what: a daemon and clients with certificates and permissions as deploy/security/keys
+// makes them.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -23,7 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::seconds;
 constexpr seconds kLimit{30};
-constexpr std::chrono::milliseconds kInVain{2500};  // a participant that is refused tries again once a second
+constexpr std::chrono::milliseconds kInVain{
+    2500};  // a participant that is refused tries again once a second
 
 /// Authorities and participants, made once for all tests of this process.
 class Keys {
@@ -62,10 +64,13 @@ class SecurityTest : public testing::Test {
  protected:
   void SetUp() override {
     const std::string text = test::read_file(daemon_.config_path());
-    ASSERT_TRUE(write_text_file(daemon_.config_path(), text + "dds: {security: " + keys().of("server", "line-3") +
-                                                           "}\nhttp: {port: " + std::to_string(http()) + "}\n"));
+    ASSERT_TRUE(write_text_file(daemon_.config_path(),
+                                text + "dds: {security: " + keys().of("server", "line-3") +
+                                    "}\nhttp: {port: " + std::to_string(http()) + "}\n"));
   }
-  [[nodiscard]] std::uint16_t http() const { return static_cast<std::uint16_t>(daemon_.port() + 1); }
+  [[nodiscard]] std::uint16_t http() const {
+    return static_cast<std::uint16_t>(daemon_.port() + 1);
+  }
   [[nodiscard]] Result<std::unique_ptr<client::Session>> session(const std::string& folder) {
     client::SessionOptions options = daemon_.session_options();
     options.security = folder;
@@ -81,8 +86,10 @@ class SecurityTest : public testing::Test {
     const auto servers = (*opened)->servers();
     ASSERT_FALSE(servers);
     EXPECT_EQ(servers.error().code, ErrorCode::kUnreachable);
-    // A server that refuses is as silent as none: who shows a certificate is told that this may be why.
-    EXPECT_EQ(servers.error().next.find("certificates") != std::string::npos, !folder.empty()) << servers.error().next;
+    // A server that refuses is as silent as none: who shows a certificate is told that this may be
+    // why.
+    EXPECT_EQ(servers.error().next.find("certificates") != std::string::npos, !folder.empty())
+        << servers.error().next;
   }
   [[nodiscard]] int refused_handshakes() const {
     const std::string text = test::http_get(http(), "/metrics").body;
@@ -114,18 +121,25 @@ const Calls& calls() {
        [](client::Session& s) {
          return said(s.predict_error(cell_7(), {{0, 0, 0, 0, 0, 0}}));
        }},
-      {"CorrectTarget", [](client::Session& s) { return said(s.correct_targets(cell_7(), {client::TargetMm{}})); }},
+      {"CorrectTarget",
+       [](client::Session& s) { return said(s.correct_targets(cell_7(), {client::TargetMm{}})); }},
       {"ReadModels", [](client::Session& s) { return said(s.models("cell-7")); }},
-      {"SubmitMeasurements", [](client::Session& s) { return said(s.submit_measurements("cell-7", "", "no csv")); }},
-      {"Diagnose", [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", false)); }},
-      {"CheckHealth", [](client::Session& s) { return said(s.check_health("cell-7", "none", "", 0.1)); }},
+      {"SubmitMeasurements",
+       [](client::Session& s) { return said(s.submit_measurements("cell-7", "", "no csv")); }},
+      {"Diagnose",
+       [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", false)); }},
+      {"CheckHealth",
+       [](client::Session& s) { return said(s.check_health("cell-7", "none", "", 0.1)); }},
       {"Train", [](client::Session& s) { return said(s.train("cell-7", {"none"}, "", "")); }},
       {"activate", [](client::Session& s) { return said(s.activate("cell-7", 77)); }},
       {"rollback", [](client::Session& s) { return said(s.rollback("cell-7")); }},
       {"import", [](client::Session& s) { return said(s.import_model("cell-7", "no model")); }},
-      {"release", [](client::Session& s) { return said(s.release("cell-7", "none").map([] { return 0; })); }},
-      {"discard", [](client::Session& s) { return said(s.discard("cell-7", "none").map([] { return 0; })); }},
-      {"apply a diagnosis", [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", true)); }},
+      {"release",
+       [](client::Session& s) { return said(s.release("cell-7", "none").map([] { return 0; })); }},
+      {"discard",
+       [](client::Session& s) { return said(s.discard("cell-7", "none").map([] { return 0; })); }},
+      {"apply a diagnosis",
+       [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", true)); }},
   };
   return all;
 }
@@ -134,10 +148,13 @@ const std::map<std::string, std::set<std::string>> kMay = {
     {"server", {}},  // it answers
     {"observer", {"ReadModels"}},
     {"cam", {"ReadModels", "PredictError", "CorrectTarget"}},
-    {"metrologist", {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth"}},
+    {"metrologist",
+     {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose",
+      "CheckHealth"}},
     {"engineer",
-     {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth", "Train",
-      "activate", "rollback", "import", "release", "discard", "apply a diagnosis"}},
+     {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose",
+      "CheckHealth", "Train", "activate", "rollback", "import", "release", "discard",
+      "apply a diagnosis"}},
 };
 
 TEST_F(SecurityTest, EachRoleMayDoWhatItsPermissionsSayAndNothingElse) {
@@ -149,8 +166,10 @@ TEST_F(SecurityTest, EachRoleMayDoWhatItsPermissionsSayAndNothingElse) {
     for (const auto& [operation, call] : calls()) {
       const Error error = call(**opened);
       const bool forbidden = error.message.starts_with("these permissions do not allow");
-      EXPECT_EQ(forbidden, !may.contains(operation)) << role << ", " << operation << ": " << error.message;
-      EXPECT_NE(error.code, ErrorCode::kUnreachable) << role << ", " << operation << ": " << error.message;
+      EXPECT_EQ(forbidden, !may.contains(operation))
+          << role << ", " << operation << ": " << error.message;
+      EXPECT_NE(error.code, ErrorCode::kUnreachable)
+          << role << ", " << operation << ": " << error.message;
     }
   }
 }
@@ -226,13 +245,15 @@ TEST_F(SecurityTest, TheAuditTrailAndTheLogNameTheCertificate) {
   const auto name_in_audit = [&](const std::string& name, const std::string& batch) {
     const auto opened = session(keys().of("engineer", name));
     ASSERT_TRUE(opened) << opened.error().message;
-    const auto job = (*opened)->submit_measurements("cell-7", batch, test::virtual_batch_csv(80, batch[0]));
+    const auto job =
+        (*opened)->submit_measurements("cell-7", batch, test::virtual_batch_csv(80, batch[0]));
     ASSERT_TRUE(job) << job.error().message;
     const auto trail = (*opened)->audit("cell-7", 0, 100);
     ASSERT_TRUE(trail) << trail.error().message;
     const auto rows = nlohmann::json::parse(trail->at(0).json).at("rows");
-    const auto row =
-        std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.at("subject") == "batch " + batch; });
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) {
+      return r.at("subject") == "batch " + batch;
+    });
     ASSERT_NE(row, rows.end()) << rows.dump();
     EXPECT_TRUE(daemon_.process().wait_for_line("\"who\":\"CN=" + name + ",O=Trammel\"", kLimit));
     const std::string who = row->at("who");
@@ -257,13 +278,15 @@ TEST_F(SecurityTest, AnswersDoNotGoToAPartitionOfSomebodyElseWhateverTheCertific
   thief.send(request, 2);
   EXPECT_EQ(thief.wait_for_replies(1).size(), 1U);
   victim.send(request, 1);
-  EXPECT_EQ(victim.wait_for_replies(1).size(), 1U) << "its own answer, and none to the other's question";
+  EXPECT_EQ(victim.wait_for_replies(1).size(), 1U)
+      << "its own answer, and none to the other's question";
   EXPECT_EQ(victim.replies(), 1U);
 }
 
 TEST_F(SecurityTest, ADatagramWithoutACertificateSendsNobodyAway) {
   daemon_.start();
-  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam", keys().of("cam", "cam-1"));
+  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam",
+                                           keys().of("cam", "cam-1"));
   ASSERT_TRUE(client.wait_until_matched());
   test::Prefix who{};
   const auto octets = client.writer_octets();
@@ -273,21 +296,26 @@ TEST_F(SecurityTest, ADatagramWithoutACertificateSendsNobodyAway) {
   wire::ReadModelsRequest request;
   request.what(wire::READ_MODELS);
   request.about().cell("cell-7");
-  const auto gone = test::ParameterList().guid(0x0070, who, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  const auto gone =
+      test::ParameterList().guid(0x0070, who, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   const auto short_lived = stranger.announcement().add(0x0002, {0, 0, 0, 0, 1, 0, 0, 0}).payload();
   for (std::int64_t number = 1; number <= 50; ++number) {
     stranger.send(test::Packet(who).data({0, test::kAnnouncerId, 1000 + number, gone, {}}).bytes());
-    stranger.send(test::Packet(who).data({0, test::kAnnouncerId, 2000 + number, {}, short_lived}).bytes());
+    stranger.send(
+        test::Packet(who).data({0, test::kAnnouncerId, 2000 + number, {}, short_lived}).bytes());
     client.send(request, number);
-    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(), static_cast<std::size_t>(number));
+    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(),
+              static_cast<std::size_t>(number));
     ASSERT_TRUE(client.is_matched()) << "it was sent away, and has come back";
   }
 }
 
-// Without signatures our reader would skip the client's next thousand requests, and answer none of them.
+// Without signatures our reader would skip the client's next thousand requests, and answer none of
+// them.
 TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks) {
   daemon_.start();
-  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam", keys().of("cam", "cam-1"));
+  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam",
+                                           keys().of("cam", "cam-1"));
   ASSERT_TRUE(client.wait_until_matched());
   test::Prefix who{};
   const auto octets = client.writer_octets();
@@ -299,7 +327,8 @@ TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks)
   stranger.set_prefix(who);
   const test::PacketBytes no_key(20);
   std::uint32_t count = 100'000;
-  constexpr std::uint32_t kReaders = 64, kReaderKind = 0x04;  // the service's readers are among these
+  constexpr std::uint32_t kReaders = 64,
+                          kReaderKind = 0x04;  // the service's readers are among these
   // In the clear, and as if the message, or the submessage, were signed.
   const auto pretend = [&](unsigned char begin, unsigned char end, std::int64_t skipped) {
     test::Packet heartbeat(who), gap(who);
@@ -319,16 +348,19 @@ TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks)
   request.what(wire::READ_MODELS);
   request.about().cell("cell-7");
   for (std::int64_t number = 1; number <= 10; ++number) {
-    for (const auto& [begin, end] : {std::pair<unsigned char, unsigned char>{0, 0}, {0x33, 0x34}, {0x31, 0x32}})
+    for (const auto& [begin, end] :
+         {std::pair<unsigned char, unsigned char>{0, 0}, {0x33, 0x34}, {0x31, 0x32}})
       pretend(begin, end, 1000 + number);
     client.send(request, number);
-    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(), static_cast<std::size_t>(number));
+    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(),
+              static_cast<std::size_t>(number));
   }
 }
 
 TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
   const std::string good = keys().of("cam", "cam-1");
-  const auto spoiled = [&](const std::string& name, const std::function<void(const std::string& folder)>& spoil) {
+  const auto spoiled = [&](const std::string& name,
+                           const std::function<void(const std::string& folder)>& spoil) {
     const std::string copy = keys().authority() + "/" + name;
     fs::copy(good, copy);
     spoil(copy);
@@ -339,9 +371,11 @@ TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
     EXPECT_TRUE(error.file.ends_with(file)) << error.file << ": " << error.message;
     EXPECT_NE(error.message.find(word), std::string::npos) << error.message;
   };
-  expect(spoiled("a", [](const std::string& f) { fs::remove(f + "/governance.p7s"); }), "governance.p7s", "");
-  expect(spoiled("b", [](const std::string& f) { fs::permissions(f + "/key.pem", fs::perms(0644)); }), "key.pem",
-         "read");
+  expect(spoiled("a", [](const std::string& f) { fs::remove(f + "/governance.p7s"); }),
+         "governance.p7s", "");
+  expect(
+      spoiled("b", [](const std::string& f) { fs::permissions(f + "/key.pem", fs::perms(0644)); }),
+      "key.pem", "read");
   expect(spoiled("c",
                  [](const std::string& f) {
                    std::string text = test::read_file(f + "/permissions.p7s");
@@ -351,8 +385,8 @@ TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
          "permissions.p7s", "signed");
   expect(spoiled("d",
                  [](const std::string& f) {
-                   fs::copy_file(keys().of("engineer", "engineer-1") + "/permissions.p7s", f + "/permissions.p7s",
-                                 fs::copy_options::overwrite_existing);
+                   fs::copy_file(keys().of("engineer", "engineer-1") + "/permissions.p7s",
+                                 f + "/permissions.p7s", fs::copy_options::overwrite_existing);
                  }),
          "permissions.p7s", "engineer-1");
   expect(spoiled("e",
@@ -364,8 +398,8 @@ TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
   Keys others;
   expect(spoiled("f",
                  [&](const std::string& f) {
-                   fs::copy_file(others.authority() + "/identity_ca.cert.pem", f + "/identity_ca.cert.pem",
-                                 fs::copy_options::overwrite_existing);
+                   fs::copy_file(others.authority() + "/identity_ca.cert.pem",
+                                 f + "/identity_ca.cert.pem", fs::copy_options::overwrite_existing);
                  }),
          "cert.pem", "");
   keys().of("engineer", "gone");
@@ -378,10 +412,12 @@ TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
 
 TEST_F(SecurityTest, TheLogNamesWhoIsRefusedAlsoWhatTheStopCutsShort) {
   Keys others;
-  const std::string stranger = others.of("engineer", "stranger"), later = others.of("engineer", "came-later");
+  const std::string stranger = others.of("engineer", "stranger"),
+                    later = others.of("engineer", "came-later");
   daemon_.start();
   expect_nobody(stranger);
-  EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=stranger,O=Trammel, at 127.0.0.1", kLimit));
+  EXPECT_TRUE(
+      daemon_.process().wait_for_line("says it is CN=stranger,O=Trammel, at 127.0.0.1", kLimit));
   expect_nobody(later);
   daemon_.process().signal(SIGTERM);
   EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=came-later,O=Trammel", kLimit));
@@ -391,14 +427,16 @@ TEST_F(SecurityTest, AServiceWithTheCertificateOfAClientIsToldWhichRoleItNeeds) 
   const std::string text = test::read_file(daemon_.config_path());
   const std::string folder = keys().of("cam", "cam-1"), service = keys().of("server", "line-3");
   ASSERT_TRUE(
-      write_text_file(daemon_.config_path(), std::string(text).replace(text.find(service), service.size(), folder)));
+      write_text_file(daemon_.config_path(),
+                      std::string(text).replace(text.find(service), service.size(), folder)));
   for (const bool check : {true, false}) {
     std::vector<std::string> words = {test::trammeld_path(), "--config", daemon_.config_path()};
     if (check) words.push_back("--check");
     const auto done = test::run(words);
     EXPECT_EQ(done.exit_code, 3);
-    EXPECT_NE(done.err.find("CN=cam-1,O=Trammel has the role cam, and a service needs the role server"),
-              std::string::npos)
+    EXPECT_NE(
+        done.err.find("CN=cam-1,O=Trammel has the role cam, and a service needs the role server"),
+        std::string::npos)
         << done.err;
     EXPECT_EQ(done.err.find("ServiceStatus"), std::string::npos) << done.err;
   }
@@ -418,14 +456,18 @@ class PlantTest : public testing::Test {
     const auto done = keys("issue", {role, name});
     ASSERT_EQ(done.exit_code, 0) << done.err;
   }
-  /// The certificate is of this plant and was not revoked: as every service would hold it, once it has the list.
+  /// The certificate is of this plant and was not revoked: as every service would hold it, once it
+  /// has the list.
   [[nodiscard]] bool counts(const std::string& certificate) const {
-    std::vector<std::string> words = {"/usr/bin/openssl", "verify", "-CAfile", of("bob") + "/identity_ca.cert.pem"};
+    std::vector<std::string> words = {"/usr/bin/openssl", "verify", "-CAfile",
+                                      of("bob") + "/identity_ca.cert.pem"};
     if (fs::exists(plant() + "/authority/revoked.pem")) words.push_back("-crl_check");
     words.push_back(certificate);
     return test::run(words).exit_code == 0;
   }
-  [[nodiscard]] std::string of(const std::string& name) const { return plant() + "/participants/" + name; }
+  [[nodiscard]] std::string of(const std::string& name) const {
+    return plant() + "/participants/" + name;
+  }
   /// The certificate that the participant has now, to compare with later ones.
   [[nodiscard]] std::string kept(const std::string& name, const std::string& as) const {
     fs::copy_file(of(name) + "/cert.pem", plant() + "/" + as);
@@ -482,16 +524,20 @@ TEST_F(PlantTest, ANameKeepsItsRoleSinceItsOldPermissionsWouldCountBesideANewCer
   EXPECT_NE(refused().find("anna was engineer"), std::string::npos);
   EXPECT_EQ(test::read_file(of("anna") + "/cert.pem"), certificate) << "nothing was changed";
   EXPECT_EQ(keys("revoke", {"anna"}).exit_code, 0);
-  EXPECT_NE(refused().find("anna was engineer"), std::string::npos) << "its permissions are still about";
+  EXPECT_NE(refused().find("anna was engineer"), std::string::npos)
+      << "its permissions are still about";
   fs::remove_all(of("anna"));
-  EXPECT_NE(refused().find("has had a certificate"), std::string::npos) << "and nothing says of which role";
+  EXPECT_NE(refused().find("has had a certificate"), std::string::npos)
+      << "and nothing says of which role";
 }
 
 TEST_F(PlantTest, ACertificateThatHasEndedBeforeItBeginsIsNotIssued) {
-  for (const auto& [option, value] : {std::pair{"--until", "2020-01-31T12:00:00Z"}, {"--days", "0"}, {"--days", "x"}}) {
+  for (const auto& [option, value] :
+       {std::pair{"--until", "2020-01-31T12:00:00Z"}, {"--days", "0"}, {"--days", "x"}}) {
     const auto done = keys("issue", {"cam", "carl", option, value});
     EXPECT_EQ(done.exit_code, 2) << value;
-    EXPECT_NE(done.err.find(value[0] == 'x' ? "a whole number" : "has passed"), std::string::npos) << done.err;
+    EXPECT_NE(done.err.find(value[0] == 'x' ? "a whole number" : "has passed"), std::string::npos)
+        << done.err;
     EXPECT_FALSE(fs::exists(of("carl"))) << value;
   }
 }
@@ -505,9 +551,11 @@ TEST(SecurityOfTheServerFile, AnAddressThatOthersReachNeedsCertificatesOrASecond
   };
   const auto once = check("address: 192.0.2.1, allow_network: true");
   EXPECT_EQ(once.exit_code, 3);
-  EXPECT_NE((once.out + once.err).find("without_security"), std::string::npos) << once.out << once.err;
+  EXPECT_NE((once.out + once.err).find("without_security"), std::string::npos)
+      << once.out << once.err;
   const auto twice = check("address: 192.0.2.1, allow_network: true, without_security: true");
-  EXPECT_EQ((twice.out + twice.err).find("without_security"), std::string::npos) << twice.out << twice.err;
+  EXPECT_EQ((twice.out + twice.err).find("without_security"), std::string::npos)
+      << twice.out << twice.err;
   const auto bad = check("security: nowhere");
   EXPECT_EQ(bad.exit_code, 3);
   EXPECT_NE((bad.out + bad.err).find("nowhere"), std::string::npos) << bad.out << bad.err;

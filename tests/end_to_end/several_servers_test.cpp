@@ -1,5 +1,5 @@
-// Cells that are shared out among servers: each server's list of cells says which are at home there, and a client that
-// names all servers asks the right one by itself.
+// Cells that are shared out among servers: each server's list of cells says which are at home
+// there, and a client that names all servers asks the right one by itself.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -27,7 +27,8 @@ class SeveralServersTest : public testing::Test {
     session_ = std::move(*opened);
   }
   static void rename_its_cell(const test::Daemon& daemon, const std::string& name) {
-    const std::string file = (std::filesystem::path(daemon.config_path()).parent_path() / "cell-7.yaml").string();
+    const std::string file =
+        (std::filesystem::path(daemon.config_path()).parent_path() / "cell-7.yaml").string();
     std::string text = test::read_file(file);
     text.replace(text.find("cell: cell-7"), std::string("cell: cell-7").size(), "cell: " + name);
     ASSERT_TRUE(write_text_file(file, text));
@@ -63,9 +64,11 @@ TEST_F(SeveralServersTest, EachCellsBatchesAndQuestionsReachTheServerThatHasIt) 
 }
 
 TEST_F(SeveralServersTest, OfTwoJobsWithOneNumberNoneIsTakenForTheOther) {
-  const auto of_seven = session_->submit_measurements("cell-7", "of-seven", test::virtual_batch_csv(60, 1));
+  const auto of_seven =
+      session_->submit_measurements("cell-7", "of-seven", test::virtual_batch_csv(60, 1));
   ASSERT_TRUE(of_seven) << sentence(of_seven.error());
-  const auto of_eight = session_->submit_measurements("cell-8", "of-eight", test::virtual_batch_csv(60, 2));
+  const auto of_eight =
+      session_->submit_measurements("cell-8", "of-eight", test::virtual_batch_csv(60, 2));
   ASSERT_TRUE(of_eight) << sentence(of_eight.error());
   ASSERT_EQ(*of_eight, *of_seven) << "every server counts its own jobs";
   const auto either = session_->wait_for_job(*of_eight, kLimit, nullptr);

@@ -39,14 +39,17 @@ class ALibrarysThread : public testing::Test {
     const std::string tasks = "/proc/" + std::to_string(process_->pid()) + "/task";
     for (const auto& task : std::filesystem::directory_iterator(tasks)) {
       if (test::read_file((task.path() / "comm").string()) != "at_load\n") continue;
-      ASSERT_EQ(::syscall(SYS_tgkill, process_->pid(), std::stoi(task.path().filename().string()), number), 0);
+      ASSERT_EQ(::syscall(SYS_tgkill, process_->pid(), std::stoi(task.path().filename().string()),
+                          number),
+                0);
       return;
     }
     FAIL() << "the library has no thread";
   }
   void expect_an_orderly_stop() {
     EXPECT_EQ(process_->wait(kLimit), 0) << process_->standard_error();
-    EXPECT_NE(process_->standard_error().find("info stopped"), std::string::npos) << process_->standard_error();
+    EXPECT_NE(process_->standard_error().find("info stopped"), std::string::npos)
+        << process_->standard_error();
   }
 
   test::Daemon daemon_;

@@ -14,10 +14,11 @@
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
-// The tours show what the programs print: each command of a `console` block is run again, and what it prints is held
-// against the page. Numbers may differ as processors do; hashes, dates, versions of the program, how long a server is
-// up and what it was asked are not compared. A command goes on in lines that begin with `> `, and `export` holds for
-// those below it. Ports and domain of a page are those of this test process instead.
+// The tours show what the programs print: each command of a `console` block is run again, and what
+// it prints is held against the page. Numbers may differ as processors do; hashes, dates, versions
+// of the program, how long a server is up and what it was asked are not compared. A command goes on
+// in lines that begin with `> `, and `export` holds for those below it. Ports and domain of a page
+// are those of this test process instead.
 namespace trammel {
 namespace {
 
@@ -51,9 +52,11 @@ bool is_number(const std::string& text, double* value) {
 
 /// Whether both texts have the same words and nearly the same numbers.
 testing::AssertionResult alike(const std::string& shown, const std::string& printed) {
-  static const std::regex kDate("\\b20[0-9]{2}-[0-9]{2}-[0-9]{2}([T ][0-9]{2}:[0-9]{2}(:[0-9]{2})?Z?)?"),
+  static const std::regex kDate(
+      "\\b20[0-9]{2}-[0-9]{2}-[0-9]{2}([T ][0-9]{2}:[0-9]{2}(:[0-9]{2})?Z?)?"),
       kHash("\\b[0-9a-f]{8,64}\\b"), kVersion("\\b[0-9]+\\.[0-9]+\\.[0-9]+\\b(?!\\.)"),
-      kSince("up [0-9]+ s, [0-9]+ requests"), kBlanks(" +"), kPart("[-+]?[0-9]+\\.?[0-9]*|[^-+0-9]+|[-+]");
+      kSince("up [0-9]+ s, [0-9]+ requests"), kBlanks(" +"),
+      kPart("[-+]?[0-9]+\\.?[0-9]*|[^-+0-9]+|[-+]");
   const auto plain = [](std::string text) {
     for (const std::regex* left_out : {&kDate, &kHash, &kVersion, &kSince})
       text = std::regex_replace(text, *left_out, "#");
@@ -64,11 +67,14 @@ testing::AssertionResult alike(const std::string& shown, const std::string& prin
   for (; x != end && y != end; ++x, ++y) {
     double was = 0, is = 0;
     if (x->str() == y->str()) continue;
-    const bool near =
-        is_number(x->str(), &was) && is_number(y->str(), &is) && std::abs(was - is) <= 0.002 + 0.03 * std::abs(was);
-    if (!near) return testing::AssertionFailure() << "'" << x->str() << "' is '" << y->str() << "' now:\n" << printed;
+    const bool near = is_number(x->str(), &was) && is_number(y->str(), &is) &&
+                      std::abs(was - is) <= 0.002 + 0.03 * std::abs(was);
+    if (!near)
+      return testing::AssertionFailure() << "'" << x->str() << "' is '" << y->str() << "' now:\n"
+                                         << printed;
   }
-  if (x != end || y != end) return testing::AssertionFailure() << "another length now:\n" << printed;
+  if (x != end || y != end)
+    return testing::AssertionFailure() << "another length now:\n" << printed;
   return testing::AssertionSuccess();
 }
 
@@ -78,7 +84,8 @@ std::string here(std::string text) {
   const std::vector<std::pair<const char*, int>> ports = {
       {"17500", first}, {"17502", first + 2}, {"9464", first + 4}, {"9465", first + 5}};
   for (const auto& [shown, own] : ports)
-    text = std::regex_replace(text, std::regex(std::string("\\b") + shown + "\\b"), std::to_string(own));
+    text = std::regex_replace(text, std::regex(std::string("\\b") + shown + "\\b"),
+                              std::to_string(own));
   static const std::regex kDomain("(domain[ :=]+)42\\b");
   return std::regex_replace(text, kDomain, "$01" + std::to_string(test::own_domain()));
 }
@@ -101,12 +108,14 @@ class Tour : public testing::TestWithParam<const char*> {};
 TEST_P(Tour, ShowsWhatTheProgramPrints) {
   const test::TemporaryFolder folder;
   for (const char* name : {"config", "models", "deploy"})
-    std::filesystem::create_directory_symlink(std::filesystem::path(TRAMMEL_SOURCE_DIR) / name, folder.path() / name);
-  const auto steps = steps_of(here(test::read_file(std::string(TRAMMEL_SOURCE_DIR "/") + GetParam())));
+    std::filesystem::create_directory_symlink(std::filesystem::path(TRAMMEL_SOURCE_DIR) / name,
+                                              folder.path() / name);
+  const auto steps =
+      steps_of(here(test::read_file(std::string(TRAMMEL_SOURCE_DIR "/") + GetParam())));
   ASSERT_GE(steps.size(), 8u);
   std::string before = "cd " + folder.path().string() +
-                       "\nexport TRAMMEL_DEFAULTS= PATH=" TRAMMEL_BINARY_DIR "/clients:" TRAMMEL_BINARY_DIR
-                       "/server:$PATH\nexec 2>&1\n";
+                       "\nexport TRAMMEL_DEFAULTS= PATH=" TRAMMEL_BINARY_DIR
+                       "/clients:" TRAMMEL_BINARY_DIR "/server:$PATH\nexec 2>&1\n";
   for (const Step& step : steps) {
     if (step.command.starts_with("export ")) before += step.command + "\n";
     const test::Finished finished = test::run({"/bin/bash", "-c", before + step.command});
@@ -123,8 +132,8 @@ std::string reader_of(const testing::TestParamInfo<const char*>& page) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Pages, Tour,
-                         testing::Values("config/TOUR.md", "clients/cam/TOUR.md", "server/diagnose/TOUR.md",
-                                         "deploy/TOUR.md"),
+                         testing::Values("config/TOUR.md", "clients/cam/TOUR.md",
+                                         "server/diagnose/TOUR.md", "deploy/TOUR.md"),
                          reader_of);
 
 }  // namespace

@@ -19,11 +19,13 @@ namespace {
 constexpr std::chrono::seconds kLimit{30};
 
 void put_everywhere(std::string& text, const std::string& what, const std::string& by) {
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+  for (std::size_t at = text.find(what); at != std::string::npos;
+       at = text.find(what, at + by.size()))
     text.replace(at, what.size(), by);
 }
 
-/// What the unit runs before it starts, as /bin/sh gets it, with this build's daemon and this server file.
+/// What the unit runs before it starts, as /bin/sh gets it, with this build's daemon and this
+/// server file.
 std::string start_check(const std::string& server_file) {
   const std::string unit = test::read_file(TRAMMEL_SOURCE_DIR "/deploy/trammeld.service");
   std::smatch found;
@@ -37,8 +39,8 @@ std::string start_check(const std::string& server_file) {
 
 TEST(Unit, AMisspeltKeyEndsTheStartAtOnceWithItsLine) {
   const test::TemporaryFolder folder;
-  const std::string start =
-      "version: 1\nserver: checked\ncells: [" TRAMMEL_SOURCE_DIR "/config/cell-7.yaml]\nstore: trammel.db\n";
+  const std::string start = "version: 1\nserver: checked\ncells: [" TRAMMEL_SOURCE_DIR
+                            "/config/cell-7.yaml]\nstore: trammel.db\n";
   const auto checked = [&](const std::string& text) {
     return test::run({"/bin/sh", "-c", start_check(folder.write("server.yaml", text))}, kLimit);
   };
@@ -75,14 +77,16 @@ class HeldPort {
 std::string port_of_demo() {
   const test::Finished asked =
       test::run({"/bin/bash", "-c",
-                 "eval \"$(sed -n '/^free_port()/,/^}/p' '" TRAMMEL_SOURCE_DIR "/deploy/demo')\" && free_port"},
+                 "eval \"$(sed -n '/^free_port()/,/^}/p' '" TRAMMEL_SOURCE_DIR
+                 "/deploy/demo')\" && free_port"},
                 kLimit);
   EXPECT_EQ(asked.exit_code, 0) << asked.err;
   return asked.out;
 }
 
 TEST(Demo, TakesAPortThatNobodyHas) {
-  if (test::run({"/bin/sh", "-c", "command -v ss"}, kLimit).exit_code != 0) GTEST_SKIP() << "no ss here (iproute2)";
+  if (test::run({"/bin/sh", "-c", "command -v ss"}, kLimit).exit_code != 0)
+    GTEST_SKIP() << "no ss here (iproute2)";
   const HeldPort first(17590), second_of_the_next(17593);
   EXPECT_NE(port_of_demo(), "17590\n");
   EXPECT_NE(port_of_demo(), "17592\n") << "a daemon takes two";

@@ -1,4 +1,5 @@
-// Threads of a real daemon are stopped one by one, as a lock inside the library that is never free stops them.
+// Threads of a real daemon are stopped one by one, as a lock inside the library that is never free
+// stops them.
 #include "server/dds/watchdog.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,8 @@ std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::s
   return threads;
 }
 
-/// Whether every thread but the first has a name of its own before long: until then it has that of the process.
+/// Whether every thread but the first has a name of its own before long: until then it has that of
+/// the process.
 bool all_are_named(pid_t process) {
   const auto deadline = std::chrono::steady_clock::now() + kLimit;
   while (named(process, "trammeld").size() > 1) {
@@ -39,14 +41,15 @@ bool all_are_named(pid_t process) {
 
 /// Whether a client gets an answer.
 bool answers(const test::Daemon& daemon) {
-  const auto status =
-      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--service", "--port", std::to_string(daemon.port()),
-                 "--domain", std::to_string(daemon.domain()), "--timeout", "10"});
+  const auto status = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--service",
+                                 "--port", std::to_string(daemon.port()), "--domain",
+                                 std::to_string(daemon.domain()), "--timeout", "10"});
   return status.exit_code == 0;
 }
 
 /// What the process ends with once its thread is stopped; empty when it goes on.
-std::optional<int> end_without(test::Process& process, pid_t thread, std::chrono::milliseconds limit) {
+std::optional<int> end_without(test::Process& process, pid_t thread,
+                               std::chrono::milliseconds limit) {
   test::StoppedThread stopped(thread);
   EXPECT_TRUE(stopped.is_stopped()) << "thread " << thread << " cannot be stopped";
   const auto deadline = std::chrono::steady_clock::now() + limit;
@@ -65,7 +68,8 @@ TEST(WatchdogTest, AStatusThreadThatHangsEndsTheDaemonAndIsNamed) {
   const auto status = named(daemon.process().pid(), "status");
   ASSERT_EQ(status.size(), 1u);
   EXPECT_EQ(end_without(daemon.process(), status[0].id, kLimit), kExitHung);
-  EXPECT_NE(daemon.process().standard_error().find("status"), std::string::npos) << daemon.process().standard_error();
+  EXPECT_NE(daemon.process().standard_error().find("status"), std::string::npos)
+      << daemon.process().standard_error();
   daemon.start();
   EXPECT_TRUE(answers(daemon));
 }
@@ -89,7 +93,8 @@ TEST(WatchdogTest, AnyThreadOfTheLibraryThatHangsEndsTheDaemon) {
     if (i > 0) daemon.start();
     const auto threads = named(daemon.process().pid(), "dds", 3);
     ASSERT_EQ(threads.size(), count);
-    EXPECT_EQ(end_without(daemon.process(), threads[i].id, kLimit), kExitHung) << "thread " << i << " of " << count;
+    EXPECT_EQ(end_without(daemon.process(), threads[i].id, kLimit), kExitHung)
+        << "thread " << i << " of " << count;
   }
   daemon.start();
   EXPECT_TRUE(answers(daemon));
@@ -105,9 +110,11 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirKindIsNamed) {
     stopped.push_back(std::make_unique<test::StoppedThread>(thread.id));
     ASSERT_TRUE(stopped.back()->is_stopped());
   }
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(1))) << "nobody asked for anything yet";
-  test::Process client({TRAMMEL_BINARY_DIR "/clients/trammel", "models", "--service", "--cell", "cell-7", "--port",
-                        std::to_string(daemon.port()), "--domain", std::to_string(daemon.domain()), "--timeout", "20"});
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(1)))
+      << "nobody asked for anything yet";
+  test::Process client({TRAMMEL_BINARY_DIR "/clients/trammel", "models", "--service", "--cell",
+                        "cell-7", "--port", std::to_string(daemon.port()), "--domain",
+                        std::to_string(daemon.domain()), "--timeout", "20"});
   ASSERT_TRUE(daemon.process().wait_for_line("reading requests; ends at once", kLimit))
       << daemon.process().standard_error();
   for (const auto& thread : stopped) thread->bury();
@@ -119,7 +126,8 @@ TEST(WatchdogTest, ADaemonThatWasStoppedAndGoesOnIsNotHung) {
   daemon.start();
   EXPECT_TRUE(answers(daemon));
   daemon.process().signal(SIGSTOP);
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(2))) << "it was stopped";
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(2)))
+      << "it was stopped";
   daemon.process().signal(SIGCONT);
   EXPECT_TRUE(answers(daemon));
   EXPECT_FALSE(daemon.process().wait(std::chrono::seconds(1))) << daemon.process().standard_error();
@@ -160,19 +168,23 @@ TEST(SuperviseTest, ADaemonThatHangsIsStartedAgainAndAnswers) {
   ASSERT_TRUE(stopped.is_stopped());
   ASSERT_TRUE(supervisor.wait_for_line("ends at once", kLimit)) << supervisor.standard_error();
   stopped.bury();
-  ASSERT_TRUE(supervisor.wait_for_line("ended with code 70", kLimit)) << supervisor.standard_error();
+  ASSERT_TRUE(supervisor.wait_for_line("ended with code 70", kLimit))
+      << supervisor.standard_error();
   EXPECT_TRUE(answers(daemon)) << supervisor.standard_error();
   EXPECT_NE(number_after(supervisor.standard_error(), "process "), first);
 
   supervisor.signal(SIGTERM);
   EXPECT_EQ(supervisor.wait(kLimit), 0) << supervisor.standard_error();
-  EXPECT_NE(supervisor.standard_error().find("stopped"), std::string::npos) << "the daemon was told to stop";
+  EXPECT_NE(supervisor.standard_error().find("stopped"), std::string::npos)
+      << "the daemon was told to stop";
   EXPECT_FALSE(answers(daemon)) << "and is gone";
 }
 
 TEST(SuperviseTest, WhatKeepsEndingIsSaidPlainlyAndStartedWithGrowingPauses) {
-  test::Process supervisor({kSupervise, "--first-pause", "0.1", "--longest-pause", "0.4", "/bin/false"});
-  ASSERT_TRUE(supervisor.wait_for_line("keeps ending: 5 times", kLimit)) << supervisor.standard_error();
+  test::Process supervisor(
+      {kSupervise, "--first-pause", "0.1", "--longest-pause", "0.4", "/bin/false"});
+  ASSERT_TRUE(supervisor.wait_for_line("keeps ending: 5 times", kLimit))
+      << supervisor.standard_error();
   const std::string said = supervisor.standard_error();
   std::size_t at = 0;
   for (const char* pause : {"in 0.1 s", "in 0.2 s", "in 0.4 s", "in 0.4 s"}) {

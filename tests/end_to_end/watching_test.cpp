@@ -36,11 +36,15 @@ class WatchingTest : public testing::Test {
   void write_config(const std::string& more, const std::string& log = "log: {level: debug}\n") {
     if (original_.empty()) original_ = test::read_file(daemon_.config_path());
     std::string text = original_.substr(0, original_.find("log:"));
-    ASSERT_TRUE(
-        write_text_file(daemon_.config_path(), fmt::format("{}{}http: {{port: {}}}\n{}", text, log, port(), more)));
+    ASSERT_TRUE(write_text_file(
+        daemon_.config_path(), fmt::format("{}{}http: {{port: {}}}\n{}", text, log, port(), more)));
   }
-  [[nodiscard]] std::uint16_t port() const { return static_cast<std::uint16_t>(daemon_.port() + 1); }
-  [[nodiscard]] test::HttpAnswer get(const std::string& path) const { return test::http_get(port(), path); }
+  [[nodiscard]] std::uint16_t port() const {
+    return static_cast<std::uint16_t>(daemon_.port() + 1);
+  }
+  [[nodiscard]] test::HttpAnswer get(const std::string& path) const {
+    return test::http_get(port(), path);
+  }
   /// The value of the first series that begins so; -1: there is none.
   [[nodiscard]] double metric(const std::string& beginning) const {
     const std::string text = "\n" + get("/metrics").body;
@@ -64,8 +68,10 @@ TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
   ASSERT_TRUE(session) << session.error().message;
   client::CallContext context;
   context.cell = "cell-7";
-  EXPECT_FALSE((*session)->predict_error(context, test::virtual_joints(1, 7))) << "there is no model";
-  const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+  EXPECT_FALSE((*session)->predict_error(context, test::virtual_joints(1, 7)))
+      << "there is no model";
+  const auto job =
+      (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
   ASSERT_TRUE(job) << job.error().message;
   ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
   ASSERT_TRUE((*session)->predict_error(context, test::virtual_joints(3, 7)));
@@ -136,26 +142,32 @@ TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
     break;
   }
   EXPECT_TRUE(told);
-  EXPECT_TRUE(daemon_.process().wait_for_line("ends at once", kLimit)) << daemon_.process().standard_error();
+  EXPECT_TRUE(daemon_.process().wait_for_line("ends at once", kLimit))
+      << daemon_.process().standard_error();
   stopped.bury();
   EXPECT_EQ(daemon_.process().wait(kLimit), 70);
 }
 
 TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNothing) {
   EXPECT_FALSE(daemon_.process().wait_for_line("\"event\"", std::chrono::milliseconds(1)));
-  write_config("trainer: {queue_capacity: 3, max_poses: 4000}\n", "log: {level: debug, format: json}\n");
+  write_config("trainer: {queue_capacity: 3, max_poses: 4000}\n",
+               "log: {level: debug, format: json}\n");
   daemon_.process().signal(SIGHUP);
-  ASSERT_TRUE(daemon_.process().wait_for_line("\"event\":\"reloaded\"", kLimit)) << daemon_.process().standard_error();
+  ASSERT_TRUE(daemon_.process().wait_for_line("\"event\":\"reloaded\"", kLimit))
+      << daemon_.process().standard_error();
   const std::string said = daemon_.process().standard_error();
   EXPECT_NE(said.find("log: format, trainer: queue_capacity"), std::string::npos) << said;
-  EXPECT_NE(said.find("trainer: max_poses changes with the next start only"), std::string::npos) << said;
+  EXPECT_NE(said.find("trainer: max_poses changes with the next start only"), std::string::npos)
+      << said;
 
   write_config("trainr: {}\n", "log: {level: wran, format: text}\n");
   daemon_.process().signal(SIGHUP);
   ASSERT_TRUE(daemon_.process().wait_for_line("everything stays as it was", kLimit));
-  EXPECT_TRUE(daemon_.process().wait_for_line("did you mean warn", kLimit)) << daemon_.process().standard_error();
+  EXPECT_TRUE(daemon_.process().wait_for_line("did you mean warn", kLimit))
+      << daemon_.process().standard_error();
   const std::string last = daemon_.process().standard_error();
-  EXPECT_EQ(last.find('{', last.rfind('\n', last.size() - 2) + 1), last.rfind('\n', last.size() - 2) + 1)
+  EXPECT_EQ(last.find('{', last.rfind('\n', last.size() - 2) + 1),
+            last.rfind('\n', last.size() - 2) + 1)
       << "still JSON";
   EXPECT_EQ(get("/healthz").code, 200);
   EXPECT_EQ(daemon_.stop(), 0);
@@ -191,7 +203,8 @@ class ReloadOfCellsTest : public testing::Test {
   void reload(const std::string& cells, const std::string& line) {
     name_cells(cells);
     daemon_.process().signal(SIGHUP);
-    ASSERT_TRUE(daemon_.process().wait_for_line(line, kLimit)) << daemon_.process().standard_error();
+    ASSERT_TRUE(daemon_.process().wait_for_line(line, kLimit))
+        << daemon_.process().standard_error();
   }
   void learn(const std::string& cell, const std::string& batch) {
     const auto job = session_->submit_measurements(cell, batch, test::virtual_batch_csv(40, 1));
@@ -208,8 +221,9 @@ class ReloadOfCellsTest : public testing::Test {
     return answer ? answer->model.version : 0;
   }
   [[nodiscard]] std::string status() const {
-    const auto said = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--port",
-                                 std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain())});
+    const auto said =
+        test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--port",
+                   std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain())});
     EXPECT_EQ(said.exit_code, 0) << said.err;
     return said.out;
   }
@@ -249,10 +263,13 @@ TEST_F(ReloadOfCellsTest, ACellThatIsLeftOutIsServedUntilTheNextStartAndComesBac
   EXPECT_EQ(daemon_.stop(), 0);
 }
 
-TEST_F(ReloadOfCellsTest, ABrokenCellFileIsNamedAndChangesNothingAndAChangedOneComesWithTheNextStart) {
-  ASSERT_TRUE(write_text_file(file("cell-9.yaml"), "version: 1\ncell: cell-9\nrobot: nowhere.yaml\n"));
+TEST_F(ReloadOfCellsTest,
+       ABrokenCellFileIsNamedAndChangesNothingAndAChangedOneComesWithTheNextStart) {
+  ASSERT_TRUE(
+      write_text_file(file("cell-9.yaml"), "version: 1\ncell: cell-9\nrobot: nowhere.yaml\n"));
   reload("[cell-7.yaml, cell-8.yaml, cell-9.yaml]", "everything stays as it was");
-  EXPECT_TRUE(daemon_.process().wait_for_line("nowhere.yaml", kLimit)) << daemon_.process().standard_error();
+  EXPECT_TRUE(daemon_.process().wait_for_line("nowhere.yaml", kLimit))
+      << daemon_.process().standard_error();
   EXPECT_EQ(status().find("cell-8"), std::string::npos);
   EXPECT_EQ(version(*session_, "cell-7"), 1);
   ASSERT_TRUE(write_text_file(file("cell-7.yaml"), cell_file_ + "# moved\n"));
@@ -264,13 +281,16 @@ TEST_F(ReloadOfCellsTest, ABrokenCellFileIsNamedAndChangesNothingAndAChangedOneC
 TEST_F(WatchingTest, ACellThatIsAddedWhileItServesHasItsPageItsReadinessAndItsFigures) {
   EXPECT_EQ(get("/cells/cell-8").code, 404);
   const std::filesystem::path server_file = daemon_.config_path();
-  std::string cell = test::read_file(std::filesystem::path(server_file).replace_filename("cell-7.yaml"));
+  std::string cell =
+      test::read_file(std::filesystem::path(server_file).replace_filename("cell-7.yaml"));
   cell.replace(cell.find("cell: cell-7"), 12, "cell: cell-8");
-  ASSERT_TRUE(write_text_file(std::filesystem::path(server_file).replace_filename("cell-8.yaml"), cell));
+  ASSERT_TRUE(
+      write_text_file(std::filesystem::path(server_file).replace_filename("cell-8.yaml"), cell));
   original_.replace(original_.find("[cell-7.yaml]"), 13, "[cell-7.yaml, cell-8.yaml]");
   write_config("");
   daemon_.process().signal(SIGHUP);
-  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit)) << daemon_.process().standard_error();
+  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit))
+      << daemon_.process().standard_error();
   EXPECT_EQ(get("/cells/cell-8").code, 200);
   EXPECT_NE(get("/").body.find("cell-8"), std::string::npos);
   const auto ready = get("/readyz?cell=cell-8");
@@ -286,7 +306,8 @@ TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
   auto session = client::Session::open(daemon_.session_options());
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_FALSE((*session)->submit_measurements("cell-9", "b1", "q1_deg\n"));
-  ASSERT_TRUE(daemon_.process().wait_for_line("request_refused", kLimit)) << daemon_.process().standard_error();
+  ASSERT_TRUE(daemon_.process().wait_for_line("request_refused", kLimit))
+      << daemon_.process().standard_error();
   EXPECT_EQ(daemon_.stop(), 0);
   std::istringstream lines(daemon_.process().standard_error());
   bool refused = false;
@@ -300,7 +321,8 @@ TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
     EXPECT_EQ(fact["cell"], "cell-9");
     EXPECT_EQ(fact["result"], "not_found");
     EXPECT_EQ(fact["who"].get<std::string>().size(), 24u) << line;
-    EXPECT_TRUE(fact["request"].get<std::string>().starts_with(fact["who"].get<std::string>())) << line;
+    EXPECT_TRUE(fact["request"].get<std::string>().starts_with(fact["who"].get<std::string>()))
+        << line;
     EXPECT_FALSE(fact["trace"].get<std::string>().empty()) << line;
   }
   EXPECT_TRUE(refused);
@@ -317,12 +339,13 @@ TEST_F(WatchingTest, ARealPrometheusScrapesTheDaemonAndTakesTheShippedRules) {
   config.replace(config.find("15s"), 3, "1s");
   folder.write("prometheus.yml", config);
   const auto listens = static_cast<std::uint16_t>(port() + 1);
-  test::Process prometheus({"/usr/bin/env", "prometheus", "--config.file=" + folder.file("prometheus.yml"),
+  test::Process prometheus({"/usr/bin/env", "prometheus",
+                            "--config.file=" + folder.file("prometheus.yml"),
                             "--storage.tsdb.path=" + folder.file("data"),
                             fmt::format("--web.listen-address=127.0.0.1:{}", listens)});
   const auto answer = [&](const std::string& query) {
-    const auto body =
-        nlohmann::json::parse(test::http_get(listens, "/api/v1/query?query=" + query).body, nullptr, false);
+    const auto body = nlohmann::json::parse(
+        test::http_get(listens, "/api/v1/query?query=" + query).body, nullptr, false);
     return body.is_object() ? body["data"]["result"] : nlohmann::json::array();
   };
   const auto until = std::chrono::steady_clock::now() + seconds(60);
@@ -339,7 +362,8 @@ TEST_F(WatchingTest, ARealPrometheusScrapesTheDaemonAndTakesTheShippedRules) {
 /// Where a manager of services listens.
 class ManagerSocket {
  public:
-  ManagerSocket() : path_(folder_.file("notify")), socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  ManagerSocket()
+      : path_(folder_.file("notify")), socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un to{};
     to.sun_family = AF_UNIX;
     path_.copy(to.sun_path, sizeof(to.sun_path) - 1);
@@ -357,7 +381,8 @@ class ManagerSocket {
       if (::poll(&look, 1, 200) <= 0) continue;
       std::array<char, 4096> text{};
       const ssize_t size = ::recv(socket_, text.data(), text.size(), 0);
-      if (size > 0 && std::string(text.data(), static_cast<std::size_t>(size)).find(what) != std::string::npos)
+      if (size > 0 &&
+          std::string(text.data(), static_cast<std::size_t>(size)).find(what) != std::string::npos)
         return true;
     }
     return false;
@@ -373,7 +398,8 @@ class ManagerSocket {
 TEST(ServiceManagerTest, ItIsToldWhatTheDaemonDoesFromItsStartToItsEnd) {
   ManagerSocket manager;
   test::Daemon daemon;
-  std::vector<std::string> command = {"/usr/bin/env", "NOTIFY_SOCKET=" + manager.path(), "WATCHDOG_USEC=1500000"};
+  std::vector<std::string> command = {"/usr/bin/env", "NOTIFY_SOCKET=" + manager.path(),
+                                      "WATCHDOG_USEC=1500000"};
   for (const std::string& word : daemon.command_line()) command.push_back(word);
   test::Process process(command);
   EXPECT_TRUE(manager.hears("READY=1"));
@@ -396,7 +422,8 @@ TEST(SupervisedReloadTest, ASupervisorPassesTheRequestOnAndGoesOnSupervising) {
   EXPECT_TRUE(supervisor.wait_for_line("read again", kLimit)) << supervisor.standard_error();
   supervisor.signal(SIGTERM);
   EXPECT_EQ(supervisor.wait(kLimit), 0) << supervisor.standard_error();
-  EXPECT_NE(supervisor.standard_error().find("after SIGTERM; not started again"), std::string::npos);
+  EXPECT_NE(supervisor.standard_error().find("after SIGTERM; not started again"),
+            std::string::npos);
 }
 
 TEST(DaemonCheckTest, TheCellsThatWouldGoDarkAreNamedAlsoWhileTheServiceRuns) {
@@ -405,14 +432,16 @@ TEST(DaemonCheckTest, TheCellsThatWouldGoDarkAreNamedAlsoWhileTheServiceRuns) {
   {
     auto session = client::Session::open(daemon.session_options());
     ASSERT_TRUE(session) << session.error().message;
-    const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+    const auto job =
+        (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
     ASSERT_TRUE(job) << job.error().message;
     ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
   }
   std::vector<std::string> command = daemon.command_line();
   command.emplace_back("--check");
   EXPECT_EQ(test::run(command).exit_code, 0);
-  const std::string cell_file = std::filesystem::path(daemon.config_path()).replace_filename("cell-7.yaml");
+  const std::string cell_file =
+      std::filesystem::path(daemon.config_path()).replace_filename("cell-7.yaml");
   std::string cell = test::read_file(cell_file);
   const std::string tool = "xyz_mm: [100, 0, 150]";
   ASSERT_NE(cell.find(tool), std::string::npos) << cell;
@@ -437,17 +466,21 @@ TEST(DaemonBackupTest, ACopyThatIsMadeWhileTheDaemonServesServesTheSameModelElse
   {
     auto session = client::Session::open(daemon.session_options());
     ASSERT_TRUE(session) << session.error().message;
-    const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+    const auto job =
+        (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
     ASSERT_TRUE(job) << job.error().message;
     ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
   }
   const std::string before = answer();
   const test::TemporaryFolder folder;
-  const test::Finished copied = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--store",
-                                           daemon.store_path(), "-o", folder.file("copy.db"), "--json", "-"});
+  const test::Finished copied =
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--store", daemon.store_path(),
+                 "-o", folder.file("copy.db"), "--json", "-"});
   ASSERT_EQ(copied.exit_code, 0) << copied.err;
   EXPECT_EQ(nlohmann::json::parse(copied.out)["models"], 1);
-  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--check", folder.file("copy.db")}).exit_code,
+  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--check",
+                       folder.file("copy.db")})
+                .exit_code,
             0);
   EXPECT_EQ(answer(), before) << "it serves on";
   EXPECT_EQ(daemon.stop(), 0);

@@ -20,20 +20,23 @@ Cell cell_7() { return *read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cel
 
 Cell cell_on_a_rail() {
   Cell cell = cell_7();
-  cell.robot = *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
+  cell.robot =
+      *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
   cell.joint_ranges.clear();
   return cell;
 }
 
-/// The source that a list spells by this form, of a joint and from a pose on where it takes them, with a number where
-/// it wants one; of joint 2 of cell-7, or of the rail.
+/// The source that a list spells by this form, of a joint and from a pose on where it takes them,
+/// with a number where it wants one; of joint 2 of cell-7, or of the rail.
 Result<ErrorSourcePtr> some_source(const CauseRecord& record, std::string_view form) {
   const bool of_joint = record.scope == Scope::kJoint;
   const std::string at = record.lasting == causes::Lasting::kFromAPose ? "@3" : "";
-  Result<ErrorSourcePtr> source = make_error_source(fmt::format("{}{}{}", form, of_joint ? ":2" : "", at), cell_7());
+  Result<ErrorSourcePtr> source =
+      make_error_source(fmt::format("{}{}{}", form, of_joint ? ":2" : "", at), cell_7());
   if (!source && of_joint) source = make_error_source(fmt::format("{}:2@40", form), cell_7());
   if (!source && of_joint) source = make_error_source(fmt::format("{}:1", form), cell_on_a_rail());
-  if (!source && of_joint) source = make_error_source(fmt::format("{}:1@40", form), cell_on_a_rail());
+  if (!source && of_joint)
+    source = make_error_source(fmt::format("{}:1@40", form), cell_on_a_rail());
   return source;
 }
 
@@ -63,14 +66,18 @@ TEST(Causes, ARecordThatLeavesSomethingOutIsTold) {
   EXPECT_TRUE(misses([](CauseRecord& record) { record.forms.clear(); }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.acts = {}; }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.whole_batch.reset(); }));
-  EXPECT_TRUE(misses([](CauseRecord& record) { record.added_by_data = causes::AddedByData{"gremlins", nullptr, ""}; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) {
+    record.added_by_data = causes::AddedByData{"gremlins", nullptr, ""};
+  }));
 }
 
 TEST(Causes, RulesAboutOneCauseAreMembersOfItsRecord) {
   const Cell cell = cell_7();
-  for (const causes::StandsFor what : {causes::StandsFor::kNoKnownCause, causes::StandsFor::kArmNotAsModelled})
+  for (const causes::StandsFor what :
+       {causes::StandsFor::kNoKnownCause, causes::StandsFor::kArmNotAsModelled})
     EXPECT_TRUE(cause_that_stands_for(what).forms.empty()) << "no physics describes it";
-  for (const causes::Part part : {causes::Part::kBase, causes::Part::kTool, causes::Part::kPayload}) {
+  for (const causes::Part part :
+       {causes::Part::kBase, causes::Part::kTool, causes::Part::kPayload}) {
     const CauseRecord& record = cause_correcting(part);
     EXPECT_EQ(record.lasting, causes::Lasting::kAlways) << record.spelling;
     EXPECT_TRUE(corrects({std::string(record.spelling)}, part));
@@ -103,7 +110,8 @@ TEST(Causes, TheReadmeHasEveryCauseWithBothItsNames) {
       read_text_file(std::string(TRAMMEL_SOURCE_DIR) + "/server/error_sources/README.md");
   ASSERT_TRUE(readme);
   for (const CauseRecord* record : all_causes()) {
-    EXPECT_NE(readme->find(fmt::format("`{}", record->spelling)), std::string::npos) << record->spelling;
+    EXPECT_NE(readme->find(fmt::format("`{}", record->spelling)), std::string::npos)
+        << record->spelling;
     EXPECT_NE(readme->find(record->plain_name), std::string::npos) << record->plain_name;
   }
 }
@@ -127,7 +135,8 @@ TEST(Causes, EveryParameterIsAmongTheFiguresOfItsCauseInOrderAndUnit) {
     for (const Parameter& parameter : (*source)->parameters()) {
       const auto fits = [&](const causes::Figure& figure) {
         const std::string_view rest =
-            std::string_view(parameter.name).substr(std::min(figure.name.size(), parameter.name.size()));
+            std::string_view(parameter.name)
+                .substr(std::min(figure.name.size(), parameter.name.size()));
         return parameter.name.starts_with(figure.name) && parameter.unit == figure.unit &&
                rest.find_first_of("abcdefghijklmnopqrstuvwxyz") == std::string_view::npos;
       };
@@ -147,7 +156,8 @@ TEST(Causes, PeopleReadPlainNamesAndFilesKeepTheSpelling) {
   EXPECT_EQ(causes_in_words({}), "");
   EXPECT_EQ(causes_in_words({"geometry", "gear_transmission:3@48.5+97", "tracker_moved@40"}),
             "link geometry, gear ripple in joint 3, the tracker moved from row 40 on");
-  EXPECT_EQ(level_in_words("base,geometry,backlash:2"), "base position, link geometry, backlash in joint 2");
+  EXPECT_EQ(level_in_words("base,geometry,backlash:2"),
+            "base position, link geometry, backlash in joint 2");
   EXPECT_EQ(level_in_words(""), "none");
 }
 

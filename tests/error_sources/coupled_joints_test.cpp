@@ -9,8 +9,8 @@
 #include "server/robot/cell.h"
 #include "tests/support/demand.h"
 
-// Two joints of which the second is commanded against the world: by a controller that counts so, or by bars. The arm of
-// this test is two links in a plane, computed with sines and cosines.
+// Two joints of which the second is commanded against the world: by a controller that counts so, or
+// by bars. The arm of this test is two links in a plane, computed with sines and cosines.
 
 namespace trammel {
 namespace {
@@ -49,7 +49,9 @@ struct Gears {
   CouplingKind kind;
   [[nodiscard]] bool in_bars() const { return kind == CouplingKind::kParallelogram; }
 
-  [[nodiscard]] Angles at(const Angles& level) const { return {level[0], in_bars() ? level[1] : level[1] - level[0]}; }
+  [[nodiscard]] Angles at(const Angles& level) const {
+    return {level[0], in_bars() ? level[1] : level[1] - level[0]};
+  }
   [[nodiscard]] Angles torque(const Angles& level) const {
     const double upper = -kMass * kGravity * kUpper * std::cos(level[0]);
     const double fore = -kMass * kGravity * kFore * std::cos(level[1]);
@@ -68,7 +70,9 @@ struct Case {
 };
 
 std::vector<Case> cases() {
-  const auto ripple = [](double g) { return 2e-3 * std::sin(kOrder * g) - 1e-3 * std::cos(kOrder * g); };
+  const auto ripple = [](double g) {
+    return 2e-3 * std::sin(kOrder * g) - 1e-3 * std::cos(kOrder * g);
+  };
   return {
       {"joint_slip:1@1",
        {3e-3},
@@ -157,7 +161,8 @@ TEST_P(CoupledJoints, EveryCauseActsOnTheGearAsItIsBuilt) {
     for (const Case& one : cases()) {
       PhysicalModel model = test::demand(make_physical_model(cell, {one.source}));
       ASSERT_EQ(model.values.size(), static_cast<Eigen::Index>(one.values.size())) << one.source;
-      for (std::size_t k = 0; k < one.values.size(); ++k) model.values(static_cast<Eigen::Index>(k)) = one.values[k];
+      for (std::size_t k = 0; k < one.values.size(); ++k)
+        model.values(static_cast<Eigen::Index>(k)) = one.values[k];
       const Vector3 expected = tip(gears.moved(level, one.off(gears, level, before)));
       EXPECT_LT((model.pose_W(context).translation() - expected).norm(), 1e-9) << one.source;
       EXPECT_GT((tip(level) - expected).norm(), 1e-5) << one.source;
@@ -165,7 +170,8 @@ TEST_P(CoupledJoints, EveryCauseActsOnTheGearAsItIsBuilt) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(By, CoupledJoints, testing::Values(CouplingKind::kController, CouplingKind::kParallelogram),
+INSTANTIATE_TEST_SUITE_P(By, CoupledJoints,
+                         testing::Values(CouplingKind::kController, CouplingKind::kParallelogram),
                          [](const auto& kind) { return std::string(to_string(kind.param)); });
 
 }  // namespace

@@ -20,7 +20,8 @@ using test::Refusal;
 using test::refusal_of;
 
 std::shared_ptr<const Cell> cell_7() {
-  return std::make_shared<const Cell>(*read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml"));
+  return std::make_shared<const Cell>(
+      *read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml"));
 }
 
 PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
@@ -45,13 +46,14 @@ PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
 
 std::shared_ptr<const Cell> cell_on_a_rail() {
   auto cell = std::make_shared<Cell>(*cell_7());
-  cell->robot = *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
+  cell->robot =
+      *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
   cell->joint_ranges.clear();
   return cell;
 }
 
-/// One of every form of every cause that `cell` can have, of the first joint that can have it; some causes want
-/// numbers.
+/// One of every form of every cause that `cell` can have, of the first joint that can have it; some
+/// causes want numbers.
 std::vector<std::string> specs_of(const Cell& cell) {
   std::vector<std::string> specs;
   for (const CauseRecord* record : all_causes()) {
@@ -61,7 +63,8 @@ std::vector<std::string> specs_of(const Cell& cell) {
       for (int k = 0; k < (of_joint ? 2 * cell.robot.size() : 1); ++k) {
         const int joint = k < 2 ? 2 : k < 4 ? 1 : k / 2 + 1;  // an upright axis feels no weight
         const std::string which = of_joint ? fmt::format(":{}", joint) : "";
-        const std::string spec = fmt::format("{}{}{}", form.spelling, which, k % 2 == 1 ? "@40" : at);
+        const std::string spec =
+            fmt::format("{}{}{}", form.spelling, which, k % 2 == 1 ? "@40" : at);
         if (!make_error_source(spec, cell)) continue;
         specs.push_back(spec);
         break;
@@ -88,7 +91,9 @@ const std::vector<std::string>& every_spec() {
 const std::vector<std::string>& rail_specs() {
   static const std::vector<std::string> kSpecs = [] {
     std::vector<std::string> specs = specs_of(*cell_on_a_rail());
-    std::erase_if(specs, [](const std::string& spec) { return make_error_source(spec, *cell_7()).has_value(); });
+    std::erase_if(specs, [](const std::string& spec) {
+      return make_error_source(spec, *cell_7()).has_value();
+    });
     return specs;
   }();
   return kSpecs;
@@ -106,7 +111,8 @@ Eigen::VectorXd plausible_values(const PhysicalModel& model, std::uint64_t seed)
   return values;
 }
 
-void expect_exact_derivatives(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs) {
+void expect_exact_derivatives(const std::shared_ptr<const Cell>& cell,
+                              const std::vector<std::string>& specs) {
   const PhysicalModel model = *make_physical_model(cell, specs);
   const Eigen::VectorXd values = plausible_values(model, 5);
   const PoseContext context = some_pose(*cell, 6);
@@ -119,10 +125,12 @@ void expect_exact_derivatives(const std::shared_ptr<const Cell>& cell, const std
     Eigen::VectorXd behind = values;
     ahead(i) += step;
     behind(i) -= step;
-    const Vector6 change =
-        pose_difference(model.pose_W(context, ahead, nullptr), model.pose_W(context, behind, nullptr)) / (2 * step);
+    const Vector6 change = pose_difference(model.pose_W(context, ahead, nullptr),
+                                           model.pose_W(context, behind, nullptr)) /
+                           (2 * step);
     EXPECT_LT((J.col(i) - change).norm(), 1e-6 * (1 + change.norm()))
-        << specs.back() << " of " << specs.size() << ", " << parameters[static_cast<std::size_t>(i)].name;
+        << specs.back() << " of " << specs.size() << ", "
+        << parameters[static_cast<std::size_t>(i)].name;
   }
 }
 
@@ -130,7 +138,8 @@ TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
   const auto cell = cell_7();
   std::vector<std::vector<std::string>> lists;
   for (const std::string& spec : every_spec()) lists.push_back({spec});
-  for (const char* compliance : {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
+  for (const char* compliance :
+       {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
     std::vector<std::string> all = {compliance};
     for (const std::string& spec : every_spec()) {
       if (!spec.starts_with("compliance")) all.push_back(spec);
@@ -147,7 +156,8 @@ TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
     expect_exact_derivatives(cell, {spec});
     all.push_back(spec);
   }
-  for (const char* beyond : {"axis_runout:2", "axis_runout:3", "instrument_scale"}) all.emplace_back(beyond);
+  for (const char* beyond : {"axis_runout:2", "axis_runout:3", "instrument_scale"})
+    all.emplace_back(beyond);
   expect_exact_derivatives(cell, all);
 }
 
@@ -165,7 +175,8 @@ TEST(ErrorSources, JacobiansOfCoupledJointsFitCentralDifferencesAloneAndTogether
   for (const CouplingKind kind : {CouplingKind::kController, CouplingKind::kParallelogram}) {
     const auto cell = coupled_cell(kind);
     for (const std::string& spec : every_spec()) expect_exact_derivatives(cell, {spec});
-    for (const char* compliance : {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
+    for (const char* compliance :
+         {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
       std::vector<std::string> all = {compliance};
       for (const std::string& spec : every_spec())
         if (!spec.starts_with("compliance")) all.push_back(spec);
@@ -180,7 +191,8 @@ TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
   const auto deflected = [&](const char* form, double stiffness_factor) {
     PhysicalModel model = *make_physical_model(cell, {form});
     model.values.setConstant(from_rad_per_nmm(2e-9) * stiffness_factor);
-    return Vector3(model.pose_W(context).translation() - model.nominal_pose_W(context).translation());
+    return Vector3(model.pose_W(context).translation() -
+                   model.nominal_pose_W(context).translation());
   };
   for (const char* form : {"compliance_equilibrium", "compliance_linear"}) {
     const double soft = (deflected(form, 1) - deflected("compliance_first_order", 1)).norm();
@@ -193,7 +205,8 @@ TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
 
 TEST(ErrorSources, WithoutValuesTheModelIsNominal) {
   const auto cell = cell_7();
-  const PhysicalModel model = *make_physical_model(cell, {"base", "geometry", "compliance", "tool"});
+  const PhysicalModel model =
+      *make_physical_model(cell, {"base", "geometry", "compliance", "tool"});
   const PoseContext context = some_pose(*cell, 8);
   EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12);
 }
@@ -203,7 +216,8 @@ TEST(ErrorSources, GeometryHasTheParametersOfTheSource) {
   std::string names;
   for (const Parameter& parameter : model.parameters()) names += parameter.name + " ";
   EXPECT_EQ(names,
-            "q1 d1 a1 alpha1 q2 a2 alpha2 beta2 q3 d3 a3 alpha3 q4 d4 a4 alpha4 q5 d5 a5 alpha5 q6 d6 a6 alpha6 ");
+            "q1 d1 a1 alpha1 q2 a2 alpha2 beta2 q3 d3 a3 alpha3 q4 d4 a4 alpha4 q5 d5 a5 alpha5 q6 "
+            "d6 a6 alpha6 ");
 }
 
 TEST(ErrorSources, EveryKnownCauseIsTestedHere) {
@@ -217,8 +231,9 @@ TEST(ErrorSources, EveryKnownCauseIsTestedHere) {
 }
 
 void expect_to_move_the_tool(const std::shared_ptr<const Cell>& cell, const std::string& spec) {
-  const std::vector<std::string> list =
-      spec.starts_with("compliance") ? std::vector<std::string>{spec} : std::vector<std::string>{"compliance", spec};
+  const std::vector<std::string> list = spec.starts_with("compliance")
+                                            ? std::vector<std::string>{spec}
+                                            : std::vector<std::string>{"compliance", spec};
   PhysicalModel loaded = *make_physical_model(cell, list);
   loaded.values = plausible_values(loaded, 9);
   PhysicalModel without = loaded;
@@ -233,7 +248,9 @@ void expect_to_move_the_tool(const std::shared_ptr<const Cell>& cell, const std:
     first += count;
   }
   const PoseContext context = some_pose(*cell, 10);
-  EXPECT_GT((loaded.pose_W(context).translation() - without.pose_W(context).translation()).norm(), 1e-6) << spec;
+  EXPECT_GT((loaded.pose_W(context).translation() - without.pose_W(context).translation()).norm(),
+            1e-6)
+      << spec;
 }
 
 TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
@@ -244,12 +261,14 @@ TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
 /// What belongs to the measuring or to what nobody knows of a request.
 TEST(ErrorSources, NothingServedHasWhatBelongsToTheInstrument) {
   const auto cell = cell_7();
-  for (const char* spec : {"tracker_drift", "tracker_moved@2", "instrument_scale", "early_reading"}) {
+  for (const char* spec :
+       {"tracker_drift", "tracker_moved@2", "instrument_scale", "early_reading"}) {
     PhysicalModel model = *make_physical_model(cell, {spec});
     model.values = plausible_values(model, 11);
     PoseContext context = some_pose(*cell, 12);
     context.served = true;
-    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12)
+        << spec;
   }
 }
 
@@ -260,7 +279,8 @@ TEST(ErrorSources, AnUnknownPoseBeforeHasNoEffect) {
     model.values = plausible_values(model, 11);
     PoseContext context = some_pose(*cell, 12);
     context.before.reset();
-    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12)
+        << spec;
   }
 }
 
@@ -270,7 +290,9 @@ TEST(ErrorSources, AGearboxFollowsTheTemperatureWithItsOwnLag) {
   PoseContext context = some_pose(*cell, 14);
   const auto turned = [&](double lag) {
     model.values << 1e-5, lag;
-    return rotation_log(model.pose_W(context).linear() * model.nominal_pose_W(context).linear().transpose()).z();
+    return rotation_log(model.pose_W(context).linear() *
+                        model.nominal_pose_W(context).linear().transpose())
+        .z();
   };
   EXPECT_NEAR(turned(kHeatLags[4]), 1e-5 * (context.lagged[4] - 20), 1e-12);
   EXPECT_NEAR(turned(1), 1e-5 * (context.lagged.front() - 20), 1e-12);
@@ -286,9 +308,11 @@ TEST(ErrorSources, AStepBeginsAtItsPose) {
     model.values = plausible_values(model, 11);
     PoseContext context = some_pose(*cell, 12);
     context.index = 2;  // the third pose
-    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12)
+        << spec;
     context.index = 3;
-    EXPECT_GT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-5) << spec;
+    EXPECT_GT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-5)
+        << spec;
   }
 }
 
@@ -299,7 +323,8 @@ TEST(ErrorSources, AJointWithPlayHangsBackFromWhereItIsGoing) {
   PoseContext context = some_pose(*cell, 14);
   const auto reached = [&](int sense) {
     context.direction = {sense, 0, 0, 0, 0, 0};
-    return rotation_log(model.pose_W(context).linear() * model.nominal_pose_W(context).linear().transpose());
+    return rotation_log(model.pose_W(context).linear() *
+                        model.nominal_pose_W(context).linear().transpose());
   };
   // Joint 1 turns about the base's z axis.
   EXPECT_LT((reached(1) - Vector3(0, 0, -1e-4)).norm(), 1e-9);
@@ -307,8 +332,8 @@ TEST(ErrorSources, AJointWithPlayHangsBackFromWhereItIsGoing) {
 }
 
 TEST(ErrorSources, BendingIsTheCantileverOfTheTextbook) {
-  // Link 2 level, load at its end: F l^3 / 3EI down, slope F l^2 / 2EI, plus the moment of the load's lever beyond the
-  // end.
+  // Link 2 level, load at its end: F l^3 / 3EI down, slope F l^2 / 2EI, plus the moment of the
+  // load's lever beyond the end.
   auto cell = std::make_shared<Cell>(*cell_7());
   PhysicalModel model = *make_physical_model(cell, {"link_bending:2"});
   model.values(0) = 1e-6;
@@ -322,7 +347,8 @@ TEST(ErrorSources, BendingIsTheCantileverOfTheTextbook) {
   const Vector3 cog = X_WF * cell->payloads.at("spindle").p_FoCog_F;
   const Vector3 end = (Vector3() << 0.320 + length, 0, 0.780).finished();
   const double moment = force * (cog.x() - end.x());
-  const double deflection = force * std::pow(length, 3) / 3 * 1e-6 + moment * length * length / 2 * 1e-6;
+  const double deflection =
+      force * std::pow(length, 3) / 3 * 1e-6 + moment * length * length / 2 * 1e-6;
   const double slope = force * length * length / 2 * 1e-6 + moment * length * 1e-6;
   const Vector3 tip = model.nominal_pose_W(context).translation();
   const Vector3 expected = Vector3(0, 0, -deflection) + Vector3(0, slope, 0).cross(tip - end);
@@ -352,7 +378,8 @@ TEST(ErrorSources, AStarStandsForEveryJointThatCanHaveTheSource) {
   };
   EXPECT_EQ(names("abb_irb6640-205-275.yaml", "joint_map:*@5"),
             "joint_map:1@5 joint_map:2@5 joint_map:3@5 joint_map:4@5 joint_map:5@5 joint_map:6@5 ");
-  EXPECT_TRUE(names("abb_irb6640-205-275-on-rail.yaml", "joint_map:*").starts_with("joint_map:2 joint_map:3 "));
+  EXPECT_TRUE(names("abb_irb6640-205-275-on-rail.yaml", "joint_map:*")
+                  .starts_with("joint_map:2 joint_map:3 "));
   EXPECT_FALSE(make_physical_model(cell_7(), {"geometry:*"}));
   EXPECT_FALSE(make_physical_model(cell_7(), {"joint_map:*", "joint_map:2"}));
 }
@@ -372,7 +399,8 @@ TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
   }
   // Whatever is learned can be read.
   for (const double wild : {1e-30, 1e30}) {
-    const MapSpectrum spectrum{.harmonics = 500, .amplitude = wild, .knee = 1 / wild, .power = wild};
+    const MapSpectrum spectrum{
+        .harmonics = 500, .amplitude = wild, .knee = 1 / wild, .power = wild};
     const Result<ErrorSourcePtr> map = make_error_source(spelled_map(0, spectrum), *cell);
     ASSERT_TRUE(map) << spelled_map(0, spectrum);
     EXPECT_GT((*map)->parameters().back().prior_scale, 0);
@@ -385,10 +413,12 @@ TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
 
 TEST(ErrorSources, AMapIsOpenWhereNothingIsToldOfItsSpectrum) {
   EXPECT_EQ(joint_of_open_map("joint_map:2"), 1);
-  for (const char* told : {"joint_map:2@48", "joint_map:2@48+300+6+2", "joint_map:x", "joint_map", "backlash:2"})
+  for (const char* told :
+       {"joint_map:2@48", "joint_map:2@48+300+6+2", "joint_map:x", "joint_map", "backlash:2"})
     EXPECT_FALSE(joint_of_open_map(told)) << told;
   EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:2"}), "joint_map:2");
-  EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:3"}), "joint_map:2@110+300+6+2");
+  EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:3"}),
+            "joint_map:2@110+300+6+2");
   EXPECT_EQ(as_listed("joint_map:2@110", {"base", "joint_map:2"}), "joint_map:2@110");
 }
 
@@ -401,11 +431,13 @@ TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const auto cell = cell_7();
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
-  EXPECT_EQ(refusal_of(unknown), Refusal("", {}, "error_sources").of(ErrorCode::kUsage).text("gremlins"));
+  EXPECT_EQ(refusal_of(unknown),
+            Refusal("", {}, "error_sources").of(ErrorCode::kUsage).text("gremlins"));
   for (const char* spec :
        {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
-        "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5", "joint_map:2@9+300",
-        "joint_map:2@9+300+6+51", "joint_map:2@9+300+0.001+2", "joint_map:2@9+2e6+6+2"}) {
+        "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5",
+        "joint_map:2@9+300", "joint_map:2@9+300+6+51", "joint_map:2@9+300+0.001+2",
+        "joint_map:2@9+2e6+6+2"}) {
     EXPECT_FALSE(make_error_source(spec, *cell)) << spec;
   }
 }

@@ -5,8 +5,8 @@
 #include "server/error_sources/joint_error.h"
 #include "server/error_sources/parameter.h"
 
-/// A cause that does not ship, in one file as the README's recipe says: the dress pack. Its hoses pull at a joint as
-/// the joint before it turns, three times a turn.
+/// A cause that does not ship, in one file as the README's recipe says: the dress pack. Its hoses
+/// pull at a joint as the joint before it turns, three times a turn.
 namespace trammel::causes {
 
 const CauseRecord& hose_pull();
@@ -22,7 +22,9 @@ class HosePull final : public JointError {
                    {angle_parameter(fmt::format("pull_sin{}", spec.joint + 1), 3e-4),
                     angle_parameter(fmt::format("pull_cos{}", spec.joint + 1), 3e-4)}) {}
   const CauseRecord& cause() const override { return causes::hose_pull(); }
-  std::string explanation() const override { return fmt::format("the hoses pull at joint {}", joint() + 1); }
+  std::string explanation() const override {
+    return fmt::format("the hoses pull at joint {}", joint() + 1);
+  }
 
  private:
   std::vector<Term> terms(const PoseContext& context) const override {
@@ -32,7 +34,8 @@ class HosePull final : public JointError {
 };
 
 inline Result<ErrorSourcePtr> make_hose_pull(const SourceSpec& spec, const Cell&) {
-  if (spec.joint == 0) return refused("error source '{}': no joint comes before joint 1", spec.text);
+  if (spec.joint == 0)
+    return refused("error source '{}': no joint comes before joint 1", spec.text);
   return std::make_shared<HosePull>(spec);
 }
 

@@ -17,7 +17,8 @@ using test::demand;
 class FleetTest : public testing::Test {
  protected:
   /// `values`: of parameters that are not the type's.
-  [[nodiscard]] FleetMember member(int seed, const std::vector<std::pair<std::string, double>>& values = {}) const {
+  [[nodiscard]] FleetMember member(
+      int seed, const std::vector<std::pair<std::string, double>>& values = {}) const {
     std::mt19937_64 random(static_cast<std::uint64_t>(seed));
     std::normal_distribution<double> normal;
     ModelParts parts;
@@ -46,7 +47,8 @@ class FleetTest : public testing::Test {
     return members;
   }
   [[nodiscard]] double scale_of(const std::string& name) const {
-    for (const Parameter& one : demand(make_physical_model(cell_, {"geometry", "compliance"})).parameters())
+    for (const Parameter& one :
+         demand(make_physical_model(cell_, {"geometry", "compliance"})).parameters())
       if (one.name == name) return one.prior_scale;
     return 0;
   }
@@ -95,7 +97,9 @@ TEST_F(FleetTest, OfFleetsOfOneLawAtMostOneInTwentyHasARobotThatIsCalledUnlike) 
       }
       with_one += any;
     }
-    EXPECT_LE(with_one, 5) << robots << " robots: of 40 fleets two are expected at the most, six in one of fifty tries";
+    EXPECT_LE(with_one, 5)
+        << robots
+        << " robots: of 40 fleets two are expected at the most, six in one of fifty tries";
   }
 }
 

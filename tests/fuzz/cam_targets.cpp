@@ -1,5 +1,5 @@
-// Robot programs: one target a dialect, and the system parameters of a backup. Several files of one program are joined
-// by the byte 0x1E.
+// Robot programs: one target a dialect, and the system parameters of a backup. Several files of one
+// program are joined by the byte 0x1E.
 #include <filesystem>
 #include <set>
 
@@ -21,22 +21,25 @@ constexpr char kNextFile = '\x1e';
 
 const Chain& robot() {
   static const Chain one =
-      parse_robot(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml").value(), "robot").value();
+      parse_robot(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml").value(),
+                  "robot")
+          .value();
   return one;
 }
 
 const cam::CellTools& tools() {
   static const cam::CellTools all{
-      {{"spindle",
-        make_pose(Eigen::Quaterniond(0.923879532511287, 0, -0.382683432365090, 0).normalized().toRotationMatrix(),
-                  {.1, 0, .15})}},
+      {{"spindle", make_pose(Eigen::Quaterniond(0.923879532511287, 0, -0.382683432365090, 0)
+                                 .normalized()
+                                 .toRotationMatrix(),
+                             {.1, 0, .15})}},
       {{"spindle", {100, {0, 0, .1}}}}};
   return all;
 }
 
 /// Moves every target a little, as a model would.
-Result<client::Answer<client::CorrectedTarget>> moved(const std::string&, const std::string&,
-                                                      const std::vector<client::TargetMm>& targets) {
+Result<client::Answer<client::CorrectedTarget>> moved(
+    const std::string&, const std::string&, const std::vector<client::TargetMm>& targets) {
   client::Answer<client::CorrectedTarget> answer;
   answer.model.id = "0123456789ab";
   for (const client::TargetMm& target : targets) {
@@ -51,7 +54,8 @@ Result<client::Answer<client::CorrectedTarget>> moved(const std::string&, const 
   return answer;
 }
 
-std::vector<cam::SourceFile> files_of(std::string_view bytes, const std::vector<std::string>& names) {
+std::vector<cam::SourceFile> files_of(std::string_view bytes,
+                                      const std::vector<std::string>& names) {
   std::vector<cam::SourceFile> files;
   for (const std::string& name : names) {
     const std::size_t end = std::min(bytes.find(kNextFile), bytes.size());
@@ -62,9 +66,12 @@ std::vector<cam::SourceFile> files_of(std::string_view bytes, const std::vector<
   return files;
 }
 
-bool is_of_number(char c) { return (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '+' || c == 'e' || c == 'E'; }
+bool is_of_number(char c) {
+  return (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '+' || c == 'e' || c == 'E';
+}
 
-/// A text without the characters that numbers are written with, and without what was inserted or folded.
+/// A text without the characters that numbers are written with, and without what was inserted or
+/// folded.
 std::string skeleton(const std::string& text, const std::set<int>& without) {
   std::string kept;
   int line = 1;
@@ -75,7 +82,8 @@ std::string skeleton(const std::string& text, const std::set<int>& without) {
   return kept;
 }
 
-/// No byte is changed but those of numbers, of lines that the receipt lists, and of motions that it says are folded.
+/// No byte is changed but those of numbers, of lines that the receipt lists, and of motions that it
+/// says are folded.
 void check_bytes(const std::vector<cam::SourceFile>& before, const cam::CorrectedProgram& after) {
   for (const cam::ReceiptRow& row : after.rows) {
     if (row.folded && row.corrected()) return;
@@ -101,7 +109,8 @@ std::string correct(Dialect dialect, const std::vector<cam::SourceFile>& files) 
                     {"USER[1]", Pose::Identity()}};
   const cam::Program program = cam::read_program(dialect, files, reading);
   TRAMMEL_CHECK(program.files.size() == files.size() && program.mark_places.size() == files.size());
-  for (std::size_t f = 0; f < files.size(); ++f) TRAMMEL_CHECK(program.files[f].text == files[f].text);
+  for (std::size_t f = 0; f < files.size(); ++f)
+    TRAMMEL_CHECK(program.files[f].text == files[f].text);
   cam::CorrectProgramOptions options;
   options.version = "1";
   options.date = "2026-11-22";
@@ -112,20 +121,33 @@ std::string correct(Dialect dialect, const std::vector<cam::SourceFile>& files) 
   static_cast<void>(cam::read_program(dialect, done->files, reading));
   std::string said = fmt::format("{} corrected", done->moves_corrected > 0 ? "some" : "none");
   for (const cam::ReceiptRow& row : done->rows) {
-    if (!row.corrected() && said.size() < 100) said += ", " + words_of(refused("{}", row.message).value());
+    if (!row.corrected() && said.size() < 100)
+      said += ", " + words_of(refused("{}", row.message).value());
   }
   return said;
 }
 
-std::string read_rapid(std::string_view bytes) { return correct(Dialect::kRapid, files_of(bytes, {"a.mod", "b.sys"})); }
+std::string read_rapid(std::string_view bytes) {
+  return correct(Dialect::kRapid, files_of(bytes, {"a.mod", "b.sys"}));
+}
 std::string read_krl(std::string_view bytes) {
   return correct(Dialect::kKrl, files_of(bytes, {"a.src", "a.dat", "$config.dat"}));
 }
-std::string read_fanuc(std::string_view bytes) { return correct(Dialect::kFanuc, files_of(bytes, {"a.ls"})); }
-std::string read_inform(std::string_view bytes) { return correct(Dialect::kInform, files_of(bytes, {"a.jbi"})); }
-std::string read_urscript(std::string_view bytes) { return correct(Dialect::kUrScript, files_of(bytes, {"a.script"})); }
-std::string read_camrob(std::string_view bytes) { return correct(Dialect::kCamRob, files_of(bytes, {"a.csv"})); }
-std::string read_robodk(std::string_view bytes) { return correct(Dialect::kRoboDk, files_of(bytes, {"a.csv"})); }
+std::string read_fanuc(std::string_view bytes) {
+  return correct(Dialect::kFanuc, files_of(bytes, {"a.ls"}));
+}
+std::string read_inform(std::string_view bytes) {
+  return correct(Dialect::kInform, files_of(bytes, {"a.jbi"}));
+}
+std::string read_urscript(std::string_view bytes) {
+  return correct(Dialect::kUrScript, files_of(bytes, {"a.script"}));
+}
+std::string read_camrob(std::string_view bytes) {
+  return correct(Dialect::kCamRob, files_of(bytes, {"a.csv"}));
+}
+std::string read_robodk(std::string_view bytes) {
+  return correct(Dialect::kRoboDk, files_of(bytes, {"a.csv"}));
+}
 
 std::string read_parameters(std::string_view bytes) {
   const auto cell = cam::read_backup(std::string(bytes), "MOC.cfg", {}, "");
@@ -136,11 +158,13 @@ std::string read_parameters(std::string_view bytes) {
 /// The programs that tests correct.
 std::vector<std::string> programs(const char* kind) {
   std::vector<std::string> all;
-  for (const auto& folder : fs::directory_iterator(TRAMMEL_SOURCE_DIR "/tests/clients/programs/" + std::string(kind))) {
+  for (const auto& folder :
+       fs::directory_iterator(TRAMMEL_SOURCE_DIR "/tests/clients/programs/" + std::string(kind))) {
     std::set<fs::path> files{fs::directory_iterator(folder.path()), fs::directory_iterator()};
     std::string joined, last;
     // $config.dat comes last, .src before .dat.
-    for (const char* ending : {".mod", ".prg", ".sys", ".src", ".dat", ".ls", ".jbi", ".script", ".csv"}) {
+    for (const char* ending :
+         {".mod", ".prg", ".sys", ".src", ".dat", ".ls", ".jbi", ".script", ".csv"}) {
       for (const fs::path& file : files) {
         if (file.extension() != ending) continue;
         const std::string text = read_text_file(file.string()).value();

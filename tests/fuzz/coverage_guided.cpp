@@ -40,8 +40,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   return 0;
 }
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
-                                               unsigned int seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size,
+                                               std::size_t max_size, unsigned int seed) {
   const trammel::fuzz::Target& target = trammel::fuzz::chosen();
   trammel::fuzz::Random random(seed);
   std::string input(reinterpret_cast<const char*>(data), size);
@@ -49,7 +49,8 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   if (random() % 4 == 0) {
     input.resize(max_size);
     input.resize(LLVMFuzzerMutate(reinterpret_cast<std::uint8_t*>(input.data()), size, max_size));
-    if (target.mutate == trammel::fuzz::mutate_model) input = trammel::fuzz::with_fitting_hashes(input);
+    if (target.mutate == trammel::fuzz::mutate_model)
+      input = trammel::fuzz::with_fitting_hashes(input);
   } else {
     input = target.mutate(input, random, max_size);
   }

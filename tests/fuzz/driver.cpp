@@ -1,5 +1,5 @@
-// Replays a target's corpus and then runs changed inputs, without coverage: what CI does, and what runs longest on a
-// plain build. An input whose outcome is new is kept as one to change further.
+// Replays a target's corpus and then runs changed inputs, without coverage: what CI does, and what
+// runs longest on a plain build. An input whose outcome is new is kept as one to change further.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/time.h>
@@ -76,11 +76,12 @@ void keep_inputs_of_crashes() {
   struct sigaction action {};
   action.sa_handler = keep_input;
   action.sa_flags = SA_ONSTACK;
-  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPROF}) ::sigaction(number, &action, nullptr);
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPROF})
+    ::sigaction(number, &action, nullptr);
 }
 
-/// From now on the process may compute so long, s; 0: as long as it likes. Counts its own time: the machine may be
-/// busy.
+/// From now on the process may compute so long, s; 0: as long as it likes. Counts its own time: the
+/// machine may be busy.
 void compute_at_most(int seconds) {
   itimerval limit{};
   limit.it_value.tv_sec = seconds;
@@ -99,7 +100,8 @@ std::string run_one(const Target& target, const std::string& input) {
 }
 
 std::vector<std::string> inputs_of(const Target& target, const std::string& corpus) {
-  std::vector<std::string> inputs = target.seeds == nullptr ? std::vector<std::string>{} : target.seeds();
+  std::vector<std::string> inputs =
+      target.seeds == nullptr ? std::vector<std::string>{} : target.seeds();
   std::set<fs::path> files;
   const fs::path folder = fs::path(corpus) / target.name;
   if (fs::is_directory(folder)) files = {fs::directory_iterator(folder), fs::directory_iterator()};
@@ -113,7 +115,9 @@ std::vector<std::string> inputs_of(const Target& target, const std::string& corp
 int run(const Target& target, const Arguments& arguments) {
   static constexpr std::size_t kMostKept = 4000;
   const auto began = std::chrono::steady_clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count(); };
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  };
   std::vector<std::string> inputs = inputs_of(target, arguments.corpus);
   if (inputs.empty()) {
     fmt::print(stderr, "{}: no input to start from in {}\n", target.name, arguments.corpus);
@@ -125,13 +129,15 @@ int run(const Target& target, const Arguments& arguments) {
   Random random(arguments.seed);
   std::uint64_t runs = 0;
   for (; runs < arguments.runs && seconds() < arguments.seconds; ++runs) {
-    std::string input = inputs[std::uniform_int_distribution<std::size_t>(0, inputs.size() - 1)(random)];
+    std::string input =
+        inputs[std::uniform_int_distribution<std::size_t>(0, inputs.size() - 1)(random)];
     for (auto changes = std::uniform_int_distribution<int>(1, 4)(random); changes > 0; --changes)
       input = target.mutate(input, random, target.longest);
-    if (outcomes.insert(run_one(target, input)).second && inputs.size() < kMostKept) inputs.push_back(std::move(input));
+    if (outcomes.insert(run_one(target, input)).second && inputs.size() < kMostKept)
+      inputs.push_back(std::move(input));
   }
-  fmt::print("{}: {} inputs replayed, {} changed ones run, {} outcomes, {:.0f} s\n", target.name, replayed, runs,
-             outcomes.size(), seconds());
+  fmt::print("{}: {} inputs replayed, {} changed ones run, {} outcomes, {:.0f} s\n", target.name,
+             replayed, runs, outcomes.size(), seconds());
   return 0;
 }
 
@@ -139,7 +145,8 @@ int run(const Target& target, const Arguments& arguments) {
 }  // namespace trammel::fuzz
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs a reader on its corpus and on changed inputs; ends by a signal where one crashes it.");
+  CLI::App app(
+      "Runs a reader on its corpus and on changed inputs; ends by a signal where one crashes it.");
   trammel::fuzz::Arguments arguments;
   app.add_option("target", arguments.target, "Its name; all where none is given");
   app.add_option("--corpus", arguments.corpus, "Folder with a folder for each target")->required();

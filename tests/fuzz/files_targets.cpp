@@ -19,21 +19,26 @@ namespace trammel::fuzz {
 namespace {
 
 const std::string& robot_yaml() {
-  static const std::string text = read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml").value();
+  static const std::string text =
+      read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml").value();
   return text;
 }
 
 std::string cell_yaml(const char* bias) {
   return fmt::format(
-      "version: 1\ncell: cell-7\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
-      "tools: {{spindle: {{xyz_mm: [58.553, -193.735, 165.958], q_wxyz: [1, 0, 0, 0]}}, probe: null}}\n"
-      "payloads: {{load: {{mass_kg: 94.5, cog_mm: [-68.5, 5.0, 208.5]}}}}\ntracker: {{sigma_mm: 0.02}}\n"
+      "version: 1\ncell: cell-7\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, "
+      "0]}}\n"
+      "tools: {{spindle: {{xyz_mm: [58.553, -193.735, 165.958], q_wxyz: [1, 0, 0, 0]}}, probe: "
+      "null}}\n"
+      "payloads: {{load: {{mass_kg: 94.5, cog_mm: [-68.5, 5.0, 208.5]}}}}\ntracker: {{sigma_mm: "
+      "0.02}}\n"
       "model: {{error_sources: [base], bias: {}}}\n",
       bias);
 }
 
 const std::shared_ptr<const Cell>& cell() {
-  static const auto one = std::make_shared<const Cell>(parse_cell(cell_yaml("se"), robot_yaml(), "cell.yaml").value());
+  static const auto one =
+      std::make_shared<const Cell>(parse_cell(cell_yaml("se"), robot_yaml(), "cell.yaml").value());
   return one;
 }
 
@@ -59,11 +64,15 @@ std::string finish(const Result<MeasurementBatch>& batch) {
   return "taken, " + words(check_against_cell(*batch, *cell(), drawn(0.2, 1)));
 }
 
-std::string read_any_batch(std::string_view bytes) { return finish(parse_batch(std::string(bytes), "fuzzed.csv")); }
+std::string read_any_batch(std::string_view bytes) {
+  return finish(parse_batch(std::string(bytes), "fuzzed.csv"));
+}
 std::string read_batch_table(std::string_view bytes) {
   return finish(parse_batch_csv(std::string(bytes), "fuzzed.csv"));
 }
-std::string read_robodk(std::string_view bytes) { return finish(parse_robodk_csv(std::string(bytes), "fuzzed.csv")); }
+std::string read_robodk(std::string_view bytes) {
+  return finish(parse_robodk_csv(std::string(bytes), "fuzzed.csv"));
+}
 std::string read_joints(std::string_view bytes) {
   const Result<JointList> list = parse_joint_csv(std::string(bytes), "fuzzed.csv");
   if (!list) return words_of(list.error());
@@ -74,7 +83,9 @@ std::string read_targets(std::string_view bytes) {
   if (!file) return words_of(file.error());
   return "taken, " + words(check_targets(*file, cell()->robot));
 }
-std::string read_points_file(std::string_view bytes) { return words(parse_points(std::string(bytes), "fuzzed.txt")); }
+std::string read_points_file(std::string_view bytes) {
+  return words(parse_points(std::string(bytes), "fuzzed.txt"));
+}
 std::string read_arcs(std::string_view bytes) {
   return words(parse_arcs_csv(std::string(bytes), "fuzzed.csv", cell()->robot));
 }
@@ -88,7 +99,8 @@ std::string read_robot_file(std::string_view bytes) {
   return "taken";
 }
 
-/// A cell that is taken says what a training would refuse, and its list of error sources can be asked to change.
+/// A cell that is taken says what a training would refuse, and its list of error sources can be
+/// asked to change.
 std::string read_cell_file(std::string_view bytes) {
   const std::string text(bytes);
   const Result<Cell> read = parse_cell(text, robot_yaml(), "fuzzed.yaml");

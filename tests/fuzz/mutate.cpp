@@ -58,7 +58,8 @@ constexpr std::array<const char*, 34> kWords = {"nan",
                                                 "",
                                                 "//"};
 
-std::string replaced(const std::string& input, std::size_t at, std::size_t length, std::string_view by) {
+std::string replaced(const std::string& input, std::size_t at, std::size_t length,
+                     std::string_view by) {
   return input.substr(0, at) + std::string(by) + input.substr(std::min(input.size(), at + length));
 }
 
@@ -112,7 +113,9 @@ std::string change_a_part(const std::string& text, Random& random) {
 std::string change_a_word(const std::string& text, Random& random) {
   const auto [at, length] = word_at(text, below(text.size() + 1, random));
   const auto [other, other_length] = word_at(text, below(text.size() + 1, random));
-  return replaced(text, at, length, below(2, random) == 0 ? one_of(kWords, random) : text.substr(other, other_length));
+  return replaced(
+      text, at, length,
+      below(2, random) == 0 ? one_of(kWords, random) : text.substr(other, other_length));
 }
 
 std::string change_a_line(const std::string& text, Random& random) {
@@ -153,11 +156,13 @@ std::string change_a_column(const std::string& text, Random& random) {
 }  // namespace
 
 std::string mutate_bytes(const std::string& input, Random& random, std::size_t longest) {
-  return cut(below(2, random) == 0 ? change_one_byte(input, random) : change_a_part(input, random), longest);
+  return cut(below(2, random) == 0 ? change_one_byte(input, random) : change_a_part(input, random),
+             longest);
 }
 
 std::string mutate_text(const std::string& input, Random& random, std::size_t longest) {
-  return below(2, random) == 0 ? mutate_bytes(input, random, longest) : cut(change_a_word(input, random), longest);
+  return below(2, random) == 0 ? mutate_bytes(input, random, longest)
+                               : cut(change_a_word(input, random), longest);
 }
 
 std::string mutate_table(const std::string& input, Random& random, std::size_t longest) {
@@ -173,13 +178,16 @@ std::string mutate_table(const std::string& input, Random& random, std::size_t l
 
 std::string mutate_yaml(const std::string& input, Random& random, std::size_t longest) {
   static constexpr std::array<const char*, 20> kYaml = {
-      "&a ", "*a", "[",  "]",     "{",     "}",           "- ", "? ", ": ",          "|\n",
-      ">\n", "!!", "<<", "---\n", "...\n", "%YAML 1.1\n", "  ", "'",  "\"\\u001b\"", "{a: &a [*a]}"};
+      "&a ",   "*a",          "[",   "]",   "{",           "}",           "- ",
+      "? ",    ": ",          "|\n", ">\n", "!!",          "<<",          "---\n",
+      "...\n", "%YAML 1.1\n", "  ",  "'",   "\"\\u001b\"", "{a: &a [*a]}"};
   switch (below(4, random)) {
     case 0:
       return cut(change_a_line(input, random), longest);
     case 1:
-      return cut(replaced(input, below(input.size() + 1, random), below(3, random), one_of(kYaml, random)), longest);
+      return cut(
+          replaced(input, below(input.size() + 1, random), below(3, random), one_of(kYaml, random)),
+          longest);
     default:
       return mutate_text(input, random, longest);
   }
@@ -208,7 +216,8 @@ Json any_value(Random& random) {
     case 8:
       return Json::array({Json::array({Json::array()})});
     case 9:
-      return std::ldexp(static_cast<double>(below(2000, random)) - 1000, static_cast<int>(below(80, random)) - 60);
+      return std::ldexp(static_cast<double>(below(2000, random)) - 1000,
+                        static_cast<int>(below(80, random)) - 60);
     case 10:
       return below(100, random);
     default:
@@ -239,7 +248,8 @@ void change_tree(Json& tree, Random& random) {
       break;
     }
     case 2:
-      if (at->is_number()) *at = at->get<double>() * (1 + 1e-6 * static_cast<double>(below(100, random)));
+      if (at->is_number())
+        *at = at->get<double>() * (1 + 1e-6 * static_cast<double>(below(100, random)));
       break;
     case 3:
       if (at->is_structured() && !at->empty())
@@ -252,13 +262,15 @@ void change_tree(Json& tree, Random& random) {
   }
 }
 
-std::string dumped(const Json& tree) { return tree.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& tree) {
+  return tree.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 /// As the hashes of a file are made: of the bytes that dump() writes.
 void make_hashes_fit(Json& file) {
   if (!file.is_object()) return;
-  for (const auto& [part, hash] :
-       {std::pair("content", "hash"), std::pair("stamp", "stamp_hash"), std::pair("self_test", "self_test_hash")}) {
+  for (const auto& [part, hash] : {std::pair("content", "hash"), std::pair("stamp", "stamp_hash"),
+                                   std::pair("self_test", "self_test_hash")}) {
     if (file.contains(part) && file.contains(hash)) file[hash] = sha256_hex(dumped(file[part]));
   }
 }
@@ -298,9 +310,11 @@ std::string mutate_cdr(const std::string& input, Random& random, std::size_t lon
   std::string changed = input;
   // Numbers are aligned to four bytes behind the encapsulation.
   const std::size_t at = 4 + 4 * below((input.size() - 4) / 4, random);
-  std::uint32_t number = below(2, random) == 0 ? one_of(kLengths, random) : static_cast<std::uint32_t>(random());
+  std::uint32_t number =
+      below(2, random) == 0 ? one_of(kLengths, random) : static_cast<std::uint32_t>(random());
   if (at + 4 <= changed.size()) std::memcpy(changed.data() + at, &number, 4);
-  return below(4, random) == 0 ? mutate_bytes(changed, random, longest) : cut(std::move(changed), longest);
+  return below(4, random) == 0 ? mutate_bytes(changed, random, longest)
+                               : cut(std::move(changed), longest);
 }
 
 }  // namespace trammel::fuzz

@@ -12,21 +12,28 @@ using Random = std::mt19937_64;
 using Mutation = std::string (*)(const std::string& input, Random& random, std::size_t longest);
 
 /// Flips, removes, repeats and replaces bytes.
-[[nodiscard]] std::string mutate_bytes(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_bytes(const std::string& input, Random& random,
+                                       std::size_t longest);
 /// The same, and words that readers of text know or fear: numbers at limits, separators, escapes.
-[[nodiscard]] std::string mutate_text(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_text(const std::string& input, Random& random,
+                                      std::size_t longest);
 /// The same, and whole lines and fields of a table.
-[[nodiscard]] std::string mutate_table(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_table(const std::string& input, Random& random,
+                                       std::size_t longest);
 /// The same for YAML: indentation, anchors and aliases, flow.
-[[nodiscard]] std::string mutate_yaml(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_yaml(const std::string& input, Random& random,
+                                      std::size_t longest);
 /// Changes values of a JSON text where they stand; of a text that is none, its bytes.
-[[nodiscard]] std::string mutate_json(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_json(const std::string& input, Random& random,
+                                      std::size_t longest);
 /// The same of a model file, whose hashes then fit again in most cases.
-[[nodiscard]] std::string mutate_model(const std::string& input, Random& random, std::size_t longest);
+[[nodiscard]] std::string mutate_model(const std::string& input, Random& random,
+                                       std::size_t longest);
 /// Changes lengths, enumerators and numbers of a serialized sample, and its bytes.
 [[nodiscard]] std::string mutate_cdr(const std::string& input, Random& random, std::size_t longest);
 
-/// The model file with the hashes that its parts have now; the text itself where it is no JSON object.
+/// The model file with the hashes that its parts have now; the text itself where it is no JSON
+/// object.
 [[nodiscard]] std::string with_fitting_hashes(const std::string& model);
 
 }  // namespace trammel::fuzz

@@ -1,5 +1,5 @@
-// What comes over the wire: every type, every request with its handler, what a session makes of replies; and the server
-// file.
+// What comes over the wire: every type, every request with its handler, what a session makes of
+// replies; and the server file.
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -54,15 +54,18 @@ std::optional<typename PubSubType::type> sample_of(std::string_view bytes, std::
 /// What a session would make of the parts of a reply or a state.
 template <typename Sample>
 void convert(const Sample& sample) {
-  if constexpr (requires { client::error_of(sample.header()); }) static_cast<void>(client::error_of(sample.header()));
-  if constexpr (requires { client::from_wire(sample.model()); }) static_cast<void>(client::from_wire(sample.model()));
+  if constexpr (requires { client::error_of(sample.header()); })
+    static_cast<void>(client::error_of(sample.header()));
+  if constexpr (requires { client::from_wire(sample.model()); })
+    static_cast<void>(client::from_wire(sample.model()));
   if constexpr (requires { sample.jobs(); }) {
     for (const auto& one : sample.jobs()) static_cast<void>(client::from_wire(one, "server-1"));
   }
   if constexpr (requires { sample.batches(); }) {
     for (const auto& one : sample.batches()) static_cast<void>(client::from_wire(one));
   }
-  if constexpr (requires { client::from_wire(sample); }) static_cast<void>(client::from_wire(sample));
+  if constexpr (requires { client::from_wire(sample); })
+    static_cast<void>(client::from_wire(sample));
   if constexpr (requires { sample.predictions(); }) {
     for (const auto& one : sample.predictions()) static_cast<void>(client::from_wire(one));
   }
@@ -87,7 +90,8 @@ std::string read_sample(std::string_view bytes) {
 /// With everything in it that a request or reply of this type may have.
 template <typename Sample>
 void fill(Sample& sample) {
-  if constexpr (requires { sample.header().reply_partition("client-1"); }) sample.header().reply_partition("client-1");
+  if constexpr (requires { sample.header().reply_partition("client-1"); })
+    sample.header().reply_partition("client-1");
   if constexpr (requires { sample.header().contract_version(wire::CONTRACT_VERSION); })
     sample.header().contract_version(wire::CONTRACT_VERSION);
   if constexpr (requires { sample.about().cell("cell-7"); }) sample.about().cell("cell-7");
@@ -118,7 +122,8 @@ template <typename PubSubType>
 std::vector<std::string> samples() {
   typename PubSubType::type empty, full;
   fill(full);
-  if constexpr (requires { empty.header().reply_partition("client-1"); }) empty.header().reply_partition("client-1");
+  if constexpr (requires { empty.header().reply_partition("client-1"); })
+    empty.header().reply_partition("client-1");
   return {bytes_of<PubSubType>(empty), bytes_of<PubSubType>(full)};
 }
 
@@ -136,22 +141,26 @@ std::vector<std::string> of_each(int last, const Set& set) {
   return all;
 }
 std::vector<std::string> manage_samples() {
-  return of_each<wire::ManageModels>(wire::MANAGE_BACKUP, [](wire::ManageModelsRequest& request, int action) {
-    request.action(static_cast<wire::ManageAction>(action));
-  });
+  return of_each<wire::ManageModels>(wire::MANAGE_BACKUP,
+                                     [](wire::ManageModelsRequest& request, int action) {
+                                       request.action(static_cast<wire::ManageAction>(action));
+                                     });
 }
 std::vector<std::string> read_samples() {
-  return of_each<wire::ReadModels>(wire::READ_REPLAY, [](wire::ReadModelsRequest& request, int what) {
-    request.what(static_cast<wire::ReadKind>(what));
-  });
+  return of_each<wire::ReadModels>(wire::READ_REPLAY,
+                                   [](wire::ReadModelsRequest& request, int what) {
+                                     request.what(static_cast<wire::ReadKind>(what));
+                                   });
 }
 std::vector<std::string> release_samples() {
-  return of_each<wire::ReleaseBatches>(wire::RELEASE_DISCARD, [](wire::ReleaseBatchesRequest& request, int action) {
-    request.action(static_cast<wire::ReleaseAction>(action));
-  });
+  return of_each<wire::ReleaseBatches>(wire::RELEASE_DISCARD,
+                                       [](wire::ReleaseBatchesRequest& request, int action) {
+                                         request.action(static_cast<wire::ReleaseAction>(action));
+                                       });
 }
 
-/// A server without its network, with a model in force and a trainer that takes jobs and does none of them.
+/// A server without its network, with a model in force and a trainer that takes jobs and does none
+/// of them.
 struct Service {
   Service() { backend.serve(1); }
   test::Backend backend;
@@ -176,8 +185,8 @@ std::string ask(std::string_view bytes) {
 /// The answer to the question of a ROS 2 node, as the node gets it.
 template <typename Ros>
 std::string ask_as_node(std::string_view bytes) {
-  wire::ReceivedMessageType<typename Ros::Request> type(wire::kMaxComputeSample,
-                                                        std::make_shared<std::atomic<std::uint64_t>>(0));
+  wire::ReceivedMessageType<typename Ros::Request> type(
+      wire::kMaxComputeSample, std::make_shared<std::atomic<std::uint64_t>>(0));
   Payload payload(static_cast<std::uint32_t>(bytes.size()));
   std::copy(bytes.begin(), bytes.end(), payload.data);
   payload.length = static_cast<std::uint32_t>(bytes.size());
@@ -211,7 +220,8 @@ std::vector<std::string> node_corrections() {
   on_branch.poses().resize(2);
   for (auto& pose : on_branch.poses()) pose.orientation().w(1);
   on_branch.conf({0, 3});
-  return {bytes_of<wire::Ros2CorrectTargets::Request>(near), bytes_of<wire::Ros2CorrectTargets::Request>(on_branch)};
+  return {bytes_of<wire::Ros2CorrectTargets::Request>(near),
+          bytes_of<wire::Ros2CorrectTargets::Request>(on_branch)};
 }
 
 /// In a folder with the cell files that it names.
@@ -230,14 +240,16 @@ std::vector<std::string> server_files() {
   return {
       "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n"
       "dds: {domain: 3, address: 127.0.0.1, port: 17500, compute_workers: 2, max_clients: 9}\n"
-      "trainer: {queue_capacity: 4, max_poses: 2000, validation_share: 0.2, accept_ratio: 1.05, seed: 1}\n"
+      "trainer: {queue_capacity: 4, max_poses: 2000, validation_share: 0.2, accept_ratio: 1.05, "
+      "seed: 1}\n"
       "log: {level: info, file: log.txt}\n"};
 }
 
 /// What a server says it found, as the command line tells it.
 std::string read_findings(std::string_view bytes) {
   const std::string text(bytes);
-  if (const Status small = check_json_limits(text, "findings"); !small) return words_of(small.error());
+  if (const Status small = check_json_limits(text, "findings"); !small)
+    return words_of(small.error());
   try {
     const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
     if (!json.is_object()) return "no object";
@@ -252,7 +264,8 @@ std::string read_findings(std::string_view bytes) {
 /// The truth of a virtual robot.
 std::string read_truth_file(std::string_view bytes) {
   static const test::TemporaryFolder folder;
-  const auto robot = read_virtual_robot(folder.write("truth.yaml", std::string(bytes)), service().backend.cell);
+  const auto robot =
+      read_virtual_robot(folder.write("truth.yaml", std::string(bytes)), service().backend.cell);
   return robot ? "taken" : words_of(robot.error());
 }
 std::vector<std::string> truths() {
@@ -274,14 +287,16 @@ Target request_target(const char* name) {
 
 /// What the guard makes of a packet; what passes must be whole.
 std::string guard_packet(std::string_view bytes) {
-  static wire::Guard guard(static_cast<std::uint32_t>(wire::kMaxTextSample));  // remembers what it has seen
+  static wire::Guard guard(
+      static_cast<std::uint32_t>(wire::kMaxTextSample));  // remembers what it has seen
   static std::array<std::uint64_t, wire::kDroppedReasons> before{};
   const wire::Bytes packet(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   guard.sent(packet);
   const auto passed = guard.check(packet, 1);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const auto reason = static_cast<wire::Dropped>(i);
-    if (std::exchange(before[i], guard.counts().of(reason)) != guard.counts().of(reason)) return wire::name_of(reason);
+    if (std::exchange(before[i], guard.counts().of(reason)) != guard.counts().of(reason))
+      return wire::name_of(reason);
   }
   TRAMMEL_CHECK(passed.has_value());
   wire::Bytes rest = passed->subspan(wire::kHeader);
@@ -293,10 +308,17 @@ std::vector<std::string> packets() {
   constexpr test::Prefix kFrom = {1, 15, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
   constexpr std::uint32_t kWriter = 0x00000103, kReader = 0x00000104;
   test::ParameterList list;
-  list.guid(0x0050, kFrom, 0x000001c1).text(0x0062, "name").locator(0x0032, 7).add(0x002c, {4, 0, 0, 0, 1, 2, 3, 4});
+  list.guid(0x0050, kFrom, 0x000001c1)
+      .text(0x0062, "name")
+      .locator(0x0032, 7)
+      .add(0x002c, {4, 0, 0, 0, 1, 2, 3, 4});
   const std::vector<test::PacketBytes> all = {
       test::Packet(kFrom).data({0, wire::kAnnouncer, 1, {}, list.payload()}).bytes(),
-      test::Packet(kFrom).to(kFrom).data({0, kWriter, 1, {}, {0, 1, 0, 0}}).heartbeat(0, kWriter, 1, 1, 1).bytes(),
+      test::Packet(kFrom)
+          .to(kFrom)
+          .data({0, kWriter, 1, {}, {0, 1, 0, 0}})
+          .heartbeat(0, kWriter, 1, 1, 1)
+          .bytes(),
       test::Packet(kFrom).gap(0, kWriter, 2, 9).acknack(kReader, kWriter, 2, 40, 1).bytes(),
       test::Packet(kFrom).fragments({0, kWriter, 3, 1, 1, 64, 256, test::PacketBytes(64)}).bytes(),
       test::Packet(kFrom).nack_frag(kReader, kWriter, 3, 2, 1).bytes()};

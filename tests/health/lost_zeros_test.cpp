@@ -1,5 +1,5 @@
-// Arms whose lengths are written down here, not read by the project's kinematics: what a check says of their lost
-// zeros.
+// Arms whose lengths are written down here, not read by the project's kinematics: what a check says
+// of their lost zeros.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ using test::PlainArm;
 using test::PlainCheck;
 
 Result<HealthCheck> checked(const CompensatedModel& model, const MeasurementBatch& batch) {
-  return check_health(model, test::demand(check_against_cell(batch, model.cell(), drawn(0, 1))), {});
+  return check_health(model, test::demand(check_against_cell(batch, model.cell(), drawn(0, 1))),
+                      {});
 }
 
 bool is_zero_of(const SingleCause& cause, int joint) {
@@ -48,8 +49,8 @@ TEST(LostZerosOfElbows, AreNamedByPositionsAloneWhereTheInstrumentStandsAsInTheM
   const std::vector<JointVector> poses = elbows(arm);
   for (int joint = 2; joint <= 6; ++joint) {
     const double by = from_deg(joint % 2 == 0 ? 1.0 : 0.1);
-    const HealthCheck check =
-        test::demand(checked(model_of_elbows(), measured(arm, {poses, by * JointVector::Unit(7, joint - 1), false})));
+    const HealthCheck check = test::demand(checked(
+        model_of_elbows(), measured(arm, {poses, by * JointVector::Unit(7, joint - 1), false})));
     EXPECT_EQ(check.verdict, HealthVerdict::kChanged) << joint << ": " << check.sentence;
     EXPECT_TRUE(names_zero_of(check, joint)) << joint << ": " << check.sentence;
     EXPECT_NE(check.sentence.find("turned as in the model"), std::string::npos) << check.sentence;
@@ -72,9 +73,12 @@ TEST(LostZerosOfElbows, CannotBeToldByPositionsOfAnInstrumentThatWasMoved) {
 
 TEST(LostZerosOfSixPoses, AreNamedThoughTheFileWouldFitBetterReadOtherwise) {
   const std::vector<std::vector<double>> angles = {
-      {1.3792, 0.0094, 0.3825, -0.7798, 0.5230, -2.0421},  {2.2160, 0.6580, 0.6713, 0.7060, 0.6040, 1.9026},
-      {2.2858, -0.3932, -0.8614, 1.1248, -0.0612, 2.3713}, {0.2870, -1.2029, -1.4952, 1.1175, -0.5163, -1.0590},
-      {0.8097, -0.7946, -0.6656, -0.5403, 0.9376, 1.0432}, {1.9383, -0.6781, 0.8978, 0.1876, -0.4608, 2.0941}};
+      {1.3792, 0.0094, 0.3825, -0.7798, 0.5230, -2.0421},
+      {2.2160, 0.6580, 0.6713, 0.7060, 0.6040, 1.9026},
+      {2.2858, -0.3932, -0.8614, 1.1248, -0.0612, 2.3713},
+      {0.2870, -1.2029, -1.4952, 1.1175, -0.5163, -1.0590},
+      {0.8097, -0.7946, -0.6656, -0.5403, 0.9376, 1.0432},
+      {1.9383, -0.6781, 0.8978, 0.1876, -0.4608, 2.0941}};
   PlainCheck few{{}, JointVector::Zero(6)};
   for (const auto& q : angles) few.poses.emplace_back(Eigen::Map<const JointVector>(q.data(), 6));
   few.zeros << 0, -0.03052, 0, -0.031006, 0.031806, 0;  // rad
@@ -111,17 +115,19 @@ TEST(LostZeroOfTheLastJoint, StandsBesideEveryToolThatSitsElsewhere) {
       PlainCheck knocked{spread_poses(14, 3), JointVector::Zero(6), orientation};
       knocked.tool += Vector3(0.8e-3, -0.4e-3, 0.5e-3);
       knocked.zeros(5) = zero;
-      const HealthCheck check = test::demand(checked(model_of_six_axes(), measured(test::irb120(), knocked)));
+      const HealthCheck check =
+          test::demand(checked(model_of_six_axes(), measured(test::irb120(), knocked)));
       ASSERT_FALSE(check.changed.empty()) << check.sentence;
       if (zero > 0 || !orientation) {
         EXPECT_TRUE(names_zero_of(check, 6)) << zero << orientation << ": " << check.sentence;
       }
-      const bool is_told = std::any_of(check.changed.begin(), check.changed.end(), [](const SeenChange& change) {
-        return change.cause.record->spelling == "tool_changed";
-      });
+      const bool is_told = std::any_of(
+          check.changed.begin(), check.changed.end(),
+          [](const SeenChange& change) { return change.cause.record->spelling == "tool_changed"; });
       EXPECT_TRUE(is_told) << zero << orientation << ": " << check.sentence;
       if (!orientation) {
-        EXPECT_NE(check.sentence.find("look at the mark of joint 6"), std::string::npos) << check.sentence;
+        EXPECT_NE(check.sentence.find("look at the mark of joint 6"), std::string::npos)
+            << check.sentence;
       }
     }
   }

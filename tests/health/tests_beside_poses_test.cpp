@@ -13,7 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A check of ten poses, three rows each: causes with one number, with four, and with one a pose; then single poses.
+/// A check of ten poses, three rows each: causes with one number, with four, and with one a pose;
+/// then single poses.
 class BesidePoses : public testing::Test {
  protected:
   static constexpr Index kPoses = 10, kRows = 3 * kPoses;
@@ -24,10 +25,13 @@ class BesidePoses : public testing::Test {
     frames_ = drawn(6);
     const MatrixXd one = drawn(1);
     MatrixXd by_pose = MatrixXd::Zero(kRows, kPoses);
-    for (Index i = 0; i < kPoses; ++i) by_pose.col(i).segment<3>(3 * i) = one.col(0).segment<3>(3 * i);
-    for (const MatrixXd& columns : {one, drawn(4), by_pose}) questions_.hypotheses.push_back({0, -1, columns});
+    for (Index i = 0; i < kPoses; ++i)
+      by_pose.col(i).segment<3>(3 * i) = one.col(0).segment<3>(3 * i);
+    for (const MatrixXd& columns : {one, drawn(4), by_pose})
+      questions_.hypotheses.push_back({0, -1, columns});
     questions_.causes = questions_.hypotheses.size();
-    for (Index i = 0; i < kPoses; ++i) questions_.hypotheses.push_back({0, static_cast<int>(i), own(i)});
+    for (Index i = 0; i < kPoses; ++i)
+      questions_.hypotheses.push_back({0, static_cast<int>(i), own(i)});
   }
   MatrixXd drawn(Index columns) {
     return MatrixXd::NullaryExpr(kRows, columns, [this] { return normal_(random_); });
@@ -58,7 +62,8 @@ TEST_F(BesidePoses, TheySeeWhatARefitOfAllRowsSees) {
   const TestsBesidePoses tests(healthy.directions(), questions_.causes, healthy.rows().freedom());
   const VectorXd residual = drawn(1);
   const auto seen = tests.seen(healthy.rows().left(residual));
-  for (const std::vector<int>& bad : {std::vector<int>{}, {4}, {0, 7}, {1, 3, 8}, {0, 1, 2, 3, 4, 5, 6}}) {
+  for (const std::vector<int>& bad :
+       {std::vector<int>{}, {4}, {0, 7}, {1, 3, 8}, {0, 1, 2, 3, 4, 5, 6}}) {
     const auto beside = tests.beside(bad);
     const auto left = beside.left(seen);
     const CheckTests expected = refitted(bad);

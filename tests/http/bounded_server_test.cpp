@@ -33,7 +33,9 @@ class BoundedServerTest : public testing::Test {
     for (const auto& [name, value] : ask.options) text += name + "=" + value + "|";
     return {200, "text/plain; charset=utf-8", text};
   }
-  static int code_of(const std::string& request) { return parse_http(http_exchange(kPort, request)).code; }
+  static int code_of(const std::string& request) {
+    return parse_http(http_exchange(kPort, request)).code;
+  }
 
   inline static const auto kPort = test::own_ports();
   std::unique_ptr<BoundedServer> server_;
@@ -41,7 +43,8 @@ class BoundedServerTest : public testing::Test {
 
 TEST_F(BoundedServerTest, AnswersWithTheWordsOfThePathAndTheOptions) {
   start();
-  EXPECT_EQ(http_get(kPort, "/cells/a%20b/models/3?cell=x%2Fy").body, "cells|a b|models|3|cell=x/y|");
+  EXPECT_EQ(http_get(kPort, "/cells/a%20b/models/3?cell=x%2Fy").body,
+            "cells|a b|models|3|cell=x/y|");
   EXPECT_EQ(http_get(kPort, "/").body, "");
 }
 
@@ -58,7 +61,8 @@ TEST_F(BoundedServerTest, AnswersToNamesOfThisHostOnly) {
   start();
   for (const char* host : {"127.0.0.1", "127.0.0.1:9464", "localhost", "localhost:80", "127.1.2.3"})
     EXPECT_EQ(code_of(std::string("GET / HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"), 200) << host;
-  for (const char* host : {"evil.example", "127.0.0.1.evil.example", "10.0.0.1", "", "127.0.0.1@evil.example"})
+  for (const char* host :
+       {"evil.example", "127.0.0.1.evil.example", "10.0.0.1", "", "127.0.0.1@evil.example"})
     EXPECT_EQ(code_of(std::string("GET / HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"), 421) << host;
 }
 
@@ -67,7 +71,8 @@ TEST_F(BoundedServerTest, BytesThatAreNoRequestEndTheirConnectionAndNothingElse)
   const std::string long_line(20000, 'a'), deep = "/" + std::string(1900, '/');
   for (const std::string& bytes :
        {std::string("\r\n\r\n"), std::string("GET\r\n\r\n"), std::string(3000, '\0'),
-        "GET /" + long_line + " HTTP/1.1\r\n\r\n", "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + long_line + "\r\n\r\n",
+        "GET /" + long_line + " HTTP/1.1\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + long_line + "\r\n\r\n",
         "GET " + deep + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
         std::string("GET /%zz%00%ff HTTP/1.1\r\nHost: localhost\r\n\r\n"),
         "GET / HTTP/1.1\r\nHost: localhost\r\nRange: bytes=" + std::string(4000, '0') + "-\r\n\r\n",
@@ -78,8 +83,8 @@ TEST_F(BoundedServerTest, BytesThatAreNoRequestEndTheirConnectionAndNothingElse)
               return more;
             }() +
             "\r\n\r\n",
-        std::string(
-            "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n")}) {
+        std::string("GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\nTransfer-Encoding: "
+                    "chunked\r\n\r\nzz\r\n")}) {
     static_cast<void>(http_exchange(kPort, bytes, seconds(5)));
     EXPECT_EQ(http_get(kPort, "/still").body, "still|") << bytes.substr(0, 60);
   }
@@ -141,7 +146,8 @@ TEST_F(BoundedServerTest, MoreRequestsThanMayWaitAreSentAwayAtOnce) {
   }
   EXPECT_EQ(parse_http(waiting.back()->read(seconds(10))).code, 503);
   over.count_down();
-  EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "late") << "who came first is served";
+  EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "late")
+      << "who came first is served";
   server_.reset();  // its handler waits for the latch
 }
 
@@ -177,7 +183,8 @@ TEST_F(BoundedServerTest, APortThatIsTakenAndAnAddressThatLeavesThisHostAreRefus
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kConflict);
   for (const char* address : {"0.0.0.0", "192.168.1.4", "localhost", "::1", "", "128.0.0.1"})
-    EXPECT_FALSE(BoundedServer::start(address, static_cast<std::uint16_t>(kPort + 1), {}, echo)) << address;
+    EXPECT_FALSE(BoundedServer::start(address, static_cast<std::uint16_t>(kPort + 1), {}, echo))
+        << address;
 }
 
 TEST_F(BoundedServerTest, EndsWhileConnectionsWait) {

@@ -1,4 +1,5 @@
-// Whatever is damaged of the model in force in the store, its copy is served, and what people ask says so.
+// Whatever is damaged of the model in force in the store, its copy is served, and what people ask
+// says so.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +20,8 @@ namespace trammel {
 namespace {
 
 using test::demand;
-constexpr int kFirst = 40, kInForce = 41, kOfOthers = 77;  // training poses, which tell the models apart
+constexpr int kFirst = 40, kInForce = 41,
+              kOfOthers = 77;  // training poses, which tell the models apart
 
 /// What is in a store's row of a model.
 struct Row {
@@ -36,7 +38,8 @@ Row row_of(const std::string& path, const std::string& cell, int version) {
 }
 
 std::string replaced(std::string text, const std::string& old, const std::string& with) {
-  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + with.size()))
+  for (std::size_t at = text.find(old); at != std::string::npos;
+       at = text.find(old, at + with.size()))
     text.replace(at, old.size(), with);
   return text;
 }
@@ -49,8 +52,8 @@ std::string flipped(std::string text, std::size_t at) {
 /// With `value` in the place of the content's first number that has a point; all hashes fit.
 Row with_number(const Row& row, const std::string& value) {
   const std::string content = nlohmann::json::parse(row.text).at("content").dump();
-  const std::string changed =
-      std::regex_replace(content, std::regex("-?[0-9]+\\.[0-9]+"), value, std::regex_constants::format_first_only);
+  const std::string changed = std::regex_replace(content, std::regex("-?[0-9]+\\.[0-9]+"), value,
+                                                 std::regex_constants::format_first_only);
   const std::string hash = sha256_hex(changed);
   return {replaced(replaced(row.text, content, changed), row.hash, hash), hash};
 }
@@ -61,7 +64,8 @@ struct Stores {
 };
 struct Damage {
   const char* name;
-  std::function<Row(const Row& row, const Stores& stores)> of;  ///< a row without text and hash: the row is gone
+  std::function<Row(const Row& row, const Stores& stores)>
+      of;  ///< a row without text and hash: the row is gone
 };
 
 const std::vector<Damage> kDamages = {
@@ -104,7 +108,8 @@ const std::vector<Damage> kDamages = {
     {"OfALaterFormat",
      [](const Row& row, const Stores&) {
        const std::string format = nlohmann::json::parse(row.text).at("trammel_model").dump();
-       return Row{replaced(row.text, "\"trammel_model\":" + format, "\"trammel_model\":99"), row.hash};
+       return Row{replaced(row.text, "\"trammel_model\":" + format, "\"trammel_model\":99"),
+                  row.hash};
      }},
     {"WithAWrongHashInIt",
      [](const Row& row, const Stores&) {
@@ -133,7 +138,8 @@ class DamagedText : public testing::TestWithParam<Damage> {
     put_in_force(*other, "cell-7", kOfOthers);
   }
   static void put_in_force(Store& store, const std::string& cell, int poses) {
-    ASSERT_TRUE(store.add_model(cell, test::nominal_model(test::small_cell(cell), poses), 0, true, "made"));
+    ASSERT_TRUE(
+        store.add_model(cell, test::nominal_model(test::small_cell(cell), poses), 0, true, "made"));
   }
   void damage() {
     const Row row = row_of(stores_.path, "cell-7", 2);
@@ -141,9 +147,10 @@ class DamagedText : public testing::TestWithParam<Damage> {
     ASSERT_TRUE(damaged.text != row.text || damaged.hash != row.hash);
     const SQLite::Database file(stores_.path, SQLite::OPEN_READWRITE);
     const bool is_gone = damaged.text.empty() && damaged.hash.empty();
-    SQLite::Statement change(file, is_gone ? "DELETE FROM models WHERE cell = 'cell-7' AND version = 2"
-                                           : "UPDATE models SET content = ?, hash = ? WHERE cell = 'cell-7' AND "
-                                             "version = 2");
+    SQLite::Statement change(
+        file,
+        is_gone ? "DELETE FROM models WHERE cell = 'cell-7' AND version = 2"
+                : "UPDATE models SET content = ?, hash = ? WHERE cell = 'cell-7' AND version = 2");
     if (!is_gone) change.bind(1, damaged.text);
     if (!is_gone) change.bind(2, damaged.hash);
     ASSERT_EQ(change.exec(), 1);
@@ -193,7 +200,8 @@ TEST_P(DamagedText, WithoutCopiesTheVersionBeforeIsServedAndThatIsSaid) {
   const CellReadiness cell = cells_readiness(watched).front();
   EXPECT_STREQ(to_text(cell.state), to_text(CellReadiness::State::kOlderServed)) << cell.why;
   EXPECT_EQ(cell.version, 1);
-  EXPECT_NE(cell.why.find("version 1 is served instead of a newer one"), std::string::npos) << cell.why;
+  EXPECT_NE(cell.why.find("version 1 is served instead of a newer one"), std::string::npos)
+      << cell.why;
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, DamagedText, testing::ValuesIn(kDamages),

@@ -49,7 +49,8 @@ TEST_F(MetricsTest, SayWhatTheServiceCounted) {
   EXPECT_EQ((now["trammel_requests_total{operation=\"PredictError\",result=\"busy\"}"]), 5);
   EXPECT_EQ((now["trammel_request_seconds_bucket{operation=\"PredictError\",le=\"0.0001\"}"]), 0);
   EXPECT_EQ((now["trammel_request_seconds_bucket{operation=\"PredictError\",le=\"0.00025\"}"]), 1);
-  EXPECT_EQ((now["trammel_request_seconds_bucket{operation=\"PredictError\",le=\"0.0025\"}"]), 2) << "cumulative";
+  EXPECT_EQ((now["trammel_request_seconds_bucket{operation=\"PredictError\",le=\"0.0025\"}"]), 2)
+      << "cumulative";
   EXPECT_EQ((now["trammel_request_seconds_bucket{operation=\"PredictError\",le=\"+Inf\"}"]), 3);
   EXPECT_EQ((now["trammel_request_seconds_count{operation=\"PredictError\"}"]), 3);
   EXPECT_NEAR((now["trammel_request_seconds_sum{operation=\"PredictError\"}"]), 60.0022, 1e-9);

@@ -23,7 +23,8 @@ HttpAsk ask(const std::string& address) {
     std::string word;
     for (std::size_t i = at; i < end; ++i) {
       const bool is_byte = address[i] == '%';
-      word += is_byte ? static_cast<char>(std::stoi(address.substr(i + 1, 2), nullptr, 16)) : address[i];
+      word += is_byte ? static_cast<char>(std::stoi(address.substr(i + 1, 2), nullptr, 16))
+                      : address[i];
       if (is_byte) i += 2;
     }
     asked.path.push_back(word);
@@ -35,7 +36,8 @@ HttpAsk ask(const std::string& address) {
 std::set<std::string> links_of(const std::string& page) {
   static const std::regex kLink("<a href=\"(/[^\"]*)\"");
   std::set<std::string> links;
-  for (auto at = std::sregex_iterator(page.begin(), page.end(), kLink); at != std::sregex_iterator(); ++at)
+  for (auto at = std::sregex_iterator(page.begin(), page.end(), kLink);
+       at != std::sregex_iterator(); ++at)
     links.insert((*at)[1]);
   return links;
 }
@@ -76,17 +78,19 @@ TEST_F(PagesTest, EveryLinkLeadsToAPageAndEveryPageIsReached) {
   server_.submit("cell-7", "b2", 2);
   server_.work();
   const auto pages = all_pages();
-  for (const auto& [address, reply] : pages) EXPECT_EQ(reply.code, 200) << address << "\n" << reply.body.substr(0, 300);
-  for (const char* address :
-       {"/", "/jobs", "/jobs/1", "/jobs/2", "/cells/cell-7", "/cells/cell-7/history", "/cells/cell-7/models/1"})
+  for (const auto& [address, reply] : pages)
+    EXPECT_EQ(reply.code, 200) << address << "\n" << reply.body.substr(0, 300);
+  for (const char* address : {"/", "/jobs", "/jobs/1", "/jobs/2", "/cells/cell-7",
+                              "/cells/cell-7/history", "/cells/cell-7/models/1"})
     EXPECT_TRUE(pages.contains(address)) << address;
   EXPECT_NE(pages.at("/cells/cell-7").body.find("in force"), std::string::npos);
   EXPECT_NE(pages.at("/cells/cell-7/models/1").body.find("What was identified"), std::string::npos);
 }
 
 TEST_F(PagesTest, WhatIsNotThereIsSaidSo) {
-  for (const char* address : {"/cells/cell-9", "/cells/cell-7/models/7", "/cells/cell-7/models/x", "/jobs/77",
-                              "/jobs/-1", "/nothing", "/cells", "/cells/cell-7/models/1/more", "/jobs/1/findings"})
+  for (const char* address :
+       {"/cells/cell-9", "/cells/cell-7/models/7", "/cells/cell-7/models/x", "/jobs/77", "/jobs/-1",
+        "/nothing", "/cells", "/cells/cell-7/models/1/more", "/jobs/1/findings"})
     EXPECT_EQ(page(address).code, 404) << address;
   EXPECT_EQ(page("/", ServerPhase::kStarting).code, 503);
   EXPECT_EQ(page("/", ServerPhase::kStopping).code, 503);
@@ -100,14 +104,17 @@ TEST_F(PagesTest, APolicyLetsOurOwnScriptsRunAndNothingElse) {
     EXPECT_EQ(policy.find("unsafe"), std::string::npos) << address;
     EXPECT_NE(policy.find("default-src 'none'"), std::string::npos) << address;
     for (const std::string& style : inserts_of(reply.body).styles)
-      EXPECT_NE(policy.find(content_policy({{}, {style}})
-                                .substr(std::string("default-src 'none'; script-src 'none'; style-src ").size(), 53)),
-                std::string::npos)
+      EXPECT_NE(
+          policy.find(
+              content_policy({{}, {style}})
+                  .substr(std::string("default-src 'none'; script-src 'none'; style-src ").size(),
+                          53)),
+          std::string::npos)
           << address << " has a style that its policy forbids";
     for (const std::string& script : inserts_of(reply.body).scripts)
-      EXPECT_NE(
-          policy.find(content_policy({{script}, {}}).substr(std::string("default-src 'none'; script-src ").size(), 53)),
-          std::string::npos)
+      EXPECT_NE(policy.find(content_policy({{script}, {}})
+                                .substr(std::string("default-src 'none'; script-src ").size(), 53)),
+                std::string::npos)
           << address << " has a script that its policy forbids";
     EXPECT_EQ(reply.body.find(" style=\""), std::string::npos) << address;
     EXPECT_EQ(reply.body.find(" onclick"), std::string::npos) << address;
@@ -129,7 +136,8 @@ TEST_F(PagesTest, NamesThatAreHtmlAreShownAsTheyStand) {
     EXPECT_EQ(reply.code, 200) << address;
     EXPECT_EQ(reply.body.find("<script>alert"), std::string::npos) << address;
     EXPECT_EQ(reply.headers.at("Content-Security-Policy").find("alert"), std::string::npos);
-    EXPECT_EQ(reply.headers.at("Content-Security-Policy").find(content_policy({{"alert(1)"}, {}}).substr(31, 53)),
+    EXPECT_EQ(reply.headers.at("Content-Security-Policy")
+                  .find(content_policy({{"alert(1)"}, {}}).substr(31, 53)),
               std::string::npos)
         << address;
   }

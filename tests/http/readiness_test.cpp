@@ -91,7 +91,9 @@ TEST_F(ReadinessTest, APartThatHangsIsNamedAndNothingIsReady) {
   EXPECT_NE(now.told["why"].get<std::string>().find("replies"), std::string::npos);
 }
 
-TEST_F(ReadinessTest, ACellWithoutAModelIsDarkAndSaysWhatToDo) { expect_dark(State::kUntrained, "submit a batch"); }
+TEST_F(ReadinessTest, ACellWithoutAModelIsDarkAndSaysWhatToDo) {
+  expect_dark(State::kUntrained, "submit a batch");
+}
 
 TEST_F(ReadinessTest, ACellWhoseFirstModelIsBeingMadeIsDark) {
   const std::int64_t job = server_.submit("cell-7", "b1", 1);
@@ -152,7 +154,8 @@ TEST_F(ReadinessTest, AnOlderVersionThatIsServedInPlaceOfADamagedOneIsReadyAndNo
   take_up();
   expect_ready(State::kOlderServed);
   EXPECT_EQ(cell().version, 1);
-  EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find("instead of a newer one"), std::string::npos);
+  EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find("instead of a newer one"),
+            std::string::npos);
 }
 
 TEST_F(ReadinessTest, AModelThatIsServedFromItsCopyIsReadyAndItIsSaidWhichAndWhy) {
@@ -163,7 +166,8 @@ TEST_F(ReadinessTest, AModelThatIsServedFromItsCopyIsReadyAndItIsSaidWhichAndWhy
   take_up();
   expect_ready(State::kCopyServed);
   const std::string said = "version 1 is served from its copy " + server_.store_path() + ".models/";
-  EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find(said), std::string::npos) << ready().told;
+  EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find(said), std::string::npos)
+      << ready().told;
   EXPECT_EQ(server_.trainer().troubles(), std::vector<std::string>{cell().why}) << "once";
 }
 
@@ -194,12 +198,14 @@ TEST_F(ReadinessTest, AStoreThatCannotBeReadIsNotedWhereCopiesOfItsModelsAreServ
   server_.set_up();
   take_up();
   expect_ready(State::kCopyServed);
-  EXPECT_NE(ready().told["notes"][0].get<std::string>().find("copies of its models are served"), std::string::npos);
+  EXPECT_NE(ready().told["notes"][0].get<std::string>().find("copies of its models are served"),
+            std::string::npos);
 }
 
 TEST_F(ReadinessTest, OneCellCanBeAskedForAloneAndAForeignOneIsNotReady) {
   server_.take_down();
-  server_.set_cells({{"cell-7", test::small_cell("cell-7")}, {"cell-8", test::small_cell("cell-8")}});
+  server_.set_cells(
+      {{"cell-7", test::small_cell("cell-7")}, {"cell-8", test::small_cell("cell-8")}});
   server_.set_up();
   train("b1", 1);
   EXPECT_FALSE(ready().ready) << "cell-8 is dark";

@@ -14,7 +14,9 @@ namespace {
 /// Beside the server that is watched another one, `server-b` on `hall-3`, has the same record.
 class ServersPage : public testing::Test {
  protected:
-  ServersPage() : other_(test::demand(Store::open(url_, folder_.file("cache")))) { other_->works_as("server-b"); }
+  ServersPage() : other_(test::demand(Store::open(url_, folder_.file("cache")))) {
+    other_->works_as("server-b");
+  }
   /// It says that it serves cell-7 by these files.
   void other_arrives(const CellDescription& files) {
     ServerSelf self{"", "hall-3", 7, "0.1.0", true, true, {}, 0};
@@ -23,9 +25,12 @@ class ServersPage : public testing::Test {
     static_cast<void>(test::demand(other_->agree_on_cells({{"cell-7", files}}, true)));
   }
   void other_is_silent() const {
-    test::Postgres::of_program().sql(url_, "UPDATE servers SET heard_at = heard_at - 60 WHERE server = 'server-b'");
+    test::Postgres::of_program().sql(
+        url_, "UPDATE servers SET heard_at = heard_at - 60 WHERE server = 'server-b'");
   }
-  static bool has(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+  static bool has(const std::string& text, const std::string& words) {
+    return text.find(words) != std::string::npos;
+  }
 
   test::TemporaryFolder folder_;
   const std::string url_ = test::Postgres::of_program().new_store();
@@ -57,15 +62,16 @@ TEST_F(ServersPage, ACellWithOtherFilesIsDarkAndNamesBothServers) {
   const auto cells = cells_readiness(server.watched());
   ASSERT_EQ(cells.size(), 1U);
   EXPECT_EQ(cells[0].state, CellReadiness::State::kDescribedOtherwise);
-  EXPECT_TRUE(has(cells[0].why, "server-a has another robot file than server-b (on hall-3)")) << cells[0].why;
+  EXPECT_TRUE(has(cells[0].why, "server-a has another robot file than server-b (on hall-3)"))
+      << cells[0].why;
   const Readiness ready = readiness(server.watched(), ServerPhase::kServing, "");
   EXPECT_FALSE(ready.ready);
   EXPECT_EQ(ready.told["dark"][0]["state"], "described_otherwise");
   ASSERT_TRUE(server.store().tell_presence(server.trainer().self())) << "as its heartbeat does";
   EXPECT_TRUE(has(servers_page(server.watched()).body, cells[0].why.substr(0, 40)));
   test::SmallBatch measured;
-  const auto refused =
-      server.trainer().submit("cell-7", "b1", test::small_batch_csv(*test::small_cell("cell-7"), measured), "b1");
+  const auto refused = server.trainer().submit(
+      "cell-7", "b1", test::small_batch_csv(*test::small_cell("cell-7"), measured), "b1");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kConflict);
 }
@@ -80,7 +86,9 @@ TEST_F(ServersPage, AFileHasItsOneServer) {
   const std::string metrics = Metrics(server.watched()).text(ServerPhase::kServing, 0);
   EXPECT_TRUE(has(metrics, "trammel_record_reachable 1")) << metrics;
   EXPECT_TRUE(has(metrics, "name=\"server-a\"")) << metrics;
-  EXPECT_EQ(readiness(server.watched(), ServerPhase::kServing, "").told["record"]["servers"][0]["server"], "server-a");
+  EXPECT_EQ(
+      readiness(server.watched(), ServerPhase::kServing, "").told["record"]["servers"][0]["server"],
+      "server-a");
 }
 
 }  // namespace

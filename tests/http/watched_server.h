@@ -13,11 +13,13 @@
 
 namespace trammel::test {
 
-/// The parts of a server of small cells, without DDS. May be taken down and set up again on the same store.
+/// The parts of a server of small cells, without DDS. May be taken down and set up again on the
+/// same store.
 class WatchedServer {
  public:
   /// `place`: of the store; empty: a file.
-  explicit WatchedServer(ServedCells cells = {{"cell-7", small_cell("cell-7")}}, const std::string& place = "")
+  explicit WatchedServer(ServedCells cells = {{"cell-7", small_cell("cell-7")}},
+                         const std::string& place = "")
       : place_(place.empty() ? store_path() : place), cells_(std::move(cells)) {
     set_up();
   }
@@ -45,7 +47,8 @@ class WatchedServer {
   std::int64_t submit(const std::string& cell, const std::string& batch, std::uint64_t seed) {
     SmallBatch measured;
     measured.seed = seed;
-    return demand(trainer_->submit(cell, batch, small_batch_csv(*cells_.at(cell), measured), batch));
+    return demand(
+        trainer_->submit(cell, batch, small_batch_csv(*cells_.at(cell), measured), batch));
   }
   /// Until all jobs are over.
   void work() {

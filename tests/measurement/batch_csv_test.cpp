@@ -17,8 +17,8 @@ Refusal refusal(const std::string& text) {
 }
 
 constexpr const char* kEverything =
-    "qz,pose_id,z_mm,q2_deg,y_mm,x_mm,q1_deg,qw,qx,qy,sigma_mm,time_s,temperature_c,tool_id,payload_id,dir1,dir2,set,"
-    "operator,note\n"
+    "qz,pose_id,z_mm,q2_deg,y_mm,x_mm,q1_deg,qw,qx,qy,sigma_mm,time_s,temperature_c,tool_id,"
+    "payload_id,dir1,dir2,set,operator,note\n"
     "0,a,3,20,2,1,-10,1,0,0,0.02,12.5,21.75,probe,light,-1,1,train,Ada,\"first, cold\"\n"
     "1,b,-3,-20,-2,-1,10,0,0,0,,,,,,,,validation,,\n"
     ",c,6,0,5,4,0,,,,0.03,14,22,probe,,0,0,,Ada,\n";
@@ -77,7 +77,8 @@ TEST(BatchCsv, CountsPosesWhereNoneIsNamed) {
 TEST(BatchCsv, ReadsARailInMillimetres) {
   const auto batch = parse_batch_csv("q1_mm,q2_deg,x_mm,y_mm,z_mm\n1500,90,2,3,4\n", "b.csv");
   ASSERT_TRUE(batch) << batch.error().message;
-  EXPECT_EQ(batch->joint_types, (std::vector<JointType>{JointType::kPrismatic, JointType::kRevolute}));
+  EXPECT_EQ(batch->joint_types,
+            (std::vector<JointType>{JointType::kPrismatic, JointType::kRevolute}));
   EXPECT_DOUBLE_EQ(batch->measurements[0].context.q(0), 1.5);
   EXPECT_DOUBLE_EQ(batch->measurements[0].context.q(1), kPi / 2);
 }
@@ -87,17 +88,21 @@ TEST(BatchCsv, RefusesMissingColumnsByName) {
   EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm\n"), Refusal("lt-07.csv").beyond(0, 1));
   EXPECT_EQ(refusal("q1_deg,x_mm,y_mm\n1,2,3\n"), Refusal("lt-07.csv", {}, "z_mm"));
   EXPECT_EQ(refusal("x_mm,y_mm,z_mm\n1,2,3\n"), Refusal("lt-07.csv", {}, "q1_deg"));
-  EXPECT_EQ(refusal("q1_deg,q3_deg,x_mm,y_mm,z_mm\n1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "q2_deg"));
+  EXPECT_EQ(refusal("q1_deg,q3_deg,x_mm,y_mm,z_mm\n1,1,1,2,3\n"),
+            Refusal("lt-07.csv", {}, "q2_deg"));
   EXPECT_EQ(refusal("q1_deg,q1_mm,x_mm,y_mm,z_mm\n1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "q1_mm"));
-  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm,qw,qx,qz\n1,1,2,3,1,0,0\n"), Refusal("lt-07.csv", {}, "qy"));
-  EXPECT_EQ(refusal("q1_deg,q2_deg,dir2,x_mm,y_mm,z_mm\n1,1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "dir1"));
+  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm,qw,qx,qz\n1,1,2,3,1,0,0\n"),
+            Refusal("lt-07.csv", {}, "qy"));
+  EXPECT_EQ(refusal("q1_deg,q2_deg,dir2,x_mm,y_mm,z_mm\n1,1,1,1,2,3\n"),
+            Refusal("lt-07.csv", {}, "dir1"));
 }
 
 /// A batch of two rows of which the second has `value` in `column`.
 std::string with(const std::string& column, const std::string& value) {
   const std::vector<std::pair<std::string, std::string>> good = {
-      {"pose_id", "p1"}, {"q1_deg", "10"}, {"x_mm", "1"},      {"y_mm", "2"}, {"z_mm", "3"}, {"qw", "1"},
-      {"qx", "0"},       {"qy", "0"},      {"sigma_mm", ".1"}, {"qz", "0"},   {"dir1", "1"}, {"set", "train"}};
+      {"pose_id", "p1"},  {"q1_deg", "10"}, {"x_mm", "1"}, {"y_mm", "2"},
+      {"z_mm", "3"},      {"qw", "1"},      {"qx", "0"},   {"qy", "0"},
+      {"sigma_mm", ".1"}, {"qz", "0"},      {"dir1", "1"}, {"set", "train"}};
   std::string header, first, second;
   for (const auto& [name, text] : good) {
     header += name + ",";
@@ -107,7 +112,9 @@ std::string with(const std::string& column, const std::string& value) {
   return header + "end\n" + first + "\n" + second + "\n";
 }
 
-TEST(BatchCsv, TheRowThatTheRefusalsStartFromIsGood) { EXPECT_EQ(refusal(with("x_mm", "4")), Refusal::none()); }
+TEST(BatchCsv, TheRowThatTheRefusalsStartFromIsGood) {
+  EXPECT_EQ(refusal(with("x_mm", "4")), Refusal::none());
+}
 
 TEST(BatchCsv, RefusesBadValuesWithRowColumnValueAndLimit) {
   EXPECT_EQ(refusal(with("q1_deg", "nan")), Refusal("lt-07.csv", 3, "q1_deg").text("nan"));

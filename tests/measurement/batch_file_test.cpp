@@ -28,7 +28,8 @@ Matrix3 turned(double x, double y, double z, const char* order) {
 
 TEST(RoboDkCsv, FindsNamedColumnsWithEverySeparatorAndDecimalCommas) {
   for (const char* text :
-       {"J1,J2,X,Y,Z\n90,-45.5,1,2,3\n", "J1;J2;X;Y;Z\n90;-45,5;1;2;3\n", "J1\tJ2\tX\tY\tZ\r\n90\t-45.5\t1\t2\t3\r\n",
+       {"J1,J2,X,Y,Z\n90,-45.5,1,2,3\n", "J1;J2;X;Y;Z\n90;-45,5;1;2;3\n",
+        "J1\tJ2\tX\tY\tZ\r\n90\t-45.5\t1\t2\t3\r\n",
         "# measured\nZ (mm), X (mm), Y (mm), Joint 2 (deg), Joint 1 (deg)\n3, 1, 2, -45.5, 90\n"}) {
     const auto batch = parse_robodk_csv(text, "data/rdk.csv");
     ASSERT_TRUE(batch) << text << batch.error().message;
@@ -47,16 +48,27 @@ TEST(RoboDkCsv, FindsNamedColumnsWithEverySeparatorAndDecimalCommas) {
 TEST(RoboDkCsv, TurnsEachKindOfAnglesAsItsControllerDoes) {
   const double x = 0.1, y = -0.2, z = 2.5;
   const auto rotation = [](const std::string& names, const std::string& values) {
-    const auto batch = parse_robodk_csv("J1,X,Y,Z," + names + "\n0,1,2,3," + values + "\n", "rdk.csv");
+    const auto batch =
+        parse_robodk_csv("J1,X,Y,Z," + names + "\n0,1,2,3," + values + "\n", "rdk.csv");
     EXPECT_TRUE(batch) << batch.error().message;
     return batch ? batch->measurements[0].R_WT.value_or(Matrix3::Zero()) : Matrix3::Zero();
   };
-  const auto values = [](double a, double b, double c) { return fmt::format("{:.15g},{:.15g},{:.15g}", a, b, c); };
-  EXPECT_LT((rotation("A,B,C", values(to_deg(z), to_deg(y), to_deg(x))) - turned(x, y, z, "zyx")).norm(), 1e-12);
-  EXPECT_LT((rotation("W,P,R", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "zyx")).norm(), 1e-12);
-  EXPECT_LT((rotation("Rx,Ry,Rz", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "xyz")).norm(), 1e-12);
-  EXPECT_LT((rotation("A (rad),B (rad),C (rad)", values(z, y, x)) - turned(x, y, z, "zyx")).norm(), 1e-12);
-  EXPECT_LT((rotation("qw,qx,qy,qz", "0.6,0,0,0.8") - turned(0, 0, 2 * std::acos(0.6), "z")).norm(), 1e-12);
+  const auto values = [](double a, double b, double c) {
+    return fmt::format("{:.15g},{:.15g},{:.15g}", a, b, c);
+  };
+  EXPECT_LT(
+      (rotation("A,B,C", values(to_deg(z), to_deg(y), to_deg(x))) - turned(x, y, z, "zyx")).norm(),
+      1e-12);
+  EXPECT_LT(
+      (rotation("W,P,R", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "zyx")).norm(),
+      1e-12);
+  EXPECT_LT((rotation("Rx,Ry,Rz", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "xyz"))
+                .norm(),
+            1e-12);
+  EXPECT_LT((rotation("A (rad),B (rad),C (rad)", values(z, y, x)) - turned(x, y, z, "zyx")).norm(),
+            1e-12);
+  EXPECT_LT((rotation("qw,qx,qy,qz", "0.6,0,0,0.8") - turned(0, 0, 2 * std::acos(0.6), "z")).norm(),
+            1e-12);
 }
 
 TEST(RoboDkCsv, ReadsTheExportsByPosition) {
@@ -72,16 +84,19 @@ TEST(RoboDkCsv, ReadsTheExportsByPosition) {
   EXPECT_EQ(points->extra_columns, (std::vector<std::string>{"tcp_x_mm", "tcp_y_mm", "tcp_z_mm"}));
   EXPECT_EQ(points->measurements[0].extra, (std::vector<std::string>{"7", "8", "9"}));
 
-  const auto poses = parse_robodk_csv("1,2,3,4,5,6,100,200,300,0.1,-0.2,2.5,7,8,9,0,0,0\n", "rdk.csv");
+  const auto poses =
+      parse_robodk_csv("1,2,3,4,5,6,100,200,300,0.1,-0.2,2.5,7,8,9,0,0,0\n", "rdk.csv");
   ASSERT_TRUE(poses) << poses.error().message;
-  EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz")).norm(), 1e-12);
+  EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz"))
+                .norm(),
+            1e-12);
   EXPECT_EQ(refusal("1,2,3,4,5,6,100,200.5,300,10,-20,170,7,8,9,0,0,0\n"),
             Refusal("rdk.csv", 1, "rx_rad").beyond(10, 6.28319));
 }
 
 TEST(RoboDkCsv, MakesAToolOfEachTcp) {
-  const auto batch =
-      parse_robodk_csv("1,2,3,4,5,6,1,2,3.5,7,8,9\n1,2,3,4,5,7,1,2,3,-7,8,9\n1,2,3,4,5,8,1,2,3,7,8,9\n", "rdk.csv");
+  const auto batch = parse_robodk_csv(
+      "1,2,3,4,5,6,1,2,3.5,7,8,9\n1,2,3,4,5,7,1,2,3,-7,8,9\n1,2,3,4,5,8,1,2,3,7,8,9\n", "rdk.csv");
   ASSERT_TRUE(batch) << batch.error().message;
   EXPECT_EQ(batch->measurements[0].context.tool, "tcp-1");
   EXPECT_EQ(batch->measurements[1].context.tool, "tcp-2");
@@ -94,12 +109,15 @@ TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
   EXPECT_EQ(refusal("1,2,3,4\n"), Refusal("rdk.csv", 1, "J1").value(4));
   EXPECT_EQ(refusal("J1,J3,X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2"));
   EXPECT_EQ(refusal("J1,X,Y\n1,2,3\n"), Refusal("rdk.csv", {}, "x").beyond(2, 3));
-  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"), Refusal("rdk.csv", {}, "orientation"));
+  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"),
+            Refusal("rdk.csv", {}, "orientation"));
   EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), Refusal("rdk.csv", 3, "Y").text("c"));
   EXPECT_EQ(refusal("J1,X,Y,Z\n1,2e7,3,4\n"), Refusal("rdk.csv", 2, "X").beyond(2e+07, 1e+06));
   EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), Refusal("rdk.csv", 2).beyond(3, 4));
-  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2 (turns)").text("turns"));
-  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"), Refusal("rdk.csv", 3, "pose_id").text("a"));
+  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"),
+            Refusal("rdk.csv", {}, "J2 (turns)").text("turns"));
+  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"),
+            Refusal("rdk.csv", 3, "pose_id").text("a"));
 }
 
 std::string repeated(const std::string& part, std::size_t times) {
@@ -119,15 +137,18 @@ TEST(BatchFile, OfMillionsOfBytesEndsSoonWhateverItsKind) {
   EXPECT_EQ(code_of("# " + std::string(2'000'000, 'x') + "\np1 1 2 3\n"), ErrorCode::kRefused);
   EXPECT_EQ(code_of("p1 1 2 3 " + std::string(2'000'000, '4') + "\n"), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of("p1 1 2 3 " + repeated("a:", 1'000'000) + "\n"), ErrorCode::kTooLarge);
-  EXPECT_EQ(code_of("p1;1;2;3\n" + repeated("# units                                   \n", 500'000)),
-            ErrorCode::kRefused);
+  EXPECT_EQ(
+      code_of("p1;1;2;3\n" + repeated("# units                                   \n", 500'000)),
+      ErrorCode::kRefused);
   EXPECT_EQ(code_of(repeated("1\n", 4'000'000)), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of(repeated("1 ", 4'000'000)), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of(repeated(",", 4'000'000)), ErrorCode::kTooLarge);
-  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm\n" + repeated("1,2,3,4\n", 200'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm\n" + repeated("1,2,3,4\n", 200'000)),
+            ErrorCode::kTooLarge);
   EXPECT_EQ(code_of("J1,X,Y,Z\n" + repeated("1,2,3,4\n", 200'000)), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of("J1;X;Y;Z\n" + repeated("1;", 2'000'000)), ErrorCode::kTooLarge);
-  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm,note\n1,2,3,4," + std::string(100'000, 'x') + "\n"), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm,note\n1,2,3,4," + std::string(100'000, 'x') + "\n"),
+            ErrorCode::kTooLarge);
 }
 
 TEST(BatchFile, WhoseIdsAreNoNamesIsRefusedByEveryReader) {
@@ -151,7 +172,8 @@ TEST(BatchFile, WhoseIdsAreNoNamesIsRefusedByEveryReader) {
 TEST(BatchFile, RecognisesKindsByTheirContent) {
   EXPECT_EQ(recognise_batch("q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n"), BatchKind::kTrammel);
   EXPECT_EQ(recognise_batch("# a\nJ1;J2;X;Y;Z\n1;2;3;4;5\n"), BatchKind::kRoboDk);
-  EXPECT_EQ(recognise_batch("a,b,c,d,e,f,g,h,i,j,k,l\n1,2,3,4,5,6,7,8,9,10,11,12\n"), BatchKind::kRoboDk);
+  EXPECT_EQ(recognise_batch("a,b,c,d,e,f,g,h,i,j,k,l\n1,2,3,4,5,6,7,8,9,10,11,12\n"),
+            BatchKind::kRoboDk);
   EXPECT_EQ(recognise_batch("// SA\nMain p1 1 2 3\n"), BatchKind::kPoints);
   EXPECT_EQ(recognise_batch("name,x_mm,y_mm,z_mm\nR1,1,2,3\n"), BatchKind::kPoints);
   EXPECT_EQ(recognise_batch("x_mm,y_mm,z_mm\n1,2,3\n"), BatchKind::kTrammel);

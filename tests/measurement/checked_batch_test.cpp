@@ -12,7 +12,8 @@ namespace trammel {
 namespace {
 
 static_assert(!std::is_default_constructible_v<CheckedBatch>);
-static_assert(!std::is_constructible_v<CheckedBatch, MeasurementBatch>, "what is not checked cannot become one");
+static_assert(!std::is_constructible_v<CheckedBatch, MeasurementBatch>,
+              "what is not checked cannot become one");
 
 MeasurementBatch measured(int poses, const std::string& id = "lt-07", std::uint64_t seed = 3) {
   MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed);
@@ -34,8 +35,10 @@ TEST(CheckedBatch, HasEachRowAmongThoseToLearnFromOrThoseHeldOut) {
   const CheckedBatch batch = checked(measured(50), drawn(0.2, 7));
   EXPECT_EQ(batch.held_out().measurements.size(), 10U);
   EXPECT_EQ(batch.training().measurements.size(), 40U);
-  for (const Measurement& m : batch.training().measurements) EXPECT_EQ(m.set, MeasurementSet::kTrain);
-  for (const Measurement& m : batch.held_out().measurements) EXPECT_EQ(m.set, MeasurementSet::kValidation);
+  for (const Measurement& m : batch.training().measurements)
+    EXPECT_EQ(m.set, MeasurementSet::kTrain);
+  for (const Measurement& m : batch.held_out().measurements)
+    EXPECT_EQ(m.set, MeasurementSet::kValidation);
   std::vector<int> both = rows_of(batch.training());
   const std::vector<int> held_out = rows_of(batch.held_out());
   both.insert(both.end(), held_out.begin(), held_out.end());
@@ -68,13 +71,15 @@ TEST(CheckedBatch, HoldsOutMoreRowsAndNeverFewer) {
   more[0] = true;
   const CheckedBatch fewer_to_learn = batch.holding_out(more);
   const std::vector<int> held_out = rows_of(fewer_to_learn.held_out());
-  for (const int row : rows_of(batch.held_out())) EXPECT_EQ(std::count(held_out.begin(), held_out.end(), row), 1);
+  for (const int row : rows_of(batch.held_out()))
+    EXPECT_EQ(std::count(held_out.begin(), held_out.end(), row), 1);
   EXPECT_EQ(std::count(held_out.begin(), held_out.end(), batch.rows().measurements[0].row), 1);
 }
 
 TEST(CheckedBatch, PutsPosesIntoTheOrderOfTheirTimesEachWithItsRowAndItsPart) {
   MeasurementBatch backwards = measured(12);
-  for (std::size_t i = 0; i < 12; ++i) backwards.measurements[i].context.time = 100.0 * static_cast<double>(12 - i);
+  for (std::size_t i = 0; i < 12; ++i)
+    backwards.measurements[i].context.time = 100.0 * static_cast<double>(12 - i);
   backwards.measurements[0].set = MeasurementSet::kValidation;
   const CheckedBatch batch = checked(backwards);
   EXPECT_FALSE(batch.is_in_order_of_time());
@@ -122,8 +127,10 @@ TEST(CheckedBatch, TheSameMeasurementsUnderTwoNamesCountOnce) {
   const CheckedBatch both = joined({first, checked(renamed), checked(measured(30, "c", 4))});
   EXPECT_EQ(both.size(), 20U + 1U + 30U) << "one row was measured again";
   EXPECT_EQ(both.rows().copies, 19);
-  EXPECT_EQ(both.rows().measurements[20].pose_id, "b/again-" + measured(20).measurements[7].pose_id);
-  EXPECT_EQ(both.held_out().measurements.size(), 4U) << "none of them is learned from under its other name";
+  EXPECT_EQ(both.rows().measurements[20].pose_id,
+            "b/again-" + measured(20).measurements[7].pose_id);
+  EXPECT_EQ(both.held_out().measurements.size(), 4U)
+      << "none of them is learned from under its other name";
   EXPECT_EQ(both.rows().sessions.size(), 3U);
 
   const CheckedBatch copied = joined({first, checked(measured(20, "b"))});

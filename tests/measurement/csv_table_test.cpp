@@ -30,7 +30,8 @@ TEST(CsvTable, ReadsTheSameRowsFromLfAndCrlfWithAndWithoutByteOrderMark) {
 }
 
 TEST(CsvTable, NamesTheLineInTheFileAfterCommentsBlankLinesAndQuotedLineEnds) {
-  const auto table = CsvTable::parse("# made by hand\n\na,b\n1,\"two\nlines\"\n  # more\n3,4\n", "f.csv");
+  const auto table =
+      CsvTable::parse("# made by hand\n\na,b\n1,\"two\nlines\"\n  # more\n3,4\n", "f.csv");
   ASSERT_TRUE(table) << table.error().message;
   ASSERT_EQ(table->size(), 2u);
   EXPECT_EQ(table->line(0), 4);
@@ -46,7 +47,8 @@ TEST(CsvTable, UnderstandsQuotedSeparatorsAndDoubledQuotes) {
 }
 
 TEST(CsvTable, WrittenFieldsReadBackAsTheyWere) {
-  for (const std::string field : {"plain", "with, comma", "a \"quote\"", "two\nlines", " edge ", "# no comment", ""}) {
+  for (const std::string field :
+       {"plain", "with, comma", "a \"quote\"", "two\nlines", " edge ", "# no comment", ""}) {
     const auto table = CsvTable::parse("a,b\n" + csv_field(field) + ",x\n", "f.csv");
     ASSERT_TRUE(table) << table.error().message;
     EXPECT_EQ(table->field(0, 0), field);
@@ -75,15 +77,17 @@ TEST(CsvTable, RefusesBytesThatAreNoUtf8AndTakesThoseThatAre) {
 }
 
 TEST(CsvTable, ReadsNumbersWholeOrNotAtAll) {
-  const auto table = CsvTable::parse("a\n+1.5\n-2e-3\n1.5mm\nnan\n-inf\n1e400\n2000\n \"\"\n0x10\n", "f.csv");
+  const auto table =
+      CsvTable::parse("a\n+1.5\n-2e-3\n1.5mm\nnan\n-inf\n1e400\n2000\n \"\"\n0x10\n", "f.csv");
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_EQ(table->number(0, 0).value(), 1.5);
   EXPECT_EQ(table->number(1, 0).value(), -2e-3);
   EXPECT_EQ(refusal_of(table->number(2, 0)), Refusal("f.csv", 4, "a").text("1.5mm"));
   EXPECT_EQ(refusal_of(table->number(3, 0)), Refusal("f.csv", 5, "a").text("nan"));
   EXPECT_EQ(refusal_of(table->number(4, 0)), Refusal("f.csv", 6, "a").text("-inf"));
-  EXPECT_EQ(refusal_of(table->number(5, 0, 1000)),
-            Refusal("f.csv", 7, "a").beyond(std::numeric_limits<double>::infinity(), 1000).text("1e400"));
+  EXPECT_EQ(
+      refusal_of(table->number(5, 0, 1000)),
+      Refusal("f.csv", 7, "a").beyond(std::numeric_limits<double>::infinity(), 1000).text("1e400"));
   EXPECT_EQ(refusal_of(table->number(6, 0, 1000)), Refusal("f.csv", 8, "a").beyond(2000, 1000));
   EXPECT_EQ(refusal_of(table->number(7, 0)), Refusal("f.csv", 9, "a"));
   EXPECT_FALSE(table->number(8, 0));

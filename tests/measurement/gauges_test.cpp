@@ -27,7 +27,8 @@ Refusal refusal(const std::string& text) { return refusal_of(parse_batch_csv(tex
 
 TEST(Gauges, EachRowSaysWhatItIsAndAllKindsComeTogether) {
   const MeasurementBatch batch = test::demand(parse_batch_csv(kMixed, "wires.csv"));
-  ASSERT_EQ(batch.measurements.size(), 4U) << "the row that others are told against is no measurement";
+  ASSERT_EQ(batch.measurements.size(), 4U)
+      << "the row that others are told against is no measurement";
   const Measurement& wire = batch.measurements[0];
   ASSERT_TRUE(wire.gauge);
   EXPECT_EQ(wire.gauge->kind, Gauge::Kind::kDistance);
@@ -61,11 +62,13 @@ TEST(Gauges, AreWrittenAsTheyWereRead) {
 }
 
 TEST(Gauges, ARowThatIsTwoThingsOrNothingIsRefused) {
-  const std::string head = "pose_id,q1_deg,x_mm,y_mm,z_mm,distance_mm,touch_mm,anchor_id,minus_pose_id\n";
+  const std::string head =
+      "pose_id,q1_deg,x_mm,y_mm,z_mm,distance_mm,touch_mm,anchor_id,minus_pose_id\n";
   EXPECT_EQ(refusal(head + "a,1,1,2,3,5,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
   EXPECT_EQ(refusal(head + "a,1,,,,5,6,a1,\n"), Refusal("wires.csv", 2, "touch_mm"));
   EXPECT_EQ(refusal(head + "a,1,,,,,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
-  EXPECT_EQ(refusal(head + "a,1,,,,-5,,a1,\n"), Refusal("wires.csv", 2, "distance_mm").beyond(-5, 0));
+  EXPECT_EQ(refusal(head + "a,1,,,,-5,,a1,\n"),
+            Refusal("wires.csv", 2, "distance_mm").beyond(-5, 0));
   EXPECT_EQ(refusal(head + "a,1,,,,5,,a1,b\n"), Refusal("wires.csv", 2, "minus_pose_id").text("b"));
   EXPECT_EQ(refusal(head + "a,1,,,,5,,a1,a\n"), Refusal("wires.csv", 2, "minus_pose_id").text("a"));
   EXPECT_EQ(refusal(head + "a,1,1,2,3,,,,a\n"), Refusal("wires.csv", 2, "minus_pose_id"));
@@ -76,12 +79,14 @@ Cell cell_with(const std::string& anchors) {
   hidden::World world;
   world.tools = {Eigen::Matrix4d::Identity()};
   world.sources = {"base"};
-  const std::string text = hidden::cell_text(world, {world.tools, {}}, "calibration") + "anchors: " + anchors + "\n";
+  const std::string text =
+      hidden::cell_text(world, {world.tools, {}}, "calibration") + "anchors: " + anchors + "\n";
   return test::demand(parse_cell(text, hidden::robot_text(), "cell.yaml"));
 }
 
 std::string rows(const std::string& column, const std::string& anchor) {
-  return "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg," + column + ",anchor_id\n0,0,0,0,0,0,900," + anchor + "\n";
+  return "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg," + column + ",anchor_id\n0,0,0,0,0,0,900," +
+         anchor + "\n";
 }
 
 TEST(Gauges, AnchorsAreThoseOfTheCellFileWithTheSigmaOfTheirInstrument) {
@@ -92,8 +97,10 @@ TEST(Gauges, AnchorsAreThoseOfTheCellFileWithTheSigmaOfTheirInstrument) {
   const CheckedBatch batch = test::demand(checked(rows("distance_mm", "")));
   EXPECT_EQ(batch.rows().measurements[0].gauge->anchor, "wire") << "the only one need not be named";
   EXPECT_DOUBLE_EQ(batch.rows().measurements[0].sigma.value(), 0.3e-3);
-  EXPECT_EQ(refusal_of(checked(rows("distance_mm", "wires"))), Refusal("w.csv", 2, "anchor_id").text("wires"));
-  EXPECT_EQ(refusal_of(checked(rows("touch_mm", "wire"))), Refusal("w.csv", 2, "touch_mm").text("wire"));
+  EXPECT_EQ(refusal_of(checked(rows("distance_mm", "wires"))),
+            Refusal("w.csv", 2, "anchor_id").text("wires"));
+  EXPECT_EQ(refusal_of(checked(rows("touch_mm", "wire"))),
+            Refusal("w.csv", 2, "touch_mm").text("wire"));
 }
 
 TEST(Gauges, AnchorsThatMakeNoSenseAreRefused) {
@@ -101,22 +108,26 @@ TEST(Gauges, AnchorsThatMakeNoSenseAreRefused) {
   world.tools = {Eigen::Matrix4d::Identity()};
   world.sources = {"base"};
   const auto refused_cell = [&](const std::string& anchors) {
-    const std::string text = hidden::cell_text(world, {world.tools, {}}, "calibration") + "anchors: " + anchors + "\n";
+    const std::string text =
+        hidden::cell_text(world, {world.tools, {}}, "calibration") + "anchors: " + anchors + "\n";
     return !parse_cell(text, hidden::robot_text(), "cell.yaml");
   };
-  EXPECT_FALSE(refused_cell("{a: null, b: {xyz_mm: [1, 2, 3], ring_axis: [0, 0, 2], ring_radius_mm: 25}}"));
+  EXPECT_FALSE(
+      refused_cell("{a: null, b: {xyz_mm: [1, 2, 3], ring_axis: [0, 0, 2], ring_radius_mm: 25}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz: [1, 2, 3]}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2]}}"));
   EXPECT_TRUE(refused_cell("{a: {sphere_radius_mm: 0}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: null, plane_normal: [0, 0, 1]}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2, 3], plane_normal: [0, 0, 0]}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2, 3], ring_axis: [0, 0, 1]}}"));
-  EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2, 3], sphere_radius_mm: 5, plane_normal: [0, 0, 1]}}"));
+  EXPECT_TRUE(
+      refused_cell("{a: {xyz_mm: [1, 2, 3], sphere_radius_mm: 5, plane_normal: [0, 0, 1]}}"));
   EXPECT_TRUE(refused_cell("{a: {sigma_mm: -1}}"));
 }
 
 TEST(Gauges, SeveralInstrumentsAtOnePoseAreNoRepeats) {
-  const std::string text = "pose_id,q1_deg,distance_mm,anchor_id\na,1,900,a1\nb,1,800,a2\nc,1,901,a1\n";
+  const std::string text =
+      "pose_id,q1_deg,distance_mm,anchor_id\na,1,900,a1\nb,1,800,a2\nc,1,901,a1\n";
   const MergedRepeats merged = merge_repeats(test::demand(parse_batch_csv(text, "w.csv")), 1e-5);
   EXPECT_EQ(merged.batch.measurements.size(), 3U);
   EXPECT_EQ(merged.statistics.groups, 0);

@@ -52,20 +52,30 @@ TEST(History, IsUnknownWhereTheBatchDoesNotSayIt) {
     fill_history(batch, one_joint());
     return batch;
   };
-  const auto before = [](const MeasurementBatch& batch) { return batch.measurements[2].context.before.has_value(); };
-  const auto lagged = [](const MeasurementBatch& batch) { return !batch.measurements[2].context.lagged.empty(); };
-  const MeasurementBatch untimed = filled([](MeasurementBatch& b) { b.measurements[3].context.time.reset(); });
+  const auto before = [](const MeasurementBatch& batch) {
+    return batch.measurements[2].context.before.has_value();
+  };
+  const auto lagged = [](const MeasurementBatch& batch) {
+    return !batch.measurements[2].context.lagged.empty();
+  };
+  const MeasurementBatch untimed =
+      filled([](MeasurementBatch& b) { b.measurements[3].context.time.reset(); });
   EXPECT_FALSE(before(untimed) || lagged(untimed));
-  const MeasurementBatch unordered = filled([](MeasurementBatch& b) { b.measurements[3].context.time = 1; });
+  const MeasurementBatch unordered =
+      filled([](MeasurementBatch& b) { b.measurements[3].context.time = 1; });
   EXPECT_FALSE(before(unordered) || lagged(unordered));
-  const MeasurementBatch cold = filled([](MeasurementBatch& b) { b.measurements[3].context.temperature.reset(); });
+  const MeasurementBatch cold =
+      filled([](MeasurementBatch& b) { b.measurements[3].context.temperature.reset(); });
   EXPECT_TRUE(before(cold));
   EXPECT_FALSE(lagged(cold));
   // From above, says the column, while the row before was below: it went elsewhere in between.
-  const MeasurementBatch around = filled([](MeasurementBatch& b) { b.measurements[2].context.direction = {-1}; });
+  const MeasurementBatch around =
+      filled([](MeasurementBatch& b) { b.measurements[2].context.direction = {-1}; });
   EXPECT_FALSE(before(around));
-  EXPECT_TRUE(before(filled([](MeasurementBatch& b) { b.measurements[2].context.direction = {1}; })));
-  EXPECT_FALSE(before(filled([](MeasurementBatch& b) { b.measurements[2].context.velocity = JointVector::Ones(1); })));
+  EXPECT_TRUE(
+      before(filled([](MeasurementBatch& b) { b.measurements[2].context.direction = {1}; })));
+  EXPECT_FALSE(before(filled(
+      [](MeasurementBatch& b) { b.measurements[2].context.velocity = JointVector::Ones(1); })));
 }
 
 TEST(History, SidesOfApproachAreHeldAgainstTheWayOfTheGears) {

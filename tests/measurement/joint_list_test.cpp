@@ -29,13 +29,15 @@ Cell cell() {
 }
 
 Refusal refusal(const std::string& text) {
-  const auto list =
-      parse_joint_csv(text, "j.csv").and_then([](const JointList& read) { return check_against_cell(read, cell()); });
+  const auto list = parse_joint_csv(text, "j.csv").and_then([](const JointList& read) {
+    return check_against_cell(read, cell());
+  });
   return refusal_of(list);
 }
 
 TEST(JointList, ReadsJointsAndTheirCircumstances) {
-  const auto list = parse_joint_csv("pose_id,q1_mm,q2_deg,tool_id,note\nup,1500,45,hook,x\n", "j.csv");
+  const auto list =
+      parse_joint_csv("pose_id,q1_mm,q2_deg,tool_id,note\nup,1500,45,hook,x\n", "j.csv");
   ASSERT_TRUE(list) << list.error().message;
   ASSERT_EQ(list->poses.size(), 1u);
   EXPECT_EQ(list->poses[0].pose_id, "up");
@@ -52,7 +54,8 @@ TEST(JointList, WhatIsWrittenReadsBackTheSame) {
 
 TEST(JointList, WritesWhatIsKnownOfEachPose) {
   const std::string text =
-      "pose_id,q1_mm,q2_deg,dir1,dir2,tool_id,payload_id\n1,1500,45.25,-1,1,hook,full\n2,0,-90,0,-1,,empty\n";
+      "pose_id,q1_mm,q2_deg,dir1,dir2,tool_id,payload_id\n1,1500,45.25,-1,1,hook,full\n2,0,-90,0,-"
+      "1,,empty\n";
   const auto list = parse_joint_csv(text, "j.csv");
   ASSERT_TRUE(list) << list.error().message;
   EXPECT_EQ(to_csv(*list), text);
@@ -77,7 +80,8 @@ TEST(JointList, OneInRadiansIsRefusedWithItsUnitAndOneNearAPlaceIsNot) {
 }
 
 TEST(JointList, ResolvesTheOnlyTool) {
-  const auto list = check_against_cell(parse_joint_csv("q1_mm,q2_deg\n1,2\n", "j.csv").value(), cell());
+  const auto list =
+      check_against_cell(parse_joint_csv("q1_mm,q2_deg\n1,2\n", "j.csv").value(), cell());
   ASSERT_TRUE(list) << list.error().message;
   EXPECT_EQ(list->poses[0].context.tool, "hook");
 }

@@ -17,7 +17,8 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Joint make_joint(double theta_deg, double d, double a, double alpha_deg, double lower_deg, double upper_deg) {
+Joint make_joint(double theta_deg, double d, double a, double alpha_deg, double lower_deg,
+                 double upper_deg) {
   Joint joint;
   joint.link = {from_deg(theta_deg), d, a, from_deg(alpha_deg), 0};
   joint.lower = from_deg(lower_deg);
@@ -29,10 +30,12 @@ Joint make_joint(double theta_deg, double d, double a, double alpha_deg, double 
 Cell make_cell(std::optional<Pose> X_FT) {
   Cell cell;
   cell.name = "cell-7";
-  cell.robot = Chain::make("six axes", {make_joint(0, .78, .32, -90, -170, 170), make_joint(-90, 0, 1.28, 0, -65, 85),
-                                        make_joint(0, 0, .2, -90, -180, 70), make_joint(180, 1.142, 0, -90, -300, 300),
-                                        make_joint(0, 0, 0, 90, -120, 120), make_joint(0, .2, 0, 0, -360, 360)})
-                   .value();
+  cell.robot =
+      Chain::make("six axes",
+                  {make_joint(0, .78, .32, -90, -170, 170), make_joint(-90, 0, 1.28, 0, -65, 85),
+                   make_joint(0, 0, .2, -90, -180, 70), make_joint(180, 1.142, 0, -90, -300, 300),
+                   make_joint(0, 0, 0, 90, -120, 120), make_joint(0, .2, 0, 0, -360, 360)})
+          .value();
   cell.tools["spindle"] = std::move(X_FT);
   cell.payloads["spindle"] = Payload{};
   return cell;
@@ -88,7 +91,8 @@ TEST(CheckAgainstCell, RefusesABatchWithoutMeasurements) {
 }
 
 TEST(CheckAgainstCell, RefusesAnotherNumberOfJoints) {
-  const auto batch = parse_batch_csv("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,x_mm,y_mm,z_mm\n1,2,3,4,5,6,7,8\n", "b.csv");
+  const auto batch = parse_batch_csv(
+      "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,x_mm,y_mm,z_mm\n1,2,3,4,5,6,7,8\n", "b.csv");
   EXPECT_EQ(refusal(batch.value(), make_cell()), Refusal("b.csv").beyond(5, 6));
 }
 
@@ -139,13 +143,15 @@ TEST(CheckAgainstCell, TakesJointsInRadiansForWhatTheyAreAndNamesBothSpreads) {
 TEST(CheckAgainstCell, FindsRadiansInASmallRangeAndWithAnUnknownTool) {
   const Cell cell = make_cell();
   EXPECT_EQ(suspected(in_radians(make_batch(cell, 50, .1, kTool)), cell), "q1_deg");
-  EXPECT_EQ(suspected(in_radians(make_batch(cell, 50, 1, kTool)), make_cell(std::nullopt)), "q1_deg");
+  EXPECT_EQ(suspected(in_radians(make_batch(cell, 50, 1, kTool)), make_cell(std::nullopt)),
+            "q1_deg");
 }
 
 TEST(CheckAgainstCell, FindsMetresAndCentimetresForMillimetres) {
   const Cell cell = make_cell();
   const MeasurementBatch batch = make_batch(cell, 50, 1, kTool);
-  for (const double factor : {1e-3, .1, 10., 1e3}) EXPECT_EQ(suspected(scaled(batch, factor), cell), "x_mm") << factor;
+  for (const double factor : {1e-3, .1, 10., 1e3})
+    EXPECT_EQ(suspected(scaled(batch, factor), cell), "x_mm") << factor;
 }
 
 TEST(CheckAgainstCell, AcceptsSmallAndUniformBatches) {
@@ -154,13 +160,15 @@ TEST(CheckAgainstCell, AcceptsSmallAndUniformBatches) {
     for (const double share : {1., .05, .01, 0.}) {
       const MeasurementBatch batch = make_batch(cell, poses, share, kTool);
       EXPECT_EQ(refusal(batch, cell), Refusal::none()) << poses << " poses, share " << share;
-      EXPECT_EQ(refusal(batch, make_cell(std::nullopt)), Refusal::none()) << poses << " poses, share " << share;
+      EXPECT_EQ(refusal(batch, make_cell(std::nullopt)), Refusal::none())
+          << poses << " poses, share " << share;
     }
   }
 }
 
 TEST(CheckAgainstCell, AcceptsAnUnknownToolThatTurnsAboutAFixedPoint) {
-  // Pivoting: the flange moves on a sphere about the tool point, which stays. No spread is measured.
+  // Pivoting: the flange moves on a sphere about the tool point, which stays. No spread is
+  // measured.
   Cell cell = make_cell(std::nullopt);
   Joint turn;
   turn.link = {0, 0, 0, from_deg(90), 0};
@@ -239,16 +247,19 @@ TEST(SplitBatch, LeavesARowForTraining) {
 
 TEST(SplitBatch, HoldsOutAllRowsOfAPoseTogether) {
   MeasurementBatch batch = make_batch(make_cell(), 90, 1, kTool);
-  for (std::size_t i = 1; i < 90; ++i) batch.measurements[i].context.q = batch.measurements[i - i % 3].context.q;
+  for (std::size_t i = 1; i < 90; ++i)
+    batch.measurements[i].context.q = batch.measurements[i - i % 3].context.q;
   const std::vector<bool> held_out = rows_held_out(batch, 0.2, 7);
   for (std::size_t i = 0; i < 90; ++i) EXPECT_EQ(held_out[i], held_out[i - i % 3]) << i;
-  EXPECT_EQ(std::count(held_out.begin(), held_out.end(), true), 18) << "a fifth of 30 poses, three rows each";
+  EXPECT_EQ(std::count(held_out.begin(), held_out.end(), true), 18)
+      << "a fifth of 30 poses, three rows each";
 }
 
 /// When the newest of measurements of these times was taken, in a batch taken in at 1.7e9.
 std::int64_t newest_of(const std::vector<std::optional<double>>& times) {
   MeasurementBatch batch;
-  for (const std::optional<double>& time : times) batch.measurements.emplace_back().context.time = time;
+  for (const std::optional<double>& time : times)
+    batch.measurements.emplace_back().context.time = time;
   return dated(std::move(batch), 1'700'000'000).measured_at.value();
 }
 

@@ -29,10 +29,11 @@ PointFileOptions behind(BehindCoordinates what) {
 }
 
 TEST(PointList, ReadsTargetsWithAndWithoutGroupAndCollectionBySeparatorsOfAnyKind) {
-  for (const char* text : {"p1 1000 -2000 3.5e2\n", "Main p1 1000 -2000 350\n", "A Main p1 1000 -2000 350\n",
-                           "A, Main, p1, 1000, -2000, 350\n", "A;Main;p1;1000;-2000;350\r\n", "p1\t1000\t-2000\t350",
-                           "\"Col A\" \"Main group\" p1 1000 -2000 +350\n",
-                           "// SpatialAnalyzer\n# more\n\nMain p1  1000   -2000 350   10/12/2021 08:15:23 AM\n"}) {
+  for (const char* text :
+       {"p1 1000 -2000 3.5e2\n", "Main p1 1000 -2000 350\n", "A Main p1 1000 -2000 350\n",
+        "A, Main, p1, 1000, -2000, 350\n", "A;Main;p1;1000;-2000;350\r\n", "p1\t1000\t-2000\t350",
+        "\"Col A\" \"Main group\" p1 1000 -2000 +350\n",
+        "// SpatialAnalyzer\n# more\n\nMain p1  1000   -2000 350   10/12/2021 08:15:23 AM\n"}) {
     const PointList list = demand(text);
     ASSERT_EQ(list.points.size(), 1u) << text;
     EXPECT_EQ(list.points[0].name, "p1") << text;
@@ -63,45 +64,60 @@ TEST(PointList, TurnsCylindricalAndSphericalCoordinatesIntoCartesianOnes) {
   const double theta = to_deg(std::atan2(p.y(), p.x()));
   const double phi = to_deg(std::acos(p.z() / p.norm()));
   const std::string cylindrical = fmt::format("p 500 {:.15g} 1200\n", theta);
-  const std::string spherical = fmt::format("p {:.15g} {:.15g} {:.15g}\n", to_mm(p.norm()), theta, phi);
+  const std::string spherical =
+      fmt::format("p {:.15g} {:.15g} {:.15g}\n", to_mm(p.norm()), theta, phi);
   EXPECT_LT((demand("// Cylindrical coordinates\n" + cylindrical).points[0].p_W - p).norm(), 1e-12);
   EXPECT_LT((demand("// Spherical: R Theta Phi\n" + spherical).points[0].p_W - p).norm(), 1e-12);
   PointFileOptions polar;
   polar.coordinates = Coordinates::kSpherical;
   EXPECT_LT((demand(spherical, polar).points[0].p_W - p).norm(), 1e-12);
-  EXPECT_LT(
-      (demand("Point Name, R (mm), Theta (deg), Z (mm)\np, 500, " + std::to_string(theta) + ", 1200\n").points[0].p_W -
-       p)
-          .norm(),
-      1e-8);
-  EXPECT_LT(
-      (demand(fmt::format("name;R;theta [rad];phi [rad]\np;1300;{:.15g};{:.15g}\n", from_deg(theta), from_deg(phi)))
-           .points[0]
-           .p_W -
-       p)
-          .norm(),
-      1e-12);
+  EXPECT_LT((demand("Point Name, R (mm), Theta (deg), Z (mm)\np, 500, " + std::to_string(theta) +
+                    ", 1200\n")
+                 .points[0]
+                 .p_W -
+             p)
+                .norm(),
+            1e-8);
+  EXPECT_LT((demand(fmt::format("name;R;theta [rad];phi [rad]\np;1300;{:.15g};{:.15g}\n",
+                                from_deg(theta), from_deg(phi)))
+                 .points[0]
+                 .p_W -
+             p)
+                .norm(),
+            1e-12);
   EXPECT_EQ(refusal("// cylindrical\np -5 0 0\n"), Refusal("sa.txt", 2, "r").beyond(-5, 0));
 }
 
 TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
-  const Matrix3 R =
-      (Eigen::AngleAxisd(from_deg(30), Vector3::UnitZ()) * Eigen::AngleAxisd(from_deg(-20), Vector3::UnitY()) *
-       Eigen::AngleAxisd(from_deg(10), Vector3::UnitX()))
-          .toRotationMatrix();
-  const auto rotation = [](const PointList& list) { return list.points.at(0).R_W.value_or(Matrix3::Zero()); };
-  EXPECT_LT((rotation(demand("f, 1.0, 2, 3, 10, -20, 30\n", behind(BehindCoordinates::kFixedXyz))) - R).norm(), 1e-12);
-  EXPECT_LT((rotation(demand("f, 1.0, 2, 3, 30, -20, 10\n", behind(BehindCoordinates::kEulerZyx))) - R).norm(), 1e-12);
-  EXPECT_LT((rotation(demand("// XYZ Fixed Angles\nf,1.0,2,3,10,-20,30,2021-10-12 08:15:23\n")) - R).norm(), 1e-12);
+  const Matrix3 R = (Eigen::AngleAxisd(from_deg(30), Vector3::UnitZ()) *
+                     Eigen::AngleAxisd(from_deg(-20), Vector3::UnitY()) *
+                     Eigen::AngleAxisd(from_deg(10), Vector3::UnitX()))
+                        .toRotationMatrix();
+  const auto rotation = [](const PointList& list) {
+    return list.points.at(0).R_W.value_or(Matrix3::Zero());
+  };
+  EXPECT_LT(
+      (rotation(demand("f, 1.0, 2, 3, 10, -20, 30\n", behind(BehindCoordinates::kFixedXyz))) - R)
+          .norm(),
+      1e-12);
+  EXPECT_LT(
+      (rotation(demand("f, 1.0, 2, 3, 30, -20, 10\n", behind(BehindCoordinates::kEulerZyx))) - R)
+          .norm(),
+      1e-12);
+  EXPECT_LT((rotation(demand("// XYZ Fixed Angles\nf,1.0,2,3,10,-20,30,2021-10-12 08:15:23\n")) - R)
+                .norm(),
+            1e-12);
   EXPECT_LT((rotation(demand("// ZYX Euler Angles\nf,1.0,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_LT((rotation(demand("Frame Name,X,Y,Z,Rz,Ry,Rx\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_EQ(refusal("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"), Refusal("sa.txt", 1, "angles"));
 }
 
 TEST(PointList, DoesNotGuessWhatThreeMoreValuesAre) {
-  EXPECT_EQ(refusal("p 1 2 3 0.01 0.01 0.01\n"), Refusal("sa.txt", 1, "columns behind the coordinates"));
-  EXPECT_EQ(refusal("// fixed XYZ\np 1 2 3 0.01 0.01 0.01\n", behind(BehindCoordinates::kUncertainties)),
-            Refusal("sa.txt", {}, "columns behind the coordinates"));
+  EXPECT_EQ(refusal("p 1 2 3 0.01 0.01 0.01\n"),
+            Refusal("sa.txt", 1, "columns behind the coordinates"));
+  EXPECT_EQ(
+      refusal("// fixed XYZ\np 1 2 3 0.01 0.01 0.01\n", behind(BehindCoordinates::kUncertainties)),
+      Refusal("sa.txt", {}, "columns behind the coordinates"));
 }
 
 TEST(PointList, MakesOneSigmaOfUncertainties) {
@@ -111,9 +127,11 @@ TEST(PointList, MakesOneSigmaOfUncertainties) {
   EXPECT_NEAR(list.points[0].sigma.value_or(0), 0.06e-3 / std::sqrt(3.0) / 2, 1e-15);
   EXPECT_FALSE(list.points[1].sigma);
   // 1 mrad at 2 m, the other two exact.
-  const PointList far = demand(fmt::format("// uncertainties, cylindrical\np 2000 30 0 0 {:.15g} 0\n", to_deg(1e-3)));
+  const PointList far =
+      demand(fmt::format("// uncertainties, cylindrical\np 2000 30 0 0 {:.15g} 0\n", to_deg(1e-3)));
   EXPECT_NEAR(far.points[0].sigma.value_or(0), 2e-3 / std::sqrt(3.0), 1e-12);
-  EXPECT_EQ(refusal("p 1 2 3 0.02 -0.04 0.04\n", two_sigma), Refusal("sa.txt", 1, "uy").text("-0.04"));
+  EXPECT_EQ(refusal("p 1 2 3 0.02 -0.04 0.04\n", two_sigma),
+            Refusal("sa.txt", 1, "uy").text("-0.04"));
 }
 
 TEST(PointList, FindsColumnsByTheNamesOfAHeaderOrOfAComment) {
@@ -122,7 +140,8 @@ TEST(PointList, FindsColumnsByTheNamesOfAHeaderOrOfAComment) {
   EXPECT_LT((list.points[1].p_W - Vector3(4e-3, 5e-3, 6e-3)).norm(), 1e-15);
   EXPECT_NEAR(list.points[0].sigma.value_or(0), 1e-5, 1e-18);
   EXPECT_EQ(list.points[1].row, 3);
-  const PointList other = demand("// Group, Point Name, Z (in), Y (in), X (in), Offset\nG, p, 3, 2, 1, 0.5\n");
+  const PointList other =
+      demand("// Group, Point Name, Z (in), Y (in), X (in), Offset\nG, p, 3, 2, 1, 0.5\n");
   EXPECT_LT((other.points[0].p_W - 0.0254 * Vector3(1, 2, 3)).norm(), 1e-15);
   EXPECT_EQ(refusal("name,x_mm,y_m,z_mm\nR1,1,2,3\n"), Refusal("sa.txt", {}, "unit"));
 }
@@ -138,13 +157,15 @@ TEST(PointList, RefusalsNameFileRowColumnValueAndLimit) {
   EXPECT_EQ(refusal("p\xff 1 2 3\n"), Refusal("sa.txt", 1));
 }
 
-JointList plan(const std::string& text) { return parse_joint_csv(text, "plan.csv").value_or(JointList{}); }
+JointList plan(const std::string& text) {
+  return parse_joint_csv(text, "plan.csv").value_or(JointList{});
+}
 
 TEST(PointList, JoinsWithAPlanByPoseIdInTheOrderOfMeasuring) {
   PointFileOptions options = behind(BehindCoordinates::kFixedXyz);
-  const auto batch =
-      join_points(demand("b 1 2 3 0 0 90\na 4 5 6 0 0 0\n", options),
-                  plan("pose_id,q1_deg,q2_mm,tool_id,temperature_c\na,10,1,probe,20\nb,20,2,probe,21\nc,3,4,,\n"));
+  const auto batch = join_points(demand("b 1 2 3 0 0 90\na 4 5 6 0 0 0\n", options),
+                                 plan("pose_id,q1_deg,q2_mm,tool_id,temperature_c\na,10,1,probe,"
+                                      "20\nb,20,2,probe,21\nc,3,4,,\n"));
   ASSERT_TRUE(batch) << batch.error().message;
   ASSERT_EQ(batch->measurements.size(), 2u);
   const Measurement& first = batch->measurements[0];
@@ -154,7 +175,8 @@ TEST(PointList, JoinsWithAPlanByPoseIdInTheOrderOfMeasuring) {
   EXPECT_NEAR(first.context.q(0), from_deg(20), 1e-15);
   EXPECT_NEAR(first.context.q(1), 2e-3, 1e-15);
   EXPECT_LT((first.p_W - Vector3(1e-3, 2e-3, 3e-3)).norm(), 1e-15);
-  EXPECT_LT((first.R_WT.value_or(Matrix3::Zero()) * Vector3::UnitX() - Vector3::UnitY()).norm(), 1e-12);
+  EXPECT_LT((first.R_WT.value_or(Matrix3::Zero()) * Vector3::UnitX() - Vector3::UnitY()).norm(),
+            1e-12);
   EXPECT_EQ(batch->id, "sa");
   const auto again = parse_batch_csv(batch->source_text, "again.csv");
   ASSERT_TRUE(again) << again.error().message;

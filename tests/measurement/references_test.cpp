@@ -12,7 +12,8 @@ using test::refusal_of;
 
 PointList reflectors(const std::string& where = "refs.csv") {
   PointList list{where, {}};
-  const std::vector<Vector3> points = {{0, 0, 0}, {3, 0, 0.2}, {3, 2, 0.1}, {0, 2, 0.9}, {1.5, 1, 2}};
+  const std::vector<Vector3> points = {
+      {0, 0, 0}, {3, 0, 0.2}, {3, 2, 0.1}, {0, 2, 0.9}, {1.5, 1, 2}};
   for (std::size_t i = 0; i < points.size(); ++i) {
     NamedPoint point;
     point.name = fmt::format("R{}", i + 1);
@@ -31,7 +32,8 @@ PointList moved(const Pose& X) {
 
 Pose shifted(double x) { return make_pose(Matrix3::Identity(), {x, 0, 0}); }
 
-Refusal refusal(const PointList& references, const PointList& measured, const ReferenceOptions& options = {}) {
+Refusal refusal(const PointList& references, const PointList& measured,
+                const ReferenceOptions& options = {}) {
   const auto check = check_references(references, measured, options);
   return refusal_of(check);
 }
@@ -47,7 +49,9 @@ TEST(References, FindWhereTheTrackerHasMovedTo) {
 }
 
 TEST(References, AreJudgedByTheRmsAtBothThresholds) {
-  const auto verdict = [](double shift) { return check_references(reflectors(), moved(shifted(shift)))->verdict; };
+  const auto verdict = [](double shift) {
+    return check_references(reflectors(), moved(shifted(shift)))->verdict;
+  };
   EXPECT_EQ(verdict(0), ReferenceVerdict::kFine);
   EXPECT_EQ(verdict(19.9e-6), ReferenceVerdict::kFine);
   EXPECT_EQ(verdict(20.1e-6), ReferenceVerdict::kLocalise);
@@ -69,7 +73,8 @@ TEST(References, NameTheReflectorThatMovedByItself) {
   ASSERT_EQ(check->residuals.size(), 5u);
   EXPECT_LT((check->residuals[3].difference_W - Vector3(1e-3, 5e-3, 0)).norm(), 1e-12);
   double sum = 0;
-  for (const ReferenceResidual& residual : check->residuals) sum += residual.remaining_W.squaredNorm();
+  for (const ReferenceResidual& residual : check->residuals)
+    sum += residual.remaining_W.squaredNorm();
   EXPECT_NEAR(check->rms_remaining, std::sqrt(sum / 5), 1e-15);
 }
 
@@ -93,16 +98,18 @@ TEST(References, RefuseTooFewUnknownOnesOnALineAndLimitsThatMakeNoSense) {
   unknown.points[2].name = "R9";
   EXPECT_EQ(refusal(reflectors(), unknown), Refusal("now.csv", 4, "name").text("R9"));
   PointList line = reflectors();
-  for (std::size_t i = 0; i < 5; ++i) line.points[i].p_W = static_cast<double>(i) * Vector3(1, 2, 3);
+  for (std::size_t i = 0; i < 5; ++i)
+    line.points[i].p_W = static_cast<double>(i) * Vector3(1, 2, 3);
   PointList line_now = line;
   line_now.where = "now.csv";
   EXPECT_EQ(refusal(line, line_now), Refusal("now.csv"));
-  EXPECT_EQ(refusal(reflectors(), moved(shifted(0)), {50e-6, 20e-6}), Refusal("").beyond(0.05, 0.02));
+  EXPECT_EQ(refusal(reflectors(), moved(shifted(0)), {50e-6, 20e-6}),
+            Refusal("").beyond(0.05, 0.02));
 }
 
 TEST(References, BringABatchIntoTheirFrame) {
-  const auto batch =
-      parse_batch_csv("q1_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,1000,0,0,1,0,0,0\n2,0,1000,0,,,,\n", "b.csv");
+  const auto batch = parse_batch_csv(
+      "q1_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,1000,0,0,1,0,0,0\n2,0,1000,0,,,,\n", "b.csv");
   ASSERT_TRUE(batch) << batch.error().message;
   const Pose X_WV = make_pose(rotation_exp({0, 0, std::acos(0.0)}), {0, 0, 1});
   const MeasurementBatch there = localised(*batch, X_WV);

@@ -28,16 +28,21 @@ MeasurementBatch batch_of(std::vector<Measurement> measurements) {
   return batch;
 }
 
-/// `poses` poses, each measured `times` times with this sigma on each axis, one round after the other.
+/// `poses` poses, each measured `times` times with this sigma on each axis, one round after the
+/// other.
 MeasurementBatch noisy(int poses, int times, double sigma, double sigma_rotation) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
-  const auto noise = [&](double s) { return Vector3(s * normal(random), s * normal(random), s * normal(random)); };
+  const auto noise = [&](double s) {
+    return Vector3(s * normal(random), s * normal(random), s * normal(random));
+  };
   std::vector<Measurement> measurements;
   for (int round = 0; round < times; ++round) {
     for (int pose = 0; pose < poses; ++pose) {
-      measurements.push_back(measured(joints(0.1 * pose), Vector3(1, 0.1 * pose, 2) + noise(sigma)));
-      measurements.back().R_WT = rotation_exp(noise(sigma_rotation)) * rotation_exp({0.1 * pose, 0, 3});
+      measurements.push_back(
+          measured(joints(0.1 * pose), Vector3(1, 0.1 * pose, 2) + noise(sigma)));
+      measurements.back().R_WT =
+          rotation_exp(noise(sigma_rotation)) * rotation_exp({0.1 * pose, 0, 3});
     }
   }
   return batch_of(std::move(measurements));
@@ -84,7 +89,8 @@ TEST(Repeats, GiveEveryRowTheScatterThatTheyShow) {
   EXPECT_NEAR(merged.batch.measurements.back().sigma.value_or(0), sigma, 0.06 * sigma);
   double squares = 0;
   for (int i = 0; i < 200; ++i) {
-    squares += (merged.batch.measurements[static_cast<std::size_t>(i)].p_W - Vector3(1, 0.1 * i, 2)).squaredNorm();
+    squares += (merged.batch.measurements[static_cast<std::size_t>(i)].p_W - Vector3(1, 0.1 * i, 2))
+                   .squaredNorm();
   }
   EXPECT_NEAR(std::sqrt(squares / 600), sigma / 2, 0.1 * sigma / 2);
 }

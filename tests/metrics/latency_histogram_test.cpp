@@ -42,7 +42,8 @@ TEST(LatencyHistogram, LosesNothingWhereManyThreadsCount) {
   }
   threads.clear();
   const auto counts = histogram.counts();
-  EXPECT_EQ(std::accumulate(counts.in_class.begin(), counts.in_class.end(), std::uint64_t{0}), 40000u);
+  EXPECT_EQ(std::accumulate(counts.in_class.begin(), counts.in_class.end(), std::uint64_t{0}),
+            40000u);
   EXPECT_EQ(operation.of_result(0), 20000u);
   EXPECT_EQ(operation.of_result(1), 20000u);
 }

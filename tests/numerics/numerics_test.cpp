@@ -18,8 +18,10 @@ using Eigen::VectorXd;
 // Every build that this processor runs must agree with Eigen.
 std::vector<const Numerics*> runnable_builds() {
   std::vector<const Numerics*> builds = {&numerics_baseline()};
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) builds.push_back(&numerics_avx2());
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) builds.push_back(&numerics_avx512());
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    builds.push_back(&numerics_avx2());
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+    builds.push_back(&numerics_avx512());
   return builds;
 }
 
@@ -74,7 +76,8 @@ TEST_P(EveryBuild, InverseRootIsTheInverseOfTheCholeskyFactor) {
     std::vector<double> packed(static_cast<std::size_t>(build().packed_size(n)));
     for (Index first = 0; first < n; first += build().packed_rows)
       build().pack_lower(n, first, a.data(), a.rows(), packed.data() + build().packed_size(first));
-    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k = random_joints(n, 45, kTargetBlock);
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k =
+        random_joints(n, 45, kTargetBlock);
     double norms[kTargetBlock];
     build().square_norms(n, packed.data(), kTargetBlock, k.data(), norms);
     for (Index j = 0; j < kTargetBlock; ++j) {
@@ -92,7 +95,8 @@ TEST_P(EveryBuild, MultipliesByATranspose) {
   struct Size {
     Index rows, cols, depth;
   };
-  for (const auto& [rows, cols, depth] : {Size{1, 1, 1}, {24, 8, 96}, {50, 31, 97}, {7, 130, 200}}) {
+  for (const auto& [rows, cols, depth] :
+       {Size{1, 1, 1}, {24, 8, 96}, {50, 31, 97}, {7, 130, 200}}) {
     MatrixXd a = MatrixXd::Zero(padded_rows(rows), depth);
     MatrixXd b = MatrixXd::Zero(padded_rows(cols), depth);
     MatrixXd c = MatrixXd::Zero(padded_rows(rows), padded_rows(cols));
@@ -101,8 +105,8 @@ TEST_P(EveryBuild, MultipliesByATranspose) {
     c.topLeftCorner(rows, cols) = random_joints(rows, 49, cols);
     const MatrixXd expected = c - a * b.transpose();
     VectorXd work(build().multiply_work_size(rows, cols));
-    build().multiply_transposed(rows, cols, depth, -1.0, a.data(), a.rows(), b.data(), b.rows(), false, c.data(),
-                                c.rows(), work.data());
+    build().multiply_transposed(rows, cols, depth, -1.0, a.data(), a.rows(), b.data(), b.rows(),
+                                false, c.data(), c.rows(), work.data());
     EXPECT_LT((c - expected).cwiseAbs().maxCoeff(), 1e-12);
   }
 }
@@ -115,7 +119,8 @@ TEST_P(EveryBuild, MultipliesAPackedTriangleInSinglePrecisionByVectors) {
     for (Index first = 0; first < n; first += build().packed_rows)
       build().pack_lower(n, first, triangle.data(), n, packed.data() + build().packed_size(first));
     const std::vector<float> singles(packed.begin(), packed.end());
-    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k = random_joints(n, 56, kTargetBlock);
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k =
+        random_joints(n, 56, kTargetBlock);
     double norms[kTargetBlock];
     build().square_norms_single(n, singles.data(), kTargetBlock, k.data(), norms);
     for (Index j = 0; j < kTargetBlock; ++j) {
@@ -148,10 +153,13 @@ TEST(Triangles, AreMultipliedAndInvertedAsEigenDoes) {
     const MatrixXd m = expected + MatrixXd::Identity(n, n);
     const auto inverse = inverse_factor(m);
     ASSERT_TRUE(inverse);
-    EXPECT_LT((*inverse * m * inverse->transpose() - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT(
+        (*inverse * m * inverse->transpose() - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(),
+        1e-9);
     EXPECT_EQ(MatrixXd(inverse->triangularView<Eigen::StrictlyUpper>()).cwiseAbs().maxCoeff(), 0);
     const MatrixXd product = a * inverse->transpose();
-    EXPECT_LT((times_lower_transposed(a, *inverse) - product).cwiseAbs().maxCoeff(), 1e-11 * static_cast<double>(n));
+    EXPECT_LT((times_lower_transposed(a, *inverse) - product).cwiseAbs().maxCoeff(),
+              1e-11 * static_cast<double>(n));
   }
   EXPECT_FALSE(inverse_factor(-MatrixXd::Identity(3, 3)));
 }
@@ -160,7 +168,8 @@ TEST_P(EveryBuild, MultipliesTheLowerTriangleAlone) {
   const MatrixXd a = random_joints(72, 50, 60);
   MatrixXd c = MatrixXd::Zero(72, 72);
   VectorXd work(build().multiply_work_size(72, 72));
-  build().multiply_transposed(72, 72, 60, 1.0, a.data(), 72, a.data(), 72, true, c.data(), 72, work.data());
+  build().multiply_transposed(72, 72, 60, 1.0, a.data(), 72, a.data(), 72, true, c.data(), 72,
+                              work.data());
   const MatrixXd difference = (c - a * a.transpose()).triangularView<Eigen::Lower>();
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
 }
@@ -182,10 +191,12 @@ TEST_P(EveryBuild, AgreesWithTheBaselineToRounding) {
   MatrixXd a = MatrixXd::Zero(padded_rows(n), 7);
   a.topLeftCorner(n, 6) = random_joints(n, 52);
   a.col(6) = 0.5 * a.leftCols(6).rowwise().squaredNorm();
-  for (const RadialShape shape : {RadialShape::kSquaredExponential, RadialShape::kMatern32, RadialShape::kMatern52}) {
+  for (const RadialShape shape :
+       {RadialShape::kSquaredExponential, RadialShape::kMatern32, RadialShape::kMatern52}) {
     const auto inverse_of = [&](const Numerics& numerics) {
       MatrixXd m = MatrixXd::Zero(padded_rows(n), padded_rows(n));
-      numerics.radial_tile(shape, 6, n, a.data(), a.rows(), n, a.data(), a.rows(), m.data(), m.rows());
+      numerics.radial_tile(shape, 6, n, a.data(), a.rows(), n, a.data(), a.rows(), m.data(),
+                           m.rows());
       m.diagonal().head(n).array() += 0.01;
       m.bottomRows(m.rows() - n).setZero();
       VectorXd work(numerics.work_size(n));
@@ -216,10 +227,12 @@ TEST_P(EveryBuild, KernelIsAccurateFromZeroToFarAway) {
   a.col(1) = 0.5 * a.col(0).cwiseAbs2();
   const double origin[] = {0, 0};
   double k[kRowPadding];
-  build().radial_tile(RadialShape::kSquaredExponential, 1, 13, a.data(), a.rows(), 1, origin, 1, k, kRowPadding);
+  build().radial_tile(RadialShape::kSquaredExponential, 1, 13, a.data(), a.rows(), 1, origin, 1, k,
+                      kRowPadding);
   for (Index i = 0; i < 13; ++i) {
     const double expected = std::exp(-0.5 * distances[i] * distances[i]);
-    EXPECT_NEAR(k[i], expected, 2e-15 * std::max(1.0, 0.5 * distances[i] * distances[i]) * expected + 1e-300);
+    EXPECT_NEAR(k[i], expected,
+                2e-15 * std::max(1.0, 0.5 * distances[i] * distances[i]) * expected + 1e-300);
   }
 }
 

@@ -8,7 +8,8 @@
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
-// deploy/compose.yaml names what deploy/image makes. That the image serves, deploy/image tries itself.
+// deploy/compose.yaml names what deploy/image makes. That the image serves, deploy/image tries
+// itself.
 namespace trammel {
 namespace {
 
@@ -24,7 +25,8 @@ class Compose : public testing::Test {
                    "import json, sys, yaml; print(json.dumps(yaml.safe_load(open(sys.argv[1]))))",
                    TRAMMEL_SOURCE_DIR "/deploy/compose.yaml"},
                   kLimit);
-    if (read.err.find("No module named 'yaml'") != std::string::npos) GTEST_SKIP() << "no python3-yaml here";
+    if (read.err.find("No module named 'yaml'") != std::string::npos)
+      GTEST_SKIP() << "no python3-yaml here";
     ASSERT_EQ(read.exit_code, 0) << read.err;
     file_ = json::parse(read.out);
     service_ = file_.at("services").at("trammeld");
@@ -76,7 +78,8 @@ TEST_F(Compose, AsksForHealthAsTheCommandLineUnderstandsIt) {
   asked[0] = TRAMMEL_BINARY_DIR "/clients/trammel";
   asked.insert(asked.end(), {"--port", "17597", "--domain", "93"});
   const test::Finished said = test::run(asked, kLimit);
-  EXPECT_EQ(said.exit_code, 4) << "nobody answers there, and nothing is wrong with the words: " << said.err;
+  EXPECT_EQ(said.exit_code, 4) << "nobody answers there, and nothing is wrong with the words: "
+                               << said.err;
 }
 
 }  // namespace

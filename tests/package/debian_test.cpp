@@ -11,7 +11,8 @@
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
-// The Debian packages of this build. Installing, upgrading and purging them on a clean root: deploy/check packages.
+// The Debian packages of this build. Installing, upgrading and purging them on a clean root:
+// deploy/check packages.
 
 namespace trammel {
 namespace {
@@ -33,19 +34,22 @@ class Debian : public testing::Test {
     }
     if (!missing_.empty()) return;
     // Quick to pack: what is looked at is what is inside.
-    const test::Finished made =
-        test::run({"/usr/bin/env", "TRAMMEL_XZ=0", TRAMMEL_SOURCE_DIR "/deploy/package", TRAMMEL_BINARY_DIR}, kLimit);
+    const test::Finished made = test::run(
+        {"/usr/bin/env", "TRAMMEL_XZ=0", TRAMMEL_SOURCE_DIR "/deploy/package", TRAMMEL_BINARY_DIR},
+        kLimit);
     EXPECT_EQ(made.exit_code, 0) << made.out << made.err;
   }
   void SetUp() override {
-    if (!missing_.empty()) GTEST_SKIP() << "no " << missing_ << " here (packages debhelper, dh-python)";
+    if (!missing_.empty())
+      GTEST_SKIP() << "no " << missing_ << " here (packages debhelper, dh-python)";
   }
 
   /// The path of a package's file.
   static std::string package(const std::string& name) {
     for (const auto& entry : fs::directory_iterator(folder())) {
       const bool is_package = entry.path().extension() == ".deb";
-      if (is_package && entry.path().filename().string().starts_with(name + "_")) return entry.path().string();
+      if (is_package && entry.path().filename().string().starts_with(name + "_"))
+        return entry.path().string();
     }
     ADD_FAILURE() << "there is no package " << name;
     return "";
@@ -53,7 +57,8 @@ class Debian : public testing::Test {
   static fs::path folder() { return fs::path(TRAMMEL_BINARY_DIR) / "packages"; }
 
   static std::string about(const std::string& package_name, const std::string& option) {
-    const test::Finished said = test::run({"/usr/bin/dpkg-deb", option, package(package_name)}, kLimit);
+    const test::Finished said =
+        test::run({"/usr/bin/dpkg-deb", option, package(package_name)}, kLimit);
     EXPECT_EQ(said.exit_code, 0) << said.err;
     return said.out;
   }
@@ -66,7 +71,9 @@ class Debian : public testing::Test {
   }
 
   /// Whether libtrammel and the Python package are in this build.
-  static bool has_library() { return fs::exists(TRAMMEL_BINARY_DIR "/clients/library/libtrammel.so"); }
+  static bool has_library() {
+    return fs::exists(TRAMMEL_BINARY_DIR "/clients/library/libtrammel.so");
+  }
   static bool has_python() {
     return has_library() && fs::exists(TRAMMEL_BINARY_DIR "/clients/python/trammel/py.typed");
   }
@@ -82,11 +89,14 @@ class Debian : public testing::Test {
 
 TEST_F(Debian, EachPackageHasItsFiles) {
   expect_files("trammel", {"usr/bin/trammel", "usr/share/trammel/config/cell-7\\.yaml",
-                           "usr/share/trammel/models/truth/chapter-5\\.yaml", "usr/share/doc/trammel/copyright"});
-  expect_files("trammeld", {"usr/bin/trammeld", "usr/libexec/trammel/supervise", "etc/trammel/server\\.yaml",
-                            "etc/trammel/cell-7\\.yaml", "etc/logrotate\\.d/trammeld",
-                            "lib/systemd/system/trammeld\\.service", "lib/systemd/system/trammel-discovery@\\.service",
-                            "usr/share/trammel/discovery-server\\.xml", "usr/share/man/man8/trammeld\\.8\\.gz"});
+                           "usr/share/trammel/models/truth/chapter-5\\.yaml",
+                           "usr/share/doc/trammel/copyright"});
+  expect_files(
+      "trammeld",
+      {"usr/bin/trammeld", "usr/libexec/trammel/supervise", "etc/trammel/server\\.yaml",
+       "etc/trammel/cell-7\\.yaml", "etc/logrotate\\.d/trammeld",
+       "lib/systemd/system/trammeld\\.service", "lib/systemd/system/trammel-discovery@\\.service",
+       "usr/share/trammel/discovery-server\\.xml", "usr/share/man/man8/trammeld\\.8\\.gz"});
 }
 
 TEST_F(Debian, TheDaemonsManualHasEveryOption) {
@@ -95,7 +105,8 @@ TEST_F(Debian, TheDaemonsManualHasEveryOption) {
   const std::string help = test::run({TRAMMEL_BINARY_DIR "/server/trammeld", "--help"}, kLimit).out;
   static const std::regex kOption("--[a-z-]+");
   int options = 0;
-  for (auto at = std::sregex_iterator(help.begin(), help.end(), kOption); at != std::sregex_iterator(); ++at) {
+  for (auto at = std::sregex_iterator(help.begin(), help.end(), kOption);
+       at != std::sregex_iterator(); ++at) {
     if (at->str() == "--help") continue;
     ++options;
     EXPECT_NE(manual.find(at->str()), std::string::npos) << at->str();
@@ -106,21 +117,28 @@ TEST_F(Debian, TheDaemonsManualHasEveryOption) {
 TEST_F(Debian, LibrariesHaveTheirFiles) {
   if (!has_library()) GTEST_SKIP() << "libtrammel is not in this build";
   expect_files("libtrammel0.1", {"usr/lib/libtrammel\\.so\\.0\\.1"});
-  expect_files("libtrammel-dev", {"usr/lib/libtrammel\\.so", "usr/include/trammel/offline\\.h",
-                                  "usr/include/trammel/service\\.h", "usr/lib/cmake/trammel/TrammelConfig\\.cmake"});
-  EXPECT_TRUE(std::regex_search(about("libtrammel-dev", "-I"), std::regex("Depends:.*libexpected-dev")));
-  EXPECT_FALSE(std::regex_search(about("libtrammel-dev", "-I"), std::regex("Depends:.*(eigen|fastrtps)")));
+  expect_files("libtrammel-dev",
+               {"usr/lib/libtrammel\\.so", "usr/include/trammel/offline\\.h",
+                "usr/include/trammel/service\\.h", "usr/lib/cmake/trammel/TrammelConfig\\.cmake"});
+  EXPECT_TRUE(
+      std::regex_search(about("libtrammel-dev", "-I"), std::regex("Depends:.*libexpected-dev")));
+  EXPECT_FALSE(
+      std::regex_search(about("libtrammel-dev", "-I"), std::regex("Depends:.*(eigen|fastrtps)")));
   if (!has_python()) GTEST_SKIP() << "the Python package is not in this build";
   expect_files("python3-trammel", {"usr/lib/python3/dist-packages/trammel/__init__\\.py",
                                    "usr/lib/python3/dist-packages/trammel/py\\.typed"});
-  EXPECT_TRUE(std::regex_search(about("python3-trammel", "-I"), std::regex("Depends:.* libtrammel0\\.1 ")));
-  EXPECT_TRUE(std::regex_search(about("python3-trammel", "-I"), std::regex("Depends:.* python3 ?\\(<< 3\\.")));
+  EXPECT_TRUE(
+      std::regex_search(about("python3-trammel", "-I"), std::regex("Depends:.* libtrammel0\\.1 ")));
+  EXPECT_TRUE(std::regex_search(about("python3-trammel", "-I"),
+                                std::regex("Depends:.* python3 ?\\(<< 3\\.")));
 }
 
 TEST_F(Debian, TheVersionIsThatOfTheProgram) {
-  const test::Finished version = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "--version"}, kLimit);
+  const test::Finished version =
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "--version"}, kLimit);
   std::smatch number;
-  ASSERT_TRUE(std::regex_search(version.out, number, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+"))) << version.out;
+  ASSERT_TRUE(std::regex_search(version.out, number, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")))
+      << version.out;
   for (const std::string& name : names()) {
     EXPECT_NE(about(name, "-I").find("Version: " + number.str() + "-"), std::string::npos) << name;
   }
@@ -128,10 +146,14 @@ TEST_F(Debian, TheVersionIsThatOfTheProgram) {
 
 TEST_F(Debian, WhatAHostConfiguresIsKeptOnUpgrades) {
   const test::TemporaryFolder control;
-  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-e", package("trammeld"), control.path().string()}, kLimit).exit_code, 0);
-  EXPECT_EQ(test::read_file(control.file("conffiles")),
-            "/etc/logrotate.d/trammeld\n/etc/trammel/cell-7.yaml\n/etc/trammel/discovery-server.xml\n"
-            "/etc/trammel/server.yaml\n");
+  ASSERT_EQ(
+      test::run({"/usr/bin/dpkg-deb", "-e", package("trammeld"), control.path().string()}, kLimit)
+          .exit_code,
+      0);
+  EXPECT_EQ(
+      test::read_file(control.file("conffiles")),
+      "/etc/logrotate.d/trammeld\n/etc/trammel/cell-7.yaml\n/etc/trammel/discovery-server.xml\n"
+      "/etc/trammel/server.yaml\n");
 }
 
 TEST_F(Debian, TheDaemonComesWithItsCommandLine) {
@@ -149,16 +171,20 @@ TEST_F(Debian, LintianFindsNoError) {
 }
 
 void put_everywhere(std::string& text, const std::string& what, const std::string& by) {
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+  for (std::size_t at = text.find(what); at != std::string::npos;
+       at = text.find(what, at + by.size()))
     text.replace(at, what.size(), by);
 }
 
 TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   if (!is_here("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze here";
   const test::TemporaryFolder root;
-  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit).exit_code, 0);
-  // Its programs are where the package was unpacked, not where it will be installed; one is of a package that it only
-  // suggests.
+  ASSERT_EQ(
+      test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit)
+          .exit_code,
+      0);
+  // Its programs are where the package was unpacked, not where it will be installed; one is of a
+  // package that it only suggests.
   const std::string here = root.path().string();
   const std::vector<std::pair<std::string, std::string>> programs = {
       {"/usr/libexec/trammel/supervise", here + "/usr/libexec/trammel/supervise"},
@@ -168,13 +194,16 @@ TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
     const std::string unit = root.file("lib/systemd/system/" + name);
     std::string text = test::read_file(unit);
     for (const auto& [installed, present] : programs) put_everywhere(text, installed, present);
-    const test::Finished verified =
-        test::run({"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kLimit);
+    const test::Finished verified = test::run(
+        {"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kLimit);
     EXPECT_EQ(verified.exit_code, 0) << name << ": " << verified.err;
     EXPECT_EQ(verified.err.find("trammel"), std::string::npos) << verified.err;
-    const test::Finished exposed = test::run(
-        {"/usr/bin/systemd-analyze", "security", "--offline=yes", "--threshold=20", "--no-pager", unit}, kLimit);
-    EXPECT_EQ(exposed.exit_code, 0) << exposed.out << exposed.err;  // 20 stands for an exposure of 2.0
+    const test::Finished exposed =
+        test::run({"/usr/bin/systemd-analyze", "security", "--offline=yes", "--threshold=20",
+                   "--no-pager", unit},
+                  kLimit);
+    EXPECT_EQ(exposed.exit_code, 0)
+        << exposed.out << exposed.err;  // 20 stands for an exposure of 2.0
   }
 }
 

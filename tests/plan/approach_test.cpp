@@ -14,8 +14,10 @@ namespace {
 TEST(Approach, TheBumpIsFiveDegreesOnTheSideTheJointsComeFrom) {
   const Chain robot = test::cell_7()->robot;
   const JointVector q = JointVector::Constant(6, 0.1);
-  EXPECT_TRUE(bump_pose(robot, q, Sides(6, -1))->isApprox(JointVector::Constant(6, 0.1 + from_deg(5))));
-  EXPECT_TRUE(bump_pose(robot, q, Sides(6, 1))->isApprox(JointVector::Constant(6, 0.1 - from_deg(5))));
+  EXPECT_TRUE(
+      bump_pose(robot, q, Sides(6, -1))->isApprox(JointVector::Constant(6, 0.1 + from_deg(5))));
+  EXPECT_TRUE(
+      bump_pose(robot, q, Sides(6, 1))->isApprox(JointVector::Constant(6, 0.1 - from_deg(5))));
   const JointVector mixed = *bump_pose(robot, q, {1, -1, 1, 1, 1, 1});
   EXPECT_NEAR(mixed(0), 0.1 - from_deg(5), 1e-12);
   EXPECT_NEAR(mixed(1), 0.1 + from_deg(5), 1e-12);
@@ -30,7 +32,8 @@ TEST(Approach, TheBumpStaysWithinTheLimitsAndLeavesEnoughWay) {
   q(1) = from_deg(84.5);
   EXPECT_FALSE(bump_pose(robot, q, Sides(6, -1)));
   EXPECT_TRUE(bump_pose(robot, q, Sides(6, 1)));
-  EXPECT_EQ(possible_sides(robot, q, Sides(6, -1)), (Sides{-1, 1, -1, -1, -1, -1})) << "joint 2 can only rise into it";
+  EXPECT_EQ(possible_sides(robot, q, Sides(6, -1)), (Sides{-1, 1, -1, -1, -1, -1}))
+      << "joint 2 can only rise into it";
 }
 
 TEST(Approach, EachJointComesFromBothSidesEquallyOftenAndNoTwoTogether) {
@@ -41,7 +44,8 @@ TEST(Approach, EachJointComesFromBothSidesEquallyOftenAndNoTwoTogether) {
     const Sides sides = planned_sides(robot, number);
     for (std::size_t a = 0; a < 6; ++a) {
       sum[a] += sides[a];
-      for (std::size_t b = 0; b < 6; ++b) together(static_cast<int>(a), static_cast<int>(b)) += sides[a] * sides[b];
+      for (std::size_t b = 0; b < 6; ++b)
+        together(static_cast<int>(a), static_cast<int>(b)) += sides[a] * sides[b];
     }
     if (number % 2 == 1) {
       EXPECT_EQ(sum, std::vector<int>(6, 0)) << number;
@@ -61,7 +65,8 @@ TEST(Approach, TheGearsComeFromOneSideWhateverTheControllerCounts) {
     for (const int direction : {1, -1}) {
       const JointVector move = q - *bump_pose(*coupled, q, Sides(6, direction));
       EXPECT_NEAR(move(1), direction * from_deg(5), 1e-12);
-      EXPECT_NEAR(move(2) + ratio * move(1), direction * from_deg(5), 1e-12) << "what the gear of joint 3 turns";
+      EXPECT_NEAR(move(2) + ratio * move(1), direction * from_deg(5), 1e-12)
+          << "what the gear of joint 3 turns";
     }
   }
 }
@@ -107,7 +112,8 @@ TEST(Approach, APlanGoesBothWaysWhateverItsPosesAreChosenFor) {
     const Plan plan = make_plan(cell, {20, 7, criterion}).value();
     ASSERT_EQ(plan.poses.size(), 20u);
     expect_directions_are_those_of_the_bump(*cell, plan);
-    for (std::size_t j = 0; j < 6; ++j) EXPECT_LE(std::abs(more_from_below(plan, j)), 2) << "joint " << j + 1;
+    for (std::size_t j = 0; j < 6; ++j)
+      EXPECT_LE(std::abs(more_from_below(plan, j)), 2) << "joint " << j + 1;
   }
 }
 
@@ -144,11 +150,13 @@ TEST(Approach, OneWayComesFromBelowAlways) {
   const auto cell = test::cell_7();
   PlanOptions options{12, 7};
   options.one_way = true;
-  for (const PlanCriterion criterion : {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability}) {
+  for (const PlanCriterion criterion :
+       {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability}) {
     options.criterion = criterion;
     const Plan plan = make_plan(cell, options).value();
     ASSERT_EQ(plan.poses.size(), 12u);
-    for (const PlannedPose& pose : plan.poses) EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
+    for (const PlannedPose& pose : plan.poses)
+      EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
   }
   options.bidirectional = true;
   EXPECT_EQ(make_plan(cell, options).error().code, ErrorCode::kUsage);
@@ -176,7 +184,8 @@ TEST(Approach, SeveralPayloadsComeInTurnAndTogether) {
   EXPECT_FALSE(make_plan(shared, options)) << "which payload?";
   options.payloads = {"spindle", "empty"};
   const Plan plan = make_plan(shared, options).value();
-  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(plan.poses[i].context.payload, i < 10 ? "empty" : "spindle");
+  for (std::size_t i = 0; i < 20; ++i)
+    EXPECT_EQ(plan.poses[i].context.payload, i < 10 ? "empty" : "spindle");
   options.payloads = {"anvil"};
   EXPECT_FALSE(make_plan(shared, options));
 }

@@ -59,8 +59,8 @@ struct JointTarget {
   std::string external;
 };
 
-/// A RAPID module read by its grammar: declarations, then one routine of moves and waits. Fails the test on anything
-/// that is none of these.
+/// A RAPID module read by its grammar: declarations, then one routine of moves and waits. Fails the
+/// test on anything that is none of these.
 struct RapidModule {
   std::string name;
   std::map<std::string, JointTarget> targets;
@@ -80,9 +80,9 @@ RapidModule read_rapid(const std::string& text) {
   const std::string id = R"(([A-Za-z][A-Za-z0-9_]{0,31}))";
   const std::string six = R"(([-0-9.]+(?:,[-0-9.]+){5}))";
   std::smatch match;
-  EXPECT_TRUE(std::regex_match(
-      code, match,
-      std::regex(R"(\s*MODULE\s+)" + id + R"((\s[^]*)PROC\s+)" + id + R"(\(\)([^]*)ENDPROC\s*ENDMODULE\s*)")))
+  EXPECT_TRUE(std::regex_match(code, match,
+                               std::regex(R"(\s*MODULE\s+)" + id + R"((\s[^]*)PROC\s+)" + id +
+                                          R"(\(\)([^]*)ENDPROC\s*ENDMODULE\s*)")))
       << text;
   module.name = match[1];
   const std::string declarations = match[2];
@@ -92,7 +92,8 @@ RapidModule read_rapid(const std::string& text) {
     std::istringstream stream(part);
     for (std::string statement; std::getline(stream, statement, ';');) {
       statement = std::regex_replace(statement, std::regex(R"(^\s+|\s+$)"), "");
-      if (!statement.empty()) found.push_back(std::regex_replace(statement, std::regex(R"(\s+)"), " "));
+      if (!statement.empty())
+        found.push_back(std::regex_replace(statement, std::regex(R"(\s+)"), " "));
     }
     return found;
   };
@@ -101,7 +102,9 @@ RapidModule read_rapid(const std::string& text) {
   const std::regex constant("CONST (num|speeddata) " + id + R"(:=[-0-9.,\[\]]+)");
   for (const std::string& statement : statements(declarations)) {
     if (std::regex_match(statement, match, target)) {
-      EXPECT_TRUE(module.targets.emplace(match[1], JointTarget{numbers_of(match[2]), match[3]}).second) << statement;
+      EXPECT_TRUE(
+          module.targets.emplace(match[1], JointTarget{numbers_of(match[2]), match[3]}).second)
+          << statement;
     } else {
       EXPECT_TRUE(std::regex_match(statement, constant)) << statement;
     }
@@ -115,7 +118,8 @@ RapidModule read_rapid(const std::string& text) {
     } else if (statement == "Stop") {
       ++module.stops;
     } else {
-      EXPECT_TRUE(std::regex_match(statement, std::regex(R"(WaitTime \\InPos,)" + id))) << statement;
+      EXPECT_TRUE(std::regex_match(statement, std::regex(R"(WaitTime \\InPos,)" + id)))
+          << statement;
       ++module.waits;
     }
   }
@@ -124,13 +128,15 @@ RapidModule read_rapid(const std::string& text) {
 
 void expect_joints(const std::vector<double>& deg, const JointVector& q, Eigen::Index first) {
   ASSERT_EQ(deg.size(), 6u);
-  for (Eigen::Index j = 0; j < 6; ++j) EXPECT_NEAR(deg[static_cast<std::size_t>(j)], to_deg(q(first + j)), 1e-9);
+  for (Eigen::Index j = 0; j < 6; ++j)
+    EXPECT_NEAR(deg[static_cast<std::size_t>(j)], to_deg(q(first + j)), 1e-9);
 }
 
 TEST(MeasuringProgram, ARapidModuleReadsBackAsThePlan) {
   const auto cell = test::cell_7();
   const Plan plan = planned(cell, true);
-  const RapidModule module = read_rapid(to_rapid(cell->robot, plan, {"my plan-2", 5, "tSpindle", 0}).value());
+  const RapidModule module =
+      read_rapid(to_rapid(cell->robot, plan, {"my plan-2", 5, "tSpindle", 0}).value());
   EXPECT_EQ(module.name, "T_my_plan_2");
   EXPECT_EQ(module.targets.size(), 48u);
   ASSERT_EQ(module.moves.size(), 48u);
@@ -140,7 +146,8 @@ TEST(MeasuringProgram, ARapidModuleReadsBackAsThePlan) {
     expect_joints(module.targets.at(module.moves[2 * i]).axes, plan.poses[i].bump, 0);
     expect_joints(module.targets.at(module.moves[2 * i + 1]).axes, plan.poses[i].context.q, 0);
     EXPECT_EQ(module.targets.at(module.moves[2 * i]).external, "9E9");
-    EXPECT_NE(module.speeds[2 * i], module.speeds[2 * i + 1]) << "fast to the bump, slow to the pose";
+    EXPECT_NE(module.speeds[2 * i], module.speeds[2 * i + 1])
+        << "fast to the bump, slow to the pose";
     EXPECT_EQ(module.tools[2 * i], "tSpindle");
   }
 }
@@ -170,8 +177,9 @@ TEST(MeasuringProgram, AKrlProgramReadsBackAsThePlan) {
   std::string axes = "A1 " + number;
   for (int k = 2; k <= 6; ++k) axes += ",A" + std::to_string(k) + " " + number;
   const std::regex ptp(R"(\s*PTP \{)" + axes + R"(\})");
-  const std::regex other(R"(&\w+ \w+|\s*;.*|DEF plan_1 \( \)|\s*EXT BAS \(BAS_COMMAND :IN,REAL :IN\)|)"
-                         R"(\s*DECL REAL \w+|\s*BAS \(#\w+,\d+\)|\s*\w+=[0-9.]+|\s*WAIT SEC \w+|END)");
+  const std::regex other(
+      R"(&\w+ \w+|\s*;.*|DEF plan_1 \( \)|\s*EXT BAS \(BAS_COMMAND :IN,REAL :IN\)|)"
+      R"(\s*DECL REAL \w+|\s*BAS \(#\w+,\d+\)|\s*\w+=[0-9.]+|\s*WAIT SEC \w+|END)");
   std::vector<std::vector<double>> moves;
   std::vector<std::string> statements;
   for (const std::string& line : lines) {
@@ -203,13 +211,15 @@ TEST(MeasuringProgram, StopsWhereThePayloadChanges) {
   options.payloads = {"spindle", "empty"};
   const Plan plan = make_plan(std::make_shared<const Cell>(cell), options).value();
   EXPECT_EQ(read_rapid(to_rapid(cell.robot, plan, {}).value()).stops, 1);
-  EXPECT_NE(to_krl(cell.robot, plan, {}).value().find("; now tool spindle, payload spindle\n  HALT\n"),
-            std::string::npos);
+  EXPECT_NE(
+      to_krl(cell.robot, plan, {}).value().find("; now tool spindle, payload spindle\n  HALT\n"),
+      std::string::npos);
 }
 
 TEST(MeasuringProgram, LongNamesAreCutToWhatAControllerTakes) {
   const auto cell = test::cell_7();
-  const RapidModule module = read_rapid(to_rapid(cell->robot, planned(cell), {std::string(60, 'x')}).value());
+  const RapidModule module =
+      read_rapid(to_rapid(cell->robot, planned(cell), {std::string(60, 'x')}).value());
   EXPECT_EQ(module.name.size(), 32u);
 }
 

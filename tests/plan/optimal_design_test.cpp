@@ -45,7 +45,8 @@ double criterion_of(const std::vector<PoseContext>& poses) {
 }
 
 TEST(OptimalDesign, RowsAreMeasuredInSigmasByPriorUnits) {
-  // A base that stands one prior scale (2 mm) elsewhere moves every measured x by 2 mm: so many sigmas.
+  // A base that stands one prior scale (2 mm) elsewhere moves every measured x by 2 mm: so many
+  // sigmas.
   const PhysicalModel model = m3_model();
   const PoseContext context = hypercube(1, 1).front();
   const Eigen::MatrixXd J = whitened_jacobian(model, context, true);
@@ -62,7 +63,8 @@ TEST(OptimalDesign, BestOfATinyProblemIsFoundAgainstEverySubset) {
   std::normal_distribution<double> normal(0, 1);
   int found = 0;
   for (int trial = 0; trial < 20; ++trial) {
-    DesignCandidates candidates{Eigen::MatrixXd::NullaryExpr(9, 2, [&] { return normal(random); }), 1};
+    DesignCandidates candidates{Eigen::MatrixXd::NullaryExpr(9, 2, [&] { return normal(random); }),
+                                1};
     const Eigen::MatrixXd start = Eigen::MatrixXd::Identity(2, 2) * 1e-3;
     const Design design = optimal_design(candidates, start, 3).value();
     double best = -1e9;
@@ -116,7 +118,8 @@ TEST(OptimalDesign, ExchangeImprovesOnGreed) {
       if (i != out) others += J.transpose() * J;
     }
     for (std::size_t in = 0; in < candidates.size(); in += 7) {
-      if (std::find(design.chosen.begin(), design.chosen.end(), in) != design.chosen.end()) continue;
+      if (std::find(design.chosen.begin(), design.chosen.end(), in) != design.chosen.end())
+        continue;
       const auto J = rows.rows.middleRows(6 * static_cast<Eigen::Index>(in), 6);
       best_swap = std::max(best_swap, log_det(others + J.transpose() * J));
     }
@@ -128,12 +131,14 @@ TEST(OptimalDesign, TheMostTellingPosesComeFirst) {
   const std::vector<PoseContext> candidates = hypercube(300, 3);
   const auto chosen = next_best_poses(m3_model(), prior(), candidates, 20).value();
   std::vector<PoseContext> first_half, last_half;
-  for (std::size_t i = 0; i < 20; ++i) (i < 10 ? first_half : last_half).push_back(candidates[chosen[i]]);
+  for (std::size_t i = 0; i < 20; ++i)
+    (i < 10 ? first_half : last_half).push_back(candidates[chosen[i]]);
   EXPECT_GT(criterion_of(first_half), criterion_of(last_half));
 }
 
 TEST(OptimalDesign, NextPosesFillWhatTheMeasuredOnesLeftOpen) {
-  // Measured with axes 4 to 6 at rest: the next poses must move them more than those that start from nothing.
+  // Measured with axes 4 to 6 at rest: the next poses must move them more than those that start
+  // from nothing.
   std::vector<PoseContext> measured = hypercube(60, 4);
   for (PoseContext& context : measured) context.q.tail(3).setZero();
   const PhysicalModel model = m3_model();
@@ -157,16 +162,19 @@ TEST(OptimalDesign, RefusesMorePosesThanCandidatesAndInformationWithoutPrior) {
   EXPECT_FALSE(next_best_poses(m3_model(), prior() * std::nan(""), candidates, 2));
 }
 
-MeasurementBatch measured_at(const VirtualRobot& robot, const Plan& plan, std::uint64_t seed, bool orientation) {
+MeasurementBatch measured_at(const VirtualRobot& robot, const Plan& plan, std::uint64_t seed,
+                             bool orientation) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(plan.poses.size()), 6);
-  for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = plan.poses[static_cast<std::size_t>(i)].context.q.transpose();
+  for (Eigen::Index i = 0; i < q.rows(); ++i)
+    q.row(i) = plan.poses[static_cast<std::size_t>(i)].context.q.transpose();
   SimulateOptions options;
   options.seed = seed;
   options.orientation = orientation;
   return simulate(robot, q, options).value();
 }
 
-/// Root mean square over seeds of the M3 error at 1000 fresh poses, measured with noise, after 40 planned ones: mm.
+/// Root mean square over seeds of the M3 error at 1000 fresh poses, measured with noise, after 40
+/// planned ones: mm.
 double validation_rms_mm(bool orientation, std::uint64_t seeds) {
   const auto cell = cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
@@ -190,7 +198,8 @@ double validation_rms_mm(bool orientation, std::uint64_t seeds) {
 TEST(OptimalDesign, FortyPlannedPosesCalibrateToTheNoise) {
   for (const bool orientation : {true, false}) {
     const double planned = validation_rms_mm(orientation, 4);
-    test::tell_figure(orientation ? "M3, 40 planned poses, mm" : "M3, 40 planned positions, mm", planned);
+    test::tell_figure(orientation ? "M3, 40 planned poses, mm" : "M3, 40 planned positions, mm",
+                      planned);
     EXPECT_LE(planned, 0.0265) << "orientation " << orientation;
   }
 }

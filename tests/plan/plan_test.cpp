@@ -16,8 +16,8 @@ TEST(Plan, LatinHypercubeUsesEverySliceOfEveryJointOnce) {
   for (std::size_t j = 0; j < ranges.size(); ++j) {
     std::vector<int> slices;
     for (int i = 0; i < 50; ++i) {
-      const double share =
-          (q(i, static_cast<Eigen::Index>(j)) - ranges[j].first) / (ranges[j].second - ranges[j].first);
+      const double share = (q(i, static_cast<Eigen::Index>(j)) - ranges[j].first) /
+                           (ranges[j].second - ranges[j].first);
       slices.push_back(static_cast<int>(share * 50));
     }
     std::sort(slices.begin(), slices.end());
@@ -37,7 +37,8 @@ TEST(Plan, KeepsToTheWorkspace) {
   const Eigen::MatrixXd q = *plan_poses(cell, {40, 1});
   ASSERT_EQ(q.rows(), 40);
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Vector3 p = (cell.robot.flange_pose(q.row(i).transpose()) * *cell.tools.at("spindle")).translation();
+    const Vector3 p =
+        (cell.robot.flange_pose(q.row(i).transpose()) * *cell.tools.at("spindle")).translation();
     EXPECT_TRUE((p.array() >= cell.workspace->lower.array()).all() &&
                 (p.array() <= cell.workspace->upper.array()).all());
   }

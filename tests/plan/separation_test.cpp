@@ -13,8 +13,9 @@ namespace {
 
 using test::cell_7;
 
-Plan separating(const std::shared_ptr<const Cell>& cell, const std::string& cause, const std::string& other,
-                bool bidirectional = false, std::vector<std::string> payloads = {}) {
+Plan separating(const std::shared_ptr<const Cell>& cell, const std::string& cause,
+                const std::string& other, bool bidirectional = false,
+                std::vector<std::string> payloads = {}) {
   PlanOptions options{30, 1, PlanCriterion::kSeparation, cause, other, bidirectional};
   options.payloads = std::move(payloads);
   Result<Plan> plan = make_plan(cell, options);
@@ -23,8 +24,9 @@ Plan separating(const std::shared_ptr<const Cell>& cell, const std::string& caus
 }
 
 const ParameterSeparation& of(const Separability& separability, const std::string& parameter) {
-  const auto found = std::find_if(separability.parameters.begin(), separability.parameters.end(),
-                                  [&](const ParameterSeparation& p) { return p.parameter == parameter; });
+  const auto found =
+      std::find_if(separability.parameters.begin(), separability.parameters.end(),
+                   [&](const ParameterSeparation& p) { return p.parameter == parameter; });
   EXPECT_NE(found, separability.parameters.end()) << parameter;
   return *found;
 }
@@ -52,11 +54,13 @@ TEST(Separation, IsWhatALeastSquaresFitOfTheRestLeaves) {
 }
 
 TEST(Separation, PlannedPosesSeparateBetterThanALatinHypercube) {
-  for (const auto& [cause, other] : {std::pair("encoder_eccentricity:2", "payload"), std::pair("payload", "compliance"),
-                                     std::pair("wrist_coupling", "geometry")}) {
+  for (const auto& [cause, other] :
+       {std::pair("encoder_eccentricity:2", "payload"), std::pair("payload", "compliance"),
+        std::pair("wrist_coupling", "geometry")}) {
     const Plan plan = separating(cell_7(), cause, other);
     ASSERT_TRUE(plan.separation);
-    EXPECT_GT(plan.separation->plan.strength, 1.3 * plan.separation->latin_hypercube.strength) << cause;
+    EXPECT_GT(plan.separation->plan.strength, 1.3 * plan.separation->latin_hypercube.strength)
+        << cause;
     EXPECT_GT(plan.criterion, plan.criterion_of_latin_hypercube) << cause;
   }
 }
@@ -70,7 +74,8 @@ TEST(Separation, NoPoseTellsAPayloadsMassFromComplianceButAHeavierPayloadHelps) 
   auto cell = std::make_shared<Cell>(*cell_7());
   cell->payloads["heavy"] = Payload{200, {0.1, 0.05, 0.2}};
   const Plan two = separating(cell, "payload", "compliance", false, {"spindle", "heavy"});
-  // Known to 5 kg of 200, it tells what the joints give way by to 2.5 %, and that the first weighs 2.5 kg more or less.
+  // Known to 5 kg of 200, it tells what the joints give way by to 2.5 %, and that the first
+  // weighs 2.5 kg more or less.
   EXPECT_NEAR(of(two.separation->candidates, "mass[spindle]").strength, 4, 0.5);
 }
 
@@ -102,7 +107,8 @@ TEST(Separation, BacklashIsToldFromGeometrySinceAPlanGoesBothWays) {
     EXPECT_TRUE(plan.separation->needs.empty());
     EXPECT_GT(of(plan.separation->plan, "b2").share, 0.5);
   }
-  EXPECT_NE(what_would_separate("backlash:2", "geometry").find("--bidirectional"), std::string::npos);
+  EXPECT_NE(what_would_separate("backlash:2", "geometry").find("--bidirectional"),
+            std::string::npos);
 }
 
 TEST(Separation, RefusesACauseBesideItselfAndUnknownOnes) {

@@ -37,7 +37,8 @@ TEST(Travel, PosesFromBothSidesAndPosesOfOnePayloadStayTogether) {
   int changes = 0;
   for (std::size_t i = 0; i < ordered.poses.size(); i += 2) {
     EXPECT_EQ(ordered.poses[i].context.q, ordered.poses[i + 1].context.q);
-    if (i > 0 && ordered.poses[i].context.payload != ordered.poses[i - 1].context.payload) ++changes;
+    if (i > 0 && ordered.poses[i].context.payload != ordered.poses[i - 1].context.payload)
+      ++changes;
   }
   EXPECT_EQ(changes, 1);
 }

@@ -44,17 +44,21 @@ TEST(Visibility, EveryPlannedPoseShowsTheTrackerItsTarget) {
   const Cell cell = watched_cell();
   const auto shared = std::make_shared<const Cell>(cell);
   PlanOptions options{30, 3};
-  for (const PlanCriterion criterion : {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability}) {
+  for (const PlanCriterion criterion :
+       {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability}) {
     options.criterion = criterion;
     const Result<Plan> plan = make_plan(shared, options);
     ASSERT_TRUE(plan) << plan.error().message;
     ASSERT_EQ(plan->poses.size(), 30u);
-    for (const PlannedPose& pose : plan->poses) EXPECT_LE(angle_deg(cell, pose.context.q, 2), 30 + 1e-9);
+    for (const PlannedPose& pose : plan->poses)
+      EXPECT_LE(angle_deg(cell, pose.context.q, 2), 30 + 1e-9);
     EXPECT_GT(plan->draw.unseen, plan->draw.kept);
-    EXPECT_EQ(plan->draw.drawn, plan->draw.kept + plan->draw.unseen + plan->draw.outside + plan->draw.no_way);
+    EXPECT_EQ(plan->draw.drawn,
+              plan->draw.kept + plan->draw.unseen + plan->draw.outside + plan->draw.no_way);
   }
   const Eigen::MatrixXd q = plan_poses(cell, {30, 3}).value();
-  for (Eigen::Index i = 0; i < q.rows(); ++i) EXPECT_LE(angle_deg(cell, q.row(i).transpose(), 2), 30 + 1e-9);
+  for (Eigen::Index i = 0; i < q.rows(); ++i)
+    EXPECT_LE(angle_deg(cell, q.row(i).transpose(), 2), 30 + 1e-9);
 }
 
 TEST(Visibility, ATargetThatLooksAlongAnotherAxisIsSeenFromThere) {
@@ -107,11 +111,13 @@ std::string cell_text(const std::string& tracker) {
 TEST(Visibility, CellFilesSayApertureAndNormal) {
   const std::string robot = test::cell_7()->robot_yaml;
   const auto cell =
-      parse_cell(cell_text("{xyz_mm: [1000, 0, 0], aperture_deg: 30, target_normal: [0, 0, -2]}"), robot, "c.yaml");
+      parse_cell(cell_text("{xyz_mm: [1000, 0, 0], aperture_deg: 30, target_normal: [0, 0, -2]}"),
+                 robot, "c.yaml");
   ASSERT_TRUE(cell) << cell.error().message;
   EXPECT_NEAR(*cell->tracker.aperture, kPi / 6, 1e-12);
   EXPECT_TRUE(cell->tracker.target_normal_T.isApprox(-Vector3::UnitZ()));
-  for (const char* wrong : {"{aperture_deg: 0}", "{aperture_deg: 181}", "{target_normal: [0, 0, 0]}"}) {
+  for (const char* wrong :
+       {"{aperture_deg: 0}", "{aperture_deg: 181}", "{target_normal: [0, 0, 0]}"}) {
     EXPECT_FALSE(parse_cell(cell_text(wrong), robot, "c.yaml")) << wrong;
   }
 }

@@ -9,7 +9,8 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-/// A diagnosis made by hand: what a page or a table must be able to show, without the minutes of finding it.
+/// A diagnosis made by hand: what a page or a table must be able to show, without the minutes of
+/// finding it.
 namespace trammel::test {
 
 constexpr double kGearOrder = 48.5;  // cycles a turn of joint 3
@@ -58,10 +59,12 @@ inline void add_residuals(Diagnosis& diagnosis, const Cell& cell) {
 inline std::vector<Periodogram> made_up_periodograms() {
   std::vector<Periodogram> all;
   for (int joint = 0; joint < 6; ++joint) {
-    Periodogram one{joint, Eigen::VectorXd::LinSpaced(4000, 0.5, 120), Eigen::VectorXd::Zero(4000), 28};
+    Periodogram one{joint, Eigen::VectorXd::LinSpaced(4000, 0.5, 120), Eigen::VectorXd::Zero(4000),
+                    28};
     for (Eigen::Index k = 0; k < one.order.size(); ++k) {
       one.strength(k) = 4 + 3 * std::sin(0.7 * static_cast<double>(k * (joint + 1)));
-      if (joint == 2) one.strength(k) += 220 * std::exp(-std::pow((one.order(k) - kGearOrder) / 0.4, 2));
+      if (joint == 2)
+        one.strength(k) += 220 * std::exp(-std::pow((one.order(k) - kGearOrder) / 0.4, 2));
     }
     all.push_back(std::move(one));
   }
@@ -102,8 +105,8 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
   Diagnosis diagnosis;
   diagnosis.verdict = Verdict::kAmbiguous;
   diagnosis.sentence =
-      "The gear of joint 3 oscillates 48.5 times a turn (58 µm rms): certain. Besides, the tool or the last link is "
-      "longer than the cell file says: these poses do not tell which.";
+      "The gear of joint 3 oscillates 48.5 times a turn (58 µm rms): certain. Besides, the tool or "
+      "the last link is longer than the cell file says: these poses do not tell which.";
   diagnosis.batch = made_up_batch(*cell);
   diagnosis.poses = static_cast<int>(diagnosis.batch.measurements.size());
   diagnosis.noise = 13e-6;
@@ -113,19 +116,23 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
   diagnosis.findings = made_up_findings(diagnosis);
   diagnosis.unexplained = {true, {"q4"}, 9e-6, 0.004};
   diagnosis.not_separable = {{{{"tool"}, {"geometry", -1, "d6", "", {}}}, 0.998}};
-  diagnosis.could_not_have_seen = {{{"thermal_growth"}, 0.12, 44e-6, 90e-6, "a wider range of temperature"},
-                                   {{"backlash", 1}, 0, {}, {}, "both approach directions"},
-                                   {{"joint_slip", 3}, 0.8, 12e-6, 16e-6, ""}};
-  diagnosis.suspects = {{"p28", 29, 310e-6, "single pose, cause not separable: repeat it and its neighbours"}};
+  diagnosis.could_not_have_seen = {
+      {{"thermal_growth"}, 0.12, 44e-6, 90e-6, "a wider range of temperature"},
+      {{"backlash", 1}, 0, {}, {}, "both approach directions"},
+      {{"joint_slip", 3}, 0.8, 12e-6, 16e-6, ""}};
+  diagnosis.suspects = {
+      {"p28", 29, 310e-6, "single pose, cause not separable: repeat it and its neighbours"}};
   for (Eigen::Index i = 0; i < 10; ++i) {
-    diagnosis.next_poses.q.push_back(diagnosis.batch.measurements[static_cast<std::size_t>(3 * i)].context.q);
+    diagnosis.next_poses.q.push_back(
+        diagnosis.batch.measurements[static_cast<std::size_t>(3 * i)].context.q);
   }
   diagnosis.next_poses.separates = diagnosis.not_separable.front().causes;
   diagnosis.next_poses.stddev_now = 2.4;
   diagnosis.next_poses.stddev_expected = 0.3;
   diagnosis.next_poses.stddev_random = 0.9;
   diagnosis.leftover = {{"q4", false, 0.004}, {"torque", true, 0.2}, {"time", false, 1}};
-  diagnosis.limits = {"The batch has one payload: an error of its mass cannot be told from the compliances."};
+  diagnosis.limits = {
+      "The batch has one payload: an error of its mass cannot be told from the compliances."};
   diagnosis.periodograms = made_up_periodograms();
   diagnosis.waterfall = {{"measured", 4.21e-3},
                          {"base", 412e-6},
@@ -134,9 +141,12 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
                          {"gear transmission 3", 31e-6},
                          {"tool", diagnosis.after.rms},
                          {"noise of one measurement", 22e-6}};
-  diagnosis.recovery = {
-      {{"gear_transmission", 2}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .4, .9, 1)},
-      {{"backlash", 1}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .1, .7, .95)}};
+  diagnosis.recovery = {{{"gear_transmission", 2},
+                         Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6),
+                         Eigen::Vector4d(0, .4, .9, 1)},
+                        {{"backlash", 1},
+                         Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6),
+                         Eigen::Vector4d(0, .1, .7, .95)}};
   diagnosis.sources_before = {"base", "geometry", "compliance"};
   diagnosis.sources_after = {"base", "geometry", "compliance", "gear_transmission:3@48.5"};
   diagnosis.batch_hash = std::string(64, 'a');

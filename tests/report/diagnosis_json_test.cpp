@@ -9,12 +9,13 @@ namespace {
 
 TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
   const auto json = diagnosis_json(test::made_up_diagnosis(test::cell_7()));
-  for (const char* key : {"verdict", "poses", "noise_mm", "before", "after", "held_out", "findings", "unexplained",
-                          "not_separable", "could_not_have_seen", "suspect_poses", "next_poses", "budget", "notes"}) {
+  for (const char* key :
+       {"verdict", "poses", "noise_mm", "before", "after", "held_out", "findings", "unexplained",
+        "not_separable", "could_not_have_seen", "suspect_poses", "next_poses", "budget", "notes"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
-  for (const char* key : {"cause", "joint", "parameters", "effect_rms_mm", "held_out_gain_mm", "strength", "p_value",
-                          "could_also_be", "action"}) {
+  for (const char* key : {"cause", "joint", "parameters", "effect_rms_mm", "held_out_gain_mm",
+                          "strength", "p_value", "could_also_be", "action"}) {
     EXPECT_TRUE(json["findings"][0].contains(key)) << key;
   }
   EXPECT_EQ(json["verdict"], "ambiguous");
@@ -23,9 +24,9 @@ TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
 }
 
 TEST(DiagnosisJson, HasTheNotesOfItsCellAsObjects) {
-  const auto note =
-      diagnosis_json(test::made_up_diagnosis(test::cell_7()),
-                     {{"robot_not_confirmed", Note::Severity::kWarning, "nobody compared it"}})["notes"][0];
+  const auto note = diagnosis_json(
+      test::made_up_diagnosis(test::cell_7()),
+      {{"robot_not_confirmed", Note::Severity::kWarning, "nobody compared it"}})["notes"][0];
   EXPECT_EQ(note["code"], "robot_not_confirmed");
   EXPECT_EQ(note["severity"], "warning");
   EXPECT_EQ(note["text"], "nobody compared it");

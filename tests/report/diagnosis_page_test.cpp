@@ -12,7 +12,9 @@
 namespace trammel {
 namespace {
 
-bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+bool has(const std::string& page, const std::string& part) {
+  return page.find(part) != std::string::npos;
+}
 
 class DiagnosisPage : public testing::Test {
  protected:
@@ -31,8 +33,8 @@ TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
   for (const std::string& part :
        {diagnosis_.batch_hash, diagnosis_.cell_hash, std::string("these poses do not tell which"),
         std::string("48.503"), std::string("parameter ± U (k = 2)"), std::string("0.040"),
-        std::string("link geometry (d6)"), std::string("p28"), std::string("repeat it and its neighbours"),
-        std::string("both approach directions")}) {
+        std::string("link geometry (d6)"), std::string("p28"),
+        std::string("repeat it and its neighbours"), std::string("both approach directions")}) {
     EXPECT_TRUE(has(page, part)) << part;
   }
 }
@@ -85,8 +87,8 @@ TEST_F(DiagnosisPage, ThinsAPeriodogramWithoutLosingItsPeak) {
   const auto joint_3 = diagnosis_charts(diagnosis_, *cell_).at("periodograms").at(2);
   EXPECT_LE(joint_3.at("order").size(), 500u);
   const auto strength = joint_3.at("strength").get<std::vector<double>>();
-  EXPECT_NEAR(*std::max_element(strength.begin(), strength.end()), diagnosis_.periodograms[2].strength.maxCoeff(),
-              0.01);
+  EXPECT_NEAR(*std::max_element(strength.begin(), strength.end()),
+              diagnosis_.periodograms[2].strength.maxCoeff(), 0.01);
 }
 
 TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
@@ -97,7 +99,9 @@ TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
   diagnosis_.findings.emplace_back().cause = {"encoder_eccentricity", 4};
   diagnosis_.findings.emplace_back().cause = {"backlash", 5};
   const auto charts = diagnosis_charts(diagnosis_, *cell_);
-  const auto title = [&](std::size_t k) { return charts.at("periodograms").at(k).at("title").get<std::string>(); };
+  const auto title = [&](std::size_t k) {
+    return charts.at("periodograms").at(k).at("title").get<std::string>();
+  };
   EXPECT_EQ(title(1), "joint 2: no oscillation found");
   EXPECT_EQ(title(2), "joint 3: 48.50, 97.00 a turn, angle error map");
   EXPECT_EQ(title(4), "joint 5: 1 a turn");
@@ -121,16 +125,19 @@ TEST_F(DiagnosisPage, DoesNotCallUnseenWhatWasLookedForByTheOrderOfThePoses) {
 
 TEST_F(DiagnosisPage, SaysOneFigureOfNoiseAndWhatItIs) {
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(has(page, "<b>0.0225 mm</b><span>noise, rms: what is left of a position when all that was found"));
+  EXPECT_TRUE(
+      has(page,
+          "<b>0.0225 mm</b><span>noise, rms: what is left of a position when all that was found"));
   EXPECT_FALSE(has(page, "per axis")) << "one figure";
 }
 
 TEST_F(DiagnosisPage, AChanceThatIsSmallerThanAnythingKnownIsNoEquality) {
   diagnosis_.unexplained = {true, {"q4"}, 5e-5, 1e-6, ""};
-  EXPECT_TRUE(
-      has(diagnosis_page(diagnosis_, *cell_), "rms. It changes with the position of joint 4 (p &lt;\u00a010⁻⁶)."));
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_),
+                  "rms. It changes with the position of joint 4 (p &lt;\u00a010⁻⁶)."));
   diagnosis_.unexplained.p_value = 0.02;
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms. It changes with the position of joint 4 (p = 0.02)."));
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_),
+                  "rms. It changes with the position of joint 4 (p = 0.02)."));
 }
 
 TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {

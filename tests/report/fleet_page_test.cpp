@@ -7,7 +7,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+bool has(const std::string& page, const std::string& part) {
+  return page.find(part) != std::string::npos;
+}
 
 TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
   const ordered_json fleet = ordered_json::parse(
@@ -17,13 +19,15 @@ TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
           {"cell": "c", "version": null, "health": null}], "types": [{"robot": "R", "robots": 3}]})");
   const std::string page = fleet_page(fleet, 1'763'942'400);
   for (const char* part :
-       {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer", "like its twins",
-        "not checked yet", "no model in force", "R: 3 robots", "2025-11-24", "3 robots: 1 changed, 1 not checked yet."})
+       {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer",
+        "like its twins", "not checked yet", "no model in force", "R: 3 robots", "2025-11-24",
+        "3 robots: 1 changed, 1 not checked yet."})
     EXPECT_TRUE(has(page, part)) << part << "\n" << page;
 }
 
 TEST(FleetPage, OfWhatItCannotReadLeavesOut) {
-  for (const char* fleet : {"null", "[]", R"({"cells": [7, null, {"health": 3, "unlike_twins": [1]}], "types": [2]})"})
+  for (const char* fleet :
+       {"null", "[]", R"({"cells": [7, null, {"health": 3, "unlike_twins": [1]}], "types": [2]})"})
     EXPECT_TRUE(has(fleet_page(ordered_json::parse(fleet), 0), "not checked yet")) << fleet;
 }
 

@@ -18,7 +18,8 @@ HealthCheck made_up_check() {
   SeenChange length;
   length.cause = {&cause_spelled("geometry"), -1, "d6"};
   length.effect_rms = 0.2e-3;
-  length.could_also_be = {{&cause_spelled("compliance"), 2, "C3"}, {&cause_spelled("gear_transmission"), 0}};
+  length.could_also_be = {{&cause_spelled("compliance"), 2, "C3"},
+                          {&cause_spelled("gear_transmission"), 0}};
   SeenChange zero;
   zero.cause = {&cause_spelled("joint_slip"), 3};
   zero.effect_rms = 0.8e-3;
@@ -46,8 +47,9 @@ TEST(HealthJson, TellsWhatChangedInTheLinesOfABudgetTheLargestFirst) {
   EXPECT_EQ(lines[2].at("line"), "rest");
   EXPECT_EQ(budget.at("beyond_frames").at("lines"), lines);
   for (const auto& line : lines) {
-    for (const char* key : {"line", "kind", "joint", "value", "u95", "unit", "alone_rms_mm", "alone_max_mm", "share",
-                            "left_if_right_mm", "times_usual", "with", "action"}) {
+    for (const char* key :
+         {"line", "kind", "joint", "value", "u95", "unit", "alone_rms_mm", "alone_max_mm", "share",
+          "left_if_right_mm", "times_usual", "with", "action"}) {
       EXPECT_TRUE(line.contains(key)) << key;
     }
   }

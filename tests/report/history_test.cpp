@@ -5,16 +5,20 @@
 namespace trammel {
 namespace {
 
-ParameterOnRecord zero_of_joint_3(double value, double u95) { return {"link geometry", "q3", "rad", value, u95, true}; }
+ParameterOnRecord zero_of_joint_3(double value, double u95) {
+  return {"link geometry", "q3", "rad", value, u95, true};
+}
 
 VersionOnRecord version(int number, ParameterOnRecord parameter) {
-  VersionOnRecord one{number, "m" + std::to_string(number), "lt-0" + std::to_string(number), 1'700'000'000 + number,
-                      60};
+  VersionOnRecord one{number, "m" + std::to_string(number), "lt-0" + std::to_string(number),
+                      1'700'000'000 + number, 60};
   one.parameters = {std::move(parameter)};
   return one;
 }
 
-bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+bool has(const std::string& page, const std::string& part) {
+  return page.find(part) != std::string::npos;
+}
 
 TEST(History, AParameterThatMovedByMoreThanItsUncertaintyIsNamedWithBothVersions) {
   const CellHistory history{
@@ -26,9 +30,11 @@ TEST(History, AParameterThatMovedByMoreThanItsUncertaintyIsNamedWithBothVersions
   EXPECT_EQ(moved[0].from_version, 2);
   EXPECT_EQ(moved[0].to_version, 3);
   EXPECT_NEAR(moved[0].u95, std::hypot(0.03e-3, 0.02e-3), 1e-12);
-  EXPECT_TRUE(has(history_page(history), "link geometry, q3: 0.0092 ± 0.0021 deg from version 2 to 3"))
+  EXPECT_TRUE(
+      has(history_page(history), "link geometry, q3: 0.0092 ± 0.0021 deg from version 2 to 3"))
       << history_page(history);
-  EXPECT_TRUE(has(history_page(history), "Versions 1 to 3, trained from 2023-11-14 22:13 to 2023-11-14 22:13 UTC"));
+  EXPECT_TRUE(has(history_page(history),
+                  "Versions 1 to 3, trained from 2023-11-14 22:13 to 2023-11-14 22:13 UTC"));
   EXPECT_FALSE(has(history_page(history), " rad ")) << "people read degrees";
 }
 
@@ -57,22 +63,25 @@ TEST(History, AVersionWhoseFileIsGoneLeavesAGapAndBreaksNothing) {
 TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmless) {
   CellHistory history{"<b>cell</b>", {version(1, zero_of_joint_3(1e-3, 1e-6))}};
   history.versions[0].in_force = true;
-  history.versions[0].notes = {
-      {"changed_between_sessions", Note::Severity::kInfo, "since session lt-02 (pose p1): lost zero in joint 3"}};
-  history.trainings = {{1'700'000'000, "lt-01", "in_force", "better beyond chance", 0.5e-3, 0.02e-3}};
+  history.versions[0].notes = {{"changed_between_sessions", Note::Severity::kInfo,
+                                "since session lt-02 (pose p1): lost zero in joint 3"}};
+  history.trainings = {
+      {1'700'000'000, "lt-01", "in_force", "better beyond chance", 0.5e-3, 0.02e-3}};
   history.events = {{1'700'000'000, "activate", "version 1", "<script>alert(1)</script>", "cam-2"}};
   EXPECT_EQ(history_json(history)["versions"][0]["notes"][0]["code"], "changed_between_sessions");
   const std::string page = history_page(history);
-  for (const char* part : {"0.5000", "0.0200", "in force: better beyond chance", "lost zero in joint 3", "activate",
-                           "&lt;b&gt;cell&lt;/b&gt;", "&lt;script&gt;", "2023-11-14 22:13"})
+  for (const char* part :
+       {"0.5000", "0.0200", "in force: better beyond chance", "lost zero in joint 3", "activate",
+        "&lt;b&gt;cell&lt;/b&gt;", "&lt;script&gt;", "2023-11-14 22:13"})
     EXPECT_TRUE(has(page, part)) << part;
   EXPECT_FALSE(has(page, "<script>"));
 }
 
 TEST(History, TheParametersAreThoseOfTheVersionInForceNotOfTheNewest) {
-  CellHistory history{"cell-7",
-                      {version(1, zero_of_joint_3(1e-3, 1e-5)), version(2, zero_of_joint_3(2e-3, 1e-5)),
-                       version(3, zero_of_joint_3(3e-3, 1e-5))}};
+  CellHistory history{
+      "cell-7",
+      {version(1, zero_of_joint_3(1e-3, 1e-5)), version(2, zero_of_joint_3(2e-3, 1e-5)),
+       version(3, zero_of_joint_3(3e-3, 1e-5))}};
   history.versions[1].in_force = true;
   const std::string page = history_page(history);
   EXPECT_TRUE(has(page, "version 2 (in force)"));

@@ -32,7 +32,8 @@ class ModelPage : public testing::Test {
   CompensatedModel trained(const std::string& bias, double validation_share = 0) const {
     TrainOptions options;
     options.bias = bias;
-    const CheckedBatch checked = check_against_cell(batch_, *cell_, drawn(validation_share, 1)).value();
+    const CheckedBatch checked =
+        check_against_cell(batch_, *cell_, drawn(validation_share, 1)).value();
     return train(cell_, checked, options).value();
   }
   /// What the charts of the page are drawn from.
@@ -41,7 +42,9 @@ class ModelPage : public testing::Test {
     const std::size_t from = page.find(opening) + opening.size();
     return nlohmann::json::parse(page.substr(from, page.find("</script>", from) - from));
   }
-  static bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+  static bool has(const std::string& page, const std::string& part) {
+    return page.find(part) != std::string::npos;
+  }
 
   std::shared_ptr<const Cell> cell_;
   MeasurementBatch batch_;
@@ -50,8 +53,9 @@ class ModelPage : public testing::Test {
 TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
   const CompensatedModel model = trained("none");
   const std::string page = model_page(model, std::nullopt);
-  for (const std::string& part : {model.provenance().hash, model.provenance().batch_hash, cell_->robot.name(),
-                                  std::string("gamma0"), std::string("U (k = 2)")}) {
+  for (const std::string& part :
+       {model.provenance().hash, model.provenance().batch_hash, cell_->robot.name(),
+        std::string("gamma0"), std::string("U (k = 2)")}) {
     EXPECT_TRUE(has(page, part)) << part;
   }
 }
@@ -59,17 +63,19 @@ TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
 TEST_F(ModelPage, SaysCoverageAgainstTheStatedSigmaBesideThatOfItsOwnIntervals) {
   const CompensatedModel model = trained("none");
   const double stated = model.parts().training.coverage_95_stated.value();
-  EXPECT_TRUE(has(model_page(model, std::nullopt), fmt::format("{:.1f} % of coordinates", 100 * stated)));
+  EXPECT_TRUE(
+      has(model_page(model, std::nullopt), fmt::format("{:.1f} % of coordinates", 100 * stated)));
   EXPECT_TRUE(has(model_page(model, std::nullopt), "inside that of the stated sigma alone"));
 }
 
 TEST_F(ModelPage, CallsErrorSourcesByTheirPlainNames) {
   CompensatedModel::Parts parts = trained("none").parts();
   parts.provenance.level = "base,geometry,compliance_linear,gear_transmission:3@48.5";
-  parts.provenance.refits = {
-      RefitRecord{.model = "m", .sources = {"base", "tool"}, .batch_id = "b", .batch_hash = "", .poses = 9}};
+  parts.provenance.refits = {RefitRecord{
+      .model = "m", .sources = {"base", "tool"}, .batch_id = "b", .batch_hash = "", .poses = 9}};
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
-  EXPECT_TRUE(has(page, "base position, link geometry, gearbox compliance, gear ripple in joint 3"));
+  EXPECT_TRUE(
+      has(page, "base position, link geometry, gearbox compliance, gear ripple in joint 3"));
   EXPECT_TRUE(has(page, "base position, tool position on 9 poses"));
   EXPECT_FALSE(has(page, "gear_transmission"));
 }
@@ -79,11 +85,13 @@ TEST_F(ModelPage, ShowsWhatIsLeftOfTheOrientationsWhereTheyWereMeasured) {
   parts.training.orientation = OrientationFigures{30, 0.02, 0.002, 0.001, 0.934};
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
   EXPECT_TRUE(has(page, "orientation, deg rms of 30 poses"));
-  for (const char* shown : {"nominal\">1.1459</td>", "calibrated\">0.1146</td>", "compensated\">0.0573</td>",
-                            "inside their 95 % interval\">93.4 %</td>"})
+  for (const char* shown :
+       {"nominal\">1.1459</td>", "calibrated\">0.1146</td>", "compensated\">0.0573</td>",
+        "inside their 95 % interval\">93.4 %</td>"})
     EXPECT_TRUE(has(page, shown)) << shown;
   parts.training.orientation.reset();
-  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "orientation, deg"));
+  EXPECT_FALSE(
+      has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "orientation, deg"));
 }
 
 TEST_F(ModelPage, ABiasThatDoesNotHelpIsSaidNotToAndIsNotGreen) {
@@ -92,8 +100,10 @@ TEST_F(ModelPage, ABiasThatDoesNotHelpIsSaidNotToAndIsNotGreen) {
   parts.validation->compensated.rms = 23.3e-6;
   parts.validation->bias_gain_z = -2;
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
-  EXPECT_TRUE(has(page, "The bias does not help here: 0.0233 mm with it, 0.0229 mm without on 9 poses."));
-  EXPECT_TRUE(has(page, "<div class=\"tile doubtful\"><b>0.023 mm</b><span>compensated, rms</span>"));
+  EXPECT_TRUE(
+      has(page, "The bias does not help here: 0.0233 mm with it, 0.0229 mm without on 9 poses."));
+  EXPECT_TRUE(
+      has(page, "<div class=\"tile doubtful\"><b>0.023 mm</b><span>compensated, rms</span>"));
   EXPECT_EQ(chart_data(page).at("doubtful"), true);
   parts.validation->compensated.rms = 10e-6;
   parts.validation->bias_gain_z = 5;
@@ -120,8 +130,8 @@ TEST_F(ModelPage, SaysThatComplianceWithoutALoadDoesNothing) {
   options.level = "M3";
   options.bias = "none";
   const CompensatedModel model = train(cell_, batch_, options).value();
-  EXPECT_TRUE(
-      has(model_page(model, std::nullopt), "Gearbox compliance does nothing here: neither link masses nor a payload"));
+  EXPECT_TRUE(has(model_page(model, std::nullopt),
+                  "Gearbox compliance does nothing here: neither link masses nor a payload"));
   EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "does nothing here"));
 }
 
@@ -155,8 +165,9 @@ TEST_F(ModelPage, DrawsNoHistogramWhereItKnowsNoPoses) {
 
 /// small_cell() with more keys.
 std::shared_ptr<const Cell> cell_with(const std::string& keys) {
-  return std::make_shared<const Cell>(
-      parse_cell(test::small_cell_yaml("cell-3", "none") + keys, test::small_robot_yaml(), "cell-3.yaml").value());
+  return std::make_shared<const Cell>(parse_cell(test::small_cell_yaml("cell-3", "none") + keys,
+                                                 test::small_robot_yaml(), "cell-3.yaml")
+                                          .value());
 }
 
 CompensatedModel trained_on(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
@@ -172,9 +183,10 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const CompensatedModel model = trained_on(cell_with(""), batch_);
   const auto accuracy = PositionAccuracy::of(model);
   const std::string promise = promise_sentence(model, accuracy);
-  EXPECT_EQ(promise, fmt::format("Good to {} mm at 95 % in this volume, by its training poses alone; not known beyond; "
-                                 "check again by 2025-12-24, a day that has passed.",
-                                 rounded_up_mm(accuracy->at(0.95))));
+  EXPECT_EQ(promise,
+            fmt::format("Good to {} mm at 95 % in this volume, by its training poses alone; not "
+                        "known beyond; check again by 2025-12-24, a day that has passed.",
+                        rounded_up_mm(accuracy->at(0.95))));
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
   EXPECT_LT(page.find(promise), page.find("<table"));
@@ -189,8 +201,9 @@ TEST_F(ModelPage, SaysWhatWasMeasuredAndDrawsIt) {
   const CompensatedModel model = trained_on(cell_with("instrument: AT960\n"), both);
   const std::string page = model_page(model, std::nullopt);
   for (const char* part :
-       {"<td>sides of approach</td><td>every joint from both sides</td>", "<td>temperature</td><td>20.",
-        " degrees Celsius</td>", "mm of the tool from the robot's base",
+       {"<td>sides of approach</td><td>every joint from both sides</td>",
+        "<td>temperature</td><td>20.", " degrees Celsius</td>",
+        "mm of the tool from the robot's base",
         "<p class=\"about\">It rests on 21 training poses; sides of approach: every joint"})
     EXPECT_TRUE(has(page, part)) << part;
   EXPECT_FALSE(has(promise_sentence(model, PositionAccuracy::of(model)), "comes to"));
@@ -204,35 +217,41 @@ TEST_F(ModelPage, APromiseOfPosesFromOneSideIsOfThatSide) {
   for (Measurement& m : above.measurements) m.context.direction.assign(6, -1);
   const CompensatedModel model = trained_on(cell_with(""), above);
   EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)),
-                  " in this volume, for poses that the arm comes to from above, by its training poses alone; not"));
-  EXPECT_TRUE(
-      has(model_page(model, std::nullopt), "nothing is promised of poses that it comes to from the other side"));
+                  " in this volume, for poses that the arm comes to from above, by its training "
+                  "poses alone; not"));
+  EXPECT_TRUE(has(model_page(model, std::nullopt),
+                  "nothing is promised of poses that it comes to from the other side"));
 }
 
 TEST_F(ModelPage, OfAModelThatDoesNotTellWhatWasMeasuredItSaysSo) {
   CompensatedModel::Parts parts = trained("none").parts();
   parts.measured.reset();
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
-  for (const char* part : {"<td>this volume</td><td>not on record</td>", "<td>sides of approach</td><td>not on record"})
+  for (const char* part : {"<td>this volume</td><td>not on record</td>",
+                           "<td>sides of approach</td><td>not on record"})
     EXPECT_TRUE(has(page, part)) << part;
 }
 
 TEST_F(ModelPage, SaysFirstWhereNoPoseHasTestedIt) {
   const CompensatedModel model = trained("none");
-  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)), " volume, by its training poses alone; not"));
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)),
+                  " volume, by its training poses alone; not"));
   const auto tested = PositionAccuracy::of(model, check_against_cell(batch_, *cell_)->rows());
   EXPECT_TRUE(has(promise_sentence(model, tested), " volume; not known beyond"));
   MeasurementBatch single = check_against_cell(batch_, *cell_)->rows();
   single.measurements.resize(1);
-  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model, single)), ", tested by 1 fresh pose only; not"));
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model, single)),
+                  ", tested by 1 fresh pose only; not"));
 }
 
 TEST_F(ModelPage, SaysThatTheDayOfTheNextCheckHasPassedWhereItHas) {
-  EXPECT_TRUE(has(model_page(trained_on(cell_with(""), batch_), std::nullopt), "That day had passed"));
+  EXPECT_TRUE(
+      has(model_page(trained_on(cell_with(""), batch_), std::nullopt), "That day had passed"));
   CompensatedModel::Parts parts = trained_on(cell_with(""), batch_).parts();
   parts.provenance.trained_at = unix_now();
   parts.provenance.measured_at = unix_now();
-  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "That day had passed"));
+  EXPECT_FALSE(
+      has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "That day had passed"));
 }
 
 TEST(RoundedUp, IsNeverSmallerThanTheLength) {
@@ -243,12 +262,15 @@ TEST(RoundedUp, IsNeverSmallerThanTheLength) {
 }
 
 TEST_F(ModelPage, ItsFirstPageNamesRobotInstrumentAndOperatorAsTheCellFileHasThem) {
-  const std::string page =
-      model_page(trained_on(cell_with("serial_number: 66-70 <b>\ninstrument: AT960\noperator: I. Newton\n"), batch_),
-                 std::nullopt);
-  for (const char* part : {"<td>serial number</td><td>66-70 &lt;b&gt;</td>", "AT960, 0.02 mm", "I. Newton"})
+  const std::string page = model_page(
+      trained_on(cell_with("serial_number: 66-70 <b>\ninstrument: AT960\noperator: I. Newton\n"),
+                 batch_),
+      std::nullopt);
+  for (const char* part :
+       {"<td>serial number</td><td>66-70 &lt;b&gt;</td>", "AT960, 0.02 mm", "I. Newton"})
     EXPECT_TRUE(has(page, part)) << part;
-  EXPECT_TRUE(has(model_page(trained("none"), std::nullopt), "<td>serial number</td><td>not in the cell file</td>"));
+  EXPECT_TRUE(has(model_page(trained("none"), std::nullopt),
+                  "<td>serial number</td><td>not in the cell file</td>"));
 }
 
 TEST_F(ModelPage, HoldsThePromiseAgainstTheToleranceOfTheCell) {
@@ -262,10 +284,11 @@ TEST_F(ModelPage, HoldsThePromiseAgainstTheToleranceOfTheCell) {
 TEST_F(ModelPage, SaysYesOrNoToNoToleranceThatIsInsideItsInterval) {
   const auto promise = PositionAccuracy::of(trained_on(cell_with(""), batch_));
   ASSERT_LT(promise->least(), promise->most());
-  for (const double tolerance :
-       {0.9 * promise->least() + 0.1 * promise->most(), 0.1 * promise->least() + 0.9 * promise->most()}) {
+  for (const double tolerance : {0.9 * promise->least() + 0.1 * promise->most(),
+                                 0.1 * promise->least() + 0.9 * promise->most()}) {
     const auto cell = cell_with(fmt::format("tolerance_mm: {}\n", 1000 * tolerance));
-    EXPECT_TRUE(has(model_page(trained_on(cell, batch_), std::nullopt), " mm: <b>cannot tell</b>")) << tolerance;
+    EXPECT_TRUE(has(model_page(trained_on(cell, batch_), std::nullopt), " mm: <b>cannot tell</b>"))
+        << tolerance;
   }
 }
 
@@ -282,14 +305,15 @@ TEST_F(ModelPage, KnowsTheRepeatabilityFromRepeatsOnly) {
   repeated.measurements.insert(repeated.measurements.end(), once.begin(), once.end());
   for (std::size_t i = 0; i < once.size(); ++i) repeated.measurements[i].p_W.x() += 40e-6;
   // Two that are 40 um apart: 28 um along x, 16 um an axis; 3.615 of them.
-  EXPECT_TRUE(has(row(repeated), "0.060 mm, instrument included (60 measurements of 30 poses)")) << row(repeated);
+  EXPECT_TRUE(has(row(repeated), "0.060 mm, instrument included (60 measurements of 30 poses)"))
+      << row(repeated);
 }
 
 TEST_F(ModelPage, TellsOfEveryLengthWhatIsDrawnByHowMuchItIsOffAndWhatItIs) {
   const CompensatedModel model = trained_on(cell_with(""), batch_, "M2");
   const auto& parameters = model.parts().parameters;
-  const auto a2 =
-      std::find_if(parameters.begin(), parameters.end(), [](const auto& one) { return one.parameter.name == "a2"; });
+  const auto a2 = std::find_if(parameters.begin(), parameters.end(),
+                               [](const auto& one) { return one.parameter.name == "a2"; });
   ASSERT_NE(a2, parameters.end());
   const std::string page = model_page(model, std::nullopt);
   const std::size_t from = page.find("<tr><td>a2</td>");
@@ -322,15 +346,18 @@ TEST_F(ModelPage, DrawsTheArmFromTheBaseToTheToolAndTheDomainAroundItsPoses) {
   for (std::size_t i = 0; i < 30; ++i) {
     const auto& arm = scene.at("poses")[i].at("arm");
     const Measurement& m = checked->rows().measurements[i];
-    const Vector3 tool = (cell_->robot.flange_pose(m.context.q) * *cell_->tools.at(m.context.tool)).translation();
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(arm.back()[static_cast<std::size_t>(k)].get<double>(), 1e3 * tool(k), 0.06);
+    const Vector3 tool =
+        (cell_->robot.flange_pose(m.context.q) * *cell_->tools.at(m.context.tool)).translation();
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(arm.back()[static_cast<std::size_t>(k)].get<double>(), 1e3 * tool(k), 0.06);
     EXPECT_EQ(arm.front(), nlohmann::ordered_json({0.0, 0.0, 0.0}));
     EXPECT_GT(arm.size(), 4u);
   }
   double farthest = 0;
   for (const auto& ring : scene.at("shell")) {
     for (const auto& p : ring)
-      if (!p.is_null()) farthest = std::max(farthest, std::hypot(p[0].get<double>(), p[1].get<double>()));
+      if (!p.is_null())
+        farthest = std::max(farthest, std::hypot(p[0].get<double>(), p[1].get<double>()));
   }
   EXPECT_GT(farthest, 500);
 }
@@ -341,7 +368,8 @@ TEST_F(ModelPage, WithoutAnyMeasuredPoseItsArrowsAreWhatTheModelCorrects) {
   EXPECT_EQ(scene.at("measured"), false);
   const auto& before = scene.at("poses")[0].at("before");
   // The base stands 2 mm along x from where it should be.
-  EXPECT_NEAR(std::hypot(before[0].get<double>(), before[1].get<double>(), before[2].get<double>()), 2, 0.2);
+  EXPECT_NEAR(std::hypot(before[0].get<double>(), before[1].get<double>(), before[2].get<double>()),
+              2, 0.2);
 }
 
 TEST_F(ModelPage, TheCurveOfABiasEndsAtAllPosesAndThatOfParametersFallsWithThem) {
@@ -368,7 +396,8 @@ TEST_F(ModelPage, ListsTheWorstPosesFirst) {
   const std::size_t table = page.find("<table class=\"poses ");
   ASSERT_NE(table, std::string::npos);
   const std::size_t first = page.find("<tr><td>", table);
-  EXPECT_EQ(page.substr(first + 8, rows.measurements[7].pose_id.size() + 1), rows.measurements[7].pose_id + "<");
+  EXPECT_EQ(page.substr(first + 8, rows.measurements[7].pose_id.size() + 1),
+            rows.measurements[7].pose_id + "<");
 }
 
 TEST_F(ModelPage, HasNoEmptyPlotInARealBrowserHoweverNarrowAndIsLight) {
@@ -397,7 +426,8 @@ TEST_F(ModelPage, SaysInWordsWhatCouldNotBeTold) {
   EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt),
                   "<li>q1 &amp; gamma0 turn the same way</li>"));
   parts.unidentifiable.clear();
-  EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "Nothing: every combination"));
+  EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt),
+                  "Nothing: every combination"));
 }
 
 /// The page of a model that was trained on so many poses, none held out.
@@ -405,11 +435,14 @@ std::string page_of_poses(int poses) {
   const auto cell = cell_with("");
   test::SmallBatch shape;
   shape.poses = poses;
-  const MeasurementBatch batch = parse_batch_csv(test::small_batch_csv(*cell, shape), "few.csv").value();
+  const MeasurementBatch batch =
+      parse_batch_csv(test::small_batch_csv(*cell, shape), "few.csv").value();
   TrainOptions options;
   options.level = "M1";
   options.bias = "none";
-  return model_page(train(cell, check_against_cell(batch, *cell, drawn(0, 1)).value(), options).value(), std::nullopt);
+  return model_page(
+      train(cell, check_against_cell(batch, *cell, drawn(0, 1)).value(), options).value(),
+      std::nullopt);
 }
 
 TEST_F(ModelPage, PromisesNothingWhereThePosesAreTooFewToTellHowGoodTheModelIs) {
@@ -427,7 +460,8 @@ TEST_F(ModelPage, PromisesNothingByPosesThatAreNotThisRobots) {
   MeasurementBatch exchanged = check_against_cell(batch_, *cell_)->rows();
   for (Measurement& m : exchanged.measurements) std::swap(m.p_W.x(), m.p_W.y());
   const std::string page = model_page(trained("none"), exchanged);
-  EXPECT_TRUE(has(page, "these poses do not fit the model")) << page.substr(page.find("id=\"promise"), 600);
+  EXPECT_TRUE(has(page, "these poses do not fit the model"))
+      << page.substr(page.find("id=\"promise"), 600);
   EXPECT_TRUE(has(page, "exchanged"));
   EXPECT_FALSE(has(page, "Good to "));
   EXPECT_FALSE(has(page, "class=\"tolerances"));

@@ -8,15 +8,19 @@
 namespace trammel {
 namespace {
 
-bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+bool has(const std::string& page, const std::string& part) {
+  return page.find(part) != std::string::npos;
+}
 
 std::string page_of(std::string_view kind, const std::string& cell, const std::string& model = "") {
-  return plain_page({.mark = {kind, cell, model}, .title = "A page", .subtitle = "", .body = "<p>body</p>"});
+  return plain_page(
+      {.mark = {kind, cell, model}, .title = "A page", .subtitle = "", .body = "<p>body</p>"});
 }
 
 class PagesBeside : public testing::Test {
  protected:
-  std::string linked(std::string_view kind, const std::string& cell, const std::string& file = "new.html") {
+  std::string linked(std::string_view kind, const std::string& cell,
+                     const std::string& file = "new.html") {
     return with_pages_beside(page_of(kind, cell), folder_.file(file));
   }
   test::TemporaryFolder folder_;
@@ -31,7 +35,8 @@ TEST_F(PagesBeside, APageLinksToThoseOfItsCellThatAreThereAndToNothingElse) {
   const std::string page = linked("program", "cell-7");
   EXPECT_TRUE(has(page, "<a href=\"./m.html\">model 0123abcd (m.html)</a>")) << page;
   EXPECT_TRUE(has(page, "<a href=\"./d.html\">diagnosis (d.html)</a>"));
-  for (const char* absent : {"other.html", "foreign.html", "./new.html"}) EXPECT_FALSE(has(page, absent)) << absent;
+  for (const char* absent : {"other.html", "foreign.html", "./new.html"})
+    EXPECT_FALSE(has(page, absent)) << absent;
 }
 
 TEST_F(PagesBeside, AFleetLinksToThePagesOfAllItsCellsAndTheyToIt) {
@@ -48,8 +53,9 @@ TEST_F(PagesBeside, NoFileNameAndNoMarkGetsIntoThePageAsMoreThanText) {
   const std::string hostile = "cell <script>alert(1)</script>\"";
   folder_.write("javascript:alert(1).html", page_of("model", hostile));
   folder_.write("a\"onclick=\"x.html", page_of("model", hostile, "<b>\""));
-  folder_.write("unclosed.html",
-                "<meta name=\"trammel-page\" content=\"model\" data-cell=\"\" data-model=\"<script>\">");
+  folder_.write(
+      "unclosed.html",
+      "<meta name=\"trammel-page\" content=\"model\" data-cell=\"\" data-model=\"<script>\">");
   const std::string page = linked("diagnosis", hostile);
   EXPECT_TRUE(has(page, "<a href=\"./javascript%3Aalert%281%29.html\">")) << page;
   EXPECT_TRUE(has(page, "<a href=\"./a%22onclick%3D%22x.html\">"));

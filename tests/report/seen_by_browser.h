@@ -18,8 +18,8 @@ namespace trammel::test {
 constexpr const char* kBrowser = "/usr/bin/chromium";
 inline bool has_browser() { return std::filesystem::exists(kBrowser); }
 
-/// Runs in the page: says of each canvas how many of its pixels have a colour that is none of text and grid, what went
-/// wrong, and how far the page is wider than its window.
+/// Runs in the page: says of each canvas how many of its pixels have a colour that is none of text
+/// and grid, what went wrong, and how far the page is wider than its window.
 constexpr const char* kLookAtIt = R"(<script>
 window.addEventListener("load", () => {
   const coloured = canvas => {
@@ -40,7 +40,8 @@ window.addEventListener("load", () => {
   document.body.append(text);
 });
 </script>)";
-constexpr const char* kListen = R"(<script>window.wentWrong = 0; window.onerror = () => ++window.wentWrong;</script>)";
+constexpr const char* kListen =
+    R"(<script>window.wentWrong = 0; window.onerror = () => ++window.wentWrong;</script>)";
 
 /// What a browser of that width finds on the page: a number a name.
 inline std::map<std::string, int> seen_by_browser(std::string page, int width) {
@@ -48,9 +49,10 @@ inline std::map<std::string, int> seen_by_browser(std::string page, int width) {
   page.replace(page.find("<head>"), 6, std::string("<head>") + kListen);
   page.replace(page.rfind("</body>"), 7, std::string(kLookAtIt) + "</body>");
   const std::string file = folder.write("page.html", page);
-  const Finished browser = run({kBrowser, "--headless=new", "--no-sandbox", "--disable-gpu",
-                                "--virtual-time-budget=5000", fmt::format("--window-size={},900", width),
-                                "--user-data-dir=" + folder.file("profile"), "--dump-dom", "file://" + file});
+  const Finished browser =
+      run({kBrowser, "--headless=new", "--no-sandbox", "--disable-gpu",
+           "--virtual-time-budget=5000", fmt::format("--window-size={},900", width),
+           "--user-data-dir=" + folder.file("profile"), "--dump-dom", "file://" + file});
   const std::string opening = "<pre id=\"seen\">";
   const std::size_t from = browser.out.find(opening);
   EXPECT_NE(from, std::string::npos) << browser.err;
@@ -67,13 +69,15 @@ inline int pages_on_paper(const std::string& page) {
   const TemporaryFolder folder;
   const std::string file = folder.write("page.html", page), pdf = folder.file("page.pdf");
   const Finished browser =
-      run({kBrowser, "--headless", "--no-sandbox", "--disable-gpu", "--user-data-dir=" + folder.file("profile"),
-           "--print-to-pdf=" + pdf, "file://" + file});
+      run({kBrowser, "--headless", "--no-sandbox", "--disable-gpu",
+           "--user-data-dir=" + folder.file("profile"), "--print-to-pdf=" + pdf, "file://" + file});
   std::ifstream in(pdf, std::ios::binary);
   const std::string all{std::istreambuf_iterator<char>(in), {}};
   EXPECT_FALSE(all.empty()) << browser.err;
   int pages = 0;
-  for (auto at = all.find("/Type /Page\n"); at != std::string::npos; at = all.find("/Type /Page\n", at + 1)) ++pages;
+  for (auto at = all.find("/Type /Page\n"); at != std::string::npos;
+       at = all.find("/Type /Page\n", at + 1))
+    ++pages;
   return pages;
 }
 

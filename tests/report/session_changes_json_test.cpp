@@ -26,8 +26,8 @@ TEST(SessionChanges, AreTheSameForProgramsAndOnThePage) {
   EXPECT_EQ(json.at("could_also_be").at(0).at("cause"), "tool_changed");
   EXPECT_TRUE(json.at("could_also_be").at(0).at("joint").is_null());
   const std::string html = session_changes_html({lost_zero()});
-  for (const char* part :
-       {"day-&lt;3&gt; (pose p1)", "lost zero in joint 3", "-0.2000", "0.0040", "mrad", "the tool was changed"})
+  for (const char* part : {"day-&lt;3&gt; (pose p1)", "lost zero in joint 3", "-0.2000", "0.0040",
+                           "mrad", "the tool was changed"})
     EXPECT_NE(html.find(part), std::string::npos) << part << " is not in " << html;
   EXPECT_EQ(session_changes_html({}), "");
 }
@@ -35,7 +35,8 @@ TEST(SessionChanges, AreTheSameForProgramsAndOnThePage) {
 TEST(SessionChanges, SayWhatTheyRestOn) {
   SessionChange change = lost_zero();
   EXPECT_EQ(sentence(change).find("order"), std::string::npos) << sentence(change);
-  EXPECT_NE(sentence(change).find("ambiguous: it could also be"), std::string::npos) << sentence(change);
+  EXPECT_NE(sentence(change).find("ambiguous: it could also be"), std::string::npos)
+      << sentence(change);
   change.rests_on_order = true;
   EXPECT_NE(sentence(change).find("rests on the order"), std::string::npos) << sentence(change);
   EXPECT_TRUE(session_changes_json({change}).at(0).at("rests_on_order").get<bool>());

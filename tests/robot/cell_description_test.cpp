@@ -9,7 +9,8 @@
 namespace trammel {
 namespace {
 
-CellDescription description(const std::string& cell_yaml, const std::string& robot_yaml = test::small_robot_yaml()) {
+CellDescription description(const std::string& cell_yaml,
+                            const std::string& robot_yaml = test::small_robot_yaml()) {
   return description_of(test::demand(parse_cell(cell_yaml, robot_yaml, "cell.yaml")));
 }
 
@@ -26,9 +27,9 @@ TEST(CellDescription, WhatIsSpelledOtherwiseOrForPeopleIsTheSame) {
   EXPECT_EQ(description(replaced(text, "0.02", "2e-2")), one);
   EXPECT_EQ(description(replaced(text, "robot.yaml", "../robots/robot.yaml")), one);
   EXPECT_EQ(description(text + "operator: Anna\nserial_number: 6640-1\n"), one);
-  EXPECT_EQ(
-      description(replaced(text, "xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 0, 0, 0], xyz_mm: [0, 0, 0]")),
-      one);
+  EXPECT_EQ(description(replaced(text, "xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]",
+                                 "q_wxyz: [1, 0, 0, 0], xyz_mm: [0, 0, 0]")),
+            one);
   EXPECT_EQ(what_differs(one, one), "");
 }
 

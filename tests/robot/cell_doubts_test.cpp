@@ -13,7 +13,8 @@ const std::string kRobot =
     "  - {d_mm: 420, alpha_deg: 90}\n";
 
 Cell cell_of(const std::string& more, const std::string& robot = kRobot) {
-  const Result<Cell> cell = parse_cell("version: 1\ncell: c\nrobot: r.yaml\n" + more, robot, "c.yaml");
+  const Result<Cell> cell =
+      parse_cell("version: 1\ncell: c\nrobot: r.yaml\n" + more, robot, "c.yaml");
   EXPECT_TRUE(cell) << sentence(cell.error());
   return *cell;
 }
@@ -27,39 +28,45 @@ std::vector<std::string> codes(const Cell& cell) {
 using Codes = std::vector<std::string>;
 
 TEST(CellDoubts, AnOrdinaryCellHasNone) {
+  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 800]}\ngravity: [0, 0, -1]\ntools: {t: {xyz_mm: "
+                          "[0, 0, 150], q_wxyz: [0.92387953, 0, -0.38268343, 0]}}\npayloads: {p: "
+                          "{mass_kg: 100, cog_mm: [0, 0, 100]}}\n")),
+            Codes{});
   EXPECT_EQ(
-      codes(cell_of(
-          "base: {xyz_mm: [0, 0, 800]}\ngravity: [0, 0, -1]\ntools: {t: {xyz_mm: [0, 0, 150], q_wxyz: [0.92387953, 0, "
-          "-0.38268343, 0]}}\npayloads: {p: {mass_kg: 100, cog_mm: [0, 0, 100]}}\n")),
-      Codes{});
-  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 3000], q_wxyz: [0, 1, 0, 0]}\ntools: {t: null}\n")), Codes{})
+      codes(cell_of("base: {xyz_mm: [0, 0, 3000], q_wxyz: [0, 1, 0, 0]}\ntools: {t: null}\n")),
+      Codes{})
       << "hangs from a ceiling";
-  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 900], q_wxyz: [0.70710678, 0, 0.70710678, 0]}\ntools: {t: null}\n")),
+  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 900], q_wxyz: [0.70710678, 0, 0.70710678, "
+                          "0]}\ntools: {t: null}\n")),
             Codes{})
       << "on a wall";
 }
 
 TEST(CellDoubts, NamesGravityUpsideDown) {
-  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0]}\ngravity: [0, 0, 1]\ntools: {t: null}\n")), Codes{"gravity_up"});
-  EXPECT_EQ(codes(cell_of("base: null\ngravity: [0, 0, 9.81]\ntools: {t: null}\n")), Codes{"gravity_up"});
+  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0]}\ngravity: [0, 0, 1]\ntools: {t: null}\n")),
+            Codes{"gravity_up"});
+  EXPECT_EQ(codes(cell_of("base: null\ngravity: [0, 0, 9.81]\ntools: {t: null}\n")),
+            Codes{"gravity_up"});
 }
 
 TEST(CellDoubts, NamesAQuaternionInTheOtherOrder) {
   EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0], q_wxyz: [0, 0, 0, 1]}\ntools: {t: null}\n")),
             Codes{"quaternion_order"});
-  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0], q_wxyz: [0, 0, 0.70710678, 0.70710678]}\ntools: {t: null}\n")),
-            Codes{"quaternion_order"});
+  EXPECT_EQ(
+      codes(cell_of(
+          "base: {xyz_mm: [0, 0, 0], q_wxyz: [0, 0, 0.70710678, 0.70710678]}\ntools: {t: null}\n")),
+      Codes{"quaternion_order"});
   EXPECT_EQ(codes(cell_of("base: null\ntools: {t: {xyz_mm: [0, 0, 100], q_wxyz: [0, 0, 0, 1]}}\n")),
             Codes{"quaternion_order"});
 }
 
 TEST(CellDoubts, NamesLengthsInMetres) {
-  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0.8]}\ntools: {t: {xyz_mm: [0, 0, 0.15]}}\npayloads: {p: {mass_kg: 3, "
-                          "cog_mm: [0, 0, 0.1]}}\n")),
+  EXPECT_EQ(codes(cell_of("base: {xyz_mm: [0, 0, 0.8]}\ntools: {t: {xyz_mm: [0, 0, "
+                          "0.15]}}\npayloads: {p: {mass_kg: 3, cog_mm: [0, 0, 0.1]}}\n")),
             (Codes{"lengths_in_metres", "lengths_in_metres", "lengths_in_metres"}));
   const Result<Chain> small = parse_robot(
-      "version: 1\nname: arm\njoints:\n  - {d_mm: 0.4, alpha_deg: -90}\n  - {a_mm: 0.455, hayati: true}\n  - {d_mm: "
-      "0.42, alpha_deg: 90}\n",
+      "version: 1\nname: arm\njoints:\n  - {d_mm: 0.4, alpha_deg: -90}\n  - {a_mm: 0.455, hayati: "
+      "true}\n  - {d_mm: 0.42, alpha_deg: 90}\n",
       "r.yaml");
   ASSERT_FALSE(small);
   EXPECT_EQ(small.error().next, "in metres? write them in mm");
@@ -75,9 +82,10 @@ TEST(CellDoubts, NamesParallelAxesWithoutAHayatiRow) {
 }
 
 TEST(CellDoubts, APayloadInGramsIsRefused) {
-  EXPECT_FALSE(parse_cell(
-      "version: 1\ncell: c\nrobot: r.yaml\ntools: {t: null}\npayloads: {p: {mass_kg: 4500, cog_mm: [0, 0, 100]}}\n",
-      kRobot, "c.yaml"));
+  EXPECT_FALSE(
+      parse_cell("version: 1\ncell: c\nrobot: r.yaml\ntools: {t: null}\npayloads: {p: {mass_kg: "
+                 "4500, cog_mm: [0, 0, 100]}}\n",
+                 kRobot, "c.yaml"));
 }
 
 }  // namespace

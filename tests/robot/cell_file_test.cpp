@@ -18,7 +18,9 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-std::string shipped(const std::string& file) { return std::string(TRAMMEL_SOURCE_DIR) + "/" + file; }
+std::string shipped(const std::string& file) {
+  return std::string(TRAMMEL_SOURCE_DIR) + "/" + file;
+}
 
 std::string with(std::string text, const std::string& old_part, const std::string& new_part) {
   const std::size_t place = text.find(old_part);
@@ -44,21 +46,23 @@ TEST(CellFile, EveryShippedRobotAndCellLoads) {
 TEST(CellFile, NamesExternalAxesThatCarryNothing) {
   const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
-  const Result<Cell> cell =
-      parse_cell(text + "axes: {gun: carries nothing, 'group 2, axis 1': carries nothing}\n", robot, "c.yaml");
+  const Result<Cell> cell = parse_cell(
+      text + "axes: {gun: carries nothing, 'group 2, axis 1': carries nothing}\n", robot, "c.yaml");
   ASSERT_TRUE(cell) << cell.error().message;
   EXPECT_EQ(rules_of(*cell)->idle_axes, (std::vector<std::string>{"gun", "group 2, axis 1"}));
-  const Result<Cell> carries = parse_cell(text + "axes: {rail: carries the robot}\n", robot, "c.yaml");
+  const Result<Cell> carries =
+      parse_cell(text + "axes: {rail: carries the robot}\n", robot, "c.yaml");
   ASSERT_FALSE(carries);
-  EXPECT_NE(sentence(carries.error()).find("'carries the robot', expected carries nothing"), std::string::npos)
+  EXPECT_NE(sentence(carries.error()).find("'carries the robot', expected carries nothing"),
+            std::string::npos)
       << sentence(carries.error());
 }
 
 TEST(CellFile, ABiasMayBeSpelledAsASum) {
   const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
-  const Result<Cell> cell =
-      parse_cell(with(text, "bias: auto", "bias: matern52 + joint_map + parameters"), robot, "c.yaml");
+  const Result<Cell> cell = parse_cell(
+      with(text, "bias: auto", "bias: matern52 + joint_map + parameters"), robot, "c.yaml");
   ASSERT_TRUE(cell) << cell.error().message;
   EXPECT_EQ(cell->model.bias, "matern52 + joint_map + parameters");
 }
@@ -70,7 +74,8 @@ TEST(CellFile, ConvertsToSiAtTheBoundary) {
   EXPECT_DOUBLE_EQ(cell.tracker.sigma, 13e-6);
   EXPECT_DOUBLE_EQ(cell.payloads.at("spindle").p_FoCog_F.z(), 0.1);
   // Eq. (5.1): the tool's x axis points to (1, 0, 1) / sqrt(2).
-  EXPECT_LT((cell.tools.at("spindle")->linear().col(0) - Vector3(1, 0, 1).normalized()).norm(), 1e-9);
+  EXPECT_LT((cell.tools.at("spindle")->linear().col(0) - Vector3(1, 0, 1).normalized()).norm(),
+            1e-9);
 }
 
 TEST(CellFile, AnUnknownBaseAndToolAreUnknown) {
@@ -105,7 +110,8 @@ TEST(CellFile, RefusesWithFileKeyAndReason) {
             Refusal("cell.yaml", 10, "payloads: spindle: mass_kg").text("heavy"));
   EXPECT_EQ(refusal(with(cell, "q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 1, 0, 0]"), robot),
             Refusal("cell.yaml", 5, "base: q_wxyz").beyond(std::sqrt(2.0), 1));
-  EXPECT_EQ(refusal(with(cell, "version: 1", "version: 2"), robot), Refusal("cell.yaml", 2, "version").beyond(2, 1));
+  EXPECT_EQ(refusal(with(cell, "version: 1", "version: 2"), robot),
+            Refusal("cell.yaml", 2, "version").beyond(2, 1));
   EXPECT_EQ(refusal(cell, with(robot, "limits_deg: [-65, 85]", "limits_deg: [85, -65]")),
             Refusal("cell.yaml (robot)", 8, "joints 2: limits_deg").beyond(85, -65));
   EXPECT_EQ(refusal(cell + "cell: twice\n", robot), Refusal("cell.yaml", 3, "cell"));
@@ -117,14 +123,20 @@ TEST(CellFile, ACouplingIsTheControllersOrOneOfBars) {
   const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
   const auto coupled = [&](const std::string& kind) {
-    return parse_cell(cell, with(robot, "coupling: []", "coupling: [{joint: 3, follows: 2, ratio: -1" + kind + "}]"),
-                      "cell.yaml");
+    return parse_cell(
+        cell,
+        with(robot, "coupling: []", "coupling: [{joint: 3, follows: 2, ratio: -1" + kind + "}]"),
+        "cell.yaml");
   };
   EXPECT_EQ(coupled("")->robot.couplings().front().kind, CouplingKind::kController);
-  EXPECT_EQ(coupled(", kind: controller")->robot.couplings().front().kind, CouplingKind::kController);
-  EXPECT_EQ(coupled(", kind: parallelogram")->robot.couplings().front().kind, CouplingKind::kParallelogram);
-  EXPECT_EQ(refusal_of(coupled(", kind: belt")), Refusal("cell.yaml (robot)", 13, "coupling 1: kind").text("belt"));
-  EXPECT_EQ(read_robot(shipped("models/fanuc_m-20ia.yaml"))->couplings().front().kind, CouplingKind::kController);
+  EXPECT_EQ(coupled(", kind: controller")->robot.couplings().front().kind,
+            CouplingKind::kController);
+  EXPECT_EQ(coupled(", kind: parallelogram")->robot.couplings().front().kind,
+            CouplingKind::kParallelogram);
+  EXPECT_EQ(refusal_of(coupled(", kind: belt")),
+            Refusal("cell.yaml (robot)", 13, "coupling 1: kind").text("belt"));
+  EXPECT_EQ(read_robot(shipped("models/fanuc_m-20ia.yaml"))->couplings().front().kind,
+            CouplingKind::kController);
 }
 
 TEST(CellFile, ARobotFileThatIsAPipeIsRefusedAndNotWaitedFor) {
@@ -132,7 +144,8 @@ TEST(CellFile, ARobotFileThatIsAPipeIsRefusedAndNotWaitedFor) {
   ASSERT_EQ(::mkfifo(folder.file("robot.yaml").c_str(), 0600), 0);
   const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string text = with(cell, "../models/abb_irb6640-205-275.yaml", "robot.yaml");
-  EXPECT_EQ(refusal_of(read_cell(folder.write("cell.yaml", text))), Refusal(folder.file("robot.yaml"), {}, "robot"));
+  EXPECT_EQ(refusal_of(read_cell(folder.write("cell.yaml", text))),
+            Refusal(folder.file("robot.yaml"), {}, "robot"));
 }
 
 TEST(CellFile, TheOnlyToolNeedsNoName) {

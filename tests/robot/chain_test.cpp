@@ -17,7 +17,8 @@ Chain shipped(const std::string& file) {
   return *chain;
 }
 
-/// A made-up arm with everything a chain can have: a rail, a Hayati row, a reversed and a coupled joint.
+/// A made-up arm with everything a chain can have: a rail, a Hayati row, a reversed and a coupled
+/// joint.
 Chain odd_arm() {
   Joint rail;
   rail.type = JointType::kPrismatic;
@@ -87,7 +88,8 @@ TEST(Chain, ReachesAsFarAsTheThesisRobotsNameSays) {
 
 TEST(Chain, PutsTheUr10WhereItsMakerDoes) {
   // All joints at zero: stretched out along -x, x = a2 + a3, y = -(d4 + d6), z = d1 - d5.
-  const Vector3 p = shipped("universal-robots_ur10.yaml").flange_pose(JointVector::Zero(6)).translation();
+  const Vector3 p =
+      shipped("universal-robots_ur10.yaml").flange_pose(JointVector::Zero(6)).translation();
   EXPECT_NEAR(p.x(), -0.612 - 0.5723, 1e-9);
   EXPECT_NEAR(p.y(), -0.163941 - 0.0922, 1e-9);
   EXPECT_NEAR(p.z(), 0.1273 - 0.1157, 1e-9);
@@ -95,7 +97,8 @@ TEST(Chain, PutsTheUr10WhereItsMakerDoes) {
 
 TEST(Chain, GeometricJacobianIsTheDerivativeOfTheFlangePose) {
   std::mt19937_64 random(1);
-  for (const Chain& chain : {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
+  for (const Chain& chain :
+       {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
     const JointVector q = random_joints(chain.size(), random);
     const Vector3 p_F(0.1, -0.2, 0.3);
     const Pose X_FT = make_pose(Matrix3::Identity(), p_F);
@@ -107,7 +110,8 @@ TEST(Chain, GeometricJacobianIsTheDerivativeOfTheFlangePose) {
       ahead(j) += kStep;
       behind(j) -= kStep;
       const Vector6 difference =
-          pose_difference(chain.flange_pose(ahead) * X_FT, chain.flange_pose(behind) * X_FT) / (2 * kStep);
+          pose_difference(chain.flange_pose(ahead) * X_FT, chain.flange_pose(behind) * X_FT) /
+          (2 * kStep);
       EXPECT_LT((J.col(j) - difference).norm(), 1e-6) << chain.name() << " joint " << j + 1;
     }
   }
@@ -155,7 +159,8 @@ ArmState loaded_arm(const Chain& chain, std::mt19937_64& random) {
 
 TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
   std::mt19937_64 random(2);
-  for (const Chain& chain : {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
+  for (const Chain& chain :
+       {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
     ArmState state = loaded_arm(chain, random);
     state.first_moments = FirstMoments::Random(2, chain.size());
     state.spring_torque = JointArray::Random(chain.size());
@@ -169,13 +174,16 @@ TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
       constexpr double kStep = 1e-5;
       const ArmKinematics ahead(moved(state, row, kStep));
       const ArmKinematics behind(moved(state, row, -kStep));
-      const Vector6 pose_change = pose_difference(ahead.tool_pose_W(), behind.tool_pose_W()) / (2 * kStep);
+      const Vector6 pose_change =
+          pose_difference(ahead.tool_pose_W(), behind.tool_pose_W()) / (2 * kStep);
       EXPECT_LT((J.col(row) - pose_change).norm(), 1e-6) << chain.name() << " row " << row;
-      const Eigen::VectorXd torque_change = (ahead.gravity_torque() - behind.gravity_torque()) / (2 * kStep);
+      const Eigen::VectorXd torque_change =
+          (ahead.gravity_torque() - behind.gravity_torque()) / (2 * kStep);
       EXPECT_LT((T.col(row) - torque_change).norm(), 1e-6 * (1 + torque_change.norm()))
           << chain.name() << " row " << row;
       const Vector3 base_change = (ahead.base_moment() - behind.base_moment()) / (2 * kStep);
-      EXPECT_LT((M.col(row) - base_change).norm(), 1e-6 * (1 + base_change.norm())) << chain.name() << " row " << row;
+      EXPECT_LT((M.col(row) - base_change).norm(), 1e-6 * (1 + base_change.norm()))
+          << chain.name() << " row " << row;
       const Vector6 deflected_change =
           (ahead.deflection_jacobian() - behind.deflection_jacobian()) * deflection / (2 * kStep);
       EXPECT_LT((D.col(row) - deflected_change).norm(), 1e-6) << chain.name() << " row " << row;
@@ -201,7 +209,8 @@ TEST(ArmKinematics, TorqueIsTheWorkOfTheWeightPerJointMotion) {
 }
 
 TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
-  // Virtual work again, for a robot whose links weigh: tau_j = sum over bodies of weight . d(cog)/dq_j.
+  // Virtual work again, for a robot whose links weigh: tau_j = sum over bodies of weight .
+  // d(cog)/dq_j.
   std::mt19937_64 random(4);
   const Chain heavy = shipped("universal-robots_ur10.yaml");
   ArmState state = loaded_arm(heavy, random);
@@ -218,10 +227,13 @@ TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
     cut.links.resize(static_cast<std::size_t>(body + 1));
     cut.X_FT = make_pose(Matrix3::Identity(), heavy.joint(body).p_cog);
     for (int j = 0; j <= body; ++j) {
-      const Vector3 motion =
-          (ArmKinematics(moved(cut, StateRows(body + 1).theta(j), 1e-6)).tool_pose_W().translation() -
-           ArmKinematics(moved(cut, StateRows(body + 1).theta(j), -1e-6)).tool_pose_W().translation()) /
-          2e-6;
+      const Vector3 motion = (ArmKinematics(moved(cut, StateRows(body + 1).theta(j), 1e-6))
+                                  .tool_pose_W()
+                                  .translation() -
+                              ArmKinematics(moved(cut, StateRows(body + 1).theta(j), -1e-6))
+                                  .tool_pose_W()
+                                  .translation()) /
+                             2e-6;
       work(j) += heavy.joint(body).mass * kGravity * state.gravity_W.dot(motion);
     }
   }
@@ -235,7 +247,8 @@ TEST(ArmKinematics, TwoFirstMomentsALinkStandForAllWeightsOfTheLinks) {
   std::vector<Joint> weightless;
   FirstMoments moments = FirstMoments::Zero(2, 6);
   double beyond = 0;
-  Vector3 along = Vector3::Zero();  // the next link's moment along its own axis, at the far end of this link
+  Vector3 along =
+      Vector3::Zero();  // the next link's moment along its own axis, at the far end of this link
   for (int i = 5; i >= 0; --i) {
     const Joint& joint = heavy.joint(i);
     const Matrix3 R = Eigen::AngleAxisd(joint.link.alpha, Vector3::UnitX()).toRotationMatrix();

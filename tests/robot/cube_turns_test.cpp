@@ -18,7 +18,9 @@ TEST(CubeTurns, EveryRotationIsNearOneOfThem) {
   double farthest = 0;
   for (int k = 0; k < 2000; ++k) {
     const Matrix3 R =
-        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized().matrix();
+        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+            .normalized()
+            .matrix();
     double nearest = kPi;
     for (const Matrix3& turn : cube_turns())
       nearest = std::min(nearest, Eigen::AngleAxisd(Matrix3(turn.transpose() * R)).angle());

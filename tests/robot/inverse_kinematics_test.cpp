@@ -15,12 +15,15 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Chain shipped(const std::string& file) { return *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + file); }
+Chain shipped(const std::string& file) {
+  return *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + file);
+}
 
 JointVector inside_limits(const Chain& chain, std::mt19937_64& random) {
   JointVector q(chain.size());
   for (int i = 0; i < chain.size(); ++i) {
-    q(i) = std::uniform_real_distribution<double>(chain.joint(i).lower, chain.joint(i).upper)(random);
+    q(i) =
+        std::uniform_real_distribution<double>(chain.joint(i).lower, chain.joint(i).upper)(random);
   }
   return q;
 }
@@ -60,7 +63,8 @@ TEST(InverseKinematics, EachBranchReachesThePoseAndIsRecognisedAgain) {
     for (int conf = 0; conf < 8; ++conf) {
       const InverseResult other = *inverse_kinematics(chain, wanted, conf, q);
       if (other.status == InverseStatus::kUnreachable) continue;
-      EXPECT_LT(pose_difference(wanted, chain.flange_pose(other.q)).norm(), 1e-9) << "conf " << conf;
+      EXPECT_LT(pose_difference(wanted, chain.flange_pose(other.q)).norm(), 1e-9)
+          << "conf " << conf;
       EXPECT_EQ(std::sin(other.q(4)) < 0, (conf & 1) != 0);
       EXPECT_EQ(*branch_of(chain, other.q), conf);
       seen.insert(conf);
@@ -81,20 +85,23 @@ TEST(InverseKinematics, TellsOutOfReachFromOutsideTheLimits) {
   const Chain chain = shipped("abb_irb6640-205-275.yaml");
   Pose far = chain.flange_pose(JointVector::Zero(6));
   far.translation().x() += 3;
-  EXPECT_EQ(inverse_kinematics(chain, far, JointVector::Zero(6)).status, InverseStatus::kUnreachable);
+  EXPECT_EQ(inverse_kinematics(chain, far, JointVector::Zero(6)).status,
+            InverseStatus::kUnreachable);
   EXPECT_EQ(inverse_kinematics(chain, far, 0)->status, InverseStatus::kUnreachable);
   JointVector beyond = JointVector::Zero(6);
   beyond(1) = from_deg(95);  // limit 85
   beyond(4) = from_deg(40);
   const Pose outside = chain.flange_pose(beyond);
   EXPECT_EQ(inverse_kinematics(chain, outside, beyond).status, InverseStatus::kJointLimit);
-  EXPECT_EQ(inverse_kinematics(chain, outside, *branch_of(chain, beyond), beyond)->status, InverseStatus::kJointLimit);
+  EXPECT_EQ(inverse_kinematics(chain, outside, *branch_of(chain, beyond), beyond)->status,
+            InverseStatus::kJointLimit);
 }
 
 TEST(InverseKinematics, CallsAStretchedWristSingular) {
   const Chain chain = shipped("abb_irb6640-205-275.yaml");
   const JointVector straight = JointVector::Zero(6);
-  EXPECT_EQ(inverse_kinematics(chain, chain.flange_pose(straight), straight).status, InverseStatus::kSingular);
+  EXPECT_EQ(inverse_kinematics(chain, chain.flange_pose(straight), straight).status,
+            InverseStatus::kSingular);
 }
 
 TEST(InverseKinematics, RefusesABranchWhereThereIsNone) {

@@ -11,13 +11,14 @@
 #include "server/robot/cell.h"
 #include "server/robot/inverse_kinematics.h"
 
-// The shipped robots against their makers' drawings, told another way than by Denavit-Hartenberg rows: each axis as the
-// drawing shows it with all joints at zero, the flange there, and the reach.
+// The shipped robots against their makers' drawings, told another way than by Denavit-Hartenberg
+// rows: each axis as the drawing shows it with all joints at zero, the flange there, and the reach.
 
 namespace trammel {
 namespace {
 
-/// A line that a joint turns about (or slides along), in B with all joints at zero, in the controller's sense; mm.
+/// A line that a joint turns about (or slides along), in B with all joints at zero, in the
+/// controller's sense; mm.
 struct Axis {
   Vector3 direction;
   Vector3 point_mm = Vector3::Zero();
@@ -30,18 +31,19 @@ struct Drawing {
   Vector3 flange_mm;  ///< at zero
   Vector3 flange_x;   ///< the flange's x and z axis there
   Vector3 flange_z;
-  std::optional<double> wrist_reach_mm;  ///< as its maker says, horizontally from axis 1 to the wrist centre
-  bool follows = false;                  ///< joint 3 is commanded against level, not against the lower arm
+  std::optional<double>
+      wrist_reach_mm;    ///< as its maker says, horizontally from axis 1 to the wrist centre
+  bool follows = false;  ///< joint 3 is commanded against level, not against the lower arm
 };
 
 const Vector3 kX = Vector3::UnitX();
 const Vector3 kY = Vector3::UnitY();
 const Vector3 kZ = Vector3::UnitZ();
 
-/// An elbow arm with forearm level and looking along x: heights and lengths as drawings give them; `senses` of joints
-/// 1 to 6 against the right-hand rule about z, y, y, x, y, x.
-std::vector<Axis> elbow(double height, double shoulder, double lower, double elbow_up, double forearm,
-                        const std::array<double, 6>& senses) {
+/// An elbow arm with forearm level and looking along x: heights and lengths as drawings give them;
+/// `senses` of joints 1 to 6 against the right-hand rule about z, y, y, x, y, x.
+std::vector<Axis> elbow(double height, double shoulder, double lower, double elbow_up,
+                        double forearm, const std::array<double, 6>& senses) {
   const double level = height + lower + elbow_up;
   const Vector3 wrist(shoulder + forearm, 0, level);
   return {{senses[0] * kZ, Vector3::Zero()},
@@ -56,11 +58,32 @@ std::vector<Drawing> drawings() {
   const std::array<double, 6> right{1, 1, 1, 1, 1, 1};
   const std::array<double, 6> three_to_six{1, 1, -1, -1, -1, -1};
   std::vector<Drawing> all = {
-      {"abb_irb6640-205-275.yaml", elbow(780, 320, 1280, 200, 1142, right), {1662, 0, 2260}, -kZ, kX, 2750},
+      {"abb_irb6640-205-275.yaml",
+       elbow(780, 320, 1280, 200, 1142, right),
+       {1662, 0, 2260},
+       -kZ,
+       kX,
+       2750},
       {"abb_irb120-3-06.yaml", elbow(290, 0, 270, 70, 302, right), {374, 0, 630}, -kZ, kX, 580},
-      {"abb_irb1200-5-09.yaml", elbow(399.1, 0, 448, 42, 451, right), {533, 0, 889.1}, -kZ, kX, 901},
-      {"fanuc_m-20ia.yaml", elbow(0, 150, 790, 250, 835, three_to_six), {1085, 0, 1040}, kZ, kX, 1811, true},
-      {"yaskawa_gp25.yaml", elbow(0, 150, 760, 200, 795, three_to_six), {1045, 0, 960}, kZ, kX, 1730},
+      {"abb_irb1200-5-09.yaml",
+       elbow(399.1, 0, 448, 42, 451, right),
+       {533, 0, 889.1},
+       -kZ,
+       kX,
+       901},
+      {"fanuc_m-20ia.yaml",
+       elbow(0, 150, 790, 250, 835, three_to_six),
+       {1085, 0, 1040},
+       kZ,
+       kX,
+       1811,
+       true},
+      {"yaskawa_gp25.yaml",
+       elbow(0, 150, 760, 200, 795, three_to_six),
+       {1045, 0, 960},
+       kZ,
+       kX,
+       1730},
       // The arm lies stretched out along x.
       {"kuka_kr210-r2700-extra.yaml",
        {{-kZ},
@@ -75,7 +98,12 @@ std::vector<Drawing> drawings() {
        2696},
       // The arm stands upright.
       {"staubli_tx2-90l.yaml",
-       {{kZ}, {kY, {50, 0, 0}}, {kY, {50, 0, 500}}, {kZ, {50, 50, 0}}, {kY, {50, 0, 1050}}, {kZ, {50, 50, 0}}},
+       {{kZ},
+        {kY, {50, 0, 0}},
+        {kY, {50, 0, 500}},
+        {kZ, {50, 50, 0}},
+        {kY, {50, 0, 1050}},
+        {kZ, {50, 50, 0}}},
        {50, 50, 1150},
        kX,
        kZ,
@@ -86,7 +114,8 @@ std::vector<Drawing> drawings() {
        kX,
        kZ,
        800},
-      // The arm lies stretched out along -x. The makers' reach is rounded and says no point, so it is not compared.
+      // The arm lies stretched out along -x. The makers' reach is rounded and says no point, so it
+      // is not compared.
       {"universal-robots_ur5.yaml",
        {{kZ},
         {-kY, {0, 0, 89.159}},
@@ -172,7 +201,8 @@ TEST(ShippedRobots, MoveAsTheAxesOfTheirDrawingsCarryThem) {
     const Chain chain = shipped(drawing.file);
     ASSERT_EQ(chain.size(), static_cast<int>(drawing.axes.size())) << drawing.file;
     for (int sample = 0; sample < 20; ++sample) {
-      const JointVector q = sample == 0 ? JointVector::Zero(chain.size()) : within_limits(chain, random);
+      const JointVector q =
+          sample == 0 ? JointVector::Zero(chain.size()) : within_limits(chain, random);
       const Vector6 difference = pose_difference(chain.flange_pose(q), carried(drawing, q));
       EXPECT_LT(difference.norm(), 1e-9) << drawing.file << " at " << q.transpose();
     }
@@ -186,9 +216,12 @@ double wrist_radius(const Chain& chain, const JointVector& q) {
   return (X.translation() - chain.joint(last).link.d * X.linear().col(2)).head<2>().norm();
 }
 
-/// The largest radius over the shoulder's and the elbow's joint, by a coarse grid and then ever smaller steps.
+/// The largest radius over the shoulder's and the elbow's joint, by a coarse grid and then ever
+/// smaller steps.
 double farthest(const Chain& chain, int shoulder, int elbow) {
-  const auto keep = [&](int j, double value) { return std::clamp(value, chain.joint(j).lower, chain.joint(j).upper); };
+  const auto keep = [&](int j, double value) {
+    return std::clamp(value, chain.joint(j).lower, chain.joint(j).upper);
+  };
   JointVector q = JointVector::Zero(chain.size());
   JointVector best = q;
   double radius = 0;
@@ -237,7 +270,8 @@ TEST(ShippedRobots, HaveAHayatiRowExactlyWhereTheNextAxisIsParallel) {
       const std::size_t at = static_cast<std::size_t>(j);
       const bool revolute = drawing.axes[at].type == JointType::kRevolute;
       const double sine = drawing.axes[at].direction.cross(drawing.axes[at + 1].direction).norm();
-      EXPECT_EQ(chain.joint(j).hayati, revolute && sine < 1e-9) << drawing.file << " link " << j + 1;
+      EXPECT_EQ(chain.joint(j).hayati, revolute && sine < 1e-9)
+          << drawing.file << " link " << j + 1;
     }
   }
 }
@@ -255,7 +289,8 @@ TEST(ShippedRobots, ElbowArmsComeBackFromTheirPosesByTheClosedForm) {
       ASSERT_TRUE(conf) << drawing.file;
       const Result<InverseResult> back = inverse_kinematics(chain, chain.flange_pose(q), *conf, q);
       ASSERT_TRUE(back) << drawing.file;
-      EXPECT_LT((back->q - q).norm(), 1e-6) << drawing.file << " at " << q.transpose() << " conf " << *conf;
+      EXPECT_LT((back->q - q).norm(), 1e-6)
+          << drawing.file << " at " << q.transpose() << " conf " << *conf;
     }
   }
   EXPECT_EQ(arms, 7);

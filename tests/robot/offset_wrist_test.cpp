@@ -13,7 +13,8 @@ namespace trammel {
 namespace {
 
 Chain shipped(const std::string& name) {
-  const Result<Chain> chain = read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + name + ".yaml");
+  const Result<Chain> chain =
+      read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + name + ".yaml");
   EXPECT_TRUE(chain) << name;
   return *chain;
 }
@@ -22,7 +23,8 @@ const std::vector<std::string> kOffset = {"universal-robots_ur10", "universal-ro
 
 TEST(OffsetWrist, OnlyArmsWithThreeParallelAxesHaveOne) {
   for (const std::string& name : kOffset) EXPECT_TRUE(has_offset_wrist(shipped(name))) << name;
-  for (const char* name : {"abb_irb6640-205-275", "kuka_lbr-iiwa-7-r800", "abb_irb6640-205-275-on-rail"})
+  for (const char* name :
+       {"abb_irb6640-205-275", "kuka_lbr-iiwa-7-r800", "abb_irb6640-205-275-on-rail"})
     EXPECT_FALSE(has_offset_wrist(shipped(name))) << name;
 }
 
@@ -40,7 +42,8 @@ TEST(OffsetWrist, EveryBranchBringsTheFlangeThereAndOneOfThemIsTheArms) {
         const auto joints = joints_of_offset_wrist(chain, X_BF, branch, q);
         if (!joints) continue;
         ++found;
-        EXPECT_LT(pose_difference(chain.flange_pose(*joints), X_BF).norm(), 1e-9) << name << " branch " << branch;
+        EXPECT_LT(pose_difference(chain.flange_pose(*joints), X_BF).norm(), 1e-9)
+            << name << " branch " << branch;
         own += (*joints - q).norm() < 1e-7 ? 1 : 0;
       }
       EXPECT_EQ(own, 1) << name << " pose " << pose << " of " << found;
@@ -86,7 +89,8 @@ TEST(OffsetWrist, OutOfReachIsNoBranch) {
   const Chain chain = shipped("universal-robots_ur10");
   for (const Vector3& p : {Vector3(2, 0, 0), Vector3(.01, 0, .5)}) {
     for (int branch = 0; branch < 8; ++branch)
-      EXPECT_FALSE(joints_of_offset_wrist(chain, make_pose(Matrix3::Identity(), p), branch, JointVector::Zero(6)));
+      EXPECT_FALSE(joints_of_offset_wrist(chain, make_pose(Matrix3::Identity(), p), branch,
+                                          JointVector::Zero(6)));
   }
 }
 

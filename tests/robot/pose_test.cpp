@@ -11,7 +11,8 @@ TEST(Pose, LogarithmUndoesExponentialUpToHalfATurn) {
   for (const double angle : {0.0, 1e-14, 1e-8, 1e-3, 1.0, 3.0, kPi - 1e-9}) {
     const Vector3 w = angle * Vector3(1, -2, 0.5).normalized();
     EXPECT_LT((rotation_log(rotation_exp(w)) - w).norm(), 1e-7 * (1 + angle)) << angle;
-    EXPECT_NEAR((rotation_exp(w).transpose() * rotation_exp(w) - Matrix3::Identity()).norm(), 0, 1e-14);
+    EXPECT_NEAR((rotation_exp(w).transpose() * rotation_exp(w) - Matrix3::Identity()).norm(), 0,
+                1e-14);
   }
 }
 

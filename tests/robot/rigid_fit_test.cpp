@@ -12,7 +12,9 @@ using test::refusal_of;
 
 const Pose kTruth = make_pose(rotation_exp({0.5, -2.5, 0.8}), {3, -1, 0.5});
 
-Eigen::Matrix3Xd moved(const Eigen::Matrix3Xd& p) { return (kTruth.linear() * p).colwise() + kTruth.translation(); }
+Eigen::Matrix3Xd moved(const Eigen::Matrix3Xd& p) {
+  return (kTruth.linear() * p).colwise() + kTruth.translation();
+}
 
 TEST(RigidFit, FindsTheDirectMapExactly) {
   const Eigen::Matrix3Xd p_B = Eigen::Matrix3Xd::Random(3, 5);

@@ -11,15 +11,17 @@ namespace trammel {
 namespace {
 
 Chain shipped(const std::string& name) {
-  const Result<Chain> chain = read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + name + ".yaml");
+  const Result<Chain> chain =
+      read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + name + ".yaml");
   EXPECT_TRUE(chain) << name;
   return *chain;
 }
 
-const std::vector<std::string> kSixAxes = {"abb_irb6640-205-275",        "abb_irb120-3-06",      "fanuc_m-20ia",
-                                           "kuka_kr210-r2700-extra",     "staubli_tx2-90l",      "yaskawa_gp25",
-                                           "universal-robots_ur10",      "universal-robots_ur5", "abb_irb1200-5-09",
-                                           "abb_irb6640-205-275-on-rail"};
+const std::vector<std::string> kSixAxes = {"abb_irb6640-205-275",   "abb_irb120-3-06",
+                                           "fanuc_m-20ia",          "kuka_kr210-r2700-extra",
+                                           "staubli_tx2-90l",       "yaskawa_gp25",
+                                           "universal-robots_ur10", "universal-robots_ur5",
+                                           "abb_irb1200-5-09",      "abb_irb6640-205-275-on-rail"};
 
 /// A pose with this wrist angle, away from other singularities.
 JointVector opened(const Chain& chain, double angle) {
@@ -55,7 +57,9 @@ TEST(Wrist, ItsAngleChangesWithTheJointsAsItSaysAndChangesSignAtTheSingularity) 
       for (int j = 0; j < chain.size(); ++j) {
         JointVector moved = q;
         moved(j) += 1e-6;
-        EXPECT_NEAR((wrist_opening(chain, moved, 0.1)->angle - angle) / 1e-6, wrist->by_joint(j), 1e-6) << j;
+        EXPECT_NEAR((wrist_opening(chain, moved, 0.1)->angle - angle) / 1e-6, wrist->by_joint(j),
+                    1e-6)
+            << j;
       }
     }
   }

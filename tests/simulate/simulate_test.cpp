@@ -56,7 +56,8 @@ TEST(Simulate, RefusesPosesTheRobotCannotTake) {
 TEST(TruthFile, RefusesUnknownSourcesParametersAndKeys) {
   const test::TemporaryFolder folder;
   const auto refusal = [&](const std::string& text) {
-    const Result<VirtualRobot> read = read_virtual_robot(folder.write("truth.yaml", text), test::cell_7());
+    const Result<VirtualRobot> read =
+        read_virtual_robot(folder.write("truth.yaml", text), test::cell_7());
     EXPECT_FALSE(read) << text;
     return refusal_of(read);
   };
@@ -64,7 +65,8 @@ TEST(TruthFile, RefusesUnknownSourcesParametersAndKeys) {
             Refusal(folder.file("truth.yaml"), 2, "error_sources").text("gremlins"));
   EXPECT_EQ(refusal("version: 1\nerror_sources: {base: {x0: 1}}\n"),
             Refusal(folder.file("truth.yaml"), 2, "error_sources: base: x0"));
-  EXPECT_EQ(refusal("version: 1\nerror_sources: {}\nnoises: {}\n"), Refusal(folder.file("truth.yaml"), 3, "noises"));
+  EXPECT_EQ(refusal("version: 1\nerror_sources: {}\nnoises: {}\n"),
+            Refusal(folder.file("truth.yaml"), 3, "noises"));
 }
 
 }  // namespace

@@ -23,13 +23,14 @@ class AuditTest : public testing::Test, protected test::StoreUnderTest {
     return StoreUnderTest::submit(batch);
   }
   int train(const std::string& id, bool put_in_force) {
-    return demand(
-        store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id), put_in_force, "judged"));
+    return demand(store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id),
+                                    put_in_force, "judged"));
   }
   std::vector<std::string> told(const AuditTrail& trail) {
     std::vector<std::string> lines;
     for (const AuditRow& row : trail.rows)
-      lines.push_back(fmt::format("{} {}: {} -> {} by {}", row.what, row.subject, row.before, row.after, row.who));
+      lines.push_back(fmt::format("{} {}: {} -> {} by {}", row.what, row.subject, row.before,
+                                  row.after, row.who));
     return lines;
   }
   void alter(const std::string& sql) {
@@ -44,12 +45,14 @@ TEST_F(AuditTest, EveryChangeIsToldOnceWithWhoAskedForItAndWhatItChanged) {
   train("lt-07", true);
   train("lt-08", false);
   ASSERT_TRUE(store_->activate("cell-7", 2, {"c:1", "activate 2", "anna", "the old one drifts"}));
-  ASSERT_TRUE(store_->activate("cell-7", 2, {"c:1", "activate 2", "anna"})) << "the repeat changes nothing";
+  ASSERT_TRUE(store_->activate("cell-7", 2, {"c:1", "activate 2", "anna"}))
+      << "the repeat changes nothing";
   ASSERT_TRUE(store_->activate("cell-7", 2)) << "nor does what is so already";
   ASSERT_TRUE(store_->rollback("cell-7", 1, {"c:2", "back", "bert"}));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-08", "strange"));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-08", "", {"c:3", "release", "anna"}));
-  ASSERT_FALSE(store_->activate("cell-7", 9, {"c:4", "activate 9", "anna"})) << "what is refused changes nothing";
+  ASSERT_FALSE(store_->activate("cell-7", 9, {"c:4", "activate 9", "anna"}))
+      << "what is refused changes nothing";
   const AuditTrail trail = demand(store_->audit());
   EXPECT_FALSE(trail.broken);
   EXPECT_EQ(trail.verified, static_cast<std::int64_t>(trail.rows.size()));
@@ -98,7 +101,8 @@ TEST_F(AuditTest, ARowThatWasForgedWithItsHashIsFoundByTheNextOne) {
   for (int i = 0; i < 3; ++i) train("lt-" + std::to_string(i), true);
   AuditRow forged = demand(store_->audit()).rows[4];
   forged.who = "nobody";
-  alter(fmt::format("UPDATE audit SET who = 'nobody', hash = '{}' WHERE number = 5", hash_of(forged)));
+  alter(fmt::format("UPDATE audit SET who = 'nobody', hash = '{}' WHERE number = 5",
+                    hash_of(forged)));
   EXPECT_EQ(demand(read_audit(path_, {})).broken->row, 6);
 }
 
@@ -123,7 +127,8 @@ TEST_F(AuditTest, AsJsonItIsTheSame) {
   const AuditTrail trail = demand(store_->audit());
   const AuditTrail again = demand(audit_of_json(audit_json(trail).dump()));
   ASSERT_EQ(again.rows.size(), trail.rows.size());
-  for (std::size_t i = 0; i < trail.rows.size(); ++i) EXPECT_EQ(hash_of(again.rows[i]), trail.rows[i].hash);
+  for (std::size_t i = 0; i < trail.rows.size(); ++i)
+    EXPECT_EQ(hash_of(again.rows[i]), trail.rows[i].hash);
   EXPECT_FALSE(audit_of_json("{}"));
 }
 
@@ -135,8 +140,10 @@ TEST_F(AuditTest, WhereAnotherVersionIsInForceThanExpectedNothingChangesAndNothi
   const auto refused = store_->add_job(test::job_of("lt-07"), false, id);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kConflict);
-  EXPECT_NE(refused.error().message.find("service put it in force"), std::string::npos) << refused.error().message;
-  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "strange", id).error().code, ErrorCode::kConflict);
+  EXPECT_NE(refused.error().message.find("service put it in force"), std::string::npos)
+      << refused.error().message;
+  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "strange", id).error().code,
+            ErrorCode::kConflict);
   EXPECT_EQ(demand(store_->audit()).rows.size(), before);
   id.expected_version = 1;
   const auto queued = demand(store_->add_job(test::job_of("lt-07"), false, id));
@@ -154,7 +161,8 @@ TEST_F(AuditTest, WhatIsDiscardedIsTakenByNothingAnyMore) {
   EXPECT_EQ(store_->add_job(test::job_of("lt-07"), true).error().code, ErrorCode::kConflict);
   const AuditTrail trail = demand(store_->audit());
   ASSERT_EQ(trail.rows.size(), 3u);
-  EXPECT_EQ(told(trail).back(), "discard batch lt-07: free -> discarded: the tracker was warm by anna");
+  EXPECT_EQ(told(trail).back(),
+            "discard batch lt-07: free -> discarded: the tracker was warm by anna");
 }
 
 TEST_F(AuditTest, PruningTakesTheOldestTextsButNeverWhatIsNeeded) {
@@ -168,20 +176,22 @@ TEST_F(AuditTest, PruningTakesTheOldestTextsButNeverWhatIsNeeded) {
   for (int version = 1; version <= 8; ++version) {
     if (store_->model_text("cell-7", version)) there.push_back(version);
   }
-  EXPECT_EQ(there, (std::vector{2, 5, 7, 8})) << "in force, what a rollback returns to, the newest two";
+  EXPECT_EQ(there, (std::vector{2, 5, 7, 8}))
+      << "in force, what a rollback returns to, the newest two";
   std::vector<std::string> batches;
   for (const StoredBatch& batch : demand(store_->batches("cell-7"))) {
     if (store_->batch("cell-7", batch.id)) batches.push_back(batch.id);
   }
-  EXPECT_EQ(batches, (std::vector<std::string>{"lt-2", "lt-5", "lt-8"})) << "trained on, and the newest";
+  EXPECT_EQ(batches, (std::vector<std::string>{"lt-2", "lt-5", "lt-8"}))
+      << "trained on, and the newest";
   EXPECT_EQ(pruned, 4 + 5);
   EXPECT_EQ(demand(store_->models("cell-7")).size(), 8u) << "records stay";
   EXPECT_EQ(store_->activate("cell-7", 1).error().code, ErrorCode::kNotFound);
   const AuditTrail trail = demand(store_->audit());
   EXPECT_FALSE(trail.broken);
-  EXPECT_EQ(
-      std::count_if(trail.rows.begin(), trail.rows.end(), [](const AuditRow& row) { return row.what == "prune"; }),
-      pruned);
+  EXPECT_EQ(std::count_if(trail.rows.begin(), trail.rows.end(),
+                          [](const AuditRow& row) { return row.what == "prune"; }),
+            pruned);
   EXPECT_EQ(demand(store_->rollback("cell-7")), 2);
 }
 

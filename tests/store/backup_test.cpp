@@ -21,14 +21,16 @@ namespace fs = std::filesystem;
 std::string content_of(const std::string& path) {
   SQLite::Database file(path, SQLite::OPEN_READONLY);
   std::vector<std::string> tables;
-  SQLite::Statement names(file, "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name");
+  SQLite::Statement names(file,
+                          "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name");
   while (names.executeStep()) tables.push_back(names.getColumn(0).getString());
   std::string content;
   for (const std::string& table : tables) {
     content += table + "\n";
     SQLite::Statement rows(file, "SELECT * FROM " + table);
     while (rows.executeStep()) {
-      for (int i = 0; i < rows.getColumnCount(); ++i) content += rows.getColumn(i).getString() + "|";
+      for (int i = 0; i < rows.getColumnCount(); ++i)
+        content += rows.getColumn(i).getString() + "|";
       content += "\n";
     }
   }
@@ -39,10 +41,12 @@ class BackupTest : public testing::Test, protected test::StoreUnderTest {
  protected:
   void SetUp() override { open(); }
   std::int64_t submit(const std::string& id) {
-    return StoreUnderTest::submit(test::batch_of(id, "q1_deg\n" + id + "\n" + std::string(20000, '#'), "client:" + id));
+    return StoreUnderTest::submit(
+        test::batch_of(id, "q1_deg\n" + id + "\n" + std::string(20000, '#'), "client:" + id));
   }
   void train(const std::string& id) {
-    ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id), true, "judged"));
+    ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id),
+                                  true, "judged"));
   }
   Result<StoreCopy> back_up() { return back_up_store(path_, copy_); }
 
@@ -76,9 +80,9 @@ TEST_F(BackupTest, AReleaseInAStoreOfBeforeIsKeptAndItsCopyIsWhole) {
     SQLite::Database file(path_, SQLite::OPEN_READWRITE);
     file.exec("DROP TABLE job_releases");
     file.exec(
-        "CREATE TABLE job_releases (job INTEGER NOT NULL REFERENCES jobs (id), cell TEXT NOT NULL, batch TEXT NOT "
-        "NULL, "
-        "PRIMARY KEY (job, batch), FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID");
+        "CREATE TABLE job_releases (job INTEGER NOT NULL REFERENCES jobs (id), cell TEXT NOT NULL, "
+        "batch TEXT NOT NULL, PRIMARY KEY (job, batch), FOREIGN KEY (cell, batch) REFERENCES "
+        "batches (cell, id)) WITHOUT ROWID");
     file.exec("INSERT INTO job_releases VALUES (" + std::to_string(job) + ", 'cell-7', 'lt-07')");
   }
   open();
@@ -131,7 +135,10 @@ TEST_F(BackupTest, WhatIsWrittenMeanwhileIsWrittenAndTheCopyIsOfOneMoment) {
   EXPECT_FALSE(store_->state().why_not_written);
   submit("last");
   store_.reset();
-  EXPECT_EQ(SQLite::Database(path_, SQLite::OPEN_READONLY).execAndGet("PRAGMA integrity_check").getString(), "ok");
+  EXPECT_EQ(SQLite::Database(path_, SQLite::OPEN_READONLY)
+                .execAndGet("PRAGMA integrity_check")
+                .getString(),
+            "ok");
 }
 
 TEST_F(BackupTest, AFileThatIsThereIsNotWrittenOver) {
@@ -158,7 +165,8 @@ TEST_F(BackupTest, ACopyThatWasChangedAfterwardsIsNotWhole) {
   train("lt-07");
   ASSERT_TRUE(back_up());
   ASSERT_TRUE(check_store_copy(copy_));
-  SQLite::Database(copy_, SQLite::OPEN_READWRITE).exec("UPDATE audit SET who = 'nobody' WHERE number = 2");
+  SQLite::Database(copy_, SQLite::OPEN_READWRITE)
+      .exec("UPDATE audit SET who = 'nobody' WHERE number = 2");
   const auto changed = check_store_copy(copy_);
   ASSERT_FALSE(changed);
   EXPECT_EQ(changed.error().row, 2);
@@ -180,9 +188,12 @@ TEST_F(BackupTest, ABatchOrAModelOfWhichADigitWasChangedIsNamed) {
     return copy ? std::string() : copy.error().message;
   };
   EXPECT_EQ(changed("UPDATE batches SET poses = poses"), "");
-  EXPECT_NE(changed("UPDATE batches SET csv = replace(csv, 'lt-07', 'lt-08')").find("batch lt-07"), std::string::npos);
-  EXPECT_NE(changed("UPDATE models SET content = replace(content, '\"values\":[1', '\"values\":[2')").find("version 1"),
+  EXPECT_NE(changed("UPDATE batches SET csv = replace(csv, 'lt-07', 'lt-08')").find("batch lt-07"),
             std::string::npos);
+  EXPECT_NE(
+      changed("UPDATE models SET content = replace(content, '\"values\":[1', '\"values\":[2')")
+          .find("version 1"),
+      std::string::npos);
 }
 
 }  // namespace

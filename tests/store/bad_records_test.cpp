@@ -1,5 +1,5 @@
-// A database that is not as it should be: each refusal has a code and words that name the place without the password,
-// and nothing that was acknowledged is lost.
+// A database that is not as it should be: each refusal has a code and words that name the place
+// without the password, and nothing that was acknowledged is lost.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -32,13 +32,17 @@ std::set<std::string> batches_of(Store& store) {
 }
 
 /// The same database for another role, perhaps with a password.
-std::string as(std::string url, const std::string& who) { return url.replace(url.find("postgres@"), 8, who); }
+std::string as(std::string url, const std::string& who) {
+  return url.replace(url.find("postgres@"), 8, who);
+}
 
 /// All on one server.
 class BadRecord : public testing::Test {
  protected:
   static void SetUpTestSuite() { Postgres::of_program(); }
-  std::unique_ptr<Store> open(const std::string& url) { return demand(Store::open(url, folder_.file("cache"))); }
+  std::unique_ptr<Store> open(const std::string& url) {
+    return demand(Store::open(url, folder_.file("cache")));
+  }
   std::string say(const std::string& sql) { return postgres_.sql(url_, sql); }
 
   Postgres& postgres_ = Postgres::of_program();
@@ -52,8 +56,8 @@ TEST_F(BadRecord, AWrongPasswordAndNoneAreRefusedWithoutSayingIt) {
   EXPECT_TRUE(Store::open(as(url_, "needs_password:right")));
   for (const char* who : {"needs_password:s3cret", "needs_password"}) {
     const std::string url = as(url_, who);
-    for (const Error& refused : {Store::open(url).error(), check_store(url).error(), init_store(url).error(),
-                                 look_through_store(url).error()}) {
+    for (const Error& refused : {Store::open(url).error(), check_store(url).error(),
+                                 init_store(url).error(), look_through_store(url).error()}) {
       EXPECT_EQ(refused.code, ErrorCode::kRefused) << sentence(refused);
       EXPECT_EQ(refused.file, spoken_place(url));
       EXPECT_NE(refused.message.find("password"), std::string::npos) << sentence(refused);
@@ -72,7 +76,8 @@ TEST_F(BadRecord, APasswordThatIsChangedWhileItServesStopsChangesUntilItIsRightA
   const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kBusy) << sentence(refused.error());
-  EXPECT_NE(refused.error().message.find("password"), std::string::npos) << sentence(refused.error());
+  EXPECT_NE(refused.error().message.find("password"), std::string::npos)
+      << sentence(refused.error());
   EXPECT_EQ(store->versions_to_serve("cell-7"), std::vector<int>{1}) << "from its copy";
   say("ALTER ROLE needs_password PASSWORD 'right'");
   ASSERT_TRUE(store->wait_until_writable({}));
@@ -84,7 +89,8 @@ TEST_F(BadRecord, WhatIsMissingIsNamed) {
   const auto no_database = Store::open(none);
   ASSERT_FALSE(no_database);
   EXPECT_EQ(no_database.error().code, ErrorCode::kRefused);
-  EXPECT_NE(no_database.error().message.find("no_such_database"), std::string::npos) << sentence(no_database.error());
+  EXPECT_NE(no_database.error().message.find("no_such_database"), std::string::npos)
+      << sentence(no_database.error());
   const auto no_role = Store::open(as(url_, "nobody"));
   ASSERT_FALSE(no_role);
   EXPECT_EQ(no_role.error().code, ErrorCode::kRefused);
@@ -93,7 +99,8 @@ TEST_F(BadRecord, WhatIsMissingIsNamed) {
   const auto no_rights = Store::open(as(url_, "stranger"));
   ASSERT_FALSE(no_rights);
   EXPECT_EQ(no_rights.error().code, ErrorCode::kRefused);
-  EXPECT_NE(no_rights.error().message.find("permission denied"), std::string::npos) << sentence(no_rights.error());
+  EXPECT_NE(no_rights.error().message.find("permission denied"), std::string::npos)
+      << sentence(no_rights.error());
 }
 
 TEST_F(BadRecord, ADatabaseThatMayNotBeWrittenIsServedFromItsCopies) {
@@ -102,37 +109,43 @@ TEST_F(BadRecord, ADatabaseThatMayNotBeWrittenIsServedFromItsCopies) {
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
   }
   const std::string name = say("SELECT current_database()");
-  postgres_.sql(postgres_.url("postgres"), "ALTER DATABASE " + name + " SET default_transaction_read_only = on");
+  postgres_.sql(postgres_.url("postgres"),
+                "ALTER DATABASE " + name + " SET default_transaction_read_only = on");
   EXPECT_EQ(check_store(url_).error().code, ErrorCode::kUnreachable);
   EXPECT_EQ(init_store(url_).error().code, ErrorCode::kUnreachable);
   const auto store = open(url_);
   EXPECT_EQ(store->versions_to_serve("cell-7"), std::vector<int>{1});
   const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("read-only"), std::string::npos) << sentence(refused.error());
+  EXPECT_NE(refused.error().message.find("read-only"), std::string::npos)
+      << sentence(refused.error());
   EXPECT_EQ(refused.error().next, "name the primary, or all hosts of the cluster");
-  postgres_.sql(postgres_.url("postgres"), "ALTER DATABASE " + name + " RESET default_transaction_read_only");
+  postgres_.sql(postgres_.url("postgres"),
+                "ALTER DATABASE " + name + " RESET default_transaction_read_only");
   ASSERT_TRUE(store->wait_until_writable({}));
   EXPECT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
 }
 
 TEST_F(BadRecord, AConnectionThatIsCutWithinATransactionLeavesNothingHalfDone) {
   const auto store = open(url_);
-  test::Process somebody({"/usr/bin/psql", url_, "-c", "BEGIN", "-c", "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c",
-                          "SELECT 'locked'", "-c", "SELECT pg_sleep(60)"});
+  test::Process somebody({"/usr/bin/psql", url_, "-c", "BEGIN", "-c",
+                          "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
+                          "SELECT pg_sleep(60)"});
   ASSERT_TRUE(somebody.wait_for_line("locked", kPatience));
   Result<StoredJob> made = tl::make_unexpected(Error{});
   {
     const std::jthread asks([&] { made = store->add_batch(batch_of("lt-07"), job_of("lt-07")); });
     // It has written the batch and its job, and waits for the end of the trail.
-    const std::string waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()";
+    const std::string waiting =
+        "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()";
     for (int i = 0; i < 1000 && say("SELECT count(*) " + waiting) == "0\n"; ++i) continue;
     say("SELECT pg_terminate_backend(pid) " + waiting);
-    say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'psql' AND "
-        "pid <> pg_backend_pid() AND datname = current_database()");
+    say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'psql' "
+        "AND pid <> pg_backend_pid() AND datname = current_database()");
   }
   // It was asked again by itself; had that been refused, too, whoever asked would do so.
-  if (!made && store->wait_until_writable({})) made = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
+  if (!made && store->wait_until_writable({}))
+    made = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_TRUE(made) << sentence(made.error());
   EXPECT_EQ(batches_of(*store), std::set<std::string>{"lt-07"});
   EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
@@ -142,16 +155,16 @@ TEST_F(BadRecord, AConnectionThatIsCutWithinATransactionLeavesNothingHalfDone) {
 TEST_F(BadRecord, FiveThousandModelsAreListed) {
   const auto store = open(url_);
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
-  say("INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
-      "content) "
-      "SELECT cell, n, id || n, hash || n, level, batch_id, created_at, training_poses, validation_rms, content "
-      "FROM models, generate_series(2, 5000) AS n");
+  say("INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, "
+      "validation_rms, content) SELECT cell, n, id || n, hash || n, level, batch_id, created_at, "
+      "training_poses, validation_rms, content FROM models, generate_series(2, 5000) AS n");
   say("UPDATE cells SET last_version = 5000");
   const auto models = demand(store->models("cell-7"));
   ASSERT_EQ(models.size(), 5000u);
   EXPECT_EQ(models.front().version, 1);
   EXPECT_EQ(models.back().version, 5000);
-  EXPECT_EQ(demand(store->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made")), 5001);
+  EXPECT_EQ(demand(store->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made")),
+            5001);
 }
 
 TEST_F(BadRecord, APoolerThatSharesConnectionsByTransactionMayStandBetween) {
@@ -189,18 +202,19 @@ TEST_F(BadRecord, APoolerThatSharesConnectionsByTransactionMayStandBetween) {
 TEST_F(BadRecord, ProgramsOfTwoBuildsWorkOnOneSchema) {
   const auto old = open(url_);
   ASSERT_TRUE(old->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
-  // What a newer program's `store init` adds while older ones go on: it says from which schema on programs may.
-  say("ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';"
-      "ALTER TABLE models ADD COLUMN weight BIGINT;"
-      "CREATE TABLE job_colours (job BIGINT PRIMARY KEY REFERENCES jobs (id));"
-      "UPDATE trammel_schema SET version = version + 1");
+  // What a newer program's `store init` adds while older ones go on: it says from which schema on
+  // programs may.
+  say("ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';ALTER TABLE models ADD COLUMN "
+      "weight BIGINT;CREATE TABLE job_colours (job BIGINT PRIMARY KEY REFERENCES jobs (id));UPDATE "
+      "trammel_schema SET version = version + 1");
   ASSERT_TRUE(old->add_batch(batch_of("lt-07"), job_of("lt-07"))) << "it was there before";
   const auto restarted = demand(Store::open(url_, folder_.file("restarted")));
   ASSERT_TRUE(restarted->add_batch(batch_of("lt-08"), job_of("lt-08")));
-  EXPECT_EQ(demand(restarted->add_model("cell-7", test::nominal_model(cell_, 2), 0, true, "made")), 2);
+  EXPECT_EQ(demand(restarted->add_model("cell-7", test::nominal_model(cell_, 2), 0, true, "made")),
+            2);
   // The newer program's own.
-  say("INSERT INTO jobs (cell, level, bias, state, message, created_at, colour) "
-      "VALUES ('cell-7', 'M3', 'none', 'queued', '', 1700000000, 'red')");
+  say("INSERT INTO jobs (cell, level, bias, state, message, created_at, colour) VALUES ('cell-7', "
+      "'M3', 'none', 'queued', '', 1700000000, 'red')");
   ASSERT_TRUE(old->rollback("cell-7"));
   EXPECT_EQ(demand(restarted->version_in_force("cell-7")), 1);
   EXPECT_EQ(demand(restarted->unfinished_jobs()).size(), 3u);
@@ -241,7 +255,8 @@ TEST(BadRecordServer, ADiskOfTheDatabaseThatIsFullStopsChangesUntilThereIsRoom) 
   }
   ASSERT_FALSE(last) << "64 MB hold no 120";
   EXPECT_EQ(last.error().code, ErrorCode::kBusy);
-  EXPECT_NE(last.error().message.find("No space left on device"), std::string::npos) << sentence(last.error());
+  EXPECT_NE(last.error().message.find("No space left on device"), std::string::npos)
+      << sentence(last.error());
   EXPECT_TRUE(store->state().why_not_written);
   EXPECT_TRUE(store->state().readable);
   EXPECT_EQ(batches_of(*store), acknowledged);

@@ -1,5 +1,5 @@
-// A database that is reached by TLS: both sides show certificates, and whoever is not who he should be is refused with
-// what is wrong, and is told no secret.
+// A database that is reached by TLS: both sides show certificates, and whoever is not who he should
+// be is refused with what is wrong, and is told no secret.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -62,10 +62,10 @@ TEST_F(Certificates, AServerThatShowsItsOwnAndComparesTheDatabasesDoesAllThatItD
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell, 1), 0, true, "made"));
   store->wait_for_change({}, std::chrono::milliseconds(1));  // it listens
   ASSERT_TRUE(store->tell_presence(ServerSelf::here("0.1.0", true, true)));
-  const std::string lines =
-      server().sql(server().url(database_),
-                   "SELECT DISTINCT ssl, version, client_dn FROM pg_stat_ssl JOIN pg_stat_activity USING "
-                   "(pid) WHERE application_name = 'trammel' AND datname = current_database()");
+  const std::string lines = server().sql(
+      server().url(database_),
+      "SELECT DISTINCT ssl, version, client_dn FROM pg_stat_ssl JOIN pg_stat_activity USING (pid) "
+      "WHERE application_name = 'trammel' AND datname = current_database()");
   EXPECT_EQ(lines, "t|TLSv1.3|/CN=keeper\n") << "each connection";
   EXPECT_FALSE(demand(read_audit(url, {})).broken);
 }
@@ -75,7 +75,8 @@ TEST_F(Certificates, WhoIsNotWhoHeShouldBeIsRefusedWithWhatIsWrong) {
   expect_refused(with(url, "/ca.crt", "/other-ca.crt"), "certificate verify failed");
   expect_refused(with(url, "localhost", "127.0.0.1"), "does not match host name");
   expect_refused(with(url, "keeper@", "another@"), "certificate authentication failed");
-  expect_refused(with(with(url, "&sslcert=" + files + "/keeper.crt", ""), "&sslkey=" + files + "/keeper.key", ""),
+  expect_refused(with(with(url, "&sslcert=" + files + "/keeper.crt", ""),
+                      "&sslkey=" + files + "/keeper.key", ""),
                  "certificate");
   expect_refused(with(url, "keeper.key", "missing.key"), "private key");
   expect_refused(with(url, "/ca.crt", "/missing.crt"), "certificate file");
@@ -83,11 +84,13 @@ TEST_F(Certificates, WhoIsNotWhoHeShouldBeIsRefusedWithWhatIsWrong) {
 }
 
 TEST_F(Certificates, WhatOpensAKeyIsNeverInWords) {
-  const std::string url = with(server().certified_url(database_), "keeper.key", "missing.key") + "&sslpassword=s3cret";
+  const std::string url =
+      with(server().certified_url(database_), "keeper.key", "missing.key") + "&sslpassword=s3cret";
   const auto refused = Store::open(with(url, "keeper@", "keeper:pa55word@"), folder_.file("none"));
   ASSERT_FALSE(refused);
   for (const char* secret : {"s3cret", "pa55word"})
-    EXPECT_EQ(sentence(refused.error()).find(secret), std::string::npos) << sentence(refused.error());
+    EXPECT_EQ(sentence(refused.error()).find(secret), std::string::npos)
+        << sentence(refused.error());
 }
 
 TEST_F(Certificates, ADatabaseThatWasAwayIsComeBackToByTheSameWay) {

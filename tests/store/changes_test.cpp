@@ -11,7 +11,8 @@ using test::demand;
 /// On each kind of database.
 class ChangesTest : public testing::TestWithParam<std::string>, protected test::StoreUnderTest {
  protected:
-  ChangesTest() : StoreUnderTest(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
+  ChangesTest()
+      : StoreUnderTest(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
   static void SetUpTestSuite() { test::Postgres::of_program(); }
   void SetUp() override {
     open();

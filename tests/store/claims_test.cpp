@@ -34,7 +34,8 @@ class Claims : public testing::Test {
   }
   /// As if the server had not been heard of for longer than its lease.
   void let_lease_pass(std::int64_t job) {
-    test::Postgres::of_program().sql(url_, fmt::format("UPDATE job_claims SET lease_until = 1 WHERE job = {}", job));
+    test::Postgres::of_program().sql(
+        url_, fmt::format("UPDATE job_claims SET lease_until = 1 WHERE job = {}", job));
   }
   static int add_model(Store& store, std::int64_t job) {
     const auto cell = test::small_cell("cell-7");
@@ -58,11 +59,13 @@ TEST_F(Claims, AJobThatAServerWorksOnIsTakenByNobodyElse) {
 }
 
 TEST_F(Claims, OneCellIsTrainedByOneServerAtATimeAndAnotherCellMeanwhile) {
-  const std::int64_t first = submit("cell-7", "b1"), second = submit("cell-7", "b2"), of_eight = submit("cell-8", "b1");
+  const std::int64_t first = submit("cell-7", "b1"), second = submit("cell-7", "b2"),
+                     of_eight = submit("cell-8", "b1");
   ASSERT_TRUE(one_->set_job_running(first));
   EXPECT_EQ(other_->set_job_running(second).error().code, ErrorCode::kConflict);
   EXPECT_EQ(demand(other_->job(second)).state, JobState::kQueued) << "it waits";
-  EXPECT_EQ(demand(other_->jobs_to_take()), (std::map<std::int64_t, std::string>{{of_eight, "cell-8"}}));
+  EXPECT_EQ(demand(other_->jobs_to_take()),
+            (std::map<std::int64_t, std::string>{{of_eight, "cell-8"}}));
   EXPECT_TRUE(other_->set_job_running(of_eight));
   ASSERT_TRUE(one_->set_job_done(first, "done"));
   EXPECT_TRUE(other_->set_job_running(second));
@@ -123,20 +126,25 @@ TEST_F(Claims, AJobThatWasToEndEndsAlsoWhereItsServerIsGone) {
 
 TEST_F(Claims, WhatAServerWorkedOnBeforeItWasStartedAgainWaitsForNobody) {
   const std::int64_t job = submit("cell-7", "b1"), second = submit("cell-7", "b2");
-  const auto here = [](const std::string& host) { return ServerSelf{"", host, 7, "0.1.0", true, true, {}, 0}; };
+  const auto here = [](const std::string& host) {
+    return ServerSelf{"", host, 7, "0.1.0", true, true, {}, 0};
+  };
   ASSERT_TRUE(one_->tell_presence(here("host-a")));
   ASSERT_TRUE(one_->set_job_running(job));
   const auto elsewhere = open("one");
   ASSERT_TRUE(elsewhere->tell_presence(here("host-b")));
-  EXPECT_TRUE(demand(other_->jobs_to_take()).empty()) << "one of the same name on another host is another one";
+  EXPECT_TRUE(demand(other_->jobs_to_take()).empty())
+      << "one of the same name on another host is another one";
   const auto again = open("one");
   ASSERT_TRUE(again->tell_presence(here("host-a")));
-  EXPECT_EQ(demand(other_->jobs_to_take()).size(), 2U) << "killed and started again: its lease ends at once";
+  EXPECT_EQ(demand(other_->jobs_to_take()).size(), 2U)
+      << "killed and started again: its lease ends at once";
   ASSERT_TRUE(other_->set_job_running(second)) << "its cell is free, too";
   EXPECT_EQ(again->set_job_running(job).error().code, ErrorCode::kConflict);
   ASSERT_TRUE(other_->set_job_done(second, "done"));
   ASSERT_TRUE(again->set_job_running(job));
-  EXPECT_EQ(add_model(*one_, job), 0) << "should the first start live all the same, it stores nothing of it";
+  EXPECT_EQ(add_model(*one_, job), 0)
+      << "should the first start live all the same, it stores nothing of it";
   ASSERT_TRUE(again->tell_presence(here("host-a")));
   EXPECT_TRUE(demand(again->renew_claim(job)).is_held) << "what it works on itself stays its own";
   EXPECT_FALSE(demand(other_->jobs_to_take()).contains(job));
@@ -157,7 +165,8 @@ TEST_F(Claims, OthersHearAtOnceOfAJobThatIsPutBack) {
   const std::int64_t job = submit("cell-7", "b1");
   ASSERT_TRUE(one_->set_job_running(job));
   std::stop_source never;
-  other_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  other_->wait_for_change(never.get_token(),
+                          std::chrono::seconds(30));  // connects, and hears from then on
   ASSERT_TRUE(one_->set_job_queued(job));
   other_->wait_for_change(never.get_token(), std::chrono::hours(1));
   EXPECT_TRUE(demand(other_->jobs_to_take()).contains(job));
@@ -171,7 +180,8 @@ TEST_F(Claims, JobsAreReadTogetherAndWhatCameWithABatchIsToldFromWhatWasAskedFor
   ASSERT_EQ(jobs.size(), 3U);
   EXPECT_EQ(jobs[1].cell, "cell-8");
   for (const StoredJob& job : jobs) EXPECT_EQ(job.batch_ids, std::vector<std::string>{"b1"});
-  EXPECT_EQ(demand(other_->came_with_batches({came, of_eight, wanted})), (std::set<std::int64_t>{came, of_eight}));
+  EXPECT_EQ(demand(other_->came_with_batches({came, of_eight, wanted})),
+            (std::set<std::int64_t>{came, of_eight}));
   EXPECT_TRUE(demand(other_->jobs({})).empty());
   const auto unfinished = demand(other_->unfinished_jobs());
   ASSERT_EQ(unfinished.size(), 3U);
@@ -183,7 +193,8 @@ TEST_F(Claims, ABatchThatIsAcceptedComesWithTheJobAsTheRecordHasItAndARepeatSays
   StoredJob asked = test::job_of("b1");
   asked.level = "M3";
   asked.created_at = 1700000000;
-  const AcceptedJob made = demand(one_->add_batch(batch, asked)), again = demand(other_->add_batch(batch, asked));
+  const AcceptedJob made = demand(one_->add_batch(batch, asked)),
+                    again = demand(other_->add_batch(batch, asked));
   const StoredJob stored = demand(other_->job(made.id));
   EXPECT_FALSE(made.is_repeat);
   EXPECT_TRUE(again.is_repeat);
@@ -217,7 +228,8 @@ TEST_F(Claims, WhoRunsAJobHearsThatAnotherServerWasAskedToEndIt) {
   ASSERT_TRUE(one_->set_job_running(job));
   EXPECT_FALSE(demand(one_->renew_claim(job)).cancelled_by);
   std::stop_source never;
-  one_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  one_->wait_for_change(never.get_token(),
+                        std::chrono::seconds(30));  // connects, and hears from then on
   ASSERT_EQ(demand(other_->cancel_job(job, {}, {"", "", "anna"})), CancelledJob::kAsked);
   one_->wait_for_change(never.get_token(), std::chrono::hours(1));
   EXPECT_EQ(demand(one_->renew_claim(job)).cancelled_by, "anna") << "it is told at once";
@@ -228,7 +240,8 @@ TEST_F(Claims, AJobThatWaitsOrWhoseServerIsGoneIsEndedByAnyServer) {
   EXPECT_EQ(demand(other_->cancel_job(waits, {}, {"", "", "anna"})), CancelledJob::kEnded);
   EXPECT_EQ(demand(one_->job(waits)).state, JobState::kFailed);
   EXPECT_EQ(one_->set_job_running(waits).error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(one_->cancel_job(waits, {}, {"", "", "bert"}).error().code, ErrorCode::kConflict) << "it is over";
+  EXPECT_EQ(one_->cancel_job(waits, {}, {"", "", "bert"}).error().code, ErrorCode::kConflict)
+      << "it is over";
   ASSERT_TRUE(one_->set_job_running(left));
   let_lease_pass(left);
   EXPECT_EQ(demand(other_->cancel_job(left, {}, {"", "", "anna"})), CancelledJob::kEnded);
@@ -244,7 +257,8 @@ TEST_F(Claims, ABatchIsPutInQuarantineByTheServerThatHasItsJobAlone) {
   ASSERT_TRUE(one_->set_job_running(job));
   let_lease_pass(job);
   ASSERT_TRUE(other_->set_job_running(job));
-  EXPECT_EQ(one_->set_quarantine("cell-7", "b1", "late", {}, job).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(one_->set_quarantine("cell-7", "b1", "late", {}, job).error().code,
+            ErrorCode::kNotFound);
   EXPECT_EQ(demand(one_->batch_record("cell-7", "b1")).quarantine, "");
   ASSERT_TRUE(other_->set_quarantine("cell-7", "b1", "moved", {}, job));
   EXPECT_EQ(demand(one_->batch_record("cell-7", "b1")).quarantine, "moved");
@@ -266,8 +280,8 @@ TEST_F(Claims, AClaimIsKeptWhileAllOtherConnectionsOfItsServerWaitForLocks) {
     const auto all_wait = [&] {
       return test::Postgres::of_program().sql(
                  url_,
-                 "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND "
-                 "datname = current_database()") == "4\n";
+                 "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname "
+                 "= current_database()") == "4\n";
     };
     const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(2);
     while (!all_wait()) ASSERT_LT(std::chrono::steady_clock::now(), until);
@@ -282,19 +296,23 @@ TEST_F(Claims, AJobIsToEndOnceUnderOneIdWhicheverServerIsAsked) {
   const ChangeId of_waiting{"cancel-1", "cancel", "anna"}, of_running{"cancel-2", "cancel", "anna"};
   ASSERT_TRUE(one_->set_job_failed(waits, "cancelled", {}, of_waiting));
   const std::int64_t changes = demand(one_->changes_made());
-  EXPECT_TRUE(other_->set_job_failed(waits, "cancelled", {}, of_waiting)) << "it is over, by this very change";
+  EXPECT_TRUE(other_->set_job_failed(waits, "cancelled", {}, of_waiting))
+      << "it is over, by this very change";
   EXPECT_EQ(demand(one_->changes_made()), changes);
-  EXPECT_EQ(other_->set_job_failed(waits, "cancelled", {}, {"cancel-3", "cancel", "anna"}).error().code,
-            ErrorCode::kNotFound);
+  EXPECT_EQ(
+      other_->set_job_failed(waits, "cancelled", {}, {"cancel-3", "cancel", "anna"}).error().code,
+      ErrorCode::kNotFound);
   ASSERT_TRUE(one_->set_job_running(runs));
   ASSERT_EQ(demand(other_->cancel_job(runs, {}, of_running)), CancelledJob::kAsked);
   ASSERT_TRUE(one_->set_job_failed(runs, "cancelled"));
-  EXPECT_EQ(demand(one_->cancel_job(runs, {}, of_running)), CancelledJob::kEnded) << "it is over, and it was asked";
+  EXPECT_EQ(demand(one_->cancel_job(runs, {}, of_running)), CancelledJob::kEnded)
+      << "it is over, and it was asked";
 }
 
 TEST_F(Claims, AServerHearsOfAChangeOfAnotherAndWhichCellItWas) {
   std::stop_source never;
-  other_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  other_->wait_for_change(never.get_token(),
+                          std::chrono::seconds(30));  // connects, and hears from then on
   const std::int64_t known = demand(other_->changes_made());
   submit("cell-8", "b1");
   other_->wait_for_change(never.get_token(), std::chrono::hours(1));

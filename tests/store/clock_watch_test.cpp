@@ -10,11 +10,14 @@ using std::chrono::seconds;
 
 constexpr milliseconds kThen = seconds(1'800'000'000);
 
-ClockWatch::Time at(seconds since_boot, milliseconds set_by) { return {kThen + since_boot + set_by, since_boot}; }
+ClockWatch::Time at(seconds since_boot, milliseconds set_by) {
+  return {kThen + since_boot + set_by, since_boot};
+}
 
 TEST(ClockWatch, WhatPassesIsNoStep) {
   ClockWatch clock(at(seconds(10), seconds(0)));
-  for (int hour = 1; hour < 100; ++hour) EXPECT_FALSE(clock.look(at(seconds(10 + 3600 * hour), seconds(0))));
+  for (int hour = 1; hour < 100; ++hour)
+    EXPECT_FALSE(clock.look(at(seconds(10 + 3600 * hour), seconds(0))));
   EXPECT_EQ(clock.off(), seconds(0));
 }
 

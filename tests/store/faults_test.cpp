@@ -57,11 +57,13 @@ class StoreFaults : public testing::Test, protected test::StoreUnderTest {
   std::optional<test::FaultyDisk> disk_;
 };
 
-TEST_F(StoreFaults, OnADiskThatIsFullAtTheStartTheModelsAreThereAndChangesAreRefusedUntilThereIsRoom) {
+TEST_F(StoreFaults,
+       OnADiskThatIsFullAtTheStartTheModelsAreThereAndChangesAreRefusedUntilThereIsRoom) {
   test::FaultyDisk& disk = disk_.emplace();
   open();
   put_in_force(1);
-  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_READONLY, SQLITE_IOERR_SHMSIZE, SQLITE_CANTOPEN}) {
+  for (const int code :
+       {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_READONLY, SQLITE_IOERR_SHMSIZE, SQLITE_CANTOPEN}) {
     store_.reset();
     disk.refuse_writing(code);
     open();
@@ -84,10 +86,13 @@ TEST_F(StoreFaults, WhateverCallFailsWhatIsRefusedIsNotThereAndWhatIsAcceptedSta
   open();
   put_in_force(1);
   std::set<std::string> accepted;
-  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_IOERR_FSYNC, SQLITE_IOERR_SHMMAP}) {
+  for (const int code :
+       {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_IOERR_FSYNC, SQLITE_IOERR_SHMMAP}) {
     for (int nth = 0; nth < 12; ++nth) {
       const std::string id = fmt::format("{}-{}", code, nth);
-      disk.set_plan([code, left = nth](auto, const std::string&) mutable { return left-- == 0 ? code : SQLITE_OK; });
+      disk.set_plan([code, left = nth](auto, const std::string&) mutable {
+        return left-- == 0 ? code : SQLITE_OK;
+      });
       if (store_->add_batch(batch(id), job_of(id))) accepted.insert(id);
       disk.work_again();
       const auto again = store_->add_batch(batch(id + "+"), job_of(id + "+"));
@@ -103,7 +108,8 @@ TEST_F(StoreFaults, WhateverCallFailsWhatIsRefusedIsNotThereAndWhatIsAcceptedSta
   EXPECT_EQ(served(), 1);
 }
 
-TEST_F(StoreFaults, AStoreOfBeforeThatAFullDiskKeepsFromBeingTakenOnIsServedFromItsCopiesUntilThereIsRoom) {
+TEST_F(StoreFaults,
+       AStoreOfBeforeThatAFullDiskKeepsFromBeingTakenOnIsServedFromItsCopiesUntilThereIsRoom) {
   test::FaultyDisk& disk = disk_.emplace();
   open();
   put_in_force(1);
@@ -112,7 +118,8 @@ TEST_F(StoreFaults, AStoreOfBeforeThatAFullDiskKeepsFromBeingTakenOnIsServedFrom
   disk.refuse_writing(SQLITE_FULL);
   open();
   EXPECT_EQ(served(), 1);
-  EXPECT_TRUE(store_->state().why_not_written) << "it would be taken for readable, and what reads it would fail";
+  EXPECT_TRUE(store_->state().why_not_written)
+      << "it would be taken for readable, and what reads it would fail";
   EXPECT_FALSE(store_->batches("cell-7"));
   disk.work_again();
   ASSERT_TRUE(store_->wait_until_writable({}));
@@ -167,7 +174,8 @@ TEST_F(StoreFaults, AfterAPowerCutAtAnyCallAllThatWasAcknowledgedIsThere) {
       const auto models = demand((*store)->models("cell-7"));
       EXPECT_GE(static_cast<int>(batches.size()), least.batches) << "cut after call " << cut;
       EXPECT_GE(static_cast<int>(models.size()), least.models) << "cut after call " << cut;
-      EXPECT_EQ(demand((*store)->version_in_force("cell-7")).value_or(0), static_cast<int>(models.size()));
+      EXPECT_EQ(demand((*store)->version_in_force("cell-7")).value_or(0),
+                static_cast<int>(models.size()));
       for (const StoredBatch& one : batches)
         EXPECT_EQ(demand((*store)->batch("cell-7", one.id)).csv, batch(one.id).csv);
       EXPECT_TRUE(models.empty() || (*store)->model("cell-7", models.back().version));
@@ -205,12 +213,14 @@ class Changes {
           static_cast<void>(store.add_job(job_of("first"), false, id));
           break;
         case 4:
-          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, true,
-                                            "better", false, id));
+          static_cast<void>(store.add_model("cell-7",
+                                            test::nominal_model(cell_, 100 + static_cast<int>(i)),
+                                            0, true, "better", false, id));
           break;
         case 5:
-          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, false,
-                                            "not better", false, id));
+          static_cast<void>(store.add_model("cell-7",
+                                            test::nominal_model(cell_, 100 + static_cast<int>(i)),
+                                            0, false, "not better", false, id));
           break;
         case 6:
           while (store.prune_one("cell-7", {1, 1, 1}).value_or(false)) {
@@ -232,19 +242,22 @@ std::string audited(const Store& store) {
   const AuditTrail trail = demand(store.audit());
   std::string all = trail.broken ? "broken: " + sentence(*trail.broken) : "";
   for (const AuditRow& row : trail.rows)
-    all += fmt::format("\n{} {} {}: {} -> {} ({}) {}", row.number, row.what, row.subject, row.before, row.after,
-                       row.why, row.request);
+    all += fmt::format("\n{} {} {}: {} -> {} ({}) {}", row.number, row.what, row.subject,
+                       row.before, row.after, row.why, row.request);
   return all;
 }
 
 /// Everything that the changes change.
 std::string contents(const Store& store) {
-  std::string all = fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
-  if (const auto before = store.previous_in_force("cell-7")) all += fmt::format(", before {}", fmt::join(*before, " "));
+  std::string all =
+      fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
+  if (const auto before = store.previous_in_force("cell-7"))
+    all += fmt::format(", before {}", fmt::join(*before, " "));
   for (const StoredBatch& one : demand(store.batches("cell-7")))
     all += "\n" + one.id + " " + one.quarantine + (one.pruned ? " pruned" : "");
   for (const StoredModel& one : demand(store.models("cell-7")))
-    all += fmt::format("\nversion {} {}", one.version, store.model("cell-7", one.version) ? "there" : "pruned");
+    all += fmt::format("\nversion {} {}", one.version,
+                       store.model("cell-7", one.version) ? "there" : "pruned");
   for (const StoredJob& one : demand(store.unfinished_jobs()))
     all += fmt::format("\njob of {}", fmt::join(one.batch_ids, " "));
   return all + "\n" + audited(store);
@@ -264,8 +277,8 @@ TEST_P(KilledStore, AtAnyCallHasMadeEveryChangeOnceThatIsAskedForAgain) {
     return to.file("trammel.db");
   };
   int killed = 0;
-  auto* answered = static_cast<std::size_t*>(
-      ::mmap(nullptr, sizeof(std::size_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+  auto* answered = static_cast<std::size_t*>(::mmap(
+      nullptr, sizeof(std::size_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
   const Changes changes(static_cast<std::uint64_t>(seed));
   std::string expected;
   std::size_t calls = 0;
@@ -303,7 +316,8 @@ TEST_P(KilledStore, AtAnyCallHasMadeEveryChangeOnceThatIsAskedForAgain) {
     const auto store = demand(Store::open(path));
     EXPECT_FALSE(store->versions_to_serve("cell-7").empty());
     changes.ask(*store, answered);  // the client knows what was answered, and repeats the rest
-    EXPECT_EQ(contents(*store), expected) << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
+    EXPECT_EQ(contents(*store), expected)
+        << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
   }
   EXPECT_GE(killed, kPoints - 1);
 }
@@ -393,7 +407,10 @@ TEST_F(StoreFaults, WithoutCopiesADamagedModelIsAnErrorOfItsOwnAndOlderOnesAreSe
   put_in_force(1, "cell-8");
   store_.reset();
   forget_copies();
-  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'x' WHERE version = 2"); }
+  {
+    SQLite::Database(path_, SQLite::OPEN_READWRITE)
+        .exec("UPDATE models SET content = 'x' WHERE version = 2");
+  }
   open();
   forget_copies();
   EXPECT_EQ(store_->versions_to_serve("cell-7"), (std::vector<int>{2, 1}));
@@ -407,9 +424,9 @@ TEST_F(StoreFaults, HoweverTheTextInForceIsDamagedItsCopyIsServedAndBothAreSaid)
   put_in_force(2);
   store_.reset();
   for (const char* const damage :
-       {"''", "'x'", "'{}'", "'null'", "substr(content, 1, length(content) / 2)", "substr(content, 2)",
-        "replace(content, '2', '3')", "replace(content, ':', '')", "upper(content)", "content || '}'",
-        "zeroblob(length(content))", "content || content",
+       {"''", "'x'", "'{}'", "'null'", "substr(content, 1, length(content) / 2)",
+        "substr(content, 2)", "replace(content, '2', '3')", "replace(content, ':', '')",
+        "upper(content)", "content || '}'", "zeroblob(length(content))", "content || content",
         "(SELECT content FROM models AS other WHERE other.version = 1)"}) {
     SCOPED_TRACE(damage);
     {
@@ -421,7 +438,8 @@ TEST_F(StoreFaults, HoweverTheTextInForceIsDamagedItsCopyIsServedAndBothAreSaid)
     const auto read = store_->read("cell-7", 2);
     ASSERT_TRUE(read) << sentence(read.error());
     EXPECT_EQ(read->model.provenance().training_poses, 2);
-    EXPECT_NE(read->damage.find("version 2 is served from its copy " + path_ + ".models/"), std::string::npos)
+    EXPECT_NE(read->damage.find("version 2 is served from its copy " + path_ + ".models/"),
+              std::string::npos)
         << read->damage;
     EXPECT_NE(read->damage.find("the text in the store is bad"), std::string::npos) << read->damage;
     EXPECT_EQ(store_->state().damages, std::vector<std::string>{read->damage});
@@ -456,7 +474,8 @@ TEST_F(StoreFaults, TheStoreOfAnotherServerInItsPlaceIsLeftAloneAndTheModelsThat
   const std::string other = folder_.file("other.db");
   {
     auto store = demand(Store::open(other));
-    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 77), 0, true, "another server's"));
+    ASSERT_TRUE(
+        store->add_model("cell-7", test::nominal_model(cell_, 77), 0, true, "another server's"));
   }
   open();
   put_in_force(1);
@@ -483,7 +502,8 @@ TEST_F(StoreFaults, AStoreThatWentBackToABackupTakesBackWhatWasInForceSince) {
   ASSERT_TRUE(store_->take_back_from_copy("cell-7"));
   EXPECT_EQ(demand(store_->version_in_force("cell-7")), 3);
   put_in_force(4);
-  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 4) << "a number that was taken is not given again";
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 4)
+      << "a number that was taken is not given again";
   restart();
   EXPECT_EQ(served(), 4);
   EXPECT_EQ(demand(store_->rollback("cell-7")), 3);
@@ -499,7 +519,8 @@ TEST_F(StoreFaults, AJournalThatIsLostDamagedOrCutLosesNothing) {
     journal = test::read_file(path_ + "-wal");
   }
   const std::string file = test::read_file(path_);
-  const std::vector<std::string> journals = {"", journal.substr(0, journal.size() / 2), journal.substr(0, 20),
+  const std::vector<std::string> journals = {"", journal.substr(0, journal.size() / 2),
+                                             journal.substr(0, 20),
                                              std::string(journal.size(), 'x'), journal};
   for (const std::string& left : journals) {
     test::TemporaryFolder crashed;
@@ -512,8 +533,8 @@ TEST_F(StoreFaults, AJournalThatIsLostDamagedOrCutLosesNothing) {
   }
 }
 
-/// What another program may do to the file while the store is open, and how that is taken back. `kept` is the file as
-/// it was just before.
+/// What another program may do to the file while the store is open, and how that is taken back.
+/// `kept` is the file as it was just before.
 struct Meddling {
   const char* name;
   void (*meddle)(const std::string& path, const std::string& kept, const std::string& earlier);
@@ -538,14 +559,18 @@ const Meddling kMeddlings[] = {
     {"Renamed", [](auto& path, auto&, auto&) { fs::rename(path, path + ".away"); },
      [](auto& path, auto&) { fs::rename(path + ".away", path); }},
     {"Removed", [](auto& path, auto&, auto&) { fs::remove(path); }, put_in_place_of},
-    {"ReplacedByAnEarlierState", [](auto& path, auto&, auto& earlier) { put_in_place_of(path, earlier); },
+    {"ReplacedByAnEarlierState",
+     [](auto& path, auto&, auto& earlier) { put_in_place_of(path, earlier); }, put_in_place_of},
+    {"ReplacedByNoStore", [](auto& path, auto&, auto&) { put_in_place_of(path, "something else"); },
      put_in_place_of},
-    {"ReplacedByNoStore", [](auto& path, auto&, auto&) { put_in_place_of(path, "something else"); }, put_in_place_of},
     {"ReplacedByAPipe", [](auto& path, auto&, auto&) { replace_by_pipe(path); }, put_in_place_of},
     {"Emptied", [](auto& path, auto&, auto&) { fs::resize_file(path, 0); }, write_over},
-    {"Cut", [](auto& path, auto& kept, auto&) { fs::resize_file(path, kept.size() / 2); }, write_over},
-    {"WrittenOverByAnEarlierState", [](auto& path, auto&, auto& earlier) { write_over(path, earlier); }, write_over},
-    {"WrittenOverByNoStore", [](auto& path, auto& kept, auto&) { write_over(path, std::string(kept.size(), 'x')); },
+    {"Cut", [](auto& path, auto& kept, auto&) { fs::resize_file(path, kept.size() / 2); },
+     write_over},
+    {"WrittenOverByAnEarlierState",
+     [](auto& path, auto&, auto& earlier) { write_over(path, earlier); }, write_over},
+    {"WrittenOverByNoStore",
+     [](auto& path, auto& kept, auto&) { write_over(path, std::string(kept.size(), 'x')); },
      write_over}};
 
 class MeddledStore : public StoreFaults, public testing::WithParamInterface<Meddling> {};

@@ -1,4 +1,5 @@
-// Stores as earlier programs left them, by their own statements: frozen here, whatever today's schema becomes.
+// Stores as earlier programs left them, by their own statements: frozen here, whatever today's
+// schema becomes.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
@@ -50,7 +51,8 @@ CREATE TABLE model_times (cell TEXT NOT NULL, version INTEGER NOT NULL, trained_
   PRIMARY KEY (cell, version), FOREIGN KEY (cell, version) REFERENCES models (cell, version)) WITHOUT ROWID;
 )sql";
 
-/// Beside that, what servers told each other while each had a store of its own. The first one had given number 4.
+/// Beside that, what servers told each other while each had a store of its own. The first one had
+/// given number 4.
 constexpr const char* kElsewhere = R"sql(
 CREATE TABLE learned_elsewhere (cell TEXT NOT NULL, batch TEXT NOT NULL, PRIMARY KEY (cell, batch),
   FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID;
@@ -97,7 +99,9 @@ const std::vector<OldStore> kOldStores = {
     {"version 1", 1, {kVersion1}},
     {"version 2", 2, {kVersion1, kVersion2}},
     {"version 2 with times", 2, {kVersion1, kVersion2, kTimesOnly}},
-    {"version 2 of servers that follow models only", 2, {kVersion1, kVersion2, kTimesOnly, kBeforeElsewhere}},
+    {"version 2 of servers that follow models only",
+     2,
+     {kVersion1, kVersion2, kTimesOnly, kBeforeElsewhere}},
     {"version 2 of servers that follow each other",
      2,
      {kVersion1, kVersion2, kTimesOnly, kBeforeElsewhere, kElsewhere},
@@ -111,21 +115,22 @@ class MigrationTest : public testing::Test {
     for (const char* statements : old.statements) file.exec(statements);
     file.exec(fmt::format("PRAGMA user_version = {}", old.schema));
     file.exec(
-        "INSERT INTO jobs (cell, level, bias, state, message, created_at, model_version, attempts) VALUES "
-        "('cell-7', '', '', 'done', 'made', 1650000000, 1, 1), ('cell-7', '', '', 'done', 'better', 1650000100, 2, 1),"
-        "('cell-7', '', '', 'queued', '', 1650000200, 0, 0)");
+        "INSERT INTO jobs (cell, level, bias, state, message, created_at, model_version, attempts) "
+        "VALUES ('cell-7', '', '', 'done', 'made', 1650000000, 1, 1), ('cell-7', '', '', 'done', "
+        "'better', 1650000100, 2, 1),('cell-7', '', '', 'queued', '', 1650000200, 0, 0)");
     for (int i = 1; i <= 2; ++i) {
       SQLite::Statement batch(file,
-                              "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
-                              "VALUES ('cell-7', ?, ?, ?, ?, 1650000000, 40, ?)");
+                              "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, "
+                              "poses, job) VALUES ('cell-7', ?, ?, ?, ?, 1650000000, 40, ?)");
       batch.bind(1, fmt::format("b{}", i));
       batch.bind(2, csv(i));
       batch.bind(3, sha256_hex(csv(i)));
       batch.bind(4, fmt::format("client:{}", i));
       batch.bind(5, i);
       batch.exec();
-      SQLite::Statement model(file,
-                              "INSERT INTO models VALUES ('cell-7', ?, ?, ?, 'none', 'by-hand', 1650000000, ?, 0, ?)");
+      SQLite::Statement model(
+          file,
+          "INSERT INTO models VALUES ('cell-7', ?, ?, ?, 'none', 'by-hand', 1650000000, ?, 0, ?)");
       model.bind(1, i);
       model.bind(2, made(i).provenance().id);
       model.bind(3, made(i).provenance().hash);
@@ -133,10 +138,12 @@ class MigrationTest : public testing::Test {
       model.bind(5, serialize(made(i)));
       model.exec();
     }
-    file.exec("INSERT INTO job_batches VALUES (1, 0, 'cell-7', 'b1'), (2, 0, 'cell-7', 'b2'), (3, 0, 'cell-7', 'b2')");
     file.exec(
-        "INSERT INTO activations (cell, version, back, activated_at) VALUES ('cell-7', 1, NULL, 1650000000), "
-        "('cell-7', 2, 1, 1650000100)");
+        "INSERT INTO job_batches VALUES (1, 0, 'cell-7', 'b1'), (2, 0, 'cell-7', 'b2'), (3, 0, "
+        "'cell-7', 'b2')");
+    file.exec(
+        "INSERT INTO activations (cell, version, back, activated_at) VALUES ('cell-7', 1, NULL, "
+        "1650000000), ('cell-7', 2, 1, 1650000100)");
   }
   static std::string csv(int i) { return fmt::format("q1_deg\n{}\n", i); }
   [[nodiscard]] CompensatedModel made(int i) const { return test::nominal_model(cell_, 40 + i); }
@@ -165,8 +172,10 @@ TEST_F(MigrationTest, AStoreOfEveryEarlierSchemaIsTakenOnWithAllThatItHolds) {
       EXPECT_EQ(demand(store->batches_learned_from("cell-7")), (std::set<std::string>{"b1", "b2"}));
     }
     auto store = demand(Store::open(path));
-    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 50), 3, true, "made")) << "and it goes on";
-    EXPECT_EQ(demand(store->version_in_force("cell-7")), old.next_version) << "what another server gave stays given";
+    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 50), 3, true, "made"))
+        << "and it goes on";
+    EXPECT_EQ(demand(store->version_in_force("cell-7")), old.next_version)
+        << "what another server gave stays given";
     store.reset();
     SQLite::Database file(path);
     for (const char* gone : {"replica", "learned_elsewhere", "versions_elsewhere"})

@@ -1,4 +1,5 @@
-// How often a change goes to the database and back. In a plant's network that is what it waits for, besides the disk.
+// How often a change goes to the database and back. In a plant's network that is what it waits for,
+// besides the disk.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -28,7 +29,9 @@ class RoundTrips : public testing::Test, protected test::StoreUnderTest {
     work();
     return postgres_.asked();
   }
-  static std::string listed(const std::vector<std::string>& asked) { return fmt::format("{}", fmt::join(asked, "\n")); }
+  static std::string listed(const std::vector<std::string>& asked) {
+    return fmt::format("{}", fmt::join(asked, "\n"));
+  }
 
   test::Postgres& postgres_ = test::Postgres::of_program();
 };

@@ -46,11 +46,13 @@ class Servers : public testing::Test {
     self.cells["cell-7"] = {version, files, ""};
     return self;
   }
-  std::string say(const std::string& sql) const { return test::Postgres::of_program().sql(url_, sql); }
+  std::string say(const std::string& sql) const {
+    return test::Postgres::of_program().sql(url_, sql);
+  }
   void was_heard(const std::string& server, int seconds_ago) const {
     say(
-        fmt::format("UPDATE servers SET heard_at = CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint) - {} "
-                    "WHERE server = '{}'",
+        fmt::format("UPDATE servers SET heard_at = CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS "
+                    "bigint) - {} WHERE server = '{}'",
                     seconds_ago, server));
   }
   std::string record_goes_by() const { return demand(described_cells(url_)).front().server; }
@@ -65,7 +67,10 @@ TEST_F(Servers, EachIsSeenByAllWithWhatItServesAndWorksOnAndHowFarItIsBehind) {
   StoredJob asked;
   asked.cell = "cell-7";
   asked.batch_ids = {"b1"};
-  const auto job = demand(one_->add_batch({"cell-7", "b1", csv, sha256_hex(csv), "client:1", 1700000000, 1}, asked)).id;
+  const auto job =
+      demand(
+          one_->add_batch({"cell-7", "b1", csv, sha256_hex(csv), "client:1", 1700000000, 1}, asked))
+          .id;
   ServerSelf self = here(kFirst, 3);
   self.serves = false;
   self.followed = demand(one_->changes_made());
@@ -121,8 +126,8 @@ TEST_F(Servers, ACellWithOtherFilesIsNotAgreedOnAndBothServersAreNamedWithWhatDi
     const auto disputes = arrive(*other_, files);
     ASSERT_TRUE(disputes.contains("cell-7"));
     const std::string why = disputes.at("cell-7");
-    for (const std::string& word :
-         {std::string("cell-7"), std::string("other has "), std::string(what), std::string("than one (on host-a)")})
+    for (const std::string& word : {std::string("cell-7"), std::string("other has "),
+                                    std::string(what), std::string("than one (on host-a)")})
       EXPECT_NE(why.find(word), std::string::npos) << why;
   }
   EXPECT_EQ(arrive(*one_, kFirst), Disputes()) << "the one that agrees with the record serves it";
@@ -141,7 +146,8 @@ TEST_F(Servers, TheFilesOfACellChangeServerByServerWithoutACommand) {
   EXPECT_EQ(arrive(*one_, kFirst), Disputes());
   EXPECT_EQ(arrive(*other_, kFirst), Disputes());
   one_ = open("one");
-  EXPECT_TRUE(arrive(*one_, kOtherRobot).contains("cell-7")) << "the other one still has the old file";
+  EXPECT_TRUE(arrive(*one_, kOtherRobot).contains("cell-7"))
+      << "the other one still has the old file";
   other_ = open("other");
   EXPECT_EQ(arrive(*other_, kOtherRobot), Disputes()) << "all that are there have the new one";
   EXPECT_EQ(arrive(*one_, kOtherRobot, false), Disputes());
@@ -150,17 +156,20 @@ TEST_F(Servers, TheFilesOfACellChangeServerByServerWithoutACommand) {
 
 TEST_F(Servers, OfThreeServersTheLastOneWithTheOldFileKeepsNobodyFromTheNewOneAndGoesOnAnswering) {
   const auto third = open("third");
-  for (Store* store : {one_.get(), other_.get(), third.get()}) EXPECT_EQ(arrive(*store, kFirst), Disputes());
+  for (Store* store : {one_.get(), other_.get(), third.get()})
+    EXPECT_EQ(arrive(*store, kFirst), Disputes());
   one_ = open("one");
   EXPECT_TRUE(arrive(*one_, kOtherRobot).contains("cell-7")) << "two have the old one";
   other_ = open("other");
-  EXPECT_EQ(arrive(*other_, kOtherRobot), Disputes()) << "most of those that are there want the new one";
+  EXPECT_EQ(arrive(*other_, kOtherRobot), Disputes())
+      << "most of those that are there want the new one";
   EXPECT_EQ(arrive(*one_, kOtherRobot, false), Disputes());
   const std::set<std::string> agreed = {"cell-7"};
   for (int look = 0; look < 2; ++look) {
     const auto disputes = arrive(*third, kFirst, false, agreed);
     ASSERT_TRUE(disputes.contains("cell-7"));
-    EXPECT_NE(disputes.at("cell-7").find("third answers with the model that it has"), std::string::npos)
+    EXPECT_NE(disputes.at("cell-7").find("third answers with the model that it has"),
+              std::string::npos)
         << disputes.at("cell-7");
   }
   EXPECT_EQ(record_goes_by(), "other") << "it wants nothing back";
@@ -174,9 +183,11 @@ TEST_F(Servers, WhoWasLeftWithTheFormerFileDoesNotBringItBackNorHelpsAnyoneElseT
   EXPECT_EQ(arrive(*other_, kOtherRobot, false), Disputes());
   const std::set<std::string> agreed = {"cell-7"};
   for (Store* store : {one_.get(), third.get()})
-    EXPECT_TRUE(arrive(*store, kFirst, false, agreed).contains("cell-7")) << "two of three have the former one";
+    EXPECT_TRUE(arrive(*store, kFirst, false, agreed).contains("cell-7"))
+        << "two of three have the former one";
   ASSERT_TRUE(other_->take_leave());
-  EXPECT_TRUE(arrive(*one_, kFirst, false, agreed).contains("cell-7")) << "nor now that nobody has the new one";
+  EXPECT_TRUE(arrive(*one_, kFirst, false, agreed).contains("cell-7"))
+      << "nor now that nobody has the new one";
   const auto fourth = open("fourth");
   EXPECT_TRUE(arrive(*fourth, kFirst).contains("cell-7")) << "those two serve, and want nothing";
   EXPECT_EQ(record_goes_by(), "other");
@@ -188,7 +199,8 @@ TEST_F(Servers, AServerThatIsAloneTakesItsOwnChangeAsItStartsAndNotLater) {
   one_ = open("one");
   EXPECT_TRUE(arrive(*one_, kOtherRobot).contains("cell-7"));
   was_heard("other", 20);
-  EXPECT_TRUE(arrive(*one_, kOtherRobot, false).contains("cell-7")) << "that the right one dies makes nothing right";
+  EXPECT_TRUE(arrive(*one_, kOtherRobot, false).contains("cell-7"))
+      << "that the right one dies makes nothing right";
   one_ = open("one");
   EXPECT_EQ(arrive(*one_, kOtherRobot), Disputes()) << "it was started again: its owner means it";
 }
@@ -201,7 +213,8 @@ TEST_F(Servers, APersonSaysWhoseFilesCount) {
   EXPECT_EQ(cells[0].servers[1].differs, "robot file");
   EXPECT_EQ(describe_cell(url_, "cell-7", "nobody", "anna").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(describe_cell(url_, "cell-9", "other", "anna").error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(describe_cell(folder_.file("trammel.db"), "cell-7", "other", "anna").error().code, ErrorCode::kRefused);
+  EXPECT_EQ(describe_cell(folder_.file("trammel.db"), "cell-7", "other", "anna").error().code,
+            ErrorCode::kRefused);
   const std::int64_t before = demand(one_->descriptions_made());
   ASSERT_TRUE(describe_cell(url_, "cell-7", "other", "anna"));
   EXPECT_GT(demand(one_->descriptions_made()), before) << "servers see that they must look";
@@ -233,9 +246,10 @@ TEST_F(Servers, TheServicesRoleIsRefusedToChangeOrDeleteWhatIsInTheTrail) {
   EXPECT_EQ(arrive(*store, kFirst), Disputes()) << "it may do what a server does";
   const auto role = demand(PostgresDatabase::connect(service, PostgresDatabase::Session::kWrites));
   for (const char* wrong :
-       {"UPDATE audit SET who = 'nobody'", "DELETE FROM audit", "TRUNCATE audit", "DELETE FROM audit_end",
-        "UPDATE cell_descriptions SET server = 'nobody'", "DELETE FROM cell_descriptions",
-        "UPDATE trammel_schema SET version = 1", "DROP TABLE audit", "ALTER TABLE audit DROP COLUMN who"})
+       {"UPDATE audit SET who = 'nobody'", "DELETE FROM audit", "TRUNCATE audit",
+        "DELETE FROM audit_end", "UPDATE cell_descriptions SET server = 'nobody'",
+        "DELETE FROM cell_descriptions", "UPDATE trammel_schema SET version = 1",
+        "DROP TABLE audit", "ALTER TABLE audit DROP COLUMN who"})
     EXPECT_THROW(role->execute(wrong), DatabaseError) << wrong;
   const AuditTrail trail = demand(read_audit(service, {}));
   EXPECT_FALSE(trail.broken);
@@ -249,8 +263,8 @@ TEST_F(Servers, ARecordOfBeforeIsBroughtUpToDateAndWhoHadTheOldTablesMayUseTheNe
   ASSERT_TRUE(init_store(url_, "earlier"));
   one_.reset();
   other_.reset();
-  say("DROP TABLE servers; DROP TABLE cell_descriptions; ALTER TABLE audit DROP COLUMN server;"
-      "UPDATE trammel_schema SET version = 2, works_from = 2");
+  say("DROP TABLE servers; DROP TABLE cell_descriptions; ALTER TABLE audit DROP COLUMN "
+      "server;UPDATE trammel_schema SET version = 2, works_from = 2");
   std::string service = url_;
   service.replace(service.find("postgres@"), 9, "earlier@");
   EXPECT_EQ(Store::open(service).error().code, ErrorCode::kRefused);

@@ -1,4 +1,5 @@
-// A store that several servers share: what is promised where more than one process writes it, and where it is away.
+// A store that several servers share: what is promised where more than one process writes it, and
+// where it is away.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -43,7 +44,8 @@ class SharedStore : public testing::Test {
     int well = 0;
     for (const pid_t child : children) {
       int status = 0;
-      if (::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0) ++well;
+      if (::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0)
+        ++well;
     }
     return well;
   }
@@ -63,8 +65,10 @@ TEST_F(SharedStore, FourProcessesThatWriteAtATimeLoseNothingAndGiveNoNumberTwice
       const auto job = store->add_batch(batch_of(id), job_of(id));
       if (!job) return false;
       const auto model = test::nominal_model(cell_, 1 + process * kEach + i);
-      const auto version = store->add_model("cell-7", model, job->id, true, "made", false, {id, "made"});
-      if (!version || store->models("cell-7")->at(static_cast<std::size_t>(*version - 1)).id != model.provenance().id)
+      const auto version =
+          store->add_model("cell-7", model, job->id, true, "made", false, {id, "made"});
+      if (!version || store->models("cell-7")->at(static_cast<std::size_t>(*version - 1)).id !=
+                          model.provenance().id)
         return false;
       // All of them ask for the same, under the same id: it is made once.
       if (!store->activate("cell-7", 1, {fmt::format("all:{}", i), "activate 1"})) return false;
@@ -94,7 +98,11 @@ TEST_F(SharedStore, FourProcessesThatWriteAtATimeLoseNothingAndGiveNoNumberTwice
 }
 
 TEST_F(SharedStore, OneBatchThatFourProcessesSubmitAtATimeIsOneJob) {
-  EXPECT_EQ(at_once(4, [&](int) { return open()->add_batch(batch_of("lt-07"), job_of("lt-07")).has_value(); }), 4);
+  EXPECT_EQ(at_once(4,
+                    [&](int) {
+                      return open()->add_batch(batch_of("lt-07"), job_of("lt-07")).has_value();
+                    }),
+            4);
   EXPECT_EQ(demand(open()->unfinished_jobs()).size(), 1u);
 }
 
@@ -125,8 +133,8 @@ TEST_F(SharedStore, ARepeatOnAnotherServerLearnsWhatCameOfTheFirst) {
 TEST_F(SharedStore, AConnectionThatIsCutIsMadeAnewAndNobodyNotices) {
   const auto store = open();
   put_in_force(*store, 1);
-  say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'trammel' AND datname = "
-      "current_database()");
+  say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'trammel' "
+      "AND datname = current_database()");
   EXPECT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
   EXPECT_FALSE(store->state().why_not_written);
 }
@@ -136,7 +144,8 @@ TEST_F(SharedStore, AnEmptyDatabaseIsRefusedWithTheCommandThatMakesItAStore) {
   const auto refused = Store::open(empty, folder_.file("cache"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kRefused);
-  EXPECT_NE(refused.error().next.find("trammel store init"), std::string::npos) << refused.error().next;
+  EXPECT_NE(refused.error().next.find("trammel store init"), std::string::npos)
+      << refused.error().next;
   ASSERT_TRUE(init_store(empty));
   EXPECT_TRUE(init_store(empty)) << "a second time changes nothing";
   EXPECT_TRUE(Store::open(empty, folder_.file("cache")));
@@ -147,7 +156,8 @@ TEST_F(SharedStore, TheDatabaseOfAnotherProgramIsRefusedAndLeftAlone) {
   postgres_.sql(other, "CREATE TABLE theirs (a int)");
   EXPECT_EQ(Store::open(other).error().code, ErrorCode::kRefused);
   EXPECT_EQ(init_store(other).error().code, ErrorCode::kRefused);
-  EXPECT_EQ(postgres_.sql(other, "SELECT count(*) FROM pg_tables WHERE schemaname = 'public'"), "1\n");
+  EXPECT_EQ(postgres_.sql(other, "SELECT count(*) FROM pg_tables WHERE schemaname = 'public'"),
+            "1\n");
 }
 
 TEST_F(SharedStore, ASchemaOfTheFutureIsRefusedUnlessItSaysThatThisProgramWorksOnIt) {
@@ -161,20 +171,22 @@ TEST_F(SharedStore, ASchemaOfTheFutureIsRefusedUnlessItSaysThatThisProgramWorksO
 }
 
 TEST_F(SharedStore, ASchemaOfBeforeIsBroughtUpToDateByInitAndByNothingElse) {
-  say("CREATE TABLE replica (epoch bigint); CREATE TABLE learned_elsewhere (cell text); "
-      "CREATE TABLE versions_elsewhere (cell text); DROP TABLE servers, cell_descriptions; "
-      "ALTER TABLE audit DROP COLUMN server; UPDATE trammel_schema SET version = 1, works_from = 1");
+  say("CREATE TABLE replica (epoch bigint); CREATE TABLE learned_elsewhere (cell text); CREATE "
+      "TABLE versions_elsewhere (cell text); DROP TABLE servers, cell_descriptions; ALTER TABLE "
+      "audit DROP COLUMN server; UPDATE trammel_schema SET version = 1, works_from = 1");
   const auto older = Store::open(url_);
   ASSERT_FALSE(older);
-  EXPECT_NE(sentence(older.error()).find("trammel store init"), std::string::npos) << sentence(older.error());
+  EXPECT_NE(sentence(older.error()).find("trammel store init"), std::string::npos)
+      << sentence(older.error());
   const Status made = init_store(url_);
   ASSERT_TRUE(made) << sentence(made.error());
   EXPECT_TRUE(Store::open(url_));
   EXPECT_EQ(postgres_.sql(url_,
-                          "SELECT count(*) FROM pg_tables WHERE tablename IN ('replica', 'learned_elsewhere', "
-                          "'versions_elsewhere')"),
+                          "SELECT count(*) FROM pg_tables WHERE tablename IN ('replica', "
+                          "'learned_elsewhere', 'versions_elsewhere')"),
             "0\n");
-  EXPECT_EQ(postgres_.sql(url_, "SELECT version >= 3 AND works_from >= 2 FROM trammel_schema"), "t\n");
+  EXPECT_EQ(postgres_.sql(url_, "SELECT version >= 3 AND works_from >= 2 FROM trammel_schema"),
+            "t\n");
 }
 
 TEST_F(SharedStore, ARoleThatMayOnlyUseItCannotChangeTheAuditTrail) {
@@ -217,7 +229,8 @@ TEST_F(SharedStore, NoErrorHoldsThePasswordOrAValue) {
   const auto refused = open()->add_batch(odd, job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kRefused);
-  EXPECT_EQ(sentence(refused.error()).find("s3cret"), std::string::npos) << sentence(refused.error());
+  EXPECT_EQ(sentence(refused.error()).find("s3cret"), std::string::npos)
+      << sentence(refused.error());
 }
 
 TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
@@ -230,7 +243,8 @@ TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
   const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
-  EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos) << sentence(refused.error());
+  EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos)
+      << sentence(refused.error());
   EXPECT_TRUE(demand(store->batches("cell-7")).empty());
 }
 
@@ -289,7 +303,8 @@ TEST_F(SharedStoreAway, ADatabaseThatIsStoppedAndNotDeadIsNoticedByADeadline) {
   check_it_comes_back(*store);
 }
 
-TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementAndARepeatLearnsWhatCameOfIt) {
+TEST_F(SharedStoreAway,
+       ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementAndARepeatLearnsWhatCameOfIt) {
   const auto store = open();
   const auto standbys = [&](const char* names) {
     postgres_.sql(url_, fmt::format("ALTER SYSTEM SET synchronous_standby_names = '{}'", names));
@@ -299,13 +314,15 @@ TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementA
   standbys("nobody");
   Result<StoredJob> unknown;
   {
-    const std::jthread asks([&] { unknown = store->add_batch(batch_of("lt-07"), job_of("lt-07")); });
+    const std::jthread asks(
+        [&] { unknown = store->add_batch(batch_of("lt-07"), job_of("lt-07")); });
     while (postgres_.sql(url_, "SELECT count(*) " + waiting) == "0\n") continue;
     postgres_.sql(url_, "SELECT pg_cancel_backend(pid) " + waiting);
   }
   ASSERT_FALSE(unknown) << "the server made it, and on one host alone";
   EXPECT_EQ(unknown.error().code, ErrorCode::kBusy);
-  EXPECT_NE(unknown.error().message.find("not known"), std::string::npos) << sentence(unknown.error());
+  EXPECT_NE(unknown.error().message.find("not known"), std::string::npos)
+      << sentence(unknown.error());
   standbys("");
   ASSERT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
   EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
@@ -322,8 +339,11 @@ TEST_F(SharedStoreAway, AHeartbeatWaitsForNoStandby) {
     postgres_.sql(url_, "SELECT pg_reload_conf()");
   };
   standbys("nobody");
-  const std::jthread asks([&] { static_cast<void>(store->add_batch(batch_of("lt-08"), job_of("lt-08"))); });
-  while (postgres_.sql(url_, "SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == "0\n") continue;
+  const std::jthread asks(
+      [&] { static_cast<void>(store->add_batch(batch_of("lt-08"), job_of("lt-08"))); });
+  while (postgres_.sql(
+             url_, "SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == "0\n")
+    continue;
   EXPECT_TRUE(demand(store->renew_claim(job)).is_held);
   EXPECT_TRUE(store->tell_presence({}));
   standbys("");

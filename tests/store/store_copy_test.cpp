@@ -32,7 +32,8 @@ class StoreCopyTest : public testing::Test {
     JobOutcome outcome;
     outcome.verdict = JobVerdict::kInForce;
     outcome.after = 0.1 + 0.2;
-    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), made.id, true, "made", false, {}, outcome));
+    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), made.id, true, "made",
+                                 false, {}, outcome));
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 2), 0, true, "better"));
     ASSERT_TRUE(store->rollback("cell-7", 1, {"robot-3:17", "roll back"}));
     ASSERT_TRUE(store->set_quarantine("cell-7", "lt-07", "odd"));
@@ -51,12 +52,14 @@ class StoreCopyTest : public testing::Test {
   /// What is served, and what else a client sees.
   std::string seen(const std::string& place) {
     const auto store = demand(Store::open(place));
-    std::string all = fmt::format("in force {}", demand(store->version_in_force("cell-7")).value_or(0));
+    std::string all =
+        fmt::format("in force {}", demand(store->version_in_force("cell-7")).value_or(0));
     for (const StoredModel& model : demand(store->models("cell-7")))
       all += "\n" + demand(store->model_text("cell-7", model.version));
     for (const StoredJob& job : demand(store->recent_jobs("", 10)))
       all += fmt::format("\njob {} {} {}", job.id, job.message, job.outcome.after.value_or(0));
-    all += demand(store->batch("cell-7", "lt-07")).csv + demand(store->batch("cell-7", "lt-07")).quarantine;
+    all += demand(store->batch("cell-7", "lt-07")).csv +
+           demand(store->batch("cell-7", "lt-07")).quarantine;
     all += fmt::format("\n{}", demand(store->outcome_of({"robot-3:17", "roll back"}))->version);
     return all;
   }
@@ -75,7 +78,8 @@ TEST_F(StoreCopyTest, ThereAndBackNothingIsLostAndTheAnswersAreTheSame) {
   expect_same(demand(copy_store(file_, url_, kKept)), before);
   EXPECT_EQ(seen(url_), was);
   EXPECT_FALSE(demand(read_audit(url_, {})).broken);
-  EXPECT_EQ(demand(read_audit(url_, {})).rows.back().what, "copy") << "the trail says where it came from";
+  EXPECT_EQ(demand(read_audit(url_, {})).rows.back().what, "copy")
+      << "the trail says where it came from";
   const StoreContent there = demand(look_through_store(url_));
   expect_same(demand(copy_store(url_, back_, kKept)), there);
   EXPECT_EQ(seen(back_), was);
@@ -100,14 +104,18 @@ TEST_F(StoreCopyTest, RefusesATargetThatIsNotEmptyAndASourceThatIsServed) {
 
 TEST_F(StoreCopyTest, AStoreThatWasMovedIsServedByNobodyUntilSomebodyGivesTheOtherUp) {
   static_cast<void>(demand(copy_store(file_, url_, SourceAfter::kMoved)));
-  const auto expect_moved = [](const Error& error, const std::string& to, const std::string& place) {
+  const auto expect_moved = [](const Error& error, const std::string& to,
+                               const std::string& place) {
     EXPECT_EQ(error.code, ErrorCode::kRefused);
-    EXPECT_NE(error.message.find("was moved to " + spoken_place(to) + " at 20"), std::string::npos) << sentence(error);
-    EXPECT_NE(error.next.find("trammel store reopen '" + spoken_place(place)), std::string::npos) << error.next;
+    EXPECT_NE(error.message.find("was moved to " + spoken_place(to) + " at 20"), std::string::npos)
+        << sentence(error);
+    EXPECT_NE(error.next.find("trammel store reopen '" + spoken_place(place)), std::string::npos)
+        << error.next;
   };
   expect_moved(Store::open(file_).error(), url_, file_);
   expect_moved(check_store(file_).error(), url_, file_);
-  expect_moved(copy_store(file_, folder_.file("again.db"), SourceAfter::kMoved).error(), url_, file_);
+  expect_moved(copy_store(file_, folder_.file("again.db"), SourceAfter::kMoved).error(), url_,
+               file_);
   EXPECT_FALSE(demand(read_audit(file_, {})).broken);
   {
     const auto served = demand(Store::open(url_));
@@ -115,7 +123,8 @@ TEST_F(StoreCopyTest, AStoreThatWasMovedIsServedByNobodyUntilSomebodyGivesTheOth
     const auto refused = served->activate("cell-7", 2);
     ASSERT_FALSE(refused) << "a service that was connected changes nothing any more";
     EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
-    EXPECT_NE(refused.error().message.find("was moved elsewhere"), std::string::npos) << sentence(refused.error());
+    EXPECT_NE(refused.error().message.find("was moved elsewhere"), std::string::npos)
+        << sentence(refused.error());
     EXPECT_FALSE(served->try_again());
   }
   expect_moved(Store::open(url_).error(), back_, url_);
@@ -144,15 +153,15 @@ TEST_F(StoreCopyTest, WhatAServiceChangesWhileItsDatabaseIsMovedIsInTheCopyOrRef
 
 TEST_F(StoreCopyTest, ACopyMayTakeAsLongAsItTakes) {
   static_cast<void>(demand(copy_store(file_, url_, kKept)));
-  // A table of the source that can be read only where the server ends no transaction that is quiet for long.
-  postgres_.sql(url_,
-                "ALTER TABLE discarded RENAME TO discarded_rows;"
-                "CREATE FUNCTION patient() RETURNS boolean LANGUAGE plpgsql AS $$ BEGIN "
-                "IF current_setting('idle_in_transaction_session_timeout') <> '0' OR "
-                "current_setting('statement_timeout') <> '0' THEN RAISE EXCEPTION 'hurries'; END IF; "
-                "RETURN true; END $$;"
-                "CREATE VIEW discarded AS SELECT * FROM discarded_rows WHERE patient() UNION ALL "
-                "SELECT 'no', 'row' WHERE NOT patient()");
+  // A table of the source that can be read only where the server ends no transaction that is quiet
+  // for long.
+  postgres_.sql(
+      url_,
+      "ALTER TABLE discarded RENAME TO discarded_rows;CREATE FUNCTION patient() RETURNS boolean "
+      "LANGUAGE plpgsql AS $$ BEGIN IF current_setting('idle_in_transaction_session_timeout') <> "
+      "'0' OR current_setting('statement_timeout') <> '0' THEN RAISE EXCEPTION 'hurries'; END IF; "
+      "RETURN true; END $$;CREATE VIEW discarded AS SELECT * FROM discarded_rows WHERE patient() "
+      "UNION ALL SELECT 'no', 'row' WHERE NOT patient()");
   const auto copied = copy_store(url_, back_, kKept);
   EXPECT_TRUE(copied) << sentence(copied.error());
   EXPECT_TRUE(look_through_store(url_));

@@ -44,7 +44,8 @@ class StoreOfBatches : protected test::StoreUnderTest {
 /// On each kind of database.
 class StoreTest : public testing::TestWithParam<std::string>, protected StoreOfBatches {
  protected:
-  StoreTest() : StoreOfBatches(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
+  StoreTest()
+      : StoreOfBatches(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
   static void SetUpTestSuite() { test::Postgres::of_program(); }
   void SetUp() override { open(); }
 };
@@ -194,7 +195,8 @@ TEST_P(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   EXPECT_EQ(store_->batches("cell-7")->at(0).quarantine, "another tool");
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", ""));
   EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "");
-  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "").error().code, ErrorCode::kConflict) << "nothing to release";
+  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "").error().code, ErrorCode::kConflict)
+      << "nothing to release";
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-08", "x").error().code, ErrorCode::kNotFound);
 }
 
@@ -211,7 +213,8 @@ TEST_F(StoreFileTest, WhereNoNumberIsLeftAModelIsRefusedAndNoneGetsAnotherOnesNu
   store_.reset();
   SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET version = 2147483647");
   open();
-  const auto one_more = store_->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made");
+  const auto one_more =
+      store_->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made");
   ASSERT_FALSE(one_more);
   EXPECT_EQ(one_more.error().code, ErrorCode::kRefused);
 }
@@ -289,7 +292,8 @@ TEST_P(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
     return ids;
   };
   EXPECT_EQ(numbers("", 20), (std::vector{first, second, third, fourth}));
-  EXPECT_EQ(numbers("cell-7", 1), (std::vector{first, third, fourth})) << "the last done, the last failed";
+  EXPECT_EQ(numbers("cell-7", 1), (std::vector{first, third, fourth}))
+      << "the last done, the last failed";
   EXPECT_TRUE(numbers("cell-8", 20).empty());
 }
 
@@ -388,10 +392,13 @@ TEST_P(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
 TEST_P(StoreTest, SaysOfEveryCellAtOnceWhatIsInForce) {
   EXPECT_TRUE(store_->versions_in_force()->empty());
   for (int version = 1; version <= 3; ++version) add_model(version, true);
-  ASSERT_TRUE(store_->add_model("cell-8", test::nominal_model(test::small_cell("cell-8"), 1), 0, true, "made"));
-  ASSERT_TRUE(store_->add_model("cell-9", test::nominal_model(test::small_cell("cell-9"), 1), 0, false, "made"));
+  ASSERT_TRUE(store_->add_model("cell-8", test::nominal_model(test::small_cell("cell-8"), 1), 0,
+                                true, "made"));
+  ASSERT_TRUE(store_->add_model("cell-9", test::nominal_model(test::small_cell("cell-9"), 1), 0,
+                                false, "made"));
   ASSERT_EQ(store_->rollback("cell-7").value(), 2);
-  EXPECT_EQ(store_->versions_in_force().value(), (std::map<std::string, int>{{"cell-7", 2}, {"cell-8", 1}}));
+  EXPECT_EQ(store_->versions_in_force().value(),
+            (std::map<std::string, int>{{"cell-7", 2}, {"cell-8", 1}}));
 }
 
 TEST_P(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
@@ -460,7 +467,10 @@ TEST_F(StoreFileTest, RefusesASecondWriterThatComesByALink) {
 
 TEST_F(StoreFileTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
   const std::string other = folder_.file("other.db");
-  { SQLite::Database(other, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec("CREATE TABLE t (a)"); }
+  {
+    SQLite::Database(other, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE)
+        .exec("CREATE TABLE t (a)");
+  }
   const std::string before = test::read_file(other);
   const auto opened = Store::open(other);
   ASSERT_FALSE(opened);
@@ -515,7 +525,10 @@ TEST_F(StoreFileTest, ADamagedFileIsAnErrorThatNamesIt) {
 TEST_F(StoreFileTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
   ASSERT_TRUE(store_->add_batch(batch("a"), job()));
   store_.reset();
-  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE batches SET csv = 'q1_deg' || char(10) || '2'"); }
+  {
+    SQLite::Database(path_, SQLite::OPEN_READWRITE)
+        .exec("UPDATE batches SET csv = 'q1_deg' || char(10) || '2'");
+  }
   open();
   const auto changed = store_->batch("cell-7", "a");
   ASSERT_FALSE(changed);
@@ -525,7 +538,10 @@ TEST_F(StoreFileTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
 TEST_F(StoreFileTest, AModelWhoseContentWasChangedIsNotHandedOut) {
   add_model(10);
   store_.reset();
-  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = replace(content, '10', '11')"); }
+  {
+    SQLite::Database(path_, SQLite::OPEN_READWRITE)
+        .exec("UPDATE models SET content = replace(content, '10', '11')");
+  }
   open();
   EXPECT_FALSE(store_->model("cell-7", 1));
 }
@@ -535,12 +551,13 @@ TEST_F(StoreFileTest, LetsAnotherProcessReadWhileItIsOpen) {
   EXPECT_TRUE(std::filesystem::exists(path_ + "-wal"));
   SQLite::Database reader(path_, SQLite::OPEN_READONLY);
   EXPECT_EQ(reader.execAndGet("PRAGMA journal_mode").getString(), "wal");
-  EXPECT_EQ(reader.execAndGet("SELECT COUNT(*) FROM batches").getInt(), 1) << "another process may read";
+  EXPECT_EQ(reader.execAndGet("SELECT COUNT(*) FROM batches").getInt(), 1)
+      << "another process may read";
 }
 
 /// Adds batches and models, saying each on `pipe` once it is acknowledged, until it is killed.
-[[noreturn]] void write_until_killed(const std::string& path, const StoredBatch& first, const CompensatedModel& model,
-                                     int pipe) {
+[[noreturn]] void write_until_killed(const std::string& path, const StoredBatch& first,
+                                     const CompensatedModel& model, int pipe) {
   auto store = Store::open(path);
   if (!store) ::_exit(1);
   for (int i = 0;; ++i) {
@@ -549,7 +566,8 @@ TEST_F(StoreFileTest, LetsAnotherProcessReadWhileItIsOpen) {
     StoredJob job;
     job.cell = batch.cell;
     const auto accepted = (*store)->add_batch(batch, job);
-    if (!accepted || !(*store)->add_model(batch.cell, model, accepted->id, true, "made")) ::_exit(1);
+    if (!accepted || !(*store)->add_model(batch.cell, model, accepted->id, true, "made"))
+      ::_exit(1);
     if (::write(pipe, &i, sizeof i) != sizeof i) ::_exit(1);
   }
 }
@@ -569,7 +587,8 @@ TEST_F(StoreFileTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
     if (writer == 0) write_until_killed(path_, first, model, pipe[1]);
     ::close(pipe[1]);
     int acknowledged = -1;
-    while (acknowledged < 5 * round && ::read(pipe[0], &acknowledged, sizeof acknowledged) == sizeof acknowledged) {
+    while (acknowledged < 5 * round &&
+           ::read(pipe[0], &acknowledged, sizeof acknowledged) == sizeof acknowledged) {
     }
     ::kill(writer, SIGKILL);
     while (::read(pipe[0], &acknowledged, sizeof acknowledged) == sizeof acknowledged) {
@@ -586,7 +605,8 @@ TEST_F(StoreFileTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
     EXPECT_GE(batches->size(), models->size());
     EXPECT_LE(batches->size(), models->size() + 1);
     EXPECT_EQ(store_->unfinished_jobs()->size(), batches->size() - models->size());
-    EXPECT_EQ(in_force(), static_cast<int>(models->size())) << "a model and its being in force are one transaction";
+    EXPECT_EQ(in_force(), static_cast<int>(models->size()))
+        << "a model and its being in force are one transaction";
     EXPECT_EQ(store_->batch("cell-7", std::to_string(acknowledged))->csv, first.csv);
     store_.reset();
   }

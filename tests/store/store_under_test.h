@@ -14,11 +14,14 @@
 /// What the tests of the store share.
 namespace trammel::test {
 
-inline StoredBatch batch_of(const std::string& id, const std::string& csv, const std::string& request) {
+inline StoredBatch batch_of(const std::string& id, const std::string& csv,
+                            const std::string& request) {
   return {"cell-7", id, csv, sha256_hex(csv), request, 1700000000, 1};
 }
 /// With a content and a request of its own.
-inline StoredBatch batch_of(const std::string& id) { return batch_of(id, "q1_deg\n" + id + "\n", "client:" + id); }
+inline StoredBatch batch_of(const std::string& id) {
+  return batch_of(id, "q1_deg\n" + id + "\n", "client:" + id);
+}
 
 /// A training from that batch.
 inline StoredJob job_of(const std::string& batch) {
@@ -32,7 +35,8 @@ inline StoredJob job_of(const std::string& batch) {
 class StoreUnderTest {
  protected:
   /// `place`: empty: a file.
-  explicit StoreUnderTest(const std::string& place = {}) : path_(place.empty() ? folder_.file("trammel.db") : place) {}
+  explicit StoreUnderTest(const std::string& place = {})
+      : path_(place.empty() ? folder_.file("trammel.db") : place) {}
 
   void open() { store_ = demand(Store::open(path_, folder_.file("cache"))); }
   void restart() {
@@ -40,10 +44,13 @@ class StoreUnderTest {
     open();
   }
   /// The job that came with it.
-  std::int64_t submit(const StoredBatch& batch) { return demand(store_->add_batch(batch, job_of(batch.id))).id; }
+  std::int64_t submit(const StoredBatch& batch) {
+    return demand(store_->add_batch(batch, job_of(batch.id))).id;
+  }
   /// Its version. `poses`: that it was trained from, which tells models apart.
   int add_model(int poses, bool put_in_force = false, std::int64_t job = 0) {
-    return demand(store_->add_model("cell-7", nominal_model(cell_, poses), job, put_in_force, "made"));
+    return demand(
+        store_->add_model("cell-7", nominal_model(cell_, poses), job, put_in_force, "made"));
   }
   int in_force() { return demand(store_->version_in_force("cell-7")).value_or(0); }
 

@@ -15,7 +15,8 @@ ChangeLoad::ChangeLoad(const client::SessionOptions& servers, int clients)
     clients_.emplace_back([this, i](const std::stop_token& stop) { work(stop, i); });
 }
 
-bool ChangeLoad::make(client::Session& session, std::size_t client, int number, const std::string& csv) {
+bool ChangeLoad::make(client::Session& session, std::size_t client, int number,
+                      const std::string& csv) {
   const std::string id = fmt::format("load-{}-{}", client, number);
   if (number % 2 == 0) return session.submit_measurements("cell-7", id, csv).has_value();
   client::ChangeOptions change;
@@ -47,7 +48,8 @@ bool ChangeLoad::wait_for_everybody(std::chrono::seconds limit) {
   const auto since = Clock::now();
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, limit, [&] {
-    return std::all_of(last_begun_.begin(), last_begun_.end(), [&](auto begun) { return begun >= since; });
+    return std::all_of(last_begun_.begin(), last_begun_.end(),
+                       [&](auto begun) { return begun >= since; });
   });
 }
 
@@ -70,14 +72,17 @@ double ChangeLoad::longest_pause_s(Clock::time_point since) const {
     longest = std::max(longest, at - before);
     before = at;
   }
-  return std::chrono::duration<double>(std::max(longest, before == since ? Clock::now() - since : longest)).count();
+  return std::chrono::duration<double>(
+             std::max(longest, before == since ? Clock::now() - since : longest))
+      .count();
 }
 
 std::set<std::string> ChangeLoad::not_in(const std::set<std::string>& batches,
                                          const std::set<std::string>& changes) const {
   const std::lock_guard lock(mutex_);
   std::set<std::string> missing;
-  for (const auto& [acknowledged, known] : {std::pair(&batches_, &batches), std::pair(&changes_, &changes)})
+  for (const auto& [acknowledged, known] :
+       {std::pair(&batches_, &batches), std::pair(&changes_, &changes)})
     std::set_difference(acknowledged->begin(), acknowledged->end(), known->begin(), known->end(),
                         std::inserter(missing, missing.end()));
   return missing;

@@ -12,8 +12,8 @@
 
 namespace trammel::test {
 
-/// Clients that submit batches and put versions 1 and 2 of cell-7 in force by turns, each change under an id of its own
-/// until it is acknowledged. They remember what was, and when.
+/// Clients that submit batches and put versions 1 and 2 of cell-7 in force by turns, each change
+/// under an id of its own until it is acknowledged. They remember what was, and when.
 class ChangeLoad {
  public:
   using Clock = std::chrono::steady_clock;
@@ -36,7 +36,8 @@ class ChangeLoad {
 
  private:
   void work(const std::stop_token& stop, std::size_t client);
-  [[nodiscard]] bool make(client::Session& session, std::size_t client, int number, const std::string& csv);
+  [[nodiscard]] bool make(client::Session& session, std::size_t client, int number,
+                          const std::string& csv);
 
   client::SessionOptions servers_;
   mutable std::mutex mutex_;  // guards what follows

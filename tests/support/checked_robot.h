@@ -25,9 +25,10 @@ struct Hidden {
   double bad_mm = 0;
 };
 /// The rows that such a check measures.
-[[nodiscard]] MeasurementBatch measured_check(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed);
+[[nodiscard]] MeasurementBatch measured_check(const CheckedRobot& robot, const Hidden& hidden,
+                                              std::uint64_t seed);
 /// What a check of the planned poses says of the robot as it is now.
-[[nodiscard]] HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed,
-                                  const HealthOptions& options);
+[[nodiscard]] HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden,
+                                  std::uint64_t seed, const HealthOptions& options);
 
 }  // namespace trammel::test

@@ -24,7 +24,8 @@ std::string text_of(const std::string& path) {
 }
 
 bool is_number(const std::string& name) {
-  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+  return !name.empty() &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 pid_t parent_of(const std::string& pid) {
@@ -52,7 +53,8 @@ std::optional<pid_t> computing_child(pid_t parent) {
   return std::nullopt;
 }
 
-Watched::Watched(pid_t pid) : pid_(pid), pidfd_(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))) {}
+Watched::Watched(pid_t pid)
+    : pid_(pid), pidfd_(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))) {}
 
 Watched::~Watched() {
   if (pidfd_ >= 0) ::close(pidfd_);
@@ -75,7 +77,8 @@ std::string Watched::status(const std::string& key) const {
 std::vector<int> Watched::descriptors() const {
   std::vector<int> numbers;
   std::error_code gone;
-  for (const auto& entry : std::filesystem::directory_iterator(fmt::format("/proc/{}/fd", pid_), gone))
+  for (const auto& entry :
+       std::filesystem::directory_iterator(fmt::format("/proc/{}/fd", pid_), gone))
     numbers.push_back(std::stoi(entry.path().filename()));
   std::sort(numbers.begin(), numbers.end());
   return numbers;

@@ -16,7 +16,8 @@ namespace trammel::test {
 /// The child of `parent` that computes; empty while there is none.
 [[nodiscard]] std::optional<pid_t> computing_child(pid_t parent);
 
-/// A process that is looked at from outside, also one that is no child of ours. Its number stays its own meanwhile.
+/// A process that is looked at from outside, also one that is no child of ours. Its number stays
+/// its own meanwhile.
 class Watched {
  public:
   explicit Watched(pid_t pid);

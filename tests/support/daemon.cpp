@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::chrono::seconds kLimit{30};
 
-/// The shipped cell, but that a bias is always learned: a training takes its time, and there is one to be served.
+/// The shipped cell, but that a bias is always learned: a training takes its time, and there is one
+/// to be served.
 std::string cell_with_a_bias() {
   std::string text = read_file(shipped_cell_file());
   const auto replace = [&](const std::string& what, const std::string& by) {
@@ -28,11 +29,12 @@ std::string cell_with_a_bias() {
 
 std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
 
-Daemon::Daemon(int number) : port_(static_cast<std::uint16_t>(own_ports() + 2 * number)), domain_(own_domain()) {
+Daemon::Daemon(int number)
+    : port_(static_cast<std::uint16_t>(own_ports() + 2 * number)), domain_(own_domain()) {
   folder_.write("cell-7.yaml", cell_with_a_bias());
-  folder_.write(
-      "server.yaml",
-      fmt::format("version: 1\nserver: {}\ncells: [cell-7.yaml]\nstore: trammel.db\nlog: {{level: debug}}\n", name()));
+  folder_.write("server.yaml", fmt::format("version: 1\nserver: {}\ncells: [cell-7.yaml]\nstore: "
+                                           "trammel.db\nlog: {{level: debug}}\n",
+                                           name()));
 }
 
 std::vector<std::string> Daemon::command_line() const {

@@ -14,8 +14,9 @@ namespace trammel::test {
 
 [[nodiscard]] std::string trammeld_path();
 
-/// A trammeld that serves the shipped virtual cell from a folder of its own, on a port that no test running at the same
-/// time has (own_ports()). May be stopped, killed and started again on the same store.
+/// A trammeld that serves the shipped virtual cell from a folder of its own, on a port that no test
+/// running at the same time has (own_ports()). May be stopped, killed and started again on the same
+/// store.
 class Daemon {
  public:
   /// `number`: the second one (1) of a test, on the port beside the first one's (0).

@@ -15,17 +15,21 @@ using hidden::HiddenCause;
 using hidden::Question;
 
 /// Row of the batch with that pose id, as the hidden cases number them; -1 for none.
-int row_of(const std::string& pose_id) { return pose_id.size() < 2 ? -1 : std::stoi(pose_id.substr(1)) - 1; }
+int row_of(const std::string& pose_id) {
+  return pose_id.size() < 2 ? -1 : std::stoi(pose_id.substr(1)) - 1;
+}
 
 bool same_place(const Cause& said, const HiddenCause& cause) {
   const bool whole_source = said.joint < 0 && said.parameter.empty();
   if (cause.cause == "geometry" || cause.cause == "compliance") {
-    return whole_source || said.parameter == cause.parameter || (cause.joint > 0 && said.joint + 1 == cause.joint);
+    return whole_source || said.parameter == cause.parameter ||
+           (cause.joint > 0 && said.joint + 1 == cause.joint);
   }
   return cause.joint == 0 || said.joint + 1 == cause.joint;
 }
 
-/// Whether `said` means the cause hidden at `place`, and where it begins, `said` says where: near enough.
+/// Whether `said` means the cause hidden at `place`, and where it begins, `said` says where: near
+/// enough.
 bool means(const Cause& said, const HiddenCase& hidden, std::size_t place) {
   const HiddenCause& cause = hidden.truth.causes[place];
   if (said.cause != cause.cause || !same_place(said, cause)) return false;
@@ -42,8 +46,8 @@ std::optional<std::size_t> place_of(const Cause& said, const HiddenCase& hidden)
   return std::nullopt;
 }
 
-/// What a reader is left with: where something was found, what it is said to be; where nothing was, what the batch is
-/// said not to tell.
+/// What a reader is left with: where something was found, what it is said to be; where nothing was,
+/// what the batch is said not to tell.
 std::vector<Cause> left_open(const Diagnosis& diagnosis) {
   std::vector<Cause> all;
   for (const Finding& finding : diagnosis.findings) {
@@ -51,7 +55,8 @@ std::vector<Cause> left_open(const Diagnosis& diagnosis) {
     all.insert(all.end(), finding.could_also_be.begin(), finding.could_also_be.end());
   }
   if (!diagnosis.findings.empty() || diagnosis.unexplained.present) return all;
-  for (const Inseparable& set : diagnosis.not_separable) all.insert(all.end(), set.causes.begin(), set.causes.end());
+  for (const Inseparable& set : diagnosis.not_separable)
+    all.insert(all.end(), set.causes.begin(), set.causes.end());
   return all;
 }
 
@@ -64,7 +69,8 @@ std::string words_for(const Finding& finding) {
 
 std::string words_for(const Diagnosis& diagnosis) {
   std::string text;
-  for (const Finding& finding : diagnosis.findings) text += (text.empty() ? "" : " + ") + words_for(finding);
+  for (const Finding& finding : diagnosis.findings)
+    text += (text.empty() ? "" : " + ") + words_for(finding);
   if (diagnosis.unexplained.present) {
     text += (text.empty() ? "" : " + ") + std::string("unknown");
     for (const std::string& on : diagnosis.unexplained.depends_on) text += " " + on;
@@ -77,7 +83,8 @@ std::vector<std::pair<std::string, double>> true_numbers(const hidden::Effect& e
   const std::string& cause = effect.cause.cause;
   const Eigen::VectorXd& v = effect.values;
   const std::string joint = std::to_string(effect.cause.joint);
-  if (cause == "gear_transmission") return {{"amplitude", 1e6 * std::hypot(v(0), v(1))}, {"order", v(2)}};
+  if (cause == "gear_transmission")
+    return {{"amplitude", 1e6 * std::hypot(v(0), v(1))}, {"order", v(2)}};
   if (cause == "encoder_eccentricity") return {{"amplitude", 1e6 * v.norm()}};
   if (cause == "joint_slip") return {{"slip" + joint, v(0)}};
   if (cause == "wrist_coupling") return {{"k54", v(0)}, {"k64", v(1)}, {"k65", v(2)}};
@@ -91,7 +98,8 @@ std::vector<NumberFound> numbers_in(const Finding& finding, const hidden::Effect
   for (const auto& [name, truth] : true_numbers(effect)) {
     for (const Estimate& estimate : finding.parameters) {
       const bool meant = estimate.name == name || estimate.name.starts_with(name + "@");
-      if (meant) numbers.push_back({effect.cause.cause + " " + name, truth, estimate.value, estimate.u95});
+      if (meant)
+        numbers.push_back({effect.cause.cause + " " + name, truth, estimate.value, estimate.u95});
     }
   }
   return numbers;
@@ -99,7 +107,8 @@ std::vector<NumberFound> numbers_in(const Finding& finding, const hidden::Effect
 
 /// The weak ripple of twice the order that every hidden gear has.
 bool is_harmonic(const Cause& said, const hidden::Effect& effect) {
-  return said.cause == "gear_transmission" && said.order && std::abs(*said.order - 2 * effect.values(2)) < 1;
+  return said.cause == "gear_transmission" && said.order &&
+         std::abs(*said.order - 2 * effect.values(2)) < 1;
 }
 
 void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgement& judgement) {
@@ -108,7 +117,8 @@ void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgem
   for (const Finding& finding : diagnosis.findings) {
     for (std::size_t k = 0; k < mentioned.size(); ++k) {
       const auto is_it = [&](const Cause& cause) { return means(cause, hidden, k); };
-      const bool open = std::any_of(finding.could_also_be.begin(), finding.could_also_be.end(), is_it);
+      const bool open =
+          std::any_of(finding.could_also_be.begin(), finding.could_also_be.end(), is_it);
       if (open || is_it(finding.cause)) mentioned[k] = true;
     }
     const auto place = place_of(finding.cause, hidden);
@@ -132,12 +142,14 @@ std::string traceable_dependence(const HiddenCause& cause) {
 }
 
 /// `left_open`: what a reader is left with.
-bool is_right_of_unrecorded(const Diagnosis& diagnosis, const HiddenCase& hidden, const std::vector<Cause>& left_open) {
+bool is_right_of_unrecorded(const Diagnosis& diagnosis, const HiddenCase& hidden,
+                            const std::vector<Cause>& left_open) {
   const bool unnamed = diagnosis.findings.empty();
   if (hidden.truth.untraceable && unnamed) return true;
   const std::vector<std::string> on = {traceable_dependence(hidden.truth.causes.front())};
   if (unnamed) return diagnosis.unexplained.present && diagnosis.unexplained.depends_on == on;
-  return std::any_of(left_open.begin(), left_open.end(), [&](const Cause& cause) { return means(cause, hidden, 0); });
+  return std::any_of(left_open.begin(), left_open.end(),
+                     [&](const Cause& cause) { return means(cause, hidden, 0); });
 }
 
 }  // namespace
@@ -147,18 +159,21 @@ Judgement judge(const Diagnosis& diagnosis, const HiddenCase& hidden) {
   judgement.said = words_for(diagnosis);
   judgement.detected = !diagnosis.findings.empty() || diagnosis.unexplained.present;
   count_findings(diagnosis, hidden, judgement);
-  judgement.exact = diagnosis.verdict == Verdict::kNamed && judgement.wrong == 0 && judgement.open == 0 &&
-                    !diagnosis.unexplained.present && judgement.right == static_cast<int>(hidden.truth.causes.size());
+  judgement.exact = diagnosis.verdict == Verdict::kNamed && judgement.wrong == 0 &&
+                    judgement.open == 0 && !diagnosis.unexplained.present &&
+                    judgement.right == static_cast<int>(hidden.truth.causes.size());
   const std::vector<Cause> mentioned = left_open(diagnosis);
-  judgement.set_holds_truth = std::any_of(mentioned.begin(), mentioned.end(), [&](const Cause& cause) {
-    return !hidden.truth.causes.empty() && means(cause, hidden, 0);
-  });
-  judgement.unrecorded_rightly = !hidden.truth.causes.empty() && is_right_of_unrecorded(diagnosis, hidden, mentioned);
+  judgement.set_holds_truth = std::any_of(
+      mentioned.begin(), mentioned.end(),
+      [&](const Cause& cause) { return !hidden.truth.causes.empty() && means(cause, hidden, 0); });
+  judgement.unrecorded_rightly =
+      !hidden.truth.causes.empty() && is_right_of_unrecorded(diagnosis, hidden, mentioned);
   judgement.over_confident = judgement.right + judgement.wrong > 0;
   if (hidden.truth.question == Question::kUnknown) {
     std::vector<std::string> on = diagnosis.unexplained.depends_on;
     std::sort(on.begin(), on.end());
-    judgement.unknown_rightly = diagnosis.verdict == Verdict::kUnknown && on == hidden.truth.causes.front().depends_on;
+    judgement.unknown_rightly =
+        diagnosis.verdict == Verdict::kUnknown && on == hidden.truth.causes.front().depends_on;
   }
   return judgement;
 }

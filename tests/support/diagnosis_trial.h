@@ -17,7 +17,8 @@ struct Trial {
   bool compare_next_poses = false;   ///< with random ones
 };
 
-/// Standard deviation of what is confounded: as it is, with ten suggested poses more, with ten random ones.
+/// Standard deviation of what is confounded: as it is, with ten suggested poses more, with ten
+/// random ones.
 struct NextPosesWorth {
   double now = 0, suggested = 0, random = 0;
 
@@ -32,7 +33,8 @@ struct TrialResult {
   std::string error;  ///< why there is no diagnosis; else empty
   Judgement judgement;
   double seconds = 0;
-  /// Of the lambda asked for, what the closest imitator with as few parameters cannot make; empty where not computed.
+  /// Of the lambda asked for, what the closest imitator with as few parameters cannot make; empty
+  /// where not computed.
   std::optional<double> beside_rival;
   std::string rival;
   double held_out_before_mm = 0, held_out_after_mm = 0;
@@ -40,7 +42,8 @@ struct TrialResult {
   std::optional<NextPosesWorth> next_poses_claimed, next_poses_measured;
 };
 
-[[nodiscard]] Result<Diagnosis> diagnose_files(const hidden::HiddenCase& hidden, const DiagnoseOptions& options);
+[[nodiscard]] Result<Diagnosis> diagnose_files(const hidden::HiddenCase& hidden,
+                                               const DiagnoseOptions& options);
 [[nodiscard]] TrialResult run_trial(const Trial& trial, const DiagnoseOptions& options);
 /// The whole verdict, for people.
 [[nodiscard]] std::string told(const Diagnosis& diagnosis);

@@ -32,8 +32,8 @@ FailingOver::FailingOver() {
   start(trains, "serves: false\n");
   const auto session = demand(client::Session::open(session_options()));
   for (const std::uint64_t seed : {1, 2}) {
-    const auto job =
-        demand(session->submit_measurements("cell-7", fmt::format("learned-{}", seed), virtual_batch_csv(60, seed)));
+    const auto job = demand(session->submit_measurements("cell-7", fmt::format("learned-{}", seed),
+                                                         virtual_batch_csv(60, seed)));
     static_cast<void>(demand(session->wait_for_job(job, kLimit, nullptr)));
   }
   trains.kill();
@@ -49,18 +49,21 @@ void FailingOver::start(Daemon& server, const std::string& keys) const {
   std::string text = read_file(server.config_path());
   const std::string own = "store: trammel.db";
   text.replace(text.find(own), own.size(), "store: '" + url + "'");
-  static_cast<void>(demand(write_text_file(server.config_path(), text + keys).map([] { return true; })));
+  static_cast<void>(
+      demand(write_text_file(server.config_path(), text + keys).map([] { return true; })));
   server.start();
 }
 
 std::set<std::string> FailingOver::lost(const ChangeLoad& load) const {
-  return load.not_in(lines_of(record.sql("SELECT id FROM batches")), lines_of(record.sql("SELECT id FROM changes")));
+  return load.not_in(lines_of(record.sql("SELECT id FROM batches")),
+                     lines_of(record.sql("SELECT id FROM changes")));
 }
 
 std::string FailingOver::twice() const {
   std::string found = record.sql(
-      "SELECT 'job of two batches: ' || job FROM batches GROUP BY job HAVING count(*) > 1;"
-      "SELECT 'made twice: ' || request FROM audit WHERE what = 'activate' GROUP BY request HAVING count(*) > 1");
+      "SELECT 'job of two batches: ' || job FROM batches GROUP BY job HAVING count(*) > 1;SELECT "
+      "'made twice: ' || request FROM audit WHERE what = 'activate' GROUP BY request HAVING "
+      "count(*) > 1");
   const AuditTrail trail = demand(read_audit(url, {}));
   if (trail.broken) found += sentence(*trail.broken);
   return found;

@@ -10,8 +10,8 @@
 
 namespace trammel::test {
 
-/// Two servers whose record is a PostgreSQL of three hosts; a training host, killed since, has made versions 1 and 2 of
-/// cell-7.
+/// Two servers whose record is a PostgreSQL of three hosts; a training host, killed since, has made
+/// versions 1 and 2 of cell-7.
 class FailingOver {
  public:
   FailingOver();

@@ -14,8 +14,9 @@
 
 namespace trammel::test {
 
-/// The disk as SQLite sees it, while it lives: every file of SQLite goes through it. It refuses what it is told to, and
-/// remembers what was written, so that a power cut after any call can be played.
+/// The disk as SQLite sees it, while it lives: every file of SQLite goes through it. It refuses
+/// what it is told to, and remembers what was written, so that a power cut after any call can be
+/// played.
 class FaultyDisk {
  public:
   enum class Call { kOpen, kWrite, kSync, kTruncate, kDelete, kShared };
@@ -60,8 +61,8 @@ class FaultyDisk {
     return events_.size();
   }
 
-  /// What the disk holds after a power cut behind the first `calls` calls. Of what was not synchronised before each
-  /// write is there, or not, or in its first half, as `random` says.
+  /// What the disk holds after a power cut behind the first `calls` calls. Of what was not
+  /// synchronised before each write is there, or not, or in its first half, as `random` says.
   template <typename Random>
   void cut_power(std::size_t calls, Random& random, const std::filesystem::path& folder) {
     std::map<std::string, Content> files;
@@ -133,9 +134,12 @@ class FaultyDisk {
     File* own = reinterpret_cast<File*>(file);
     own->base.pMethods = nullptr;
     own->name = nullptr;
-    const std::string short_name = name == nullptr ? "" : std::filesystem::path(name).filename().string();
+    const std::string short_name =
+        name == nullptr ? "" : std::filesystem::path(name).filename().string();
     if (name != nullptr && (flags & SQLITE_OPEN_CREATE) != 0 && !std::filesystem::exists(name)) {
-      if (const int refused = only_->happens({Call::kOpen, short_name, 0, ""}); refused != SQLITE_OK) return refused;
+      if (const int refused = only_->happens({Call::kOpen, short_name, 0, ""});
+          refused != SQLITE_OK)
+        return refused;
     }
     const int opened = only_->real_->xOpen(only_->real_, name, own->real(), flags, out);
     if (opened != SQLITE_OK) return opened;
@@ -145,7 +149,9 @@ class FaultyDisk {
   }
   static int remove(sqlite3_vfs*, const char* name, int sync) {
     const std::string short_name = std::filesystem::path(name).filename().string();
-    if (const int refused = only_->happens({Call::kDelete, short_name, 0, ""}); refused != SQLITE_OK) return refused;
+    if (const int refused = only_->happens({Call::kDelete, short_name, 0, ""});
+        refused != SQLITE_OK)
+      return refused;
     return only_->real_->xDelete(only_->real_, name, sync);
   }
   static File* own(sqlite3_file* file) { return reinterpret_cast<File*>(file); }
@@ -174,7 +180,9 @@ class FaultyDisk {
         const int refused = only_->happens({Call::kSync, *own(f)->name, 0, ""});
         return refused != SQLITE_OK ? refused : real(f)->pMethods->xSync(real(f), flags);
       };
-      m.xFileSize = [](sqlite3_file* f, sqlite3_int64* size) { return real(f)->pMethods->xFileSize(real(f), size); };
+      m.xFileSize = [](sqlite3_file* f, sqlite3_int64* size) {
+        return real(f)->pMethods->xFileSize(real(f), size);
+      };
       m.xLock = [](sqlite3_file* f, int how) { return real(f)->pMethods->xLock(real(f), how); };
       m.xUnlock = [](sqlite3_file* f, int how) { return real(f)->pMethods->xUnlock(real(f), how); };
       m.xCheckReservedLock = [](sqlite3_file* f, int* out) {
@@ -184,7 +192,9 @@ class FaultyDisk {
         return real(f)->pMethods->xFileControl(real(f), what, with);
       };
       m.xSectorSize = [](sqlite3_file* f) { return real(f)->pMethods->xSectorSize(real(f)); };
-      m.xDeviceCharacteristics = [](sqlite3_file* f) { return real(f)->pMethods->xDeviceCharacteristics(real(f)); };
+      m.xDeviceCharacteristics = [](sqlite3_file* f) {
+        return real(f)->pMethods->xDeviceCharacteristics(real(f));
+      };
       m.xShmMap = [](sqlite3_file* f, int page, int size, int extend, void volatile** at) {
         if (extend != 0) {
           const int refused = only_->happens({Call::kShared, *own(f)->name, 0, ""});
@@ -196,7 +206,9 @@ class FaultyDisk {
         return real(f)->pMethods->xShmLock(real(f), at, count, how);
       };
       m.xShmBarrier = [](sqlite3_file* f) { real(f)->pMethods->xShmBarrier(real(f)); };
-      m.xShmUnmap = [](sqlite3_file* f, int remove) { return real(f)->pMethods->xShmUnmap(real(f), remove); };
+      m.xShmUnmap = [](sqlite3_file* f, int remove) {
+        return real(f)->pMethods->xShmUnmap(real(f), remove);
+      };
       return m;
     }();
     return &all;

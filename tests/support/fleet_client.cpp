@@ -33,11 +33,13 @@ std::optional<SharedBatches::Batch> SharedBatches::next(const std::string& cell)
   return known.back();
 }
 
-std::optional<SharedBatches::Batch> SharedBatches::any(const std::string& cell, std::mt19937_64& random) const {
+std::optional<SharedBatches::Batch> SharedBatches::any(const std::string& cell,
+                                                       std::mt19937_64& random) const {
   const std::lock_guard lock(mutex_);
   const auto known = batches_.find(cell);
   if (known == batches_.end() || known->second.empty()) return std::nullopt;
-  return known->second[std::uniform_int_distribution<std::size_t>(0, known->second.size() - 1)(random)];
+  return known
+      ->second[std::uniform_int_distribution<std::size_t>(0, known->second.size() - 1)(random)];
 }
 
 std::string text_of(const AskedCell& cell, std::uint64_t seed) {
@@ -49,9 +51,9 @@ std::string text_of(const AskedCell& cell, std::uint64_t seed) {
   return text;
 }
 
-FleetClient::FleetClient(int number, const client::SessionOptions& first, const client::SessionOptions& other,
-                         const std::vector<AskedCell>& cells, SharedBatches& batches, History& history,
-                         std::uint64_t seed)
+FleetClient::FleetClient(int number, const client::SessionOptions& first,
+                         const client::SessionOptions& other, const std::vector<AskedCell>& cells,
+                         SharedBatches& batches, History& history, std::uint64_t seed)
     : number_(number),
       first_(opened(first)),
       other_(opened(other)),
@@ -90,13 +92,16 @@ void FleetClient::one(const AskedCell& cell) {
   }
 }
 
-bool FleetClient::by_chance(double share) { return std::uniform_real_distribution<double>(0, 1)(random_) < share; }
+bool FleetClient::by_chance(double share) {
+  return std::uniform_real_distribution<double>(0, 1)(random_) < share;
+}
 
 json FleetClient::record_of(const char* operation, const std::string& cell) const {
   return {{"op", operation}, {"cell", cell}, {"client", number_}};
 }
 
-void FleetClient::send_batch(const AskedCell& cell, const SharedBatches::Batch& batch, const std::string& text) {
+void FleetClient::send_batch(const AskedCell& cell, const SharedBatches::Batch& batch,
+                             const std::string& text) {
   json record = record_of("submit", cell.name);
   record["batch"] = batch.id;
   record["hash"] = sha256_hex(text);
@@ -114,7 +119,8 @@ void FleetClient::send_batch(const AskedCell& cell, const SharedBatches::Batch& 
 }
 
 void FleetClient::submit(const AskedCell& cell) {
-  if (const auto batch = batches_.next(cell.name)) send_batch(cell, *batch, text_of(cell, batch->seed));
+  if (const auto batch = batches_.next(cell.name))
+    send_batch(cell, *batch, text_of(cell, batch->seed));
 }
 
 void FleetClient::submit_again(const AskedCell& cell) {
@@ -137,29 +143,37 @@ void FleetClient::change(json record, const Call& call) {
   const std::int64_t until = monotonic_us() + kUntilAnsweredUs;
   std::string answer = "unknown";
   for (int tries = 0; answer == "unknown" && monotonic_us() < until; ++tries) {
-    answer =
-        history_.ask(record, [&] { return call(session(tries % 2 == 0 ? Server::kFirst : Server::kOther), options); });
+    answer = history_.ask(record, [&] {
+      return call(session(tries % 2 == 0 ? Server::kFirst : Server::kOther), options);
+    });
   }
   if (by_chance(0.15))
-    history_.ask(record, [&] { return call(session(by_chance(0.5) ? Server::kFirst : Server::kOther), options); });
+    history_.ask(record, [&] {
+      return call(session(by_chance(0.5) ? Server::kFirst : Server::kOther), options);
+    });
 }
 
 void FleetClient::activate(const AskedCell& cell) {
   const int newest = seen_[cell.name].newest;
   if (newest == 0) return read_models(cell.name);
-  const int version =
-      std::uniform_int_distribution<int>(std::max(1, newest - 3), newest + (by_chance(0.1) ? 5 : 0))(random_);
+  const int version = std::uniform_int_distribution<int>(
+      std::max(1, newest - 3), newest + (by_chance(0.1) ? 5 : 0))(random_);
   json record = record_of("activate", cell.name);
   record["version"] = version;
-  change(std::move(record), [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
-    return session.activate(cell.name, version, options).map([](int now) { return json{{"value", now}}; });
-  });
+  change(std::move(record),
+         [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
+           return session.activate(cell.name, version, options).map([](int now) {
+             return json{{"value", now}};
+           });
+         });
 }
 
 void FleetClient::rollback(const AskedCell& cell) {
   change(record_of("rollback", cell.name),
          [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
-           return session.rollback(cell.name, options).map([](int now) { return json{{"value", now}}; });
+           return session.rollback(cell.name, options).map([](int now) {
+             return json{{"value", now}};
+           });
          });
 }
 
@@ -168,11 +182,12 @@ void FleetClient::train(const AskedCell& cell) {
   if (!batch) return;
   json record = record_of("train", cell.name);
   record["batch"] = batch->id;
-  change(std::move(record), [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
-    return session.train(cell.name, {batch->id}, "", "", options).map([](std::int64_t job) {
-      return json{{"value", job}};
-    });
-  });
+  change(std::move(record),
+         [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
+           return session.train(cell.name, {batch->id}, "", "", options).map([](std::int64_t job) {
+             return json{{"value", job}};
+           });
+         });
 }
 
 void FleetClient::keep_out(const AskedCell& cell, bool for_ever) {
@@ -180,10 +195,12 @@ void FleetClient::keep_out(const AskedCell& cell, bool for_ever) {
   if (!batch) return;
   json record = record_of(for_ever ? "discard" : "release", cell.name);
   record["batch"] = batch->id;
-  change(std::move(record), [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
-    return (for_ever ? session.discard(cell.name, batch->id, options) : session.release(cell.name, batch->id, options))
-        .map([] { return json::object(); });
-  });
+  change(std::move(record),
+         [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
+           return (for_ever ? session.discard(cell.name, batch->id, options)
+                            : session.release(cell.name, batch->id, options))
+               .map([] { return json::object(); });
+         });
 }
 
 void FleetClient::read_batch(const AskedCell& cell) {

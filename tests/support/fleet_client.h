@@ -45,12 +45,14 @@ class SharedBatches {
 /// The text of that batch; one in seven has two columns exchanged, and is kept in quarantine.
 [[nodiscard]] std::string text_of(const AskedCell& cell, std::uint64_t seed);
 
-/// Asks one thing after the other, all kinds of changes and reads of all cells, and records each. A change that is not
-/// answered is asked for again under its id, of this server or another, until it is.
+/// Asks one thing after the other, all kinds of changes and reads of all cells, and records each. A
+/// change that is not answered is asked for again under its id, of this server or another, until it
+/// is.
 class FleetClient {
  public:
   FleetClient(int number, const client::SessionOptions& first, const client::SessionOptions& other,
-              const std::vector<AskedCell>& cells, SharedBatches& batches, History& history, std::uint64_t seed);
+              const std::vector<AskedCell>& cells, SharedBatches& batches, History& history,
+              std::uint64_t seed);
 
   void work(const std::stop_token& stop);
   void read_models(const std::string& cell);
@@ -70,14 +72,18 @@ class FleetClient {
   void keep_out(const AskedCell& cell, bool for_ever);
   void read_batch(const AskedCell& cell);
 
-  void send_batch(const AskedCell& cell, const SharedBatches::Batch& batch, const std::string& text);
+  void send_batch(const AskedCell& cell, const SharedBatches::Batch& batch,
+                  const std::string& text);
   /// Asks `call(session, options)` until it is answered, and now and then once more.
   template <typename Call>
   void change(nlohmann::json record, const Call& call);
   [[nodiscard]] nlohmann::json record_of(const char* operation, const std::string& cell) const;
   [[nodiscard]] bool by_chance(double share);
-  [[nodiscard]] client::Session& session(Server which) { return which == Server::kFirst ? *first_ : *other_; }
-  [[nodiscard]] static std::unique_ptr<client::Session> opened(const client::SessionOptions& options);
+  [[nodiscard]] client::Session& session(Server which) {
+    return which == Server::kFirst ? *first_ : *other_;
+  }
+  [[nodiscard]] static std::unique_ptr<client::Session> opened(
+      const client::SessionOptions& options);
 
   const int number_;
   const std::unique_ptr<client::Session> first_, other_;

@@ -5,33 +5,38 @@
 #include "server/tasks/train/extend.h"
 #include "server/tasks/train/train.h"
 
-/// What programs ask of a batch that is checked, for tests that begin with rows: each checks them first, and holds out
-/// what their `set` says.
+/// What programs ask of a batch that is checked, for tests that begin with rows: each checks them
+/// first, and holds out what their `set` says.
 namespace trammel {
 
 [[nodiscard]] inline Result<CompensatedModel> train(const std::shared_ptr<const Cell>& cell,
-                                                    const MeasurementBatch& batch, const TrainOptions& options) {
+                                                    const MeasurementBatch& batch,
+                                                    const TrainOptions& options) {
   return check_against_cell(batch, *cell).and_then([&](const CheckedBatch& checked) {
     return train(cell, checked, options);
   });
 }
 
 [[nodiscard]] inline Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated,
-                                                         const MeasurementBatch& batch, const TrainOptions& options) {
+                                                         const MeasurementBatch& batch,
+                                                         const TrainOptions& options) {
   return check_against_cell(batch, calibrated.cell()).and_then([&](const CheckedBatch& checked) {
     return learn_bias(calibrated, checked, options);
   });
 }
 
-[[nodiscard]] inline Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+[[nodiscard]] inline Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell,
+                                                const MeasurementBatch& batch,
                                                 const DiagnoseOptions& options) {
   return check_against_cell(batch, *cell).and_then([&](const CheckedBatch& checked) {
     return diagnose(cell, checked, options);
   });
 }
 
-[[nodiscard]] inline Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                                              const Diagnosis& diagnosis, const TrainOptions& options) {
+[[nodiscard]] inline Result<Extension> extend(const std::shared_ptr<const Cell>& cell,
+                                              const MeasurementBatch& batch,
+                                              const Diagnosis& diagnosis,
+                                              const TrainOptions& options) {
   return check_against_cell(batch, *cell).and_then([&](const CheckedBatch& checked) {
     return extend(cell, checked, diagnosis, options);
   });
@@ -39,8 +44,10 @@ namespace trammel {
 
 namespace test {
 
-/// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for validation.
-[[nodiscard]] inline MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed) {
+/// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for
+/// validation.
+[[nodiscard]] inline MeasurementBatch with_held_out(MeasurementBatch batch, double share,
+                                                    std::uint64_t seed) {
   const std::vector<bool> held_out = rows_held_out(batch, share, seed);
   for (std::size_t i = 0; i < held_out.size(); ++i) {
     batch.measurements[i].set = held_out[i] ? MeasurementSet::kValidation : MeasurementSet::kTrain;

@@ -17,14 +17,16 @@ constexpr double kNearest = 300, kFarthest = 3000;  // mm
 constexpr int kAskedPoses = 150;
 
 /// The world's arm with its parameters moved by `values`, at a pose: tool point, mm.
-Eigen::Vector3d point_of(const hidden::Arm& arm, const hidden::World& world, const hidden::MeasuringPose& pose) {
+Eigen::Vector3d point_of(const hidden::Arm& arm, const hidden::World& world,
+                         const hidden::MeasuringPose& pose) {
   hidden::Arm one = arm;
   one.tool = world.tools[static_cast<std::size_t>(pose.tool)];
   one.load = world.loads[static_cast<std::size_t>(pose.load)];
   return hidden::tool_frame(one, pose.q).block<3, 1>(0, 3);
 }
 
-/// 3 x P: derivative of the tool point by every parameter, in units that it may reasonably be off by.
+/// 3 x P: derivative of the tool point by every parameter, in units that it may reasonably be off
+/// by.
 Eigen::MatrixXd point_columns(const GaugedArm& arm, const hidden::MeasuringPose& pose) {
   constexpr double kStep = 1e-3;
   const auto& all = hidden::arm_parameters();
@@ -67,7 +69,8 @@ std::map<std::string, Eigen::Vector3d> three_corners() {
 
 std::string unknown_places(const std::map<std::string, Eigen::Vector3d>& anchors_mm) {
   std::string text;
-  for (const auto& [id, p] : anchors_mm) text += (text.empty() ? "" : ", ") + id + ": {xyz_mm: null}";
+  for (const auto& [id, p] : anchors_mm)
+    text += (text.empty() ? "" : ", ") + id + ": {xyz_mm: null}";
   return "{" + text + "}";
 }
 
@@ -80,7 +83,8 @@ GaugedArm gauged_arm(std::uint64_t seed, const std::map<std::string, Eigen::Vect
   const auto& all = hidden::arm_parameters();
   Eigen::VectorXd errors(static_cast<Eigen::Index>(all.size()));
   for (std::size_t k = 0; k < all.size(); ++k) {
-    const double size = all[k].group == "compliance" ? std::abs(hidden::normal(random)) : hidden::normal(random);
+    const double size =
+        all[k].group == "compliance" ? std::abs(hidden::normal(random)) : hidden::normal(random);
     errors(static_cast<Eigen::Index>(k)) = size * all[k].unit;
   }
   arm.world.arm = hidden::changed(arm.world.arm, errors);
@@ -90,15 +94,18 @@ GaugedArm gauged_arm(std::uint64_t seed, const std::map<std::string, Eigen::Vect
   arm.world.orientation = false;
   std::string known;
   for (const auto& [id, p] : anchors_mm)
-    known +=
-        fmt::format("{}{}: {{xyz_mm: [{:.9g}, {:.9g}, {:.9g}]}}", known.empty() ? "" : ", ", id, p.x(), p.y(), p.z());
-  const std::string text = hidden::cell_text(arm.world, {arm.world.tools, arm.world.loads}, "calibration") +
-                           "anchors: " + (anchors_yaml.empty() ? "{" + known + "}" : anchors_yaml) + "\n" + more;
-  arm.cell = std::make_shared<const Cell>(demand(parse_cell(text, hidden::robot_text(), "gauged.yaml")));
+    known += fmt::format("{}{}: {{xyz_mm: [{:.9g}, {:.9g}, {:.9g}]}}", known.empty() ? "" : ", ",
+                         id, p.x(), p.y(), p.z());
+  const std::string text =
+      hidden::cell_text(arm.world, {arm.world.tools, arm.world.loads}, "calibration") +
+      "anchors: " + (anchors_yaml.empty() ? "{" + known + "}" : anchors_yaml) + "\n" + more;
+  arm.cell =
+      std::make_shared<const Cell>(demand(parse_cell(text, hidden::robot_text(), "gauged.yaml")));
   return arm;
 }
 
-std::vector<GaugeRow> wire_rows(const GaugedArm& arm, int count, std::uint64_t seed, double zero_mm) {
+std::vector<GaugeRow> wire_rows(const GaugedArm& arm, int count, std::uint64_t seed,
+                                double zero_mm) {
   std::vector<GaugeRow> rows;
   auto anchor = arm.anchors_mm.begin();
   for (const hidden::MeasuringPose& pose : some_poses(20 * count, seed)) {
@@ -128,7 +135,8 @@ std::string gauge_text(const std::vector<GaugeRow>& rows, double sigma_mm, std::
     text += fmt::format("p{}", ++id);
     for (const double q : row.pose.q) text += fmt::format(",{:.10f}", q / kDegree);
     if (row.column.empty()) {
-      for (const double x : row.p_mm) text += fmt::format(",{:.7f}", x + sigma_mm * hidden::normal(random));
+      for (const double x : row.p_mm)
+        text += fmt::format(",{:.7f}", x + sigma_mm * hidden::normal(random));
       text += ",,,,";
     } else {
       const double value = row.value_mm + sigma_mm * hidden::normal(random);
@@ -141,13 +149,16 @@ std::string gauge_text(const std::vector<GaugeRow>& rows, double sigma_mm, std::
   return text;
 }
 
-MeasurementBatch gauge_batch(const GaugedArm& arm, const std::vector<GaugeRow>& rows, double sigma_mm,
-                             std::uint64_t seed) {
-  return demand(check_against_cell(demand(parse_batch_csv(gauge_text(rows, sigma_mm, seed), "gauged.csv")), *arm.cell))
+MeasurementBatch gauge_batch(const GaugedArm& arm, const std::vector<GaugeRow>& rows,
+                             double sigma_mm, std::uint64_t seed) {
+  return demand(check_against_cell(
+                    demand(parse_batch_csv(gauge_text(rows, sigma_mm, seed), "gauged.csv")),
+                    *arm.cell))
       .rows();
 }
 
-double volumetric_mm(const GaugedArm& arm, const CalibrationResult& found, bool in_base, std::uint64_t seed) {
+double volumetric_mm(const GaugedArm& arm, const CalibrationResult& found, bool in_base,
+                     std::uint64_t seed) {
   const auto poses = some_poses(kAskedPoses, seed);
   Eigen::Matrix3Xd truth(3, kAskedPoses), predicted(3, kAskedPoses);
   for (Eigen::Index i = 0; i < kAskedPoses; ++i) {
@@ -163,8 +174,8 @@ double volumetric_mm(const GaugedArm& arm, const CalibrationResult& found, bool 
   return std::sqrt((truth - predicted).colwise().squaredNorm().mean());
 }
 
-double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& rows, double sigma_mm, bool known,
-                           bool in_base, std::uint64_t seed) {
+double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& rows, double sigma_mm,
+                           bool known, bool in_base, std::uint64_t seed) {
   const auto P = static_cast<Eigen::Index>(hidden::arm_parameters().size());
   const Eigen::Index places = known ? 0 : 3 * static_cast<Eigen::Index>(arm.anchors_mm.size());
   constexpr double kAnywhere = 1000;  // mm: as uncertain as a place is before
@@ -179,7 +190,8 @@ double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& ro
       const Eigen::RowVector3d u =
           (point_of(arm.world.arm, arm.world, row.pose) - anchor->second).normalized().transpose();
       J.leftCols(P) = u * columns;
-      if (!known) J.block<1, 3>(0, P + 3 * std::distance(arm.anchors_mm.begin(), anchor)) = -kAnywhere * u;
+      if (!known)
+        J.block<1, 3>(0, P + 3 * std::distance(arm.anchors_mm.begin(), anchor)) = -kAnywhere * u;
     }
     information += J.transpose() * J / (sigma_mm * sigma_mm);
   }

@@ -30,14 +30,16 @@ void draw_errors(hidden::Arm& arm, hidden::Random& random) {
   const auto& all = hidden::arm_parameters();
   Eigen::VectorXd errors = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.size()));
   for (std::size_t k = 0; k < all.size(); ++k) {
-    errors(static_cast<Eigen::Index>(k)) = all[k].group == "compliance"
-                                               ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * hidden::normal(random))
-                                               : 0.15 * all[k].unit * hidden::normal(random);
+    errors(static_cast<Eigen::Index>(k)) =
+        all[k].group == "compliance"
+            ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * hidden::normal(random))
+            : 0.15 * all[k].unit * hidden::normal(random);
   }
   arm = hidden::changed(arm, errors);
 }
 
-MeasurementBatch with_noise(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses, hidden::Random& random) {
+MeasurementBatch with_noise(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses,
+                            hidden::Random& random) {
   hidden::World world = arm.world;
   world.poses = std::move(poses);
   hidden::Frames frames = hidden::frames_at(world, world.poses, world.effects);
@@ -47,10 +49,13 @@ MeasurementBatch with_noise(const HeavyArm& arm, std::vector<hidden::MeasuringPo
       frame(k, 3) += world.sigma_mm * hidden::normal(random);
       turn(k) = world.sigma_rad * hidden::normal(random);
     }
-    const Eigen::Matrix4d turned = hidden::motion(Eigen::Vector3d::Zero(), turn.z(), turn.y(), turn.x());
+    const Eigen::Matrix4d turned =
+        hidden::motion(Eigen::Vector3d::Zero(), turn.z(), turn.y(), turn.x());
     frame.block<3, 3>(0, 0) = (turned * frame).block<3, 3>(0, 0).eval();
   }
-  return demand(check_against_cell(demand(parse_batch_csv(hidden::batch_text(world, frames), "heavy.csv")), *arm.cell))
+  return demand(check_against_cell(
+                    demand(parse_batch_csv(hidden::batch_text(world, frames), "heavy.csv")),
+                    *arm.cell))
       .rows();
 }
 
@@ -63,7 +68,8 @@ HeavyArm draw_heavy_arm(const HeavyArmSpec& spec) {
   world.arm = hidden::drawn_arm();
   draw_errors(world.arm, random);
   if (spec.links_weigh) draw_weights(world.arm, random);
-  if (spec.balancer) world.arm.spring = {9000, 6, 700, 520, 310, std::numbers::pi - 0.2};  // some 3 kNm
+  if (spec.balancer)
+    world.arm.spring = {9000, 6, 700, 520, 310, std::numbers::pi - 0.2};  // some 3 kNm
   if (spec.soft_foot) world.arm.foot = {3e-11, 5e-11};
   world.sources = {"base", "geometry", "compliance"};
   hidden::Belief belief{{hidden::motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0)}, {}};
@@ -72,8 +78,8 @@ HeavyArm draw_heavy_arm(const HeavyArmSpec& spec) {
   world.tools = belief.tools;
   world.loads = belief.loads;
   if (spec.payloads == 0) belief.loads = world.loads = {{0, {0, 0, 0}}};
-  heavy.cell = std::make_shared<const Cell>(
-      demand(parse_cell(hidden::cell_text(world, belief, "calibration"), hidden::robot_text(), "heavy.yaml")));
+  heavy.cell = std::make_shared<const Cell>(demand(parse_cell(
+      hidden::cell_text(world, belief, "calibration"), hidden::robot_text(), "heavy.yaml")));
   return heavy;
 }
 
@@ -88,7 +94,8 @@ MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed, in
   return with_noise(arm, std::move(drawn), random);
 }
 
-MeasurementBatch measured_at(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses, std::uint64_t seed) {
+MeasurementBatch measured_at(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses,
+                             std::uint64_t seed) {
   hidden::Random random(seed);
   return with_noise(arm, std::move(poses), random);
 }

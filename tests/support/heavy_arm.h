@@ -26,11 +26,14 @@ struct HeavyArm {
 };
 [[nodiscard]] HeavyArm draw_heavy_arm(const HeavyArmSpec& spec);
 
-/// `poses` poses as its tracker measures them, payloads in turns; `payload`: that one alone (from 0).
-[[nodiscard]] MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed, int payload = -1);
+/// `poses` poses as its tracker measures them, payloads in turns; `payload`: that one alone (from
+/// 0).
+[[nodiscard]] MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed,
+                                        int payload = -1);
 
 /// The same at poses of the caller's. What `world.effects` hide acts in both.
-[[nodiscard]] MeasurementBatch measured_at(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses,
+[[nodiscard]] MeasurementBatch measured_at(const HeavyArm& arm,
+                                           std::vector<hidden::MeasuringPose> poses,
                                            std::uint64_t seed);
 
 }  // namespace trammel::test

@@ -65,7 +65,8 @@ HeldAnswer::HeldAnswer(const std::string& url) {
   url_ = url.substr(0, host + kHost.size()) + folder_.path().string();
   listener_ = new_socket();
   const sockaddr_un address = address_of(folder_.path().string() + std::string(kSocket));
-  TRAMMEL_CHECK(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
+  TRAMMEL_CHECK(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) ==
+                0);
   TRAMMEL_CHECK(::listen(listener_, 64) == 0);
   end_ = ::eventfd(0, EFD_CLOEXEC);
   TRAMMEL_CHECK(end_ >= 0);

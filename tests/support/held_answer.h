@@ -12,8 +12,8 @@
 
 namespace trammel::test {
 
-/// Stands between servers and a PostgreSQL, and keeps to itself that a change was committed: as if whoever made it died
-/// between the commit and its answer.
+/// Stands between servers and a PostgreSQL, and keeps to itself that a change was committed: as if
+/// whoever made it died between the commit and its answer.
 class HeldAnswer {
  public:
   /// `url`: of a database that is reached by a socket in a folder.

@@ -60,11 +60,12 @@ struct Draft {
   bool permuted = false;
 };
 
-/// Causes that mixtures are drawn from: those that a cell with all three usual sources can have at scattered poses. Not
-/// a drift, of which a moved tracker makes three quarters.
+/// Causes that mixtures are drawn from: those that a cell with all three usual sources can have at
+/// scattered poses. Not a drift, of which a moved tracker makes three quarters.
 const std::vector<std::string> kMixable = {
-    "payload",         "tool",         "gear_transmission", "encoder_eccentricity", "joint_map",  "backlash",
-    "wrist_coupling",  "link_bending", "thermal_growth",    "tracker_moved",        "joint_slip", "tool_changed",
+    "payload",         "tool",          "gear_transmission", "encoder_eccentricity",
+    "joint_map",       "backlash",      "wrist_coupling",    "link_bending",
+    "thermal_growth",  "tracker_moved", "joint_slip",        "tool_changed",
     "payload_changed", "outlier"};
 
 std::vector<std::string> draw_mixture(int count, Random& random) {
@@ -97,7 +98,8 @@ void understand(Draft& draft) {
   } else if (contains(undecidable_kinds(), kind)) {
     draft.truth.question = Question::kAbstain;
     draft.names = {kind};
-    draft.size_given = !kind.ends_with("_or_link") && !kind.ends_with("_or_tracker") && !kind.ends_with("_or_tool");
+    draft.size_given = !kind.ends_with("_or_link") && !kind.ends_with("_or_tracker") &&
+                       !kind.ends_with("_or_tool");
   } else if (contains(replica_kinds(), kind)) {
     draft.names = {kind};
     draft.size_given = true;
@@ -118,8 +120,9 @@ void arrange(Draft& draft) {
   if (has("geometry") || has("tool_or_link") || has("replica_tool")) world.sources = {"base"};
   if (has("base")) world.sources = {};
   world.orientation = draft.spec.orientation;
-  draft.plan = {
-      .count = draft.spec.poses, .ranges = draft.spec.ranges, .validation_share = draft.spec.validation_share};
+  draft.plan = {.count = draft.spec.poses,
+                .ranges = draft.spec.ranges,
+                .validation_share = draft.spec.validation_share};
   if (has("time_lag")) draft.plan.course = Course::kPath;
   if (has("tool")) draft.plan.tools = 2;
   if (has("payload")) draft.plan.loads = 2;
@@ -140,8 +143,9 @@ VectorXd draw_arm_errors(const std::vector<std::string>& sources, Random& random
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (!contains(sources, all[k].group)) continue;
     const auto row = static_cast<Index>(k);
-    errors(row) = all[k].group == "compliance" ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * normal(random))
-                                               : 0.15 * all[k].unit * normal(random);
+    errors(row) = all[k].group == "compliance"
+                      ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * normal(random))
+                      : 0.15 * all[k].unit * normal(random);
   }
   return errors;
 }
@@ -149,22 +153,25 @@ VectorXd draw_arm_errors(const std::vector<std::string>& sources, Random& random
 void build(Draft& draft) {
   World& world = draft.world;
   world.arm = changed(drawn_arm(), draw_arm_errors(world.sources, draft.random));
-  draft.belief.tools = {motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0), motion({-80, 60, 220}, 0.7, 0.3, -0.5)};
+  draft.belief.tools = {motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0),
+                        motion({-80, 60, 220}, 0.7, 0.3, -0.5)};
   draft.belief.loads = {{100, {40, -25, 140}}, {45, {-15, 20, 90}}};
   draft.belief.knows_stand = contains(draft.names, "instrument_scale");
   draft.belief.tools.resize(static_cast<std::size_t>(draft.plan.tools));
   draft.belief.loads.resize(static_cast<std::size_t>(draft.plan.loads));
   world.tools = draft.belief.tools;
   world.loads = draft.belief.loads;
-  world.poses =
-      contains(draft.names, "replica_p28") ? panel_poses(world, draft.random) : draw_poses(draft.plan, draft.random);
+  world.poses = contains(draft.names, "replica_p28") ? panel_poses(world, draft.random)
+                                                     : draw_poses(draft.plan, draft.random);
 }
 
-Effect one_parameter(const HiddenCause& cause, Index which, double size, const Scene& scene, Random& random) {
+Effect one_parameter(const HiddenCause& cause, Index which, double size, const Scene& scene,
+                     Random& random) {
   Effect made = draw_effect(cause, scene, random);
   made.values.setZero();
   made.values(which) = size;
-  for (std::size_t k = 0; k < made.grows.size(); ++k) made.grows[k] = static_cast<Index>(k) == which;
+  for (std::size_t k = 0; k < made.grows.size(); ++k)
+    made.grows[k] = static_cast<Index>(k) == which;
   return made;
 }
 
@@ -177,7 +184,8 @@ Effect tool_or_link(const Scene& scene, Random& random) {
   };
   constexpr Pair kPairs[] = {{"a6", 0, 0.2}, {"d6", 2, 0.2}, {"q6", 3, 3e-4}, {"alpha6", 5, 3e-4}};
   const Pair& pair = kPairs[whole(random, 0, 3)];
-  if (whole(random, 0, 1) == 1) return draw_effect({"geometry", 0, pair.link, -1, {}}, scene, random);
+  if (whole(random, 0, 1) == 1)
+    return draw_effect({"geometry", 0, pair.link, -1, {}}, scene, random);
   return one_parameter({"tool", 0, "", -1, {}}, pair.tool, pair.size, scene, random);
 }
 
@@ -220,7 +228,8 @@ Effect ripple(int joint, const Scene& scene, Random& random) {
 /// The spindle's data in the robot and in the offline program differ by some millimetres.
 Effect other_tool(const Scene& scene, Random& random) {
   Effect made = draw_effect({"tool", 0, "", -1, {}}, scene, random);
-  for (Index k = 0; k < 3; ++k) made.values(k) = uniform(random, 0.8, 2.5) * (whole(random, 0, 1) == 1 ? 1 : -1);
+  for (Index k = 0; k < 3; ++k)
+    made.values(k) = uniform(random, 0.8, 2.5) * (whole(random, 0, 1) == 1 ? 1 : -1);
   for (Index k = 3; k < 6; ++k) made.values(k) = 2e-3 * normal(random);
   return made;
 }
@@ -233,17 +242,20 @@ Effect hole_28(const Scene& scene, Random& random) {
 
 Effect draw_named(const std::string& name, const Draft& draft, const Scene& scene, Random& random) {
   if (name == "unknown") {
-    const bool pair =
-        draft.spec.kind == "unknown_q2q3" || (draft.spec.kind == "null_structured" && whole(random, 0, 1));
+    const bool pair = draft.spec.kind == "unknown_q2q3" ||
+                      (draft.spec.kind == "null_structured" && whole(random, 0, 1));
     const std::vector<std::string> joints =
         pair ? std::vector<std::string>{"q2", "q3"} : std::vector<std::string>{"q4"};
     return draw_effect({"unknown", 0, "", -1, joints}, scene, random);
   }
   if (contains(slow_kinds(), name)) return draw_slow_effect(name, scene, random);
   if (contains(foreign_kinds(), name)) return draw_foreign_effect(name, scene, random);
-  if (name == "backlash_one_side") return draw_effect(draw_cause("backlash", scene, random), scene, random);
-  if (name == "payload_alone") return one_parameter({"payload", 0, "", -1, {}}, 0, 8, scene, random);
-  if (name == "constant_warmth") return draw_effect({"thermal_growth", 0, "", -1, {}}, scene, random);
+  if (name == "backlash_one_side")
+    return draw_effect(draw_cause("backlash", scene, random), scene, random);
+  if (name == "payload_alone")
+    return one_parameter({"payload", 0, "", -1, {}}, 0, 8, scene, random);
+  if (name == "constant_warmth")
+    return draw_effect({"thermal_growth", 0, "", -1, {}}, scene, random);
   if (name == "tool_or_link") return tool_or_link(scene, random);
   if (name == "tool_absorbed") return tool_absorbed(scene, random);
   if (name == "joint1_or_tracker") return joint1_or_tracker(scene, random);
@@ -257,7 +269,8 @@ Effect draw_named(const std::string& name, const Draft& draft, const Scene& scen
 
 void draw_effects(Draft& draft) {
   World& world = draft.world;
-  Scene scene{world.arm, &world.poses, draft.plan.tools, draft.plan.loads, !contains(draft.names, "backlash_one_side")};
+  Scene scene{world.arm, &world.poses, draft.plan.tools, draft.plan.loads,
+              !contains(draft.names, "backlash_one_side")};
   scene.arm.tool = world.tools.front();
   scene.arm.load = world.loads.front();
   for (const std::string& name : draft.names) {
@@ -268,7 +281,8 @@ void draw_effects(Draft& draft) {
 
 /// Columns of length one thousand sigma, so that all that are not zero count as directions.
 MatrixXd lengthened(MatrixXd columns) {
-  for (Index k = 0; k < columns.cols(); ++k) columns.col(k) *= 1e3 / std::max(columns.col(k).norm(), 1e-300);
+  for (Index k = 0; k < columns.cols(); ++k)
+    columns.col(k) *= 1e3 / std::max(columns.col(k).norm(), 1e-300);
   return columns;
 }
 
@@ -277,7 +291,8 @@ MatrixXd nuisance_of(const World& world, std::size_t but, const std::vector<Meas
   MatrixXd columns = directions_of(arm_columns(world, poses)) * 1e3;
   for (std::size_t k = 0; k < world.effects.size(); ++k) {
     if (k == but) continue;
-    const MatrixXd more = lengthened(outside(columns / 1e3, effect_columns(world, poses, world.effects[k])));
+    const MatrixXd more =
+        lengthened(outside(columns / 1e3, effect_columns(world, poses, world.effects[k])));
     const Index before = columns.cols();
     columns.conservativeResize(more.rows(), before + more.cols());
     columns.rightCols(more.cols()) = more;
@@ -290,8 +305,8 @@ struct Strength {
   double whole = 0, left = 0;
 };
 
-Strength strength_of(const World& world, const Effect& effect, const MatrixXd& nuisance, const Frames& still,
-                     const std::vector<MeasuringPose>& poses) {
+Strength strength_of(const World& world, const Effect& effect, const MatrixXd& nuisance,
+                     const Frames& still, const std::vector<MeasuringPose>& poses) {
   const VectorXd rows = whitened(world, frames_at(world, poses, {effect}), still);
   return {rows.squaredNorm(), outside(nuisance, rows).squaredNorm()};
 }
@@ -319,8 +334,8 @@ void set_sizes(Draft& draft) {
   }
 }
 
-/// Rows around the one at which an effect begins between which it makes a difference of less than 5.5 sigma: noise
-/// takes a beginning that far in 1 case of 170.
+/// Rows around the one at which an effect begins between which it makes a difference of less
+/// than 5.5 sigma: noise takes a beginning that far in 1 case of 170.
 std::pair<int, int> beginnings(const World& world, const Effect& effect, const Frames& still) {
   constexpr double kUnnoticed = 30;
   if (effect.cause.first < 0) return {-1, -1};
@@ -334,13 +349,16 @@ std::pair<int, int> beginnings(const World& world, const Effect& effect, const F
   const VectorXd rows = whitened(world, frames_at(world, world.poses, {always}), still);
   const Index per_pose = rows.size() / static_cast<Index>(world.poses.size());
   const auto lost = [&](int row) {
-    return world.poses[static_cast<std::size_t>(row)].validation ? 0.0
-                                                                 : rows.segment(per_pose * row, per_pose).squaredNorm();
+    return world.poses[static_cast<std::size_t>(row)].validation
+               ? 0.0
+               : rows.segment(per_pose * row, per_pose).squaredNorm();
   };
   int low = effect.cause.first;
   int high = effect.cause.first;
   for (double sum = 0; low > 0 && (sum += lost(low - 1)) < kUnnoticed;) --low;
-  for (double sum = 0; high + 1 < static_cast<int>(world.poses.size()) && (sum += lost(high)) < kUnnoticed;) ++high;
+  for (double sum = 0;
+       high + 1 < static_cast<int>(world.poses.size()) && (sum += lost(high)) < kUnnoticed;)
+    ++high;
   return {low, high};
 }
 
@@ -350,7 +368,8 @@ Matrix3d turn_of(const Vector3d& vector) {
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
-/// What the effects do at each pose happens at another one instead: sizes stay, all relations are gone.
+/// What the effects do at each pose happens at another one instead: sizes stay, all relations are
+/// gone.
 void permute(const Frames& still, Frames& moved, Random& random) {
   std::vector<std::size_t> from(moved.size());
   std::iota(from.begin(), from.end(), 0);
@@ -402,7 +421,8 @@ void add_noise(const World& world, const std::string& noise, Frames& frames, Ran
 }  // namespace
 
 HiddenCase hide(const HiddenSpec& spec) {
-  Draft draft{spec, Random(spec.seed * 0x9e3779b97f4a7c15u + number_of(spec.kind)), {}, {}, {}, {}, {}};
+  Draft draft{spec, Random(spec.seed * 0x9e3779b97f4a7c15u + number_of(spec.kind)), {}, {}, {}, {},
+              {}};
   understand(draft);
   arrange(draft);
   build(draft);
@@ -441,7 +461,8 @@ const std::vector<std::string>& unknown_kinds() {
 }
 
 const std::vector<std::string>& slow_kinds() {
-  static const std::vector<std::string> kinds = {"slow_zero", "slow_stand", "slow_growth", "slow_walk"};
+  static const std::vector<std::string> kinds = {"slow_zero", "slow_stand", "slow_growth",
+                                                 "slow_walk"};
   return kinds;
 }
 
@@ -452,15 +473,15 @@ const std::vector<std::string>& foreign_kinds() {
 }
 
 const std::vector<std::string>& undecidable_kinds() {
-  static const std::vector<std::string> kinds = {"backlash_one_side", "payload_alone",     "tool_or_link",
-                                                 "tool_absorbed",     "joint1_or_tracker", "joint6_or_tool",
-                                                 "constant_warmth"};
+  static const std::vector<std::string> kinds = {
+      "backlash_one_side", "payload_alone",  "tool_or_link",   "tool_absorbed",
+      "joint1_or_tracker", "joint6_or_tool", "constant_warmth"};
   return kinds;
 }
 
 const std::vector<std::string>& replica_kinds() {
-  static const std::vector<std::string> kinds = {"replica_ripple_1dim", "replica_ripple_6dim", "replica_tool",
-                                                 "replica_p28"};
+  static const std::vector<std::string> kinds = {"replica_ripple_1dim", "replica_ripple_6dim",
+                                                 "replica_tool", "replica_p28"};
   return kinds;
 }
 
@@ -468,15 +489,16 @@ std::string to_json(const HiddenTruth& truth, const World& world) {
   std::string text = fmt::format("{{\n  \"kind\": \"{}\",\n  \"causes\": [", truth.kind);
   for (std::size_t k = 0; k < truth.causes.size(); ++k) {
     const HiddenCause& cause = truth.causes[k];
-    text += fmt::format("{}\n    {{\"cause\": \"{}\", \"joint\": {}, \"parameter\": \"{}\", \"pose_id\": \"{}\", ",
-                        k == 0 ? "" : ",", cause.cause, cause.joint, cause.parameter,
-                        cause.first < 0 ? "" : fmt::format("p{}", cause.first + 1));
-    text +=
-        fmt::format("\"lambda\": {:.9g}, \"absorbed\": {:.6g}, \"values\": {{", truth.lambdas[k], truth.absorbed[k]);
+    text += fmt::format(
+        "{}\n    {{\"cause\": \"{}\", \"joint\": {}, \"parameter\": \"{}\", \"pose_id\": \"{}\", ",
+        k == 0 ? "" : ",", cause.cause, cause.joint, cause.parameter,
+        cause.first < 0 ? "" : fmt::format("p{}", cause.first + 1));
+    text += fmt::format("\"lambda\": {:.9g}, \"absorbed\": {:.6g}, \"values\": {{",
+                        truth.lambdas[k], truth.absorbed[k]);
     const Effect& effect = world.effects[k];
     for (std::size_t v = 0; v < effect.names.size(); ++v) {
-      text +=
-          fmt::format("{}\"{}\": {:.9g}", v == 0 ? "" : ", ", effect.names[v], effect.values(static_cast<Index>(v)));
+      text += fmt::format("{}\"{}\": {:.9g}", v == 0 ? "" : ", ", effect.names[v],
+                          effect.values(static_cast<Index>(v)));
     }
     text += "}}";
   }

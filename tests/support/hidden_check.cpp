@@ -15,7 +15,8 @@ using Eigen::VectorXd;
 
 constexpr int kWorkingPoses = 300;
 
-/// How much larger than usual one reading's noise is: 1, or so that each coordinate has Student's t of variance 1.
+/// How much larger than usual one reading's noise is: 1, or so that each coordinate has Student's t
+/// of variance 1.
 double disturbance(const RobotSpec& spec, Random& random) {
   const auto freedom = static_cast<int>(spec.tail_freedom);
   if (freedom <= 2) return 1;
@@ -47,9 +48,10 @@ VectorXd draw_errors(const std::vector<std::string>& sources, Random& random) {
   VectorXd errors = VectorXd::Zero(static_cast<Index>(all.size()));
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (std::find(sources.begin(), sources.end(), all[k].group) == sources.end()) continue;
-    errors(static_cast<Index>(k)) = all[k].group == "compliance"
-                                        ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * normal(random))
-                                        : 0.15 * all[k].unit * normal(random);
+    errors(static_cast<Index>(k)) =
+        all[k].group == "compliance"
+            ? kGive[all[k].name.at(1) - '1'] * std::exp(0.4 * normal(random))
+            : 0.15 * all[k].unit * normal(random);
   }
   return errors;
 }
@@ -78,14 +80,16 @@ VectorXd positions(const Frames& frames) {
 }
 
 /// What a motion of the base makes of positions, and one of the tool.
-MatrixXd frame_columns(const TrainedRobot& robot, const std::vector<MeasuringPose>& poses, bool new_tool) {
+MatrixXd frame_columns(const TrainedRobot& robot, const std::vector<MeasuringPose>& poses,
+                       bool new_tool) {
   const Frames still = frames_at(robot.world, poses, {});
   MatrixXd columns(3 * static_cast<Index>(poses.size()), new_tool ? 9 : 6);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Index row = 3 * static_cast<Index>(i);
     const Vector3d p = still[i].block<3, 1>(0, 3);
     columns.block<3, 3>(row, 0).setIdentity();
-    for (Index axis = 0; axis < 3; ++axis) columns.block<3, 1>(row, 3 + axis) = Vector3d::Unit(axis).cross(p) / 1000;
+    for (Index axis = 0; axis < 3; ++axis)
+      columns.block<3, 1>(row, 3 + axis) = Vector3d::Unit(axis).cross(p) / 1000;
     // A tool that is turned about its own point moves none.
     if (new_tool) columns.block<3, 3>(row, 6) = still[i].block<3, 3>(0, 0);
   }
@@ -117,26 +121,29 @@ TrainedRobot robot_with(const RobotSpec& spec, const Arm& arm) {
   plan.constant_temperature = true;
   world.poses = draw_poses(plan, random);
   if (spec.ripple_mm > 0) {
-    Effect always = draw_effect({"unknown", 0, "", -1, {"q2", "q3"}}, scene_of(robot, world.poses), random);
+    Effect always =
+        draw_effect({"unknown", 0, "", -1, {"q2", "q3"}}, scene_of(robot, world.poses), random);
     always.values(0) = spec.ripple_mm / std::sqrt(3.0);
     world.effects.push_back(always);
   }
   robot.robot_yaml = robot_text();
   robot.cell_yaml = cell_text(world, robot.belief, plan.ranges);
-  robot.batch_csv = batch_text(world, noisy(world, spec, frames_at(world, world.poses, world.effects), random));
+  robot.batch_csv =
+      batch_text(world, noisy(world, spec, frames_at(world, world.poses, world.effects), random));
   return robot;
 }
 
 double left_rms_mm(const TrainedRobot& robot, const std::vector<Effect>& effects, bool new_tool) {
   const std::vector<MeasuringPose> poses = working_poses(robot.spec);
-  const VectorXd moved =
-      positions(frames_at(robot.world, poses, effects)) - positions(frames_at(robot.world, poses, {}));
+  const VectorXd moved = positions(frames_at(robot.world, poses, effects)) -
+                         positions(frames_at(robot.world, poses, {}));
   const MatrixXd columns = frame_columns(robot, poses, new_tool);
   const VectorXd left = moved - columns * columns.colPivHouseholderQr().solve(moved);
   return left.norm() / std::sqrt(static_cast<double>(poses.size()));
 }
 
-Effect changed_by(const TrainedRobot& robot, const HiddenCause& cause, double rms_mm, bool new_tool, Random& random) {
+Effect changed_by(const TrainedRobot& robot, const HiddenCause& cause, double rms_mm, bool new_tool,
+                  Random& random) {
   constexpr int kRounds = 6;
   const std::vector<MeasuringPose> poses = working_poses(robot.spec);
   HiddenCause always = cause;
@@ -165,12 +172,14 @@ std::string check_csv(const TrainedRobot& robot, const CheckSpec& check, Random&
   std::vector<Effect> effects = robot.world.effects;
   effects.insert(effects.end(), check.effects.begin(), check.effects.end());
   Frames frames = noisy(world, robot.spec, frames_at(world, world.poses, effects), random);
-  const Matrix4d stand = motion({uniform(random, -500, 500), uniform(random, -500, 500), uniform(random, -200, 200)},
-                                uniform(random, -0.4, 0.4), 0.01 * normal(random), 0.01 * normal(random));
+  const Matrix4d stand =
+      motion({uniform(random, -500, 500), uniform(random, -500, 500), uniform(random, -200, 200)},
+             uniform(random, -0.4, 0.4), 0.01 * normal(random), 0.01 * normal(random));
   for (Matrix4d& frame : frames) frame = stand * frame;
   if (check.bad_pose >= 0) {
     Vector3d off(normal(random), normal(random), normal(random));
-    frames[static_cast<std::size_t>(check.bad_pose)].block<3, 1>(0, 3) += check.bad_mm * off.normalized();
+    frames[static_cast<std::size_t>(check.bad_pose)].block<3, 1>(0, 3) +=
+        check.bad_mm * off.normalized();
   }
   return batch_text(world, frames);
 }

@@ -7,8 +7,8 @@
 #include "tests/support/hidden_files.h"
 #include "tests/support/hidden_world.h"
 
-/// A robot of the second simulation that is trained once and then checked by a few poses, changed or not. Whoever
-/// checks gets the files and no more.
+/// A robot of the second simulation that is trained once and then checked by a few poses, changed
+/// or not. Whoever checks gets the files and no more.
 namespace trammel::hidden {
 
 struct RobotSpec {
@@ -17,7 +17,8 @@ struct RobotSpec {
   bool orientation = true;
   double sigma_mm = 0.013;
   double tail_freedom = 0;  ///< of Student's t, of the same variance, for the noise; 0: normal
-  double ripple_mm = 0;     ///< rms of a smooth error of the arm that no cause makes and that was always there
+  double ripple_mm =
+      0;  ///< rms of a smooth error of the arm that no cause makes and that was always there
   std::vector<std::string> sources = {"base", "geometry", "compliance"};
 };
 
@@ -31,21 +32,23 @@ struct TrainedRobot {
 /// The same with this arm and nothing else changed.
 [[nodiscard]] TrainedRobot robot_with(const RobotSpec& spec, const Arm& arm);
 
-/// `cause` with numbers drawn, acting from the first pose on, scaled to `rms_mm`: over poses of the whole ranges, of
-/// the position, after base and, with `new_tool`, the tool were refitted.
-[[nodiscard]] Effect changed_by(const TrainedRobot& robot, const HiddenCause& cause, double rms_mm, bool new_tool,
-                                Random& random);
+/// `cause` with numbers drawn, acting from the first pose on, scaled to `rms_mm`: over poses of the
+/// whole ranges, of the position, after base and, with `new_tool`, the tool were refitted.
+[[nodiscard]] Effect changed_by(const TrainedRobot& robot, const HiddenCause& cause, double rms_mm,
+                                bool new_tool, Random& random);
 /// mm: that size, of any effects.
-[[nodiscard]] double left_rms_mm(const TrainedRobot& robot, const std::vector<Effect>& effects, bool new_tool);
+[[nodiscard]] double left_rms_mm(const TrainedRobot& robot, const std::vector<Effect>& effects,
+                                 bool new_tool);
 
-/// The batch of a check at these joints (rad): measured by a tracker that stands elsewhere. `bad_pose`: the row that is
-/// off by `bad_mm` in some direction; -1: none.
+/// The batch of a check at these joints (rad): measured by a tracker that stands elsewhere.
+/// `bad_pose`: the row that is off by `bad_mm` in some direction; -1: none.
 struct CheckSpec {
   std::vector<Joints> q;
   std::vector<Effect> effects;
   int bad_pose = -1;
   double bad_mm = 0;
 };
-[[nodiscard]] std::string check_csv(const TrainedRobot& robot, const CheckSpec& check, Random& random);
+[[nodiscard]] std::string check_csv(const TrainedRobot& robot, const CheckSpec& check,
+                                    Random& random);
 
 }  // namespace trammel::hidden

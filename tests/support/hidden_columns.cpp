@@ -31,8 +31,9 @@ std::string without_columns(const std::string& csv, const std::vector<std::strin
   const std::vector<std::string> head = split(line);
   std::vector<bool> kept;
   for (const std::string& name : head) {
-    kept.push_back(std::none_of(beginnings.begin(), beginnings.end(),
-                                [&](const std::string& beginning) { return name.starts_with(beginning); }));
+    kept.push_back(
+        std::none_of(beginnings.begin(), beginnings.end(),
+                     [&](const std::string& beginning) { return name.starts_with(beginning); }));
   }
   lines.seekg(0);
   while (std::getline(lines, line)) {
@@ -52,7 +53,8 @@ std::string with_added(const std::string& csv, const std::string& column, int ro
   std::getline(lines, line);
   text = line + "\n";
   const std::vector<std::string> head = split(line);
-  const auto place = static_cast<std::size_t>(std::find(head.begin(), head.end(), column) - head.begin());
+  const auto place =
+      static_cast<std::size_t>(std::find(head.begin(), head.end(), column) - head.begin());
   for (int at = 0; std::getline(lines, line); ++at) {
     std::vector<std::string> fields = split(line);
     if (at == row) fields.at(place) = fmt::format("{:.10g}", std::stod(fields.at(place)) + change);

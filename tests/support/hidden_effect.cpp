@@ -22,7 +22,9 @@ constexpr double kReferenceTemperature = 20;
 
 VectorXd one(double value) { return VectorXd::Constant(1, value); }
 double either_sign(Random& random) { return whole(random, 0, 1) == 1 ? 1 : -1; }
-double some(Random& random, double size) { return size * either_sign(random) * uniform(random, 0.6, 1.4); }
+double some(Random& random, double size) {
+  return size * either_sign(random) * uniform(random, 0.6, 1.4);
+}
 
 VectorXd draw_motion(Random& random, double shift_mm, double turn) {
   VectorXd values(6);
@@ -31,7 +33,9 @@ VectorXd draw_motion(Random& random, double shift_mm, double turn) {
   return values;
 }
 
-Matrix4d motion_of(const VectorXd& values) { return motion(values.head<3>(), values(3), values(4), values(5)); }
+Matrix4d motion_of(const VectorXd& values) {
+  return motion(values.head<3>(), values(3), values(4), values(5));
+}
 
 const std::vector<std::string> kMotionNames = {"x", "y", "z", "rz", "ry", "rx"};
 
@@ -45,18 +49,23 @@ Index joint_of(const HiddenCause& cause) { return cause.joint - 1; }
 
 Effect base(const HiddenCause& cause, const Scene&, Random& random) {
   return effect(cause, kMotionNames, draw_motion(random, 0.5, 5e-4),
-                [](const MeasuringPose&, const VectorXd& v, Moment& m) { m.arm.base = m.arm.base * motion_of(v); });
+                [](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  m.arm.base = m.arm.base * motion_of(v);
+                });
 }
 
 /// One number of the arm's own table, or of its gearboxes.
 Effect arm_parameter(const HiddenCause& cause, const Scene&, Random& random) {
   const auto& all = arm_parameters();
   Index at = 0;
-  while (at < static_cast<Index>(all.size()) && all[static_cast<std::size_t>(at)].name != cause.parameter) ++at;
+  while (at < static_cast<Index>(all.size()) &&
+         all[static_cast<std::size_t>(at)].name != cause.parameter)
+    ++at;
   const double unit = all[static_cast<std::size_t>(at)].unit;
   const bool stiffness = cause.cause == "compliance";
   return effect(cause, {cause.parameter}, one(0.1 * unit * (stiffness ? 1 : either_sign(random))),
-                [at, count = static_cast<Index>(all.size())](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                [at, count = static_cast<Index>(all.size())](const MeasuringPose&,
+                                                             const VectorXd& v, Moment& m) {
                   VectorXd values = VectorXd::Zero(count);
                   values(at) = v(0);
                   m.arm = changed(m.arm, values);
@@ -66,9 +75,10 @@ Effect arm_parameter(const HiddenCause& cause, const Scene&, Random& random) {
 /// One of the loads is heavier or lighter than the cell file says.
 Effect payload(const HiddenCause& cause, const Scene& scene, Random& random) {
   const int load = whole(random, 0, scene.loads - 1);
-  return effect(cause, {"mass"}, one(some(random, 4)), [load](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    if (p.load == load) m.arm.load.mass_kg += v(0);
-  });
+  return effect(cause, {"mass"}, one(some(random, 4)),
+                [load](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.load == load) m.arm.load.mass_kg += v(0);
+                });
 }
 
 Effect payload_changed(const HiddenCause& cause, const Scene&, Random& random) {
@@ -118,11 +128,13 @@ Effect encoder_eccentricity(const HiddenCause& cause, const Scene&, Random& rand
   VectorXd values(2);
   values << 2e-4 * std::cos(phase), 2e-4 * std::sin(phase);
   const double second_phase = uniform(random, 0, kTurn);
-  return effect(cause, {"sine", "cosine"}, values,
-                [j = joint_of(cause), second_phase](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  const double q = p.q(j);
-                  m.q(j) += v(0) * std::sin(q) + v(1) * std::cos(q) + 0.03 * v.norm() * std::sin(2 * q + second_phase);
-                });
+  return effect(
+      cause, {"sine", "cosine"}, values,
+      [j = joint_of(cause), second_phase](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+        const double q = p.q(j);
+        m.q(j) += v(0) * std::sin(q) + v(1) * std::cos(q) +
+                  0.03 * v.norm() * std::sin(2 * q + second_phase);
+      });
 }
 
 struct Waves {
@@ -131,7 +143,8 @@ struct Waves {
   [[nodiscard]] double at(double q) const {
     double sum = 0;
     for (std::size_t k = 0; k < size_and_phase.size(); ++k) {
-      sum += size_and_phase[k].first * std::sin((kLowest + static_cast<double>(k)) * q + size_and_phase[k].second);
+      sum += size_and_phase[k].first *
+             std::sin((kLowest + static_cast<double>(k)) * q + size_and_phase[k].second);
     }
     return sum;
   }
@@ -143,7 +156,8 @@ double best_single_order(const VectorXd& q, const VectorXd& values) {
   double best = 0;
   for (double order = 0.5; order < 20; order += 0.1) {
     Eigen::MatrixX3d columns(q.size(), 3);
-    columns << (order * q).array().sin(), (order * q).array().cos(), VectorXd::Ones(q.size()).array();
+    columns << (order * q).array().sin(), (order * q).array().cos(),
+        VectorXd::Ones(q.size()).array();
     const VectorXd left = varying - columns * columns.householderQr().solve(varying);
     best = std::max(best, 1 - left.squaredNorm() / varying.squaredNorm());
   }
@@ -164,39 +178,44 @@ Effect joint_map(const HiddenCause& cause, const Scene& scene, Random& random) {
       waves.size_and_phase.emplace_back(uniform(random, 0.7, 1.3), uniform(random, 0, kTurn));
     }
   } while (best_single_order(q, q.unaryExpr([&](double at) { return waves.at(at); })) > kStandsOut);
-  return effect(cause, {"size"}, one(4e-5), [j, waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    m.q(j) += v(0) * waves.at(p.q(j));
-  });
+  return effect(cause, {"size"}, one(4e-5),
+                [j, waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) += v(0) * waves.at(p.q(j));
+                });
 }
 
 /// Play that the load widens a little.
 Effect backlash(const HiddenCause& cause, const Scene& scene, Random&) {
   double mean_moment = 1;
   for (const MeasuringPose& pose : *scene.poses) {
-    mean_moment +=
-        std::abs(load_moments(scene.arm, pose.q)(joint_of(cause))) / static_cast<double>(scene.poses->size());
+    mean_moment += std::abs(load_moments(scene.arm, pose.q)(joint_of(cause))) /
+                   static_cast<double>(scene.poses->size());
   }
   const double share = scene.load_widens_play ? 0.1 : 0;
-  return effect(cause, {"play"}, one(4e-5),
-                [j = joint_of(cause), mean_moment, share](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  const double moment = share > 0 ? std::abs(load_moments(m.arm, p.q)(j)) / mean_moment : 0;
-                  m.q(j) -= p.direction[static_cast<std::size_t>(j)] * v(0) * (1 - share + share * moment);
-                });
+  return effect(
+      cause, {"play"}, one(4e-5),
+      [j = joint_of(cause), mean_moment, share](const MeasuringPose& p, const VectorXd& v,
+                                                Moment& m) {
+        const double moment = share > 0 ? std::abs(load_moments(m.arm, p.q)(j)) / mean_moment : 0;
+        m.q(j) -= p.direction[static_cast<std::size_t>(j)] * v(0) * (1 - share + share * moment);
+      });
 }
 
 Effect wrist_coupling(const HiddenCause& cause, const Scene&, Random& random) {
   VectorXd values(3);
   values << some(random, 1e-4), some(random, 1e-4), some(random, 1e-4);
-  return effect(cause, {"k54", "k64", "k65"}, values, [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    m.q(4) += v(0) * (p.q(3) + 0.05 * std::sin(p.q(3)));
-    m.q(5) += v(1) * (p.q(3) + 0.05 * std::sin(p.q(3))) + v(2) * p.q(4);
-  });
+  return effect(cause, {"k54", "k64", "k65"}, values,
+                [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(4) += v(0) * (p.q(3) + 0.05 * std::sin(p.q(3)));
+                  m.q(5) += v(1) * (p.q(3) + 0.05 * std::sin(p.q(3))) + v(2) * p.q(4);
+                });
 }
 
 Effect link_bending(const HiddenCause& cause, const Scene&, Random&) {
-  return effect(cause, {"flex"}, one(1e-13), [j = joint_of(cause)](const MeasuringPose&, const VectorXd& v, Moment& m) {
-    m.arm.flex[static_cast<std::size_t>(j)] += v(0);
-  });
+  return effect(cause, {"flex"}, one(1e-13),
+                [j = joint_of(cause)](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  m.arm.flex[static_cast<std::size_t>(j)] += v(0);
+                });
 }
 
 /// The links grow with their own temperature, which follows the thermometer.
@@ -213,7 +232,8 @@ Effect thermal_growth(const HiddenCause& cause, const Scene&, Random& random) {
 
 /// The stand moves: it is shifted, and turned about its own place.
 Matrix4d stand_moved(const VectorXd& values) {
-  return motion(tracker_stand_mm(), 0, 0, 0) * motion_of(values) * motion(-tracker_stand_mm(), 0, 0, 0);
+  return motion(tracker_stand_mm(), 0, 0, 0) * motion_of(values) *
+         motion(-tracker_stand_mm(), 0, 0, 0);
 }
 
 Effect tracker_moved(const HiddenCause& cause, const Scene&, Random& random) {
@@ -236,14 +256,16 @@ Effect tracker_drift(const HiddenCause& cause, const Scene& scene, Random& rando
 
 Effect joint_slip(const HiddenCause& cause, const Scene&, Random& random) {
   return effect(cause, {"slip"}, one(some(random, 5e-5)),
-                [j = joint_of(cause), first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                [j = joint_of(cause), first = cause.first](const MeasuringPose& p,
+                                                           const VectorXd& v, Moment& m) {
                   if (p.index >= first) m.q(j) += v(0);
                 });
 }
 
 Effect time_lag(const HiddenCause& cause, const Scene&, Random& random) {
-  return effect(cause, {"lag"}, one(some(random, 3e-3)),
-                [](const MeasuringPose& p, const VectorXd& v, Moment& m) { m.q -= v(0) * p.velocity; });
+  return effect(
+      cause, {"lag"}, one(some(random, 3e-3)),
+      [](const MeasuringPose& p, const VectorXd& v, Moment& m) { m.q -= v(0) * p.velocity; });
 }
 
 Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
@@ -255,8 +277,8 @@ Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
-/// How far something slow has come, 0 to 1 at most, by the share of the batch's time: it warms up and settles, or goes
-/// with the day and comes back.
+/// How far something slow has come, 0 to 1 at most, by the share of the batch's time: it warms up
+/// and settles, or goes with the day and comes back.
 std::function<double(double)> draw_course(Random& random) {
   if (whole(random, 0, 1) == 1) {
     const double lag = uniform(random, 0.15, 0.6);
@@ -264,7 +286,8 @@ std::function<double(double)> draw_course(Random& random) {
   }
   const double turns = uniform(random, 0.5, 1.1);
   const double phase = uniform(random, 0, kTurn);
-  return [turns, phase](double share) { return 0.5 + 0.5 * std::sin(kTurn * turns * share + phase); };
+  return
+      [turns, phase](double share) { return 0.5 + 0.5 * std::sin(kTurn * turns * share + phase); };
 }
 
 std::function<double(const MeasuringPose&)> draw_course(const Scene& scene, Random& random) {
@@ -278,10 +301,10 @@ std::function<double(const MeasuringPose&)> draw_course(const Scene& scene, Rand
 /// The zero of a joint follows the heat of its gearbox, which nobody measures.
 Effect slow_zero(const HiddenCause& cause, const Scene& scene, Random& random) {
   const Index j = cause.depends_on.front().at(1) - '1';
-  return effect(cause, {"size"}, one(some(random, 1e-4)),
-                [j, course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  m.q(j) += v(0) * course(p);
-                });
+  return effect(
+      cause, {"size"}, one(some(random, 1e-4)),
+      [j, course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v,
+                                               Moment& m) { m.q(j) += v(0) * course(p); });
 }
 
 /// The zero of a joint wanders: as much again at every pose, to either side.
@@ -292,66 +315,80 @@ Effect slow_walk(const HiddenCause& cause, const Scene& scene, Random& random) {
   const double size = 1 / std::sqrt(static_cast<double>(way.size()));
   return effect(cause, {"size"}, one(some(random, 1e-4)),
                 [j, way, size](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  m.q(j) += v(0) * size * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
+                  m.q(j) += v(0) * size *
+                            way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
                 });
 }
 
 /// The links grow with a heat that the thermometer, which is stuck, does not see.
 Effect slow_growth(const HiddenCause& cause, const Scene& scene, Random& random) {
-  return effect(cause, {"size"}, one(uniform(random, 3e-5, 1e-4)),
-                [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  for (Link& link : m.arm.links) {
-                    link.a *= 1 + v(0) * course(p);
-                    link.d *= 1 + v(0) * course(p);
-                  }
-                });
+  return effect(
+      cause, {"size"}, one(uniform(random, 3e-5, 1e-4)),
+      [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+        for (Link& link : m.arm.links) {
+          link.a *= 1 + v(0) * course(p);
+          link.d *= 1 + v(0) * course(p);
+        }
+      });
 }
 
 /// The stand of the tracker settles, or the floor under it gives way with the sun.
 Effect slow_stand(const HiddenCause& cause, const Scene& scene, Random& random) {
-  return effect(cause, kMotionNames, draw_motion(random, 0.08, 2e-5),
-                [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  m.seen = stand_moved(v * course(p)) * m.seen;
-                });
+  return effect(
+      cause, kMotionNames, draw_motion(random, 0.08, 2e-5),
+      [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+        m.seen = stand_moved(v * course(p)) * m.seen;
+      });
 }
 
-/// An axis that wobbles in an oval bearing: it tilts and shifts two and three times a turn, and a little back once.
+/// An axis that wobbles in an oval bearing: it tilts and shifts two and three times a turn, and a
+/// little back once.
 Effect axis_runout(const HiddenCause& cause, const Scene&, Random& random) {
-  const double tilt = uniform(random, 0, kTurn), shift = uniform(random, 0, kTurn), back = uniform(random, 0, kTurn);
-  return effect(cause, {"size"}, one(1e-4),
-                [j = joint_of(cause), tilt, shift, back](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  const double q = p.q(j);
-                  const double x = std::cos(2 * q + tilt) + 0.3 * std::cos(3 * q + shift) + 0.4 * std::cos(back - q);
-                  const double y = std::sin(2 * q + tilt) + 0.3 * std::sin(3 * q + shift) + 0.4 * std::sin(back - q);
-                  const Vector3d across(200 * v(0) * std::cos(2 * q + shift), 200 * v(0) * std::sin(2 * q + shift), 0);
-                  m.arm.bearings[static_cast<std::size_t>(j)] = motion(across, 0, v(0) * y, v(0) * x);
-                });
+  const double tilt = uniform(random, 0, kTurn), shift = uniform(random, 0, kTurn),
+               back = uniform(random, 0, kTurn);
+  return effect(
+      cause, {"size"}, one(1e-4),
+      [j = joint_of(cause), tilt, shift, back](const MeasuringPose& p, const VectorXd& v,
+                                               Moment& m) {
+        const double q = p.q(j);
+        const double x =
+            std::cos(2 * q + tilt) + 0.3 * std::cos(3 * q + shift) + 0.4 * std::cos(back - q);
+        const double y =
+            std::sin(2 * q + tilt) + 0.3 * std::sin(3 * q + shift) + 0.4 * std::sin(back - q);
+        const Vector3d across(200 * v(0) * std::cos(2 * q + shift),
+                              200 * v(0) * std::sin(2 * q + shift), 0);
+        m.arm.bearings[static_cast<std::size_t>(j)] = motion(across, 0, v(0) * y, v(0) * x);
+      });
 }
 
 /// The plate under the foot yields, to one side more than to the other.
 Effect base_compliance(const HiddenCause& cause, const Scene&, Random& random) {
   const double share = uniform(random, 0.3, 0.9);
-  return effect(cause, {"yield"}, one(1e-11), [share](const MeasuringPose&, const VectorXd& v, Moment& m) {
-    m.arm.foot += v(0) * Eigen::Vector2d(1, share);
-  });
+  return effect(cause, {"yield"}, one(1e-11),
+                [share](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  m.arm.foot += v(0) * Eigen::Vector2d(1, share);
+                });
 }
 
 /// The links weigh something, which the gearboxes feel: the upper arm most.
 Effect self_weight(const HiddenCause& cause, const Scene&, Random& random) {
   const double second = uniform(random, 0.5, 1), third = uniform(random, 0.1, 0.4);
-  return effect(cause, {"mass"}, one(150), [second, third](const MeasuringPose&, const VectorXd& v, Moment& m) {
-    m.arm.weights[1] = {v(0), {-600, 20, 0}};
-    m.arm.weights[2] = {second * v(0), {-80, 0, 60}};
-    m.arm.weights[3] = {third * v(0), {0, -150, 0}};
-  });
+  return effect(cause, {"mass"}, one(150),
+                [second, third](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  m.arm.weights[1] = {v(0), {-600, 20, 0}};
+                  m.arm.weights[2] = {second * v(0), {-80, 0, 60}};
+                  m.arm.weights[3] = {third * v(0), {0, -150, 0}};
+                });
 }
 
-/// A bar or belt of a joint that is not as long as it should be: it is off by the angle of the joint before it, and by
-/// that between the two.
+/// A bar or belt of a joint that is not as long as it should be: it is off by the angle of the
+/// joint before it, and by that between the two.
 Effect joint_coupling(const HiddenCause& cause, const Scene&, Random& random) {
-  const double rate = uniform(random, 0.5, 1), phase = uniform(random, 0, kTurn), other = uniform(random, 0, kTurn);
+  const double rate = uniform(random, 0.5, 1), phase = uniform(random, 0, kTurn),
+               other = uniform(random, 0, kTurn);
   return effect(cause, {"size"}, one(1e-4),
-                [j = joint_of(cause), rate, phase, other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                [j = joint_of(cause), rate, phase, other](const MeasuringPose& p, const VectorXd& v,
+                                                          Moment& m) {
                   m.q(j) += v(0) * (rate * p.q(j - 1) + std::sin(2 * p.q(j - 1) + phase) +
                                     0.6 * std::sin(p.q(j) - p.q(j - 1) + other));
                 });
@@ -359,7 +396,8 @@ Effect joint_coupling(const HiddenCause& cause, const Scene&, Random& random) {
 
 /// The joints of the pose before; of the first one its own.
 Joints come_from(const std::vector<MeasuringPose>& poses, const MeasuringPose& p) {
-  const auto i = static_cast<std::size_t>(std::clamp<int>(p.index, 0, static_cast<int>(poses.size()) - 1));
+  const auto i =
+      static_cast<std::size_t>(std::clamp<int>(p.index, 0, static_cast<int>(poses.size()) - 1));
   return i == 0 ? p.q : poses[i - 1].q;
 }
 
@@ -367,31 +405,37 @@ Joints come_from(const std::vector<MeasuringPose>& poses, const MeasuringPose& p
 Effect hysteresis(const HiddenCause& cause, const Scene& scene, Random& random) {
   const double way = uniform(random, 0.05, 0.4);
   return effect(cause, {"hold"}, one(4e-5),
-                [j = joint_of(cause), way, poses = *scene.poses](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                [j = joint_of(cause), way, poses = *scene.poses](const MeasuringPose& p,
+                                                                 const VectorXd& v, Moment& m) {
                   m.q(j) -= v(0) * std::tanh((p.q(j) - come_from(poses, p)(j)) / way);
                 });
 }
 
-/// Measured before it stood still: every joint still lacks a share of its last move, some a little more.
+/// Measured before it stood still: every joint still lacks a share of its last move, some a little
+/// more.
 Effect early_reading(const HiddenCause& cause, const Scene& scene, Random& random) {
   Joints lacks;
   for (Index j = 0; j < kJoints; ++j) lacks(j) = uniform(random, 0.9, 1.1);
-  return effect(cause, {"share"}, one(5e-5),
-                [lacks, poses = *scene.poses](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  m.q -= v(0) * lacks.cwiseProduct(p.q - come_from(poses, p));
-                });
+  return effect(
+      cause, {"share"}, one(5e-5),
+      [lacks, poses = *scene.poses](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+        m.q -= v(0) * lacks.cwiseProduct(p.q - come_from(poses, p));
+      });
 }
 
 /// All that the tracker measures is larger in warm air, as seen from its stand.
 Effect instrument_scale(const HiddenCause& cause, const Scene&, Random& random) {
-  return effect(
-      cause, {"scale"}, one(uniform(random, 2e-6, 6e-6)), [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-        const Matrix4d tool = m.seen * tool_frame(m.arm, m.q);
-        m.shift += v(0) * (p.temperature_c - kReferenceTemperature) * (tool.block<3, 1>(0, 3) - tracker_stand_mm());
-      });
+  return effect(cause, {"scale"}, one(uniform(random, 2e-6, 6e-6)),
+                [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const Matrix4d tool = m.seen * tool_frame(m.arm, m.q);
+                  m.shift += v(0) * (p.temperature_c - kReferenceTemperature) *
+                             (tool.block<3, 1>(0, 3) - tracker_stand_mm());
+                });
 }
 
-HiddenCause unknown_of(std::vector<std::string> joints) { return {"unknown", 0, "", -1, std::move(joints), 0}; }
+HiddenCause unknown_of(std::vector<std::string> joints) {
+  return {"unknown", 0, "", -1, std::move(joints), 0};
+}
 
 /// The angle of joint 3 is off by a wave that runs along two joints at once.
 Effect wave_of_two(Random& random) {
@@ -416,19 +460,22 @@ Effect seam_in_the_floor(Random& random) {
 /// A cracked link: its lower half opens as soon as joint 2 leans back.
 Effect cracked_link(Random& random) {
   const double at = uniform(random, -0.2, 0.4);
-  return effect(unknown_of({"q2"}), {"size"}, one(0.05), [at](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    if (p.q(1) < at) m.arm.links[1].a += v(0);
-  });
+  return effect(unknown_of({"q2"}), {"size"}, one(0.05),
+                [at](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.q(1) < at) m.arm.links[1].a += v(0);
+                });
 }
 
 /// A spindle in a soft mount: it sags by how it stands to gravity.
 Effect soft_mount(Random& random) {
-  const Vector3d softness(uniform(random, 0.3, 1), uniform(random, 0.3, 1), uniform(random, 0.1, 0.3));
-  return effect(unknown_of({}), {"size"}, one(0.05), [softness](const MeasuringPose&, const VectorXd& v, Moment& m) {
-    const Matrix4d tool = tool_frame(m.arm, m.q);
-    const Vector3d down = tool.block<3, 3>(0, 0).transpose() * Vector3d(0, 0, -1);
-    m.arm.tool = m.arm.tool * motion(v(0) * softness.cwiseProduct(down), 0, 0, 0);
-  });
+  const Vector3d softness(uniform(random, 0.3, 1), uniform(random, 0.3, 1),
+                          uniform(random, 0.1, 0.3));
+  return effect(unknown_of({}), {"size"}, one(0.05),
+                [softness](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  const Matrix4d tool = tool_frame(m.arm, m.q);
+                  const Vector3d down = tool.block<3, 3>(0, 0).transpose() * Vector3d(0, 0, -1);
+                  m.arm.tool = m.arm.tool * motion(v(0) * softness.cwiseProduct(down), 0, 0, 0);
+                });
 }
 
 /// Every joint's zero walks at random, from pose to pose.
@@ -439,21 +486,25 @@ Effect walking_zeros(const Scene& scene, Random& random) {
     for (Index j = 0; j < kJoints; ++j) next(j) += normal(random);
     way.push_back(next);
   }
-  return effect(unknown_of({"time"}), {"size"}, one(1e-5), [way](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    m.q += v(0) * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
-  });
+  return effect(unknown_of({"time"}), {"size"}, one(1e-5),
+                [way](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q += v(0) * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
+                });
 }
 
 /// At some three of ten poses another load hangs there than the batch says.
 Effect other_loads(const Scene& scene, Random& random) {
   std::vector<bool> other;
   while (other.size() < scene.poses->size()) other.push_back(uniform(random, 0, 1) < 0.3);
-  return effect(unknown_of({}), {"mass"}, one(20), [other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    if (other[std::min(static_cast<std::size_t>(p.index), other.size() - 1)]) m.arm.load.mass_kg -= v(0);
-  });
+  return effect(unknown_of({}), {"mass"}, one(20),
+                [other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (other[std::min(static_cast<std::size_t>(p.index), other.size() - 1)])
+                    m.arm.load.mass_kg -= v(0);
+                });
 }
 
-/// A smooth random function of some joints, in three axes of the base: waves of random direction and phase.
+/// A smooth random function of some joints, in three axes of the base: waves of random direction
+/// and phase.
 Effect unknown(const HiddenCause& cause, const Scene&, Random& random) {
   constexpr int kWaves = 40;
   struct Wave {
@@ -464,13 +515,16 @@ Effect unknown(const HiddenCause& cause, const Scene&, Random& random) {
   std::vector<Wave> waves(kWaves);
   const double length = uniform(random, 0.6, 1.0);  // rad
   for (Wave& wave : waves) {
-    for (const std::string& joint : cause.depends_on) wave.order(joint.at(1) - '1') = normal(random) / length;
+    for (const std::string& joint : cause.depends_on)
+      wave.order(joint.at(1) - '1') = normal(random) / length;
     wave.size = Vector3d(normal(random), normal(random), normal(random)) / std::sqrt(kWaves / 2.0);
     wave.phase = uniform(random, 0, kTurn);
   }
-  return effect(cause, {"size"}, one(0.02), [waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-    for (const Wave& wave : waves) m.shift += v(0) * wave.size * std::cos(wave.order.dot(p.q) + wave.phase);
-  });
+  return effect(cause, {"size"}, one(0.02),
+                [waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  for (const Wave& wave : waves)
+                    m.shift += v(0) * wave.size * std::cos(wave.order.dot(p.q) + wave.phase);
+                });
 }
 
 using Maker = Effect (*)(const HiddenCause&, const Scene&, Random&);
@@ -507,8 +561,9 @@ const std::map<std::string, Maker>& makers() {
 }
 
 /// Parameters of the arm's table that nothing but themselves makes: not the base, not the tool.
-const std::vector<std::string> kOwnGeometry = {"a1", "alpha1", "q2", "a2", "alpha2", "beta2", "q3", "d3",
-                                               "a3", "alpha3", "q4", "d4", "alpha4", "q5",    "d5", "alpha5"};
+const std::vector<std::string> kOwnGeometry = {
+    "a1", "alpha1", "q2", "a2", "alpha2", "beta2", "q3", "d3",
+    "a3", "alpha3", "q4", "d4", "alpha4", "q5",    "d5", "alpha5"};
 
 }  // namespace
 
@@ -536,12 +591,14 @@ const std::vector<std::string>& hideable_causes() {
 HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& random) {
   HiddenCause cause{name, 0, "", -1, {}};
   const auto count = static_cast<int>(scene.poses->size());
-  if (name == "gear_transmission" || name == "encoder_eccentricity" || name == "joint_map" || name == "backlash") {
+  if (name == "gear_transmission" || name == "encoder_eccentricity" || name == "joint_map" ||
+      name == "backlash") {
     cause.joint = whole(random, 1, 6);
   } else if (name == "axis_runout" || name == "hysteresis") {
     cause.joint = whole(random, 1, 5);
   } else if (name == "joint_coupling") {
-    cause.joint = whole(random, 3, 4);  // joint 2 is not driven past joint 1; of the wrist it is a wrist coupling
+    cause.joint = whole(
+        random, 3, 4);  // joint 2 is not driven past joint 1; of the wrist it is a wrist coupling
   } else if (name == "joint_slip") {
     cause.joint = whole(random, 2, 5);  // of joint 6 it looks like a tool that turned
   } else if (name == "link_bending") {
@@ -550,10 +607,11 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
     cause.joint = whole(random, 2, 5);
     cause.parameter = "C" + std::to_string(cause.joint);
   } else if (name == "geometry") {
-    cause.parameter =
-        kOwnGeometry[static_cast<std::size_t>(whole(random, 0, static_cast<int>(kOwnGeometry.size()) - 1))];
+    cause.parameter = kOwnGeometry[static_cast<std::size_t>(
+        whole(random, 0, static_cast<int>(kOwnGeometry.size()) - 1))];
   }
-  if (name == "tracker_moved" || name == "joint_slip" || name == "tool_changed" || name == "payload_changed") {
+  if (name == "tracker_moved" || name == "joint_slip" || name == "tool_changed" ||
+      name == "payload_changed") {
     cause.first = whole(random, count / 4, 3 * count / 4);
   } else if (name == "outlier") {
     cause.first = whole(random, 0, count - 1);

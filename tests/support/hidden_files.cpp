@@ -10,12 +10,14 @@ namespace trammel::hidden {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr int kLimitsDeg[kJoints][2] = {{-170, 170}, {-65, 85}, {-180, 70}, {-300, 300}, {-120, 120}, {-360, 360}};
+constexpr int kLimitsDeg[kJoints][2] = {{-170, 170}, {-65, 85},   {-180, 70},
+                                        {-300, 300}, {-120, 120}, {-360, 360}};
 
 std::string pose_text(const Eigen::Matrix4d& frame) {
   const Eigen::Quaterniond turn(Eigen::Matrix3d(frame.block<3, 3>(0, 0)));
-  return fmt::format("{{xyz_mm: [{:.9g}, {:.9g}, {:.9g}], q_wxyz: [{:.12g}, {:.12g}, {:.12g}, {:.12g}]}}", frame(0, 3),
-                     frame(1, 3), frame(2, 3), turn.w(), turn.x(), turn.y(), turn.z());
+  return fmt::format(
+      "{{xyz_mm: [{:.9g}, {:.9g}, {:.9g}], q_wxyz: [{:.12g}, {:.12g}, {:.12g}, {:.12g}]}}",
+      frame(0, 3), frame(1, 3), frame(2, 3), turn.w(), turn.x(), turn.y(), turn.z());
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -29,7 +31,8 @@ std::string ranges_text(const std::string& name) {
   int joint = 0;
   for (const auto& [lower, upper] : joint_ranges(name)) {
     if (lower == upper) return "";  // a joint that stands still has no range
-    text += fmt::format("{}q{}: [{:.6g}, {:.6g}]", joint == 0 ? "" : ", ", joint + 1, lower / kDegree, upper / kDegree);
+    text += fmt::format("{}q{}: [{:.6g}, {:.6g}]", joint == 0 ? "" : ", ", joint + 1,
+                        lower / kDegree, upper / kDegree);
     ++joint;
   }
   return "joint_ranges_deg: {" + text + "}\n";
@@ -43,8 +46,10 @@ std::string robot_text() {
   for (std::size_t i = 0; i < kJoints; ++i) {
     const Link& link = arm.links[i];
     const std::string along = link.parallel ? "hayati: true" : fmt::format("d_mm: {:.9g}", link.d);
-    text += fmt::format("  - {{theta_deg: {:.9g}, {}, a_mm: {:.9g}, alpha_deg: {:.9g}, limits_deg: [{}, {}]}}\n",
-                        link.theta / kDegree, along, link.a, link.alpha / kDegree, kLimitsDeg[i][0], kLimitsDeg[i][1]);
+    text += fmt::format(
+        "  - {{theta_deg: {:.9g}, {}, a_mm: {:.9g}, alpha_deg: {:.9g}, limits_deg: [{}, {}]}}\n",
+        link.theta / kDegree, along, link.a, link.alpha / kDegree, kLimitsDeg[i][0],
+        kLimitsDeg[i][1]);
   }
   return text;
 }
@@ -58,14 +63,15 @@ std::string cell_text(const World& world, const Belief& belief, const std::strin
   text += "payloads:\n";
   for (std::size_t i = 0; i < belief.loads.size(); ++i) {
     const Load& load = belief.loads[i];
-    text += fmt::format("  load-{}: {{mass_kg: {:.9g}, cog_mm: [{:.9g}, {:.9g}, {:.9g}]}}\n", i + 1, load.mass_kg,
-                        load.cog_mm.x(), load.cog_mm.y(), load.cog_mm.z());
+    text += fmt::format("  load-{}: {{mass_kg: {:.9g}, cog_mm: [{:.9g}, {:.9g}, {:.9g}]}}\n", i + 1,
+                        load.mass_kg, load.cog_mm.x(), load.cog_mm.y(), load.cog_mm.z());
   }
   const Eigen::Vector3d stand = tracker_stand_mm();
   const std::string told =
-      belief.knows_stand ? fmt::format(", xyz_mm: [{}, {}, {}]", stand.x(), stand.y(), stand.z()) : "";
-  text += fmt::format("tracker: {{sigma_mm: {:.9g}, sigma_deg: {:.9g}{}}}\n", world.sigma_mm, world.sigma_rad / kDegree,
-                      told);
+      belief.knows_stand ? fmt::format(", xyz_mm: [{}, {}, {}]", stand.x(), stand.y(), stand.z())
+                         : "";
+  text += fmt::format("tracker: {{sigma_mm: {:.9g}, sigma_deg: {:.9g}{}}}\n", world.sigma_mm,
+                      world.sigma_rad / kDegree, told);
   text += "model: {error_sources: [" + joined(world.sources) + "], bias: none}\n";
   return text + ranges_text(ranges);
 }
@@ -87,10 +93,11 @@ std::string batch_text(const World& world, const Frames& measured) {
     for (int axis = 0; axis < 3; ++axis) text += fmt::format(",{:.10g}", frame(axis, 3));
     if (world.orientation) {
       const Eigen::Quaterniond turn(Eigen::Matrix3d(frame.block<3, 3>(0, 0)));
-      text += fmt::format(",{:.12g},{:.12g},{:.12g},{:.12g}", turn.w(), turn.x(), turn.y(), turn.z());
+      text +=
+          fmt::format(",{:.12g},{:.12g},{:.12g},{:.12g}", turn.w(), turn.x(), turn.y(), turn.z());
     }
-    text +=
-        fmt::format(",{:.6f},{:.4f},tool-{},load-{}", pose.time_s, pose.temperature_c, pose.tool + 1, pose.load + 1);
+    text += fmt::format(",{:.6f},{:.4f},tool-{},load-{}", pose.time_s, pose.temperature_c,
+                        pose.tool + 1, pose.load + 1);
     for (const int direction : pose.direction) text += fmt::format(",{}", direction);
     text += sets ? (pose.validation ? ",validation\n" : ",train\n") : "\n";
   }

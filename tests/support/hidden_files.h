@@ -17,7 +17,8 @@ struct Belief {
 
 /// The arm as drawn.
 [[nodiscard]] std::string robot_text();
-[[nodiscard]] std::string cell_text(const World& world, const Belief& belief, const std::string& ranges);
+[[nodiscard]] std::string cell_text(const World& world, const Belief& belief,
+                                    const std::string& ranges);
 /// `frames` as measured at the world's poses, with pose ids p1, p2, ...
 [[nodiscard]] std::string batch_text(const World& world, const Frames& measured);
 

@@ -27,14 +27,15 @@ MatrixXd of_length(MatrixXd columns, double length) {
 }
 
 Scene scene_of(const World& world) {
-  Scene scene{world.arm, &world.poses, static_cast<int>(world.tools.size()), static_cast<int>(world.loads.size()),
-              true};
+  Scene scene{world.arm, &world.poses, static_cast<int>(world.tools.size()),
+              static_cast<int>(world.loads.size()), true};
   scene.arm.tool = world.tools.front();
   scene.arm.load = world.loads.front();
   return scene;
 }
 
-MatrixXd rival_columns(const World& world, const HiddenCause& cause, const std::vector<MeasuringPose>& poses) {
+MatrixXd rival_columns(const World& world, const HiddenCause& cause,
+                       const std::vector<MeasuringPose>& poses) {
   Random random(1);  // sizes only: columns are derivatives
   return effect_columns(world, poses, draw_effect(cause, scene_of(world), random));
 }
@@ -54,14 +55,16 @@ std::vector<HiddenCause> steady_causes(const World& world) {
   for (const ArmParameter& parameter : arm_parameters()) {
     const auto& known = world.sources;
     const bool identified = std::find(known.begin(), known.end(), parameter.group) != known.end();
-    if (!identified && parameter.group != "base") causes.push_back({parameter.group, 0, parameter.name, -1, {}});
+    if (!identified && parameter.group != "base")
+      causes.push_back({parameter.group, 0, parameter.name, -1, {}});
   }
   return causes;
 }
 
 std::vector<HiddenCause> sudden_causes() {
   std::vector<HiddenCause> causes;
-  for (const char* name : {"tracker_moved", "tool_changed", "payload_changed"}) causes.push_back({name, 0, "", 0, {}});
+  for (const char* name : {"tracker_moved", "tool_changed", "payload_changed"})
+    causes.push_back({name, 0, "", 0, {}});
   for (int joint = 1; joint <= kJoints; ++joint) causes.push_back({"joint_slip", joint, "", 0, {}});
   return causes;
 }
@@ -103,16 +106,18 @@ double held_out_rms_mm(const HiddenCase& hidden) {
     }
     return all;
   };
-  const VectorXd noise = whitened(world, measured_learned, frames_at(world, learned, world.effects));
+  const VectorXd noise =
+      whitened(world, measured_learned, frames_at(world, learned, world.effects));
   const Eigen::BDCSVD<MatrixXd> svd(columns(learned), Eigen::ComputeThinU | Eigen::ComputeThinV);
   const Index rank = (svd.singularValues().array() >= 1).count();
-  const VectorXd along =
-      (svd.matrixU().leftCols(rank).transpose() * noise).array() / svd.singularValues().head(rank).array();
+  const VectorXd along = (svd.matrixU().leftCols(rank).transpose() * noise).array() /
+                         svd.singularValues().head(rank).array();
   const VectorXd left = whitened(world, measured_kept, frames_at(world, kept, world.effects)) -
                         columns(kept) * (svd.matrixV().leftCols(rank) * along);
   double sum = 0;
   const Index per_pose = left.size() / static_cast<Index>(kept.size());
-  for (Index i = 0; i < static_cast<Index>(kept.size()); ++i) sum += left.segment<3>(per_pose * i).squaredNorm();
+  for (Index i = 0; i < static_cast<Index>(kept.size()); ++i)
+    sum += left.segment<3>(per_pose * i).squaredNorm();
   return world.sigma_mm * std::sqrt(sum / static_cast<double>(kept.size()));
 }
 
@@ -145,7 +150,8 @@ std::vector<Rival> closest_rivals(const HiddenCase& hidden) {
     }
     rivals.push_back(best);
   }
-  std::sort(rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.left < b.left; });
+  std::sort(rivals.begin(), rivals.end(),
+            [](const Rival& a, const Rival& b) { return a.left < b.left; });
   return rivals;
 }
 

@@ -19,7 +19,8 @@ constexpr double kSecondsAHole = 25;
 Joints gap(const Matrix4d& is, const Matrix4d& wanted) {
   Joints rows;
   rows.head<3>() = (wanted - is).block<3, 1>(0, 3);
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(wanted.block<3, 3>(0, 0) * is.block<3, 3>(0, 0).transpose()));
+  const Eigen::AngleAxisd turn(
+      Eigen::Matrix3d(wanted.block<3, 3>(0, 0) * is.block<3, 3>(0, 0).transpose()));
   rows.tail<3>() = 1000 * turn.angle() * turn.axis();
   return rows;
 }
@@ -62,7 +63,8 @@ std::vector<MeasuringPose> panel_poses(const World& world, Random& random) {
       wanted(1, 3) += kWidth_mm * (column / (kColumns - 1.0) - 0.5);
       wanted(2, 3) += kHeight_mm * (row / (kRows - 1.0) - 0.5);
       pose.q = joints_for(arm, wanted, q);
-      for (Index j = 0; j < kJoints; ++j) pose.direction[static_cast<std::size_t>(j)] = pose.q(j) > before(j) ? 1 : -1;
+      for (Index j = 0; j < kJoints; ++j)
+        pose.direction[static_cast<std::size_t>(j)] = pose.q(j) > before(j) ? 1 : -1;
       before = pose.q;
       pose.time_s = kSecondsAHole * (pose.index + uniform(random, 0, 0.2));
       pose.temperature_c = 21 + 0.3 * std::sin(pose.time_s / 300);

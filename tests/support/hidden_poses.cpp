@@ -16,14 +16,16 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSecondsAPose = 20;
 constexpr double kSecondsAPathPoint = 0.4;
-constexpr double kLinkLag = 1.0 / 40;  // of the time measured, that the links follow the thermometer by
-constexpr int kTurnsOfAKind = 8;       // how often a tool or a load is put on again
+constexpr double kLinkLag =
+    1.0 / 40;                     // of the time measured, that the links follow the thermometer by
+constexpr int kTurnsOfAKind = 8;  // how often a tool or a load is put on again
 
 using Ranges = std::array<std::pair<double, double>, kJoints>;
 
 const std::map<std::string, Ranges>& all_ranges_deg() {
   static const std::map<std::string, Ranges> ranges = {
-      {"calibration", {{{-170, 170}, {-65, 85}, {-180, 70}, {-300, 300}, {-120, 120}, {-180, 180}}}},
+      {"calibration",
+       {{{-170, 170}, {-65, 85}, {-180, 70}, {-300, 300}, {-120, 120}, {-180, 180}}}},
       {"1dim", {{{5, 5}, {0, 0}, {-45, 45}, {0, 0}, {0, 0}, {0, 0}}}},
       {"3dim", {{{-45, 45}, {-45, 45}, {-45, 45}, {0, 0}, {0, 0}, {0, 0}}}},
       {"6dim-s", {{{-15, 15}, {-15, 15}, {-15, 30}, {-30, 30}, {-30, 30}, {-30, 30}}}},
@@ -51,8 +53,8 @@ void scatter(std::vector<MeasuringPose>& poses, const Ranges& ranges, Random& ra
   }
 }
 
-/// One continuous motion: every joint swings to and fro within its range, each at its own pace, slowly enough that it
-/// moves by less than 0.2 rad from point to point.
+/// One continuous motion: every joint swings to and fro within its range, each at its own pace,
+/// slowly enough that it moves by less than 0.2 rad from point to point.
 void follow_path(std::vector<MeasuringPose>& poses, const Ranges& ranges, Random& random) {
   for (std::size_t j = 0; j < kJoints; ++j) {
     const auto [lower, upper] = ranges[j];
@@ -66,10 +68,12 @@ void follow_path(std::vector<MeasuringPose>& poses, const Ranges& ranges, Random
       const double t = kSecondsAPathPoint * static_cast<double>(i);
       const auto joint = static_cast<Eigen::Index>(j);
       poses[i].time_s = t;
-      poses[i].q(joint) = (lower + upper) / 2 +
-                          half * (0.65 * std::sin(pace * t + phase) + 0.35 * std::sin(second_pace * t + second_phase));
-      poses[i].velocity(joint) = half * (0.65 * pace * std::cos(pace * t + phase) +
-                                         0.35 * second_pace * std::cos(second_pace * t + second_phase));
+      poses[i].q(joint) =
+          (lower + upper) / 2 + half * (0.65 * std::sin(pace * t + phase) +
+                                        0.35 * std::sin(second_pace * t + second_phase));
+      poses[i].velocity(joint) =
+          half * (0.65 * pace * std::cos(pace * t + phase) +
+                  0.35 * second_pace * std::cos(second_pace * t + second_phase));
     }
   }
 }
@@ -80,15 +84,16 @@ void set_directions(std::vector<MeasuringPose>& poses, Approach approach, Random
     for (std::size_t j = 0; j < kJoints; ++j) {
       const auto joint = static_cast<Eigen::Index>(j);
       const double way = pose.q(joint) - before(joint);
-      const bool upwards =
-          approach == Approach::kFromBelow || (approach == Approach::kBothSides ? whole(random, 0, 1) == 1 : way > 0);
+      const bool upwards = approach == Approach::kFromBelow ||
+                           (approach == Approach::kBothSides ? whole(random, 0, 1) == 1 : way > 0);
       pose.direction[j] = upwards ? 1 : -1;
     }
     before = pose.q;
   }
 }
 
-/// A warm-up with the door opened and shut during it: neither the thermometer nor the links rise all the time.
+/// A warm-up with the door opened and shut during it: neither the thermometer nor the links rise
+/// all the time.
 void set_temperatures(std::vector<MeasuringPose>& poses, bool constant, Random& random) {
   const double start = poses.front().time_s;
   const double whole_time = std::max(poses.back().time_s - start, 1.0);
@@ -103,9 +108,9 @@ void set_temperatures(std::vector<MeasuringPose>& poses, bool constant, Random& 
   for (std::size_t i = 0; i < poses.size(); ++i) {
     MeasuringPose& pose = poses[i];
     const double share = (pose.time_s - start) / whole_time;
-    pose.temperature_c =
-        constant ? constant_at
-                 : 20.5 + rise * (1 - std::exp(-4 * share)) + swing * std::sin(kTurn * swings * share + phase);
+    pose.temperature_c = constant ? constant_at
+                                  : 20.5 + rise * (1 - std::exp(-4 * share)) +
+                                        swing * std::sin(kTurn * swings * share + phase);
     if (i == 0) links = pose.temperature_c;
     links += (pose.temperature_c - links) * (1 - std::exp(-(pose.time_s - before) / lag));
     before = pose.time_s;
@@ -114,7 +119,8 @@ void set_temperatures(std::vector<MeasuringPose>& poses, bool constant, Random& 
 }
 
 /// Turns of about equal length, the kinds one after the other.
-void take_turns(std::vector<MeasuringPose>& poses, int kinds, int MeasuringPose::*which, Random& random) {
+void take_turns(std::vector<MeasuringPose>& poses, int kinds, int MeasuringPose::*which,
+                Random& random) {
   if (kinds == 1) return;
   const auto count = static_cast<int>(poses.size());
   int kind = whole(random, 0, kinds - 1);
@@ -140,7 +146,9 @@ double normal(Random& random) {
   return radius * std::cos(uniform(random, 0, kTurn));
 }
 
-int whole(Random& random, int from, int to) { return from + static_cast<int>(uniform(random, 0, 1) * (to - from + 1)); }
+int whole(Random& random, int from, int to) {
+  return from + static_cast<int>(uniform(random, 0, 1) * (to - from + 1));
+}
 
 Ranges joint_ranges(const std::string& name) {
   const auto found = all_ranges_deg().find(name);

@@ -53,12 +53,14 @@ struct Deflection {
 };
 
 /// frames[0] is the base, frames[i] what follows link i.
-std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q, const Deflection& deflection) {
+std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q,
+                                            const Deflection& deflection) {
   std::array<Matrix4d, kJoints + 1> frames;
   frames[0] = arm.base * deflection.tilt;
   for (std::size_t i = 0; i < kJoints; ++i) {
     const auto joint = static_cast<Eigen::Index>(i);
-    frames[i + 1] = frames[i] * arm.bearings[i] * link_frame(arm.links[i], q(joint) + deflection.joints(joint));
+    frames[i + 1] =
+        frames[i] * arm.bearings[i] * link_frame(arm.links[i], q(joint) + deflection.joints(joint));
     if (deflection.bent) frames[i + 1] = frames[i + 1] * deflection.bends[i];
   }
   return frames;
@@ -73,26 +75,31 @@ struct Weight {
 };
 
 std::vector<Weight> weights_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm) {
-  std::vector<Weight> all = {
-      {origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm, weight_of(arm.load), kJoints - 1}};
+  std::vector<Weight> all = {{origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm,
+                              weight_of(arm.load), kJoints - 1}};
   for (std::size_t i = 0; i < kJoints; ++i) {
     if (arm.weights[i].mass_kg == 0) continue;
-    all.push_back({origin(frames[i + 1]) + axes(frames[i + 1]) * arm.weights[i].cog_mm, weight_of(arm.weights[i]), i});
+    all.push_back({origin(frames[i + 1]) + axes(frames[i + 1]) * arm.weights[i].cog_mm,
+                   weight_of(arm.weights[i]), i});
   }
   return all;
 }
 
-/// Torque of a spring whose pins are at (fixed, 0) and, turned by the angle, at (moving, 0): from the length between.
+/// Torque of a spring whose pins are at (fixed, 0) and, turned by the angle, at (moving, 0): from
+/// the length between.
 double torque_of(const Spring& spring, double q) {
   if (spring.fixed_mm == 0) return 0;
   const double angle = q + spring.phase;
-  const double length = std::sqrt(spring.fixed_mm * spring.fixed_mm + spring.moving_mm * spring.moving_mm -
-                                  2 * spring.fixed_mm * spring.moving_mm * std::cos(angle));
+  const double length =
+      std::sqrt(spring.fixed_mm * spring.fixed_mm + spring.moving_mm * spring.moving_mm -
+                2 * spring.fixed_mm * spring.moving_mm * std::cos(angle));
   const double pull = spring.force_N + spring.stiffness_N_mm * (length - spring.rest_mm);
-  return -pull * spring.fixed_mm * spring.moving_mm * std::sin(angle) / length;  // -d(length)/d(angle)
+  return -pull * spring.fixed_mm * spring.moving_mm * std::sin(angle) /
+         length;  // -d(length)/d(angle)
 }
 
-Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm, const Joints& q) {
+Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm,
+                  const Joints& q) {
   Joints moments = Joints::Zero();
   for (const Weight& weight : weights_in(frames, arm)) {
     for (std::size_t i = 0; i <= weight.last; ++i) {
@@ -107,16 +114,20 @@ Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& ar
 /// How the foot tilts under the moment of all that weighs.
 Matrix4d tilt_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm) {
   Vector3d moment = Vector3d::Zero();
-  for (const Weight& weight : weights_in(frames, arm)) moment += (weight.at - origin(arm.base)).cross(weight.force);
+  for (const Weight& weight : weights_in(frames, arm))
+    moment += (weight.at - origin(arm.base)).cross(weight.force);
   const Vector3d in_base = axes(arm.base).transpose() * moment;
   const Vector3d turn(arm.foot.x() * in_base.x(), arm.foot.y() * in_base.y(), 0);
   Matrix4d tilt = Matrix4d::Identity();
-  if (turn.norm() > 0) tilt.block<3, 3>(0, 0) = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  if (turn.norm() > 0)
+    tilt.block<3, 3>(0, 0) = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   return tilt;
 }
 
-/// A beam that is a little thinner towards its far end, clamped at its joint, pulled and turned at the far end.
-Matrix4d bend_of(double flex, const Matrix4d& start, const Matrix4d& end, const Vector3d& cog, const Vector3d& force) {
+/// A beam that is a little thinner towards its far end, clamped at its joint, pulled and turned at
+/// the far end.
+Matrix4d bend_of(double flex, const Matrix4d& start, const Matrix4d& end, const Vector3d& cog,
+                 const Vector3d& force) {
   const Matrix3d to_end = axes(end).transpose();
   const Vector3d span = to_end * (origin(end) - origin(start));
   const double length = span.norm();
@@ -125,7 +136,8 @@ Matrix4d bend_of(double flex, const Matrix4d& start, const Matrix4d& end, const 
   const Vector3d across = pull - along * along.dot(pull);
   const Vector3d turning = (to_end * (cog - origin(end))).cross(pull);
   const Vector3d moment = turning - along * along.dot(turning);
-  // Flexibility 1.15 at the far end, 0.85 at the joint: integrals of it times 1, s, s2, s the way from the far end.
+  // Flexibility 1.15 at the far end, 0.85 at the joint: integrals of it times 1, s, s2, s the way
+  // from the far end.
   const double zeroth = flex * length;
   const double first = flex * length * length * (1.15 / 2 - 0.3 / 3);
   const double second = flex * length * length * length * (1.15 / 3 - 0.3 / 4);
@@ -159,8 +171,8 @@ Deflection settled(const Arm& arm, const Joints& q) {
     const Vector3d cog = origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm;
     for (std::size_t i = 0; deflection.bent && i < kJoints; ++i) {
       if (arm.flex[i] == 0) continue;
-      const Matrix4d straight =
-          frames[i] * arm.bearings[i] * link_frame(arm.links[i], q(static_cast<Eigen::Index>(i)) + next(i));
+      const Matrix4d straight = frames[i] * arm.bearings[i] *
+                                link_frame(arm.links[i], q(static_cast<Eigen::Index>(i)) + next(i));
       const Matrix4d bend = bend_of(arm.flex[i], frames[i], straight, cog, force);
       moved = std::max(moved, (bend - deflection.bends[i]).block<3, 3>(0, 0).cwiseAbs().maxCoeff());
       deflection.bends[i] = bend;
@@ -185,17 +197,21 @@ Arm drawn_arm() {
 
 Matrix4d motion(const Vector3d& shift_mm, double about_z, double about_y, double about_x) {
   Matrix4d frame = Matrix4d::Identity();
-  frame.block<3, 3>(0, 0) =
-      (Eigen::AngleAxisd(about_z, Vector3d::UnitZ()) * Eigen::AngleAxisd(about_y, Vector3d::UnitY()) *
-       Eigen::AngleAxisd(about_x, Vector3d::UnitX()))
-          .toRotationMatrix();
+  frame.block<3, 3>(0, 0) = (Eigen::AngleAxisd(about_z, Vector3d::UnitZ()) *
+                             Eigen::AngleAxisd(about_y, Vector3d::UnitY()) *
+                             Eigen::AngleAxisd(about_x, Vector3d::UnitX()))
+                                .toRotationMatrix();
   frame.block<3, 1>(0, 3) = shift_mm;
   return frame;
 }
 
-Joints load_moments(const Arm& arm, const Joints& q) { return moments_in(frames_of(arm, q, settled(arm, q)), arm, q); }
+Joints load_moments(const Arm& arm, const Joints& q) {
+  return moments_in(frames_of(arm, q, settled(arm, q)), arm, q);
+}
 
-Matrix4d tool_frame(const Arm& arm, const Joints& q) { return frames_of(arm, q, settled(arm, q))[kJoints] * arm.tool; }
+Matrix4d tool_frame(const Arm& arm, const Joints& q) {
+  return frames_of(arm, q, settled(arm, q))[kJoints] * arm.tool;
+}
 
 const std::vector<ArmParameter>& arm_parameters() {
   static const std::vector<ArmParameter> all = [] {
@@ -211,7 +227,8 @@ const std::vector<ArmParameter>& arm_parameters() {
       list.push_back({"alpha" + number, "geometry", 5e-3});
       if (parallel) list.push_back({"beta" + number, "geometry", 5e-3});
     }
-    for (std::size_t i = 0; i < kJoints; ++i) list.push_back({"C" + std::to_string(i + 1), "compliance", 1e-8});
+    for (std::size_t i = 0; i < kJoints; ++i)
+      list.push_back({"C" + std::to_string(i + 1), "compliance", 1e-8});
     return list;
   }();
   return all;

@@ -5,15 +5,16 @@
 #include <string>
 #include <vector>
 
-/// A second, small simulation of a robot arm, for tests that hide an effect and ask for it. It shares nothing with the
-/// server: own kinematics, own load, own deflection. Lengths in mm, angles in rad, masses in kg, forces in N, joints
-/// counted from 0.
+/// A second, small simulation of a robot arm, for tests that hide an effect and ask for it. It
+/// shares nothing with the server: own kinematics, own load, own deflection. Lengths in mm, angles
+/// in rad, masses in kg, forces in N, joints counted from 0.
 namespace trammel::hidden {
 
 constexpr int kJoints = 6;
 using Joints = Eigen::Matrix<double, kJoints, 1>;
 
-/// One row of the arm's table: Tz(d) Rz(theta) Tx(a) Rx(alpha), or with `parallel` Rz(theta) Tx(a) Rx(alpha) Ry(beta).
+/// One row of the arm's table: Tz(d) Rz(theta) Tx(a) Rx(alpha), or with `parallel` Rz(theta) Tx(a)
+/// Rx(alpha) Ry(beta).
 struct Link {
   double theta = 0, d = 0, a = 0, alpha = 0, beta = 0;
   bool parallel = false;
@@ -24,7 +25,8 @@ struct Load {
   Eigen::Vector3d cog_mm = Eigen::Vector3d::Zero();  ///< in the flange
 };
 
-/// A gas spring or balancer at a joint: it pulls a pin on the link that follows towards a pin on the link before.
+/// A gas spring or balancer at a joint: it pulls a pin on the link that follows towards a pin on
+/// the link before.
 struct Spring {
   double force_N = 0;         ///< where its pins are `rest_mm` apart
   double stiffness_N_mm = 0;  ///< what it pulls more a mm beyond
@@ -62,14 +64,16 @@ struct Arm {
 [[nodiscard]] Arm drawn_arm();
 
 /// Tx Ty Tz Rz Ry Rx.
-[[nodiscard]] Eigen::Matrix4d motion(const Eigen::Vector3d& shift_mm, double about_z, double about_y, double about_x);
+[[nodiscard]] Eigen::Matrix4d motion(const Eigen::Vector3d& shift_mm, double about_z,
+                                     double about_y, double about_x);
 
 /// Moment of load, links and spring about every joint axis, Nmm, in the loaded posture.
 [[nodiscard]] Joints load_moments(const Arm& arm, const Joints& q);
 /// World from tool, gearboxes and links having given way until moments and deflections agree.
 [[nodiscard]] Eigen::Matrix4d tool_frame(const Arm& arm, const Joints& q);
 
-/// What a calibration could change of the arm, as one vector: `x0`..`alpha0`, `q1`..`alpha6`, `C1`..`C6`.
+/// What a calibration could change of the arm, as one vector: `x0`..`alpha0`, `q1`..`alpha6`,
+/// `C1`..`C6`.
 struct ArmParameter {
   std::string name;
   std::string group;  ///< base, geometry, compliance

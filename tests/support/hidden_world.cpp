@@ -22,7 +22,8 @@ Vector3d small_turn(const Matrix3d& R) {
   return twice / 2;
 }
 
-Matrix4d frame_at(const World& world, const MeasuringPose& pose, const std::vector<Effect>& effects) {
+Matrix4d frame_at(const World& world, const MeasuringPose& pose,
+                  const std::vector<Effect>& effects) {
   Moment moment;
   moment.arm = world.arm;
   moment.arm.tool = world.tools[static_cast<std::size_t>(pose.tool)];
@@ -42,7 +43,8 @@ VectorXd central(const World& world, double steps, FramesAt frames_of) {
 
 }  // namespace
 
-Frames frames_at(const World& world, const std::vector<MeasuringPose>& poses, const std::vector<Effect>& effects) {
+Frames frames_at(const World& world, const std::vector<MeasuringPose>& poses,
+                 const std::vector<Effect>& effects) {
   Frames frames;
   frames.reserve(poses.size());
   for (const MeasuringPose& pose : poses) frames.push_back(frame_at(world, pose, effects));
@@ -66,7 +68,8 @@ MatrixXd arm_columns(const World& world, const std::vector<MeasuringPose>& poses
   const auto& all = arm_parameters();
   MatrixXd columns(static_cast<Index>(poses.size()) * (world.orientation ? 6 : 3), 0);
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if (std::find(world.sources.begin(), world.sources.end(), all[k].group) == world.sources.end()) continue;
+    if (std::find(world.sources.begin(), world.sources.end(), all[k].group) == world.sources.end())
+      continue;
     columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
     columns.rightCols(1) = central(world, kStep, [&](double way) {
       VectorXd values = VectorXd::Zero(static_cast<Index>(all.size()));
@@ -79,8 +82,10 @@ MatrixXd arm_columns(const World& world, const std::vector<MeasuringPose>& poses
   return columns;
 }
 
-MatrixXd effect_columns(const World& world, const std::vector<MeasuringPose>& poses, const Effect& effect) {
-  MatrixXd columns(static_cast<Index>(poses.size()) * (world.orientation ? 6 : 3), effect.values.size());
+MatrixXd effect_columns(const World& world, const std::vector<MeasuringPose>& poses,
+                        const Effect& effect) {
+  MatrixXd columns(static_cast<Index>(poses.size()) * (world.orientation ? 6 : 3),
+                   effect.values.size());
   for (Index k = 0; k < effect.values.size(); ++k) {
     const double size = effect.grows[static_cast<std::size_t>(k)] ? effect.values.norm() : 1e-2;
     columns.col(k) = central(world, kStep, [&](double way) {
@@ -99,7 +104,8 @@ MatrixXd directions_of(const MatrixXd& columns) {
   const MatrixXd R = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
   const Eigen::JacobiSVD<MatrixXd> svd(R, Eigen::ComputeThinU);
   const Index kept = (svd.singularValues().array() >= 1).count();
-  return qr.householderQ() * MatrixXd::Identity(columns.rows(), rank) * svd.matrixU().leftCols(kept);
+  return qr.householderQ() * MatrixXd::Identity(columns.rows(), rank) *
+         svd.matrixU().leftCols(kept);
 }
 
 MatrixXd outside(const MatrixXd& directions, const MatrixXd& rows) {

@@ -25,19 +25,25 @@ using Frames = std::vector<Eigen::Matrix4d>;
 [[nodiscard]] Frames frames_at(const World& world, const std::vector<MeasuringPose>& poses,
                                const std::vector<Effect>& effects);
 
-/// Rows for all of what a pose shows (three, or six with orientation), over the tracker's sigma: `moved` minus `still`.
-[[nodiscard]] Eigen::VectorXd whitened(const World& world, const Frames& moved, const Frames& still);
-/// Likewise, by finite differences: what the cell's error sources can do, one column each, in units that they may
-/// reasonably be off by.
-[[nodiscard]] Eigen::MatrixXd arm_columns(const World& world, const std::vector<MeasuringPose>& poses);
+/// Rows for all of what a pose shows (three, or six with orientation), over the tracker's sigma:
+/// `moved` minus `still`.
+[[nodiscard]] Eigen::VectorXd whitened(const World& world, const Frames& moved,
+                                       const Frames& still);
+/// Likewise, by finite differences: what the cell's error sources can do, one column each, in units
+/// that they may reasonably be off by.
+[[nodiscard]] Eigen::MatrixXd arm_columns(const World& world,
+                                          const std::vector<MeasuringPose>& poses);
 /// What `effect` can do: derivatives by its values, in units of its size.
-[[nodiscard]] Eigen::MatrixXd effect_columns(const World& world, const std::vector<MeasuringPose>& poses,
+[[nodiscard]] Eigen::MatrixXd effect_columns(const World& world,
+                                             const std::vector<MeasuringPose>& poses,
                                              const Effect& effect);
 
-/// Orthonormal directions that `columns` can make: singular values of 1 (one sigma for a reasonable change) and above.
+/// Orthonormal directions that `columns` can make: singular values of 1 (one sigma for a reasonable
+/// change) and above.
 [[nodiscard]] Eigen::MatrixXd directions_of(const Eigen::MatrixXd& columns);
 /// `rows` without what lies along `directions`.
-[[nodiscard]] Eigen::MatrixXd outside(const Eigen::MatrixXd& directions, const Eigen::MatrixXd& rows);
+[[nodiscard]] Eigen::MatrixXd outside(const Eigen::MatrixXd& directions,
+                                      const Eigen::MatrixXd& rows);
 
 /// Poses not set aside for validation.
 [[nodiscard]] std::vector<MeasuringPose> training_poses(const World& world);

@@ -8,7 +8,8 @@
 
 #include "server/base/result.h"
 
-/// What clients asked and were answered, for tests/faults/history/history_check.py: a JSON object a line.
+/// What clients asked and were answered, for tests/faults/history/history_check.py: a JSON object a
+/// line.
 namespace trammel::test {
 
 /// Microseconds by a clock that all processes of this host have.
@@ -21,9 +22,9 @@ class History {
 
   void add(const nlohmann::json& record);
 
-  /// Calls `call`, whose Result<nlohmann::json> holds what the record is to have besides, and adds the record with when
-  /// that was and how it was answered. Returns the answer: `ok`, `conflict`, `not_found`, `refused`, or `unknown` where
-  /// it may have been made or not.
+  /// Calls `call`, whose Result<nlohmann::json> holds what the record is to have besides, and adds
+  /// the record with when that was and how it was answered. Returns the answer: `ok`, `conflict`,
+  /// `not_found`, `refused`, or `unknown` where it may have been made or not.
   template <typename Call>
   std::string ask(nlohmann::json record, const Call& call) {
     record["invoke"] = monotonic_us();

@@ -15,7 +15,8 @@ namespace trammel::test {
 
 using Clock = std::chrono::steady_clock;
 
-OpenConnection::OpenConnection(std::uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+OpenConnection::OpenConnection(std::uint16_t port)
+    : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_port = htons(port);
@@ -49,7 +50,8 @@ bool OpenConnection::closes_within(std::chrono::milliseconds limit) const {
   return Clock::now() < until;
 }
 
-std::string http_exchange(std::uint16_t port, const std::string& bytes, std::chrono::milliseconds limit) {
+std::string http_exchange(std::uint16_t port, const std::string& bytes,
+                          std::chrono::milliseconds limit) {
   const OpenConnection connection(port);
   connection.send(bytes);
   return connection.read(limit);
@@ -74,7 +76,9 @@ HttpAnswer parse_http(const std::string& bytes) {
 
 HttpAnswer http_get(std::uint16_t port, const std::string& path, std::chrono::milliseconds limit) {
   return parse_http(http_exchange(
-      port, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", path, port), limit));
+      port,
+      fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", path, port),
+      limit));
 }
 
 }  // namespace trammel::test

@@ -69,9 +69,11 @@ void kill_one_after_another(const KillLoad& load, int killed) {
                         Clock::now() + life});
       ++begun;
     }
-    const auto first = std::min_element(living.begin(), living.end(),
-                                        [](const Living& a, const Living& b) { return a.until < b.until; });
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(first->until - Clock::now());
+    const auto first =
+        std::min_element(living.begin(), living.end(),
+                         [](const Living& a, const Living& b) { return a.until < b.until; });
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(first->until - Clock::now());
     ::poll(nullptr, 0, static_cast<int>(std::max<std::int64_t>(0, left.count())));
     end_child(first->process);
     living.erase(first);

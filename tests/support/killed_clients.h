@@ -21,8 +21,8 @@ struct KillOutcome {
   double longest_call_s = 0;  ///< of the honest clients, a lost one included
 };
 
-/// Kills clients (-9) while they connect and call, others being connected. The clients are forked from this process,
-/// which has no participant yet.
+/// Kills clients (-9) while they connect and call, others being connected. The clients are forked
+/// from this process, which has no participant yet.
 [[nodiscard]] KillOutcome kill_clients(const KillLoad& load);
 
 }  // namespace trammel::test

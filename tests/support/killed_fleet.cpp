@@ -41,12 +41,14 @@ void pass(milliseconds time) { ::poll(nullptr, 0, static_cast<int>(time.count())
 
 double p99(std::vector<double> times) {
   if (times.empty()) return 0;
-  const auto at = times.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(times.size() - 1) * 0.99);
+  const auto at =
+      times.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(times.size() - 1) * 0.99);
   std::nth_element(times.begin(), at, times.end());
   return *at;
 }
 
-client::SessionOptions options_for(const std::vector<const Daemon*>& daemons, milliseconds patience) {
+client::SessionOptions options_for(const std::vector<const Daemon*>& daemons,
+                                   milliseconds patience) {
   client::SessionOptions options = daemons.front()->session_options();
   options.timeout = patience;
   options.server_ports.clear();
@@ -90,7 +92,8 @@ class Predictor {
     }
   }
   /// Each model once; and each failure.
-  void note(const Result<client::Answer<client::PredictedError>>& answer, std::int64_t before, std::int64_t after) {
+  void note(const Result<client::Answer<client::PredictedError>>& answer, std::int64_t before,
+            std::int64_t after) {
     json record = {{"op", "predict"}, {"cell", "cell-7"}, {"invoke", before}, {"complete", after}};
     if (!answer) {
       record["answer"] = "unknown";
@@ -173,10 +176,12 @@ class Fleet {
       demand_written(folder / (name + ".yaml"), small_cell_yaml(name) + "sessions: {last: 3}\n");
       names += ", " + name + ".yaml";
     }
-    demand_written(folder / "cell-7.yaml", read_file(folder / "cell-7.yaml") + "sessions: {last: 3}\n");
-    demand_written(daemon.config_path(),
-                   fmt::format("version: 1\nserver: {}\ncells: [{}]\nstore: '{}'\nlog: {{level: info}}\n{}",
-                               daemon.name(), names, url_, keys));
+    demand_written(folder / "cell-7.yaml",
+                   read_file(folder / "cell-7.yaml") + "sessions: {last: 3}\n");
+    demand_written(
+        daemon.config_path(),
+        fmt::format("version: 1\nserver: {}\ncells: [{}]\nstore: '{}'\nlog: {{level: info}}\n{}",
+                    daemon.name(), names, url_, keys));
   }
   static void demand_written(const std::filesystem::path& path, const std::string& text) {
     if (const Status written = write_text_file(path, text); !written) {
@@ -186,11 +191,15 @@ class Fleet {
   }
   /// Microseconds, drawn.
   std::int64_t after(milliseconds least, milliseconds most) {
-    return std::uniform_int_distribution<std::int64_t>(least.count(), most.count())(random_) * kMillisecondUs;
+    return std::uniform_int_distribution<std::int64_t>(least.count(), most.count())(random_) *
+           kMillisecondUs;
   }
-  std::size_t drawn(std::size_t count) { return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_); }
+  std::size_t drawn(std::size_t count) {
+    return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_);
+  }
 
-  /// Of the serving servers one is always there, and was for a while. False: it is another one's turn.
+  /// Of the serving servers one is always there, and was for a while. False: it is another one's
+  /// turn.
   bool strike() {
     const std::size_t kind = drawn(20);
     if (kind < 5) return strike_database(false);
@@ -202,7 +211,8 @@ class Fleet {
     if (database_away_) return false;
     losses_.push_back({freezes ? "database stopped" : "database killed", monotonic_us()});
     freezes ? database_.freeze(true) : database_.kill();
-    database_away_ = {monotonic_us() + (freezes ? after(seconds(2), seconds(6)) : after(milliseconds(0), seconds(2))),
+    database_away_ = {monotonic_us() + (freezes ? after(seconds(2), seconds(6))
+                                                : after(milliseconds(0), seconds(2))),
                       freezes};
     return true;
   }
@@ -211,9 +221,9 @@ class Fleet {
     const std::size_t other = 1 - std::min<std::size_t>(which, 1);
     const bool is_last = which < kServing && (away_[other] || monotonic_us() < known_at_[other]);
     if (is_last) return false;
-    losses_.push_back(
-        {fmt::format("{} {}", which < kServing ? "server" : "training host", freezes ? "stopped" : "killed"),
-         monotonic_us()});
+    losses_.push_back({fmt::format("{} {}", which < kServing ? "server" : "training host",
+                                   freezes ? "stopped" : "killed"),
+                       monotonic_us()});
     freezes ? servers_[which].process().signal(SIGSTOP) : servers_[which].kill();
     // Some are away for longer than a claim holds.
     away_[which] = {monotonic_us() + (freezes ? after(seconds(2), seconds(drawn(4) == 0 ? 20 : 6))
@@ -281,12 +291,14 @@ std::vector<std::int64_t> acknowledged(const std::string& history) {
 }
 
 /// How long it took from a loss until a change was acknowledged that was made afterwards.
-void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& history, KillOutcome& outcome) {
+void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& history,
+                KillOutcome& outcome) {
   const auto times = acknowledged(history);
   for (const Fleet::Loss& loss : losses) {
     ++outcome.kills[loss.what];
     const bool of_database = loss.ready != 0;
-    const auto first = std::lower_bound(times.begin(), times.end(), of_database ? loss.ready : loss.at);
+    const auto first =
+        std::lower_bound(times.begin(), times.end(), of_database ? loss.ready : loss.at);
     if (first == times.end()) continue;
     const double passed_s = static_cast<double>(*first - loss.at) / 1e6;
     if (of_database) {
@@ -298,27 +310,30 @@ void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& histo
   }
 }
 
-/// What the record says that nobody asked for: models, and what was put in quarantine. Not before the second that the
-/// trail says.
+/// What the record says that nobody asked for: models, and what was put in quarantine. Not before
+/// the second that the trail says.
 void add_inner_changes(const Fleet& fleet, History& history) {
   const auto since_unix = std::chrono::system_clock::now().time_since_epoch();
   const std::int64_t offset =
       std::chrono::duration_cast<std::chrono::microseconds>(since_unix).count() - monotonic_us();
   const auto invoked = [&](const std::string& at) { return 1'000'000 * std::stoll(at) - offset; };
-  for (const auto& row :
-       fleet.rows("SELECT m.cell, m.version, substr(m.hash, 1, 16), COALESCE(o.verdict, '') = 'in_force', a.at FROM "
-                  "models AS m "
-                  "JOIN audit AS a ON a.cell = m.cell AND a.what = 'model' AND a.subject = 'version ' || m.version "
-                  "JOIN jobs AS j ON j.cell = m.cell AND j.model_version = m.version "
-                  "LEFT JOIN job_outcomes AS o ON o.job = j.id ORDER BY 1, 2"))
+  for (const auto& row : fleet.rows(
+           "SELECT m.cell, m.version, substr(m.hash, 1, 16), COALESCE(o.verdict, '') = 'in_force', "
+           "a.at FROM models AS m JOIN audit AS a ON a.cell = m.cell AND a.what = 'model' AND "
+           "a.subject = 'version ' || m.version JOIN jobs AS j ON j.cell = m.cell AND "
+           "j.model_version = m.version LEFT JOIN job_outcomes AS o ON o.job = j.id ORDER BY 1, 2"))
     history.add({{"op", "made"},
                  {"cell", row.at(0)},
                  {"version", std::stoi(row.at(1))},
                  {"hash", row.at(2)},
                  {"in_force", row.at(3) == "t"},
                  {"invoke", invoked(row.at(4))}});
-  for (const auto& row : fleet.rows("SELECT cell, substr(subject, 7), at FROM audit WHERE what = 'quarantine'"))
-    history.add({{"op", "quarantined"}, {"cell", row.at(0)}, {"batch", row.at(1)}, {"invoke", invoked(row.at(2))}});
+  for (const auto& row :
+       fleet.rows("SELECT cell, substr(subject, 7), at FROM audit WHERE what = 'quarantine'"))
+    history.add({{"op", "quarantined"},
+                 {"cell", row.at(0)},
+                 {"batch", row.at(1)},
+                 {"invoke", invoked(row.at(2))}});
 }
 
 /// What is there in the end, of one cell, as the record says.
@@ -333,19 +348,21 @@ json end_of(const Fleet& fleet, const std::string& cell) {
   const std::string of_cell = fmt::format(" WHERE cell = '{}' ", cell);
   for (const auto& row : fleet.rows("SELECT id, hash FROM batches" + of_cell))
     end["batches"][row.at(0)] = {{"hash", row.at(1)}};
-  for (const auto& row : fleet.rows("SELECT id, state FROM jobs" + of_cell)) end["jobs"][row.at(0)] = row.at(1);
+  for (const auto& row : fleet.rows("SELECT id, state FROM jobs" + of_cell))
+    end["jobs"][row.at(0)] = row.at(1);
   for (const auto& row : fleet.rows("SELECT id FROM changes")) end["changes"].push_back(row.at(0));
   for (const auto& row : fleet.rows("SELECT what, subject, request FROM audit" + of_cell +
                                     "AND request <> '' GROUP BY 1, 2, 3 HAVING COUNT(*) > 1"))
     end["twice"].push_back(fmt::format("{}", fmt::join(row, " ")));
+  for (const auto& row : fleet.rows("SELECT subject FROM audit" + of_cell +
+                                    "AND what = 'batch' GROUP BY 1 HAVING COUNT(*) > 1"))
+    end["twice"].push_back(row.at(0));
+  for (const auto& row : fleet.rows("SELECT substring(after FROM 'of job [0-9]+') FROM audit" +
+                                    of_cell + "AND what = 'model' GROUP BY 1 HAVING COUNT(*) > 1"))
+    end["twice"].push_back(row.at(0));
   for (const auto& row :
-       fleet.rows("SELECT subject FROM audit" + of_cell + "AND what = 'batch' GROUP BY 1 HAVING COUNT(*) > 1"))
-    end["twice"].push_back(row.at(0));
-  for (const auto& row : fleet.rows("SELECT substring(after FROM 'of job [0-9]+') FROM audit" + of_cell +
-                                    "AND what = 'model' GROUP BY 1 HAVING COUNT(*) > 1"))
-    end["twice"].push_back(row.at(0));
-  for (const auto& row : fleet.rows("SELECT CASE WHEN what = 'model' THEN subject ELSE request END FROM audit" +
-                                    of_cell + "AND what IN ('model', 'activate', 'rollback') ORDER BY number"))
+       fleet.rows("SELECT CASE WHEN what = 'model' THEN subject ELSE request END FROM audit" +
+                  of_cell + "AND what IN ('model', 'activate', 'rollback') ORDER BY number"))
     end["order"].push_back(row.at(0));
   return end;
 }
@@ -370,7 +387,8 @@ int served_otherwise(const Fleet& fleet) {
       const bool same = wait_until(
           [&] {
             const auto rows = fleet.rows(fmt::format(
-                "SELECT version FROM activations WHERE cell = '{}' ORDER BY number DESC LIMIT 1", cell.name));
+                "SELECT version FROM activations WHERE cell = '{}' ORDER BY number DESC LIMIT 1",
+                cell.name));
             if (rows.empty()) return true;
             const auto answer = session->predict_error(context, virtual_joints(1, 7));
             return answer && std::to_string(answer->model.version) == rows.front().front();
@@ -386,18 +404,19 @@ class Load {
  public:
   Load(const Fleet& fleet, const KillPlan& plan, History& history) : batches_(plan.batches) {
     const std::vector<const Daemon*> both = {&fleet.server(0), &fleet.server(1)};
-    const std::array<std::vector<const Daemon*>, kClients> firsts = {both, std::vector{both[0]}, std::vector{both[1]},
-                                                                     both};
+    const std::array<std::vector<const Daemon*>, kClients> firsts = {both, std::vector{both[0]},
+                                                                     std::vector{both[1]}, both};
     for (int i = 0; i < kClients; ++i) {
       const auto at = static_cast<std::size_t>(i);
-      clients_.push_back(std::make_unique<FleetClient>(i + 1, options_for(firsts[at], kPatience),
-                                                       options_for({both[at % 2]}, kPatience), fleet.cells(), batches_,
-                                                       history, plan.seed * 100 + at));
+      clients_.push_back(std::make_unique<FleetClient>(
+          i + 1, options_for(firsts[at], kPatience), options_for({both[at % 2]}, kPatience),
+          fleet.cells(), batches_, history, plan.seed * 100 + at));
     }
   }
   void start() {
     for (const auto& client : clients_)
-      threads_.emplace_back([&client = *client](const std::stop_token& stop) { client.work(stop); });
+      threads_.emplace_back(
+          [&client = *client](const std::stop_token& stop) { client.work(stop); });
   }
   void stop() { threads_.clear(); }
   [[nodiscard]] FleetClient& client(std::size_t i) { return *clients_.at(i); }
@@ -421,7 +440,8 @@ Predictor::Times times_of(std::deque<Predictor>& predictors) {
 
 /// A model of the cell that predictions are asked of.
 void train_first(const Fleet& fleet, History& history) {
-  const auto session = demand(client::Session::open(options_for({&fleet.server(0), &fleet.server(1)}, kLimit)));
+  const auto session =
+      demand(client::Session::open(options_for({&fleet.server(0), &fleet.server(1)}, kLimit)));
   for (const AskedCell& cell : fleet.cells()) {
     json record = {{"op", "submit"}, {"cell", cell.name}, {"client", 0}, {"batch", "first"}};
     const std::string text = text_of(cell, 1'000);
@@ -438,10 +458,10 @@ void train_first(const Fleet& fleet, History& history) {
 /// How long the jobs of a cell waited since then (Unix time, s) though nobody worked for it.
 void add_idle_times(const Fleet& fleet, std::int64_t since, KillOutcome& outcome) {
   const auto rows = fleet.rows(fmt::format(
-      "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) OVER (PARTITION BY "
-      "cell ORDER BY started_at, id ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING), 0)) AS gap "
-      "FROM jobs JOIN job_times ON job_times.job = jobs.id WHERE started_at >= {0}) "
-      "SELECT MAX(GREATEST(gap, 0)), SUM(GREATEST(gap, 0)) FROM gaps GROUP BY cell",
+      "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) "
+      "OVER (PARTITION BY cell ORDER BY started_at, id ROWS BETWEEN UNBOUNDED PRECEDING AND 1 "
+      "PRECEDING), 0)) AS gap FROM jobs JOIN job_times ON job_times.job = jobs.id WHERE started_at "
+      ">= {0}) SELECT MAX(GREATEST(gap, 0)), SUM(GREATEST(gap, 0)) FROM gaps GROUP BY cell",
       since));
   for (const auto& row : rows) {
     outcome.longest_idle_s = std::max(outcome.longest_idle_s, std::stod(row.at(0)));
@@ -453,7 +473,8 @@ void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KillOutcome& outcom
   const std::int64_t since = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   const std::int64_t begin = monotonic_us();
   const auto open_jobs = [&] {
-    return static_cast<int>(fleet.rows("SELECT 1 FROM jobs WHERE state NOT IN ('done', 'failed')").size());
+    return static_cast<int>(
+        fleet.rows("SELECT 1 FROM jobs WHERE state NOT IN ('done', 'failed')").size());
   };
   outcome.jobs = static_cast<int>(fleet.rows("SELECT 1 FROM jobs").size());
   outcome.left_over = open_jobs();
@@ -466,13 +487,16 @@ void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KillOutcome& outcom
 void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillOutcome& outcome) {
   wait_for_jobs(fleet, plan, outcome);
   for (const AskedCell& cell : fleet.cells()) {
-    for (const std::size_t client : {std::size_t{1}, std::size_t{2}}) load.client(client).read_models(cell.name);
+    for (const std::size_t client : {std::size_t{1}, std::size_t{2}})
+      load.client(client).read_models(cell.name);
     history.add(end_of(fleet, cell.name));
   }
   add_inner_changes(fleet, history);
-  outcome.given_up = static_cast<int>(fleet.rows("SELECT 1 FROM job_outcomes WHERE verdict = 'broken'").size());
+  outcome.given_up =
+      static_cast<int>(fleet.rows("SELECT 1 FROM job_outcomes WHERE verdict = 'broken'").size());
   outcome.served_otherwise = served_otherwise(fleet);
-  outcome.trail_whole = run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", fleet.url()}).exit_code == 0;
+  outcome.trail_whole =
+      run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", fleet.url()}).exit_code == 0;
 }
 
 }  // namespace
@@ -486,7 +510,8 @@ KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
     Load load(fleet, plan, history);
     std::deque<Predictor> predictors;
     for (int i = 0; i < 2; ++i)
-      predictors.emplace_back(options_for({&fleet.server(0), &fleet.server(1)}, kPredictionPatience), history);
+      predictors.emplace_back(
+          options_for({&fleet.server(0), &fleet.server(1)}, kPredictionPatience), history);
     pass(seconds(2));  // they have found their servers
     static_cast<void>(times_of(predictors));
     pass(plan.quiet);
@@ -501,7 +526,8 @@ KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
     outcome.p99_kills_ms = p99(times.ms);
     outcome.predictions = static_cast<int>(times.ms.size());
     outcome.failed = times.failed;
-    history.add({{"op", "predictions"}, {"asked", outcome.predictions}, {"failed", outcome.failed}});
+    history.add(
+        {{"op", "predictions"}, {"asked", outcome.predictions}, {"failed", outcome.failed}});
     end(fleet, plan, load, history, outcome);
   }
   add_losses(fleet.losses(), path, outcome);
@@ -509,8 +535,9 @@ KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
 }
 
 Finished check_history(const std::string& history) {
-  return run({"/usr/bin/python3", TRAMMEL_SOURCE_DIR "/tests/faults/history/history_check.py", history},
-             std::chrono::minutes(20));
+  return run(
+      {"/usr/bin/python3", TRAMMEL_SOURCE_DIR "/tests/faults/history/history_check.py", history},
+      std::chrono::minutes(20));
 }
 
 }  // namespace trammel::test

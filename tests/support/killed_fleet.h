@@ -23,24 +23,25 @@ struct KillPlan {
   int kills = 200;
   std::uint64_t seed = 1;
   std::chrono::milliseconds longest_pause{2500};  ///< between two kills
-  std::chrono::seconds quiet{10};                 ///< how long it is measured without load, and with load alone
-  int batches = 40;                               ///< of a cell, at most
-  std::chrono::seconds until_jobs_end{300};       ///< after the last kill
+  std::chrono::seconds quiet{10};  ///< how long it is measured without load, and with load alone
+  int batches = 40;                ///< of a cell, at most
+  std::chrono::seconds until_jobs_end{300};  ///< after the last kill
 };
 
 struct KillOutcome {
   std::map<std::string, int> kills;  ///< by what was killed or stopped
   int predictions = 0, failed = 0;   ///< while there were kills
   double p99_quiet_ms = 0, p99_load_ms = 0, p99_kills_ms = 0;
-  std::vector<double> after_database_s, after_server_s;  ///< from the loss until a change was acknowledged again
-  std::vector<double> after_ready_s;                     ///< from when the database was back
-  int given_up = 0;                                      ///< jobs that three servers died of
-  int jobs = 0;                                          ///< all that there were
-  int left_over = 0;                                     ///< that waited still when the last kill was over
-  int open = 0;                                          ///< that have not ended in the time that they were given
-  double jobs_ended_s = 0;                               ///< from the last kill until all had ended
-  /// Since then: how long jobs of a cell waited that nobody worked for, the longest time and the sum, of the worst
-  /// cell.
+  std::vector<double> after_database_s,
+      after_server_s;                 ///< from the loss until a change was acknowledged again
+  std::vector<double> after_ready_s;  ///< from when the database was back
+  int given_up = 0;                   ///< jobs that three servers died of
+  int jobs = 0;                       ///< all that there were
+  int left_over = 0;                  ///< that waited still when the last kill was over
+  int open = 0;                       ///< that have not ended in the time that they were given
+  double jobs_ended_s = 0;            ///< from the last kill until all had ended
+  /// Since then: how long jobs of a cell waited that nobody worked for, the longest time and the
+  /// sum, of the worst cell.
   double longest_idle_s = 0, idle_s = 0;
   int served_otherwise = 0;  ///< servers that in the end do not serve what is in force
   bool trail_whole = false;

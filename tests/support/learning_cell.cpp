@@ -20,7 +20,8 @@ constexpr int kTruePoses = 400;
 
 LearningCell::LearningCell(std::shared_ptr<const Cell> cell, TrainerOptions options)
     : cell_(cell->name), store_(demand(Store::open(folder_.file("trammel.db")))) {
-  trainer_ = std::make_unique<Trainer>(std::map{std::pair{cell_, std::move(cell)}}, *store_, registry_, options);
+  trainer_ = std::make_unique<Trainer>(std::map{std::pair{cell_, std::move(cell)}}, *store_,
+                                       registry_, options);
   trainer_->set_listeners(
       [this](const JobProgress& progress) {
         if (progress.stage != JobStage::kDone && progress.stage != JobStage::kFailed) return;
@@ -58,18 +59,21 @@ const CompensatedModel& LearningCell::version(int version) {
   return asked_->model;
 }
 
-double true_error(const CompensatedModel& model, const VirtualRobot& robot, const std::string& tool) {
+double true_error(const CompensatedModel& model, const VirtualRobot& robot,
+                  const std::string& tool) {
   const Cell& cell = *robot.truth.cell;
   const Eigen::MatrixXd q = demand(plan_poses(cell, {kTruePoses, 987654}));
   SimulateOptions exact;
   exact.noise = false;
   exact.tool = tool;
-  const MeasurementBatch truth = demand(check_against_cell(demand(simulate(robot, q, exact)), cell)).rows();
+  const MeasurementBatch truth =
+      demand(check_against_cell(demand(simulate(robot, q, exact)), cell)).rows();
   Eigen::Matrix3Xd real(3, q.rows()), predicted(3, q.rows());
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const Measurement& m = truth.measurements[static_cast<std::size_t>(i)];
     real.col(i) = m.p_W;
-    predicted.col(i) = model.predict(m.context.q, m.context.tool, m.context.payload).X_BT_predicted.translation();
+    predicted.col(i) =
+        model.predict(m.context.q, m.context.tool, m.context.payload).X_BT_predicted.translation();
   }
   const Pose X_WB = demand(fit_transform(real, predicted));
   return std::sqrt((real - (X_WB * predicted)).squaredNorm() / static_cast<double>(q.rows()));

@@ -11,7 +11,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
-/// A cell that is measured again and again: the trainer with a store of its own, and the robot that it never sees.
+/// A cell that is measured again and again: the trainer with a store of its own, and the robot that
+/// it never sees.
 namespace trammel::test {
 
 class LearningCell {
@@ -41,17 +42,20 @@ class LearningCell {
   ServedModelPtr asked_;                          // the last version that was asked for
 };
 
-/// m, rms over the cell's joint ranges of what the model gets wrong of the robot without noise, with the best shift and
-/// turn of the whole arm taken off.
-[[nodiscard]] double true_error(const CompensatedModel& model, const VirtualRobot& robot, const std::string& tool = {});
+/// m, rms over the cell's joint ranges of what the model gets wrong of the robot without noise,
+/// with the best shift and turn of the whole arm taken off.
+[[nodiscard]] double true_error(const CompensatedModel& model, const VirtualRobot& robot,
+                                const std::string& tool = {});
 
 /// What measuring is like that day.
 struct Day {
   int poses = 200;
   std::uint64_t seed = 1;
-  double noise = 1;          ///< times that of the cell's tracker
-  double corner = 1;         ///< share of each joint's range that is measured, about a place drawn with the seed
-  bool set_up_anew = false;  ///< the tracker stands up to 500 mm and 20 deg about the vertical elsewhere
+  double noise = 1;  ///< times that of the cell's tracker
+  double corner =
+      1;  ///< share of each joint's range that is measured, about a place drawn with the seed
+  bool set_up_anew =
+      false;  ///< the tracker stands up to 500 mm and 20 deg about the vertical elsewhere
   std::string tool = {};
 };
 [[nodiscard]] MeasurementBatch measured_on(const VirtualRobot& robot, const Day& day);

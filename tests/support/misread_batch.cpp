@@ -26,11 +26,15 @@ const std::vector<std::string> kRobots = {"abb_irb6640-205-275",  "abb_irb120-3-
 
 constexpr std::size_t kOfSixJoints = 9;
 
-double gauss(Random& random, double stddev) { return std::normal_distribution<double>(0, stddev)(random); }
+double gauss(Random& random, double stddev) {
+  return std::normal_distribution<double>(0, stddev)(random);
+}
 double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
-int pick(Random& random, int count) { return std::uniform_int_distribution<int>(0, count - 1)(random); }
+int pick(Random& random, int count) {
+  return std::uniform_int_distribution<int>(0, count - 1)(random);
+}
 
 Eigen::MatrixXd joints_of(const FirstBatch& first, const Cell& cell, Random& random) {
   constexpr double kMostRange = 170;  // deg to each side
@@ -40,15 +44,20 @@ Eigen::MatrixXd joints_of(const FirstBatch& first, const Cell& cell, Random& ran
     const bool turns = joint.type == JointType::kRevolute;
     const double low = std::max(joint.lower, turns ? from_deg(-kMostRange) : 0.0);
     const double high = std::min(joint.upper, turns ? from_deg(kMostRange) : 2.0);
-    const double middle =
-        uniform(random, low + first.spread / 2 * (high - low), high - first.spread / 2 * (high - low));
-    for (double& value : q.col(j)) value = middle + uniform(random, -first.spread / 2, first.spread / 2) * (high - low);
+    const double middle = uniform(random, low + first.spread / 2 * (high - low),
+                                  high - first.spread / 2 * (high - low));
+    for (double& value : q.col(j))
+      value = middle + uniform(random, -first.spread / 2, first.spread / 2) * (high - low);
   }
   return q;
 }
 
-VirtualRobot as_delivered(const FirstBatch& first, const std::shared_ptr<const Cell>& cell, Random& random) {
-  VirtualRobot robot{demand(make_physical_model(cell, {"base", "geometry", "compliance"})), first.noise, 60e-6, {}};
+VirtualRobot as_delivered(const FirstBatch& first, const std::shared_ptr<const Cell>& cell,
+                          Random& random) {
+  VirtualRobot robot{demand(make_physical_model(cell, {"base", "geometry", "compliance"})),
+                     first.noise,
+                     60e-6,
+                     {}};
   const auto parameters = robot.truth.parameters();
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     const std::string& name = parameters[k].name;
@@ -67,7 +76,8 @@ VirtualRobot as_delivered(const FirstBatch& first, const std::shared_ptr<const C
       value = gauss(random, first.length);
     }
   }
-  if (!cell->X_WB) robot.truth.X_WB = make_pose(rotation_exp(Vector3(0.1, -0.2, 0.5)), Vector3(1.2, -0.8, 0.4));
+  if (!cell->X_WB)
+    robot.truth.X_WB = make_pose(rotation_exp(Vector3(0.1, -0.2, 0.5)), Vector3(1.2, -0.8, 0.4));
   for (auto& [tool, X_FT] : robot.truth.tools) {
     X_FT = make_pose(rotation_exp(Vector3(0.02, -0.01, 0.03)), Vector3(0.06, -0.12, 0.17));
     for (double& value : X_FT.translation()) value += gauss(random, first.length);
@@ -118,7 +128,8 @@ std::vector<Misreading> all_misreadings() {
   });
   add("a block of rows shifted", false, [](MeasurementBatch& b, const Cell&, Random& random) {
     const std::size_t n = b.measurements.size();
-    const std::size_t begin = n / 5 + static_cast<std::size_t>(pick(random, static_cast<int>(n / 4)));
+    const std::size_t begin =
+        n / 5 + static_cast<std::size_t>(pick(random, static_cast<int>(n / 4)));
     shift_rows(b, begin, n, 1);
     return std::string("of the next row");
   });
@@ -192,15 +203,16 @@ std::vector<Misreading> all_misreadings() {
     for (Measurement& m : b.measurements) m.context.q(2) += m.context.q(1);
     return std::string("with q2_deg subtracted from q3_deg");
   });
-  add("another point of the tool", false, [](MeasurementBatch& b, const Cell& cell, Random& random) {
-    Vector3 moved(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
-    moved *= 0.12 / moved.norm();
-    for (Measurement& m : b.measurements) {
-      if (m.R_WT) m.p_W += *m.R_WT * moved;
-    }
-    static_cast<void>(cell);
-    return std::string("another point of the tool");
-  });
+  add("another point of the tool", false,
+      [](MeasurementBatch& b, const Cell& cell, Random& random) {
+        Vector3 moved(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+        moved *= 0.12 / moved.norm();
+        for (Measurement& m : b.measurements) {
+          if (m.R_WT) m.p_W += *m.R_WT * moved;
+        }
+        static_cast<void>(cell);
+        return std::string("another point of the tool");
+      });
   all.back().needs_orientation = true;
   return all;
 }
@@ -236,8 +248,8 @@ std::shared_ptr<const Cell> new_cell(const FirstBatch& first) {
       "model: {{error_sources: [base, geometry], bias: none}}\n",
       first.base_known ? "{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}" : "null",
       first.tool_known ? "{xyz_mm: [58.553, -193.735, 165.958], q_wxyz: [1, 0, 0, 0]}" : "null");
-  return std::make_shared<const Cell>(
-      demand(parse_cell(text, read_file(TRAMMEL_SOURCE_DIR "/models/" + first.robot + ".yaml"), "new.yaml")));
+  return std::make_shared<const Cell>(demand(parse_cell(
+      text, read_file(TRAMMEL_SOURCE_DIR "/models/" + first.robot + ".yaml"), "new.yaml")));
 }
 
 MeasurementBatch measured_first(const FirstBatch& first, const Cell& cell) {
@@ -256,7 +268,8 @@ MeasurementBatch measured_first(const FirstBatch& first, const Cell& cell) {
   MeasurementBatch batch = demand(simulate(robot, joints_of(first, cell, random), options));
   for (Measurement& m : batch.measurements) {
     if (uniform(random, 0, 1) < first.outliers)
-      m.p_W += Vector3(uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3));
+      m.p_W += Vector3(uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3),
+                       uniform(random, -0.3, 0.3));
   }
   return batch;
 }

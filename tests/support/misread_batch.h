@@ -9,7 +9,8 @@
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
 
-/// First batches of new cells: robots as they are delivered, and the mistakes that their files come with.
+/// First batches of new cells: robots as they are delivered, and the mistakes that their files come
+/// with.
 namespace trammel::test {
 
 /// How a new cell is measured for the first time.
@@ -18,18 +19,20 @@ struct FirstBatch {
   bool base_known = true, tool_known = true;
   bool orientation = true;
   int poses = 60;
-  double spread = 0.6;        ///< share of each joint's range that is measured
-  double length = 2e-3;       ///< m, standard deviation of every length, and of the tool point
-  double zero = 0.01;         ///< rad, of every joint's zero
-  double twist = 1e-3;        ///< rad, of every axis
-  double compliance = 5e-10;  ///< rad/Nmm, standard deviation of every joint's, under the load of 100 kg
-  double noise = 30e-6;       ///< m, of one coordinate
-  double outliers = 0;        ///< share of the rows, each off by up to 0.3 m
-  double tracker = 2;  ///< m, how far off the drawn base the tracker may stand; it is turned about the vertical, too
+  double spread = 0.6;   ///< share of each joint's range that is measured
+  double length = 2e-3;  ///< m, standard deviation of every length, and of the tool point
+  double zero = 0.01;    ///< rad, of every joint's zero
+  double twist = 1e-3;   ///< rad, of every axis
+  double compliance =
+      5e-10;             ///< rad/Nmm, standard deviation of every joint's, under the load of 100 kg
+  double noise = 30e-6;  ///< m, of one coordinate
+  double outliers = 0;   ///< share of the rows, each off by up to 0.3 m
+  double tracker = 2;  ///< m, how far off the drawn base the tracker may stand; it is turned about
+                       ///< the vertical, too
   std::uint64_t seed = 1;
 };
-/// One of them, drawn: 15 to 300 poses, positions alone or full poses, what is known of base and tool, errors up to
-/// some mm and degrees, noise to 0.2 mm, outliers.
+/// One of them, drawn: 15 to 300 poses, positions alone or full poses, what is known of base and
+/// tool, errors up to some mm and degrees, noise to 0.2 mm, outliers.
 enum class Robots { kOfSixJoints, kAll };
 [[nodiscard]] FirstBatch first_batch(std::uint64_t seed, Robots robots);
 [[nodiscard]] std::shared_ptr<const Cell> new_cell(const FirstBatch& first);
@@ -40,12 +43,13 @@ enum class Robots { kOfSixJoints, kAll };
 struct Misreading {
   std::string kind;
   bool needs_orientation = false;
-  std::function<std::string(MeasurementBatch& batch, const Cell& cell, std::mt19937_64& random)> make;
+  std::function<std::string(MeasurementBatch& batch, const Cell& cell, std::mt19937_64& random)>
+      make;
 };
 [[nodiscard]] const std::vector<Misreading>& misreadings();
 
-/// What is said of a batch before anything is learned from it: by check_against_cell(), else by batch_doubt(); empty:
-/// it is learned from.
+/// What is said of a batch before anything is learned from it: by check_against_cell(), else by
+/// batch_doubt(); empty: it is learned from.
 [[nodiscard]] std::optional<Error> said_of(MeasurementBatch batch, const Cell& cell);
 /// Whether the error names the reading.
 [[nodiscard]] bool names(const Error& error, const std::string& reading);

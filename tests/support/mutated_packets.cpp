@@ -28,17 +28,23 @@ bool MutatedPackets::collect() {
   std::uint32_t entity = kWriter;
   std::int64_t number = 0;
   for (const char* topic : {"PredictError_2_Request", "ManageModels_2_Request", "SpokenContract"}) {
-    const ParameterList list = participant_.endpoint(entity += 0x100, topic, std::string("trammel::wire::") + topic);
+    const ParameterList list =
+        participant_.endpoint(entity += 0x100, topic, std::string("trammel::wire::") + topic);
     const PacketBytes packet =
-        participant_.packet().data({kPublicationsReader, kPublicationsId, ++number, {}, list.payload()}).bytes();
+        participant_.packet()
+            .data({kPublicationsReader, kPublicationsId, ++number, {}, list.payload()})
+            .bytes();
     participant_.send(packet);
     corpus_.push_back(packet);
   }
-  corpus_.push_back(
-      Packet(participant_.prefix()).data({0, kAnnouncerId, 1, {}, participant_.announcement().payload()}).bytes());
+  corpus_.push_back(Packet(participant_.prefix())
+                        .data({0, kAnnouncerId, 1, {}, participant_.announcement().payload()})
+                        .bytes());
   corpus_.push_back(participant_.packet().data({0, kWriter, 3, {}, PacketBytes(200, 1)}).bytes());
-  corpus_.push_back(participant_.packet().heartbeat(0, kWriter, 1, 3, 1).gap(0, kWriter, 4, 9).bytes());
-  corpus_.push_back(participant_.packet().fragments({0, kWriter, 5, 1, 1, 512, 2048, PacketBytes(512)}).bytes());
+  corpus_.push_back(
+      participant_.packet().heartbeat(0, kWriter, 1, 3, 1).gap(0, kWriter, 4, 9).bytes());
+  corpus_.push_back(
+      participant_.packet().fragments({0, kWriter, 5, 1, 1, 512, 2048, PacketBytes(512)}).bytes());
   corpus_.push_back(participant_.packet().nack_frag(kReader, kWriter, 2, 1, 1).bytes());
   corpus_.push_back(participant_.packet().acknack(kReader, kWriter, 2, 40, 2).bytes());
   static_cast<void>(participant_.wait_for(
@@ -57,8 +63,8 @@ PacketBytes MutatedPackets::mutated() {
   for (std::size_t i = random_() % 5; i-- > 0 && packet.size() > 24;) {
     switch (random_() % 6) {
       case 0:  // a word of one kind of byte
-        std::fill_n(packet.begin() + static_cast<std::ptrdiff_t>(any() & ~3u & (packet.size() - 5)), 4,
-                    kNotable[random_() % sizeof kNotable]);
+        std::fill_n(packet.begin() + static_cast<std::ptrdiff_t>(any() & ~3u & (packet.size() - 5)),
+                    4, kNotable[random_() % sizeof kNotable]);
         break;
       case 1:
         packet.resize(any());
@@ -73,21 +79,23 @@ PacketBytes MutatedPackets::mutated() {
         packet[random_() % 20] = static_cast<unsigned char>(random_());
         break;
       default:
-        packet[any()] =
-            random_() % 2 == 0 ? kNotable[random_() % sizeof kNotable] : static_cast<unsigned char>(random_());
+        packet[any()] = random_() % 2 == 0 ? kNotable[random_() % sizeof kNotable]
+                                           : static_cast<unsigned char>(random_());
     }
   }
   return packet;
 }
 
 void MutatedPackets::wait_until_read() {
-  participant_.send(
-      participant_.packet().heartbeat(kPublicationsReader, kPublicationsId, 1, 3, 1'000'000 + ++pings_).bytes());
+  participant_.send(participant_.packet()
+                        .heartbeat(kPublicationsReader, kPublicationsId, 1, 3, 1'000'000 + ++pings_)
+                        .bytes());
   static_cast<void>(participant_.wait_for(
       [](const PacketBytes& message) {
-        return any_submessage(message, [](unsigned char id, unsigned char, const PacketBytes& body) {
-          return id == 0x06 && body.size() > 8 && body[6] == 0x03 && body[7] == 0xc2;
-        });
+        return any_submessage(
+            message, [](unsigned char id, unsigned char, const PacketBytes& body) {
+              return id == 0x06 && body.size() > 8 && body[6] == 0x03 && body[7] == 0xc2;
+            });
       },
       std::chrono::milliseconds(20)));
 }

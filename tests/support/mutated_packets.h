@@ -8,8 +8,8 @@
 
 namespace trammel::test {
 
-/// Sends changed copies of real packets to a participant: of what it sent itself, turned round, and of what a client
-/// sends to join.
+/// Sends changed copies of real packets to a participant: of what it sent itself, turned round, and
+/// of what a client sends to join.
 class MutatedPackets {
  public:
   MutatedPackets(std::uint16_t port, std::uint32_t domain, unsigned seed);

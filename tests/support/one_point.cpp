@@ -14,11 +14,13 @@ std::shared_ptr<const Cell> cell_of_one_point(const std::string& base, const std
       "version: 1\ncell: one-point\nrobot: robot.yaml\nbase: {}\ntools: {{tip: {}}}\n"
       "tracker: {{sigma_mm: 0.02}}\nmodel: {}\n",
       base, tool, model);
-  return std::make_shared<const Cell>(demand(
-      parse_cell(text, demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur5.yaml")), "cell.yaml")));
+  return std::make_shared<const Cell>(demand(parse_cell(
+      text, demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur5.yaml")),
+      "cell.yaml")));
 }
 
-MeasurementBatch one_point(const Cell& cell, const Vector3& off, const Pose& X_WB, int poses, std::uint64_t seed) {
+MeasurementBatch one_point(const Cell& cell, const Vector3& off, const Pose& X_WB, int poses,
+                           std::uint64_t seed) {
   const Vector3 drawn(0.03, 0, 0.15);
   JointVector q0(6);
   q0 << 0.6, -1.9, 1.6, -1.2, -1.4, 0.3;
@@ -31,7 +33,8 @@ MeasurementBatch one_point(const Cell& cell, const Vector3& off, const Pose& X_W
   batch.id = "one-point";
   while (static_cast<int>(batch.measurements.size()) < poses) {
     const Matrix3 R = rotation_exp({turn(random), turn(random), turn(random)}) * X_BF0.linear();
-    const InverseResult inverse = inverse_kinematics(cell.robot, make_pose(R, point_B - R * drawn), q0);
+    const InverseResult inverse =
+        inverse_kinematics(cell.robot, make_pose(R, point_B - R * drawn), q0);
     if (inverse.status != InverseStatus::kOk) continue;
     Measurement m;
     m.pose_id = fmt::format("p{}", batch.measurements.size() + 1);

@@ -50,7 +50,8 @@ Eigen::VectorXd missed(const CompensatedModel& model, const MeasurementBatch& as
 
 }  // namespace
 
-MeasurementBatch measured_within(const VirtualRobot& robot, const JointRanges& ranges, int poses, std::uint64_t seed) {
+MeasurementBatch measured_within(const VirtualRobot& robot, const JointRanges& ranges, int poses,
+                                 std::uint64_t seed) {
   SimulateOptions options;
   options.seed = seed;
   MeasurementBatch batch = demand(simulate(robot, latin_hypercube(ranges, poses, seed), options));
@@ -58,11 +59,13 @@ MeasurementBatch measured_within(const VirtualRobot& robot, const JointRanges& r
   return batch;
 }
 
-OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& ranges, const std::string& level,
-                             const std::string& bias_name, int training_poses, int seeds) {
+OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& ranges,
+                             const std::string& level, const std::string& bias_name,
+                             int training_poses, int seeds) {
   OutsideFigures figures;
   figures.bands.push_back({});
-  for (std::size_t b = 1; b < kBands.size(); ++b) figures.bands.push_back({kBands[b - 1], kBands[b]});
+  for (std::size_t b = 1; b < kBands.size(); ++b)
+    figures.bands.push_back({kBands[b - 1], kBands[b]});
   const JointRanges limits = demand(planning_ranges(*robot.truth.cell));
   for (int seed = 1; seed <= seeds; ++seed) {
     const auto draw = static_cast<std::uint64_t>(100 * seed);
@@ -70,8 +73,8 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
     options.level = level;
     options.bias = bias_name;
     options.seed = static_cast<std::uint64_t>(seed);
-    const CompensatedModel model =
-        demand(train(robot.truth.cell, measured_within(robot, ranges, training_poses, draw), options));
+    const CompensatedModel model = demand(
+        train(robot.truth.cell, measured_within(robot, ranges, training_poses, draw), options));
     for (std::size_t w = 0; w < kWidenings.size(); ++w) {
       const MeasurementBatch asked =
           measured_within(robot, widened(ranges, limits, kWidenings[w]), kAsked, draw + w + 1);
@@ -80,7 +83,8 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
       for (Eigen::Index i = 0; i < distance.size(); ++i) {
         const auto row = static_cast<std::size_t>(i);
         const double out = farthest(asked.measurements[row].context.q, ranges);
-        const bool beyond_known = distance(i) > kBeyondKnown * model.bias()->report().leave_one_out_rms;
+        const bool beyond_known =
+            distance(i) > kBeyondKnown * model.bias()->report().leave_one_out_rms;
         if (beyond_known) ++figures.outsiders;
         if (beyond_known && !errors.in_domain[row]) ++figures.caught;
         if (!beyond_known && out <= 0) ++figures.insiders;
@@ -97,7 +101,8 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
           const CompensatedModel::LevelErrors::Rotations& turns = errors.rotation;
           if (turns.stddev.cols() != distance.size()) continue;
           const auto r = turns.compensated.col(i).array();
-          band.rotation_coverage_95 += (r.abs() <= kInterval95 * turns.stddev.col(i).array()).cast<double>().mean();
+          band.rotation_coverage_95 +=
+              (r.abs() <= kInterval95 * turns.stddev.col(i).array()).cast<double>().mean();
         }
       }
     }

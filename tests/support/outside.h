@@ -22,19 +22,19 @@ struct OutsideBand {
 
 struct OutsideFigures {
   std::vector<OutsideBand> bands;  ///< the first is within range
-  /// A true outsider is missed by the whole bias by more than three times what it misses training poses left out by
-  /// (rms); an insider lies within the training ranges and is not.
+  /// A true outsider is missed by the whole bias by more than three times what it misses training
+  /// poses left out by (rms); an insider lies within the training ranges and is not.
   int outsiders = 0, caught = 0;  ///< caught: not in domain
   int insiders = 0, refused = 0;  ///< refused: not in domain either
 };
 
 /// `poses` poses of a Latin hypercube, measured by the cell's tracker.
-[[nodiscard]] MeasurementBatch measured_within(const VirtualRobot& robot, const JointRanges& ranges, int poses,
-                                               std::uint64_t seed);
-/// A model of `level` and `bias` trained on `training_poses` within `ranges`, asked there and at growing distances up
-/// to the cell's joint ranges; the poses of all seeds 1..`seeds` together.
+[[nodiscard]] MeasurementBatch measured_within(const VirtualRobot& robot, const JointRanges& ranges,
+                                               int poses, std::uint64_t seed);
+/// A model of `level` and `bias` trained on `training_poses` within `ranges`, asked there and at
+/// growing distances up to the cell's joint ranges; the poses of all seeds 1..`seeds` together.
 [[nodiscard]] OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& ranges,
-                                           const std::string& level, const std::string& bias, int training_poses,
-                                           int seeds);
+                                           const std::string& level, const std::string& bias,
+                                           int training_poses, int seeds);
 
 }  // namespace trammel::test

@@ -18,8 +18,8 @@ constexpr int kBlocks = 1500;
 constexpr int kFirstPort = 20000;
 constexpr int kDomains = 48;  // the ports that DDS derives from them end below kFirstPort
 
-/// Whether this process has the number of that kind now: others see it by an abstract socket, which the kernel lets go
-/// with the process. tests/python/test_trammel.py uses the same names.
+/// Whether this process has the number of that kind now: others see it by an abstract socket, which
+/// the kernel lets go with the process. tests/python/test_trammel.py uses the same names.
 bool reserve(const char* kind, int number) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
@@ -27,7 +27,8 @@ bool reserve(const char* kind, int number) {
   std::copy(text.begin(), text.end(), name.sun_path + 1);
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + text.size());
   const int held = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (::bind(held, reinterpret_cast<const sockaddr*>(&name), size) == 0) return true;  // kept open for good
+  if (::bind(held, reinterpret_cast<const sockaddr*>(&name), size) == 0)
+    return true;  // kept open for good
   ::close(held);
   return false;
 }
@@ -66,8 +67,9 @@ int block() {
   return mine;
 }
 
-/// In one domain the port of a client that has left may be the next client's, whom a server then answers that still
-/// announces itself to the former one. Where more tests run at once than there are domains, two share one.
+/// In one domain the port of a client that has left may be the next client's, whom a server then
+/// answers that still announces itself to the former one. Where more tests run at once than there
+/// are domains, two share one.
 int free_domain() {
   for (int tried = 0; tried < kDomains; ++tried) {
     const int domain = 1 + (block() + tried) % kDomains;

@@ -20,8 +20,10 @@ constexpr const char* kScript = TRAMMEL_SOURCE_DIR "/deploy/patroni/cluster";
 }  // namespace
 
 Patroni::Patroni() {
-  for (const char* program : {"/usr/bin/patroni", "/usr/bin/etcd", "/usr/bin/psql", "/usr/sbin/ip"}) {
-    if (::access(program, X_OK) != 0) why_not_ = fmt::format("{} is not installed (deploy/dependencies)", program);
+  for (const char* program :
+       {"/usr/bin/patroni", "/usr/bin/etcd", "/usr/bin/psql", "/usr/sbin/ip"}) {
+    if (::access(program, X_OK) != 0)
+      why_not_ = fmt::format("{} is not installed (deploy/dependencies)", program);
   }
   if (!why_not_.empty()) return;
   outside_ = ::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC);
@@ -30,8 +32,8 @@ Patroni::Patroni() {
     return;
   }
   // TERM: it ends what it has started. Killed with this process it could not.
-  cluster_.emplace(
-      std::vector<std::string>{"/usr/bin/setpriv", "--pdeathsig=TERM", kScript, "run", folder_.path().string()});
+  cluster_.emplace(std::vector<std::string>{"/usr/bin/setpriv", "--pdeathsig=TERM", kScript, "run",
+                                            folder_.path().string()});
   if (!cluster_->wait_for_line("ready: ", kPatience)) why_not_ = cluster_->standard_error();
 }
 
@@ -46,8 +48,10 @@ Patroni::~Patroni() {
 }
 
 std::string Patroni::url(const std::string& role, const std::string& database) const {
-  return fmt::format("postgresql://{}:only-here@10.201.0.1,10.201.0.2,10.201.0.3/{}?target_session_attrs=read-write",
-                     role, database);
+  return fmt::format(
+      "postgresql://{}:only-here@10.201.0.1,10.201.0.2,10.201.0.3/"
+      "{}?target_session_attrs=read-write",
+      role, database);
 }
 
 Finished Patroni::ask(const std::string& what, const std::string& more) const {
@@ -55,19 +59,21 @@ Finished Patroni::ask(const std::string& what, const std::string& more) const {
 }
 
 std::string Patroni::sql(const std::string& statement) const {
-  const Finished said = run(
-      {"/usr/bin/psql", url("postgres", "trammel") + "&connect_timeout=2", "-v", "ON_ERROR_STOP=1", "-qAtc", statement},
-      kPatience);
+  const Finished said = run({"/usr/bin/psql", url("postgres", "trammel") + "&connect_timeout=2",
+                             "-v", "ON_ERROR_STOP=1", "-qAtc", statement},
+                            kPatience);
   if (said.exit_code == 0) return said.out;
   fmt::print(stderr, "{}\n", said.err);
   std::abort();
 }
 
 std::string Patroni::new_store() {
-  const Finished made = run({"/usr/bin/psql", url("postgres", "postgres"), "-v", "ON_ERROR_STOP=1", "-qc",
-                             "CREATE ROLE trammel LOGIN PASSWORD 'only-here'", "-c", "CREATE DATABASE trammel"},
-                            kPatience);
-  const Status ready = made.exit_code == 0 ? init_store(url("postgres", "trammel"), "trammel") : Status();
+  const Finished made =
+      run({"/usr/bin/psql", url("postgres", "postgres"), "-v", "ON_ERROR_STOP=1", "-qc",
+           "CREATE ROLE trammel LOGIN PASSWORD 'only-here'", "-c", "CREATE DATABASE trammel"},
+          kPatience);
+  const Status ready =
+      made.exit_code == 0 ? init_store(url("postgres", "trammel"), "trammel") : Status();
   if (made.exit_code == 0 && ready) return url("trammel", "trammel");
   fmt::print(stderr, "{}{}\n", made.err, ready ? "" : sentence(ready.error()));
   std::abort();

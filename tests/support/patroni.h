@@ -8,8 +8,9 @@
 
 namespace trammel::test {
 
-/// A PostgreSQL of three hosts that fails over by itself, by the files of deploy/patroni. The hosts are network
-/// namespaces, and so is the place of this thread and of all that it starts from now on. They go with the test.
+/// A PostgreSQL of three hosts that fails over by itself, by the files of deploy/patroni. The hosts
+/// are network namespaces, and so is the place of this thread and of all that it starts from now
+/// on. They go with the test.
 class Patroni {
  public:
   Patroni();

@@ -108,11 +108,13 @@ MeasurementBatch measured(const PlainArm& arm, const PlainCheck& check) {
 CompensatedModel trained(const PlainArm& arm) {
   constexpr int kPoses = 100;
   const std::string text =
-      "version: 1\ncell: plain\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}\n"
+      "version: 1\ncell: plain\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, "
+      "0]}\n"
       "tools: {tip: {xyz_mm: [40, -25, 140], q_wxyz: [1, 0, 0, 0]}}\n"
-      "tracker: {sigma_mm: 0.013, sigma_deg: 0.003}\nmodel: {error_sources: [base, geometry], bias: none}\n";
-  const auto cell = std::make_shared<const Cell>(
-      demand(parse_cell(text, demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/" + arm.file)), "cell.yaml")));
+      "tracker: {sigma_mm: 0.013, sigma_deg: 0.003}\nmodel: {error_sources: [base, geometry], "
+      "bias: none}\n";
+  const auto cell = std::make_shared<const Cell>(demand(parse_cell(
+      text, demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/" + arm.file)), "cell.yaml")));
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> angle(-1.1, 1.1);
   const auto joints = static_cast<Index>(arm.links.size());
@@ -121,7 +123,8 @@ CompensatedModel trained(const PlainArm& arm) {
     poses.poses.push_back(JointVector::NullaryExpr(joints, [&] { return angle(random); }));
   TrainOptions options;
   options.bias = "none";
-  return demand(train(cell, demand(check_against_cell(measured(arm, poses), *cell, drawn(0.2, 1))), options));
+  return demand(
+      train(cell, demand(check_against_cell(measured(arm, poses), *cell, drawn(0.2, 1))), options));
 }
 
 std::vector<JointVector> elbows(const PlainArm& arm, int count, const JointVector& like) {

@@ -7,8 +7,8 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// Arms whose lengths are written down here, not read by the project's kinematics, and that are as drawn but for their
-/// zeros.
+/// Arms whose lengths are written down here, not read by the project's kinematics, and that are as
+/// drawn but for their zeros.
 namespace trammel::test {
 
 /// m and rad. The second axis of an arm whose second and third axes are parallel has d 0.
@@ -41,9 +41,10 @@ struct PlainCheck {
 /// On 100 poses, base and geometry identified.
 [[nodiscard]] CompensatedModel trained(const PlainArm& arm);
 
-/// Elbows of one pose of the flange of an arm of seven axes: the third joint turns from -60 to 60 degrees. `like`: the
-/// posture that has it.
-[[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count, const JointVector& like);
+/// Elbows of one pose of the flange of an arm of seven axes: the third joint turns from -60 to 60
+/// degrees. `like`: the posture that has it.
+[[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count,
+                                              const JointVector& like);
 [[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count = 14);
 
 }  // namespace trammel::test

@@ -20,14 +20,16 @@ Pooler::Pooler(const Postgres& server) {
   folder_.write("users", "\"postgres\" \"\"\n");
   const std::string file = folder_.write(
       "pgbouncer.ini",
-      fmt::format("[databases]\n* = host={}\n[pgbouncer]\npool_mode = transaction\ndefault_pool_size = 2\n"
-                  "listen_addr =\nlisten_port = 6432\nunix_socket_dir = {}\nauth_type = trust\nauth_file = {}\n",
-                  server_folder_, folder_.path().string(), folder_.file("users")));
+      fmt::format(
+          "[databases]\n* = host={}\n[pgbouncer]\npool_mode = transaction\ndefault_pool_size = 2\n"
+          "listen_addr =\nlisten_port = 6432\nunix_socket_dir = {}\nauth_type = trust\nauth_file = "
+          "{}\n",
+          server_folder_, folder_.path().string(), folder_.file("users")));
   std::vector<std::string> command = {"/usr/sbin/pgbouncer", file};
   if (::geteuid() == 0) {  // it refuses to run as root
     static_cast<void>(run({"/bin/chown", "-R", "postgres", folder_.path().string()}));
-    command.insert(command.begin(),
-                   {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres", "--init-groups", "--pdeathsig=KILL"});
+    command.insert(command.begin(), {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres",
+                                     "--init-groups", "--pdeathsig=KILL"});
   }
   pooler_.emplace(command);
   if (pooler_->wait_for_line("process up", kPatience)) return;

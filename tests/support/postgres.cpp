@@ -41,8 +41,8 @@ std::string program(const std::string& name) {
 /// It refuses to run as root.
 std::vector<std::string> as_its_user(std::vector<std::string> command) {
   if (::geteuid() != 0) return command;
-  std::vector<std::string> whole = {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres", "--init-groups",
-                                    "--pdeathsig=QUIT"};
+  std::vector<std::string> whole = {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres",
+                                    "--init-groups", "--pdeathsig=QUIT"};
   whole.insert(whole.end(), command.begin(), command.end());
   return whole;
 }
@@ -55,7 +55,8 @@ std::vector<pid_t> children_of(pid_t parent) {
 void give_to_its_user(const fs::path& folder) {
   if (::geteuid() != 0) return;
   const passwd* user = ::getpwnam("postgres");
-  if (user == nullptr || ::chown(folder.c_str(), user->pw_uid, user->pw_gid) != 0) give_up("has no user");
+  if (user == nullptr || ::chown(folder.c_str(), user->pw_uid, user->pw_gid) != 0)
+    give_up("has no user");
 }
 
 }  // namespace
@@ -67,17 +68,19 @@ Postgres& Postgres::of_program() {
 
 Postgres::Postgres(Disk disk) : disk_(disk) {
   give_to_its_user(folder_.path());
-  const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A", "trust", "-E", "UTF8",
-                                         "--locale=C.UTF-8", "--no-sync"}),
+  const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A",
+                                         "trust", "-E", "UTF8", "--locale=C.UTF-8", "--no-sync"}),
                             kPatience);
   if (made.exit_code != 0) give_up(made.err);
-  folder_.write("data/pg_hba.conf", "local all needs_password scram-sha-256\nlocal all all trust\n");
+  folder_.write("data/pg_hba.conf",
+                "local all needs_password scram-sha-256\nlocal all all trust\n");
   start();
   sql(url("postgres"), "CREATE ROLE needs_password LOGIN PASSWORD 'right'");
   if (disk_ == Disk::kSmall)
     sql(url("postgres"), fmt::format("CREATE TABLESPACE small LOCATION '{}/space'", small_disk()));
   sql(url("postgres"), "CREATE DATABASE template_store");
-  if (const Status ready = init_store(url("template_store")); !ready) give_up(sentence(ready.error()));
+  if (const Status ready = init_store(url("template_store")); !ready)
+    give_up(sentence(ready.error()));
 }
 
 Postgres::~Postgres() { stop(); }
@@ -86,16 +89,19 @@ void Postgres::start() { start_until("ready to accept connections"); }
 
 void Postgres::start_until(const std::string& line) {
   auto command =
-      as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c", "listen_addresses=", "-c",
-                   disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off", "-c", "max_connections=60"});
+      as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
+                   "listen_addresses=", "-c", disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off",
+                   "-c", "max_connections=60"});
   if (port_ != 0)
-    command.insert(command.end(), {"-c", "listen_addresses=127.0.0.1", "-c", "ssl=on", "-p", std::to_string(port_)});
+    command.insert(command.end(), {"-c", "listen_addresses=127.0.0.1", "-c", "ssl=on", "-p",
+                                   std::to_string(port_)});
   if (disk_ == Disk::kSmall) {
     // Mounted for the server alone: it goes with it.
     constexpr const char* kMounted =
         "set -e; mkdir -p \"$0\"; mount -t tmpfs -o size=64m tmpfs \"$0\"; mkdir \"$0/space\"; "
         "chown -R postgres \"$0\"; head -c 16M /dev/zero >\"$0/ballast\"; exec \"$@\"";
-    command.insert(command.begin(), {"/usr/bin/unshare", "--mount", "/bin/bash", "-c", kMounted, small_disk()});
+    command.insert(command.begin(),
+                   {"/usr/bin/unshare", "--mount", "/bin/bash", "-c", kMounted, small_disk()});
   }
   server_.emplace(command);
   if (!server_->wait_for_line(line, kPatience)) give_up(server_->standard_error());
@@ -107,7 +113,9 @@ void Postgres::become_standby() {
   start_until("ready to accept read-only connections");
 }
 
-void Postgres::make_room() const { fs::remove(fmt::format("/proc/{}/root{}/ballast", server_->pid(), small_disk())); }
+void Postgres::make_room() const {
+  fs::remove(fmt::format("/proc/{}/root{}/ballast", server_->pid(), small_disk()));
+}
 
 void Postgres::stop() {
   if (!server_) return;
@@ -122,7 +130,8 @@ void Postgres::kill() {
   static_cast<void>(server_->wait(kPatience));
   server_.reset();
   for (const pid_t child : children) {
-    if (!Watched(child).ends(kPatience)) give_up("a process of the one that was killed does not end");
+    if (!Watched(child).ends(kPatience))
+      give_up("a process of the one that was killed does not end");
   }
 }
 
@@ -140,16 +149,17 @@ std::string Postgres::url(const std::string& database, const std::string& role) 
 
 void Postgres::take_certificates(std::uint16_t port) {
   constexpr const char* kMake =
-      "set -e; mkdir \"$0\"; cd \"$0\"; ec='-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes'; "
-      "for ca in ca other-ca; do openssl req -x509 $ec -keyout $ca.key -out $ca.crt -days 2 -subj /CN=$ca; done; "
-      "sign() { openssl req $ec -keyout $1.key -out $1.csr -subj /CN=$2 -addext subjectAltName=DNS:$2; "
-      "openssl x509 -req -in $1.csr -CA ca.crt -CAkey ca.key -CAcreateserial -copy_extensions copy -days 2 -out "
-      "$1.crt; }; "
-      "sign server localhost; sign keeper keeper; "
-      "cp server.crt server.key ../data; cp ca.crt ../data/root.crt; chmod 600 ../data/server.key";
+      "set -e; mkdir \"$0\"; cd \"$0\"; ec='-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 "
+      "-nodes'; for ca in ca other-ca; do openssl req -x509 $ec -keyout $ca.key -out $ca.crt -days "
+      "2 -subj /CN=$ca; done; sign() { openssl req $ec -keyout $1.key -out $1.csr -subj /CN=$2 "
+      "-addext subjectAltName=DNS:$2; openssl x509 -req -in $1.csr -CA ca.crt -CAkey ca.key "
+      "-CAcreateserial -copy_extensions copy -days 2 -out $1.crt; }; sign server localhost; sign "
+      "keeper keeper; cp server.crt server.key ../data; cp ca.crt ../data/root.crt; chmod 600 "
+      "../data/server.key";
   const Finished made = run({"/bin/bash", "-c", kMake, certificates()}, kPatience);
   if (made.exit_code != 0) give_up(made.err);
-  for (const char* file : {"data/server.crt", "data/server.key", "data/root.crt"}) give_to_its_user(folder_.file(file));
+  for (const char* file : {"data/server.crt", "data/server.key", "data/root.crt"})
+    give_to_its_user(folder_.file(file));
   stop();
   port_ = port;
   folder_.write("data/pg_hba.conf", "local all all trust\nhostssl all all 127.0.0.1/32 cert\n");
@@ -159,20 +169,22 @@ void Postgres::take_certificates(std::uint16_t port) {
 
 std::string Postgres::certified_url(const std::string& database, const std::string& role) const {
   return fmt::format(
-      "postgresql://{}@localhost:{}/{}?sslmode=verify-full&sslrootcert={}/ca.crt&sslcert={}/keeper.crt&sslkey={}/"
-      "keeper.key",
+      "postgresql://{}@localhost:{}/{}?sslmode=verify-full&sslrootcert={}/ca.crt&sslcert={}/"
+      "keeper.crt&sslkey={}/keeper.key",
       role, port_, database, certificates(), certificates(), certificates());
 }
 
 std::string Postgres::sql(const std::string& url, const std::string& statement) const {
-  const Finished said = run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPatience);
+  const Finished said =
+      run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPatience);
   if (said.exit_code != 0) give_up(said.err);
   return said.out;
 }
 
 void Postgres::write_down(const std::string& url) const {
   const std::string name = sql(url, "SELECT current_database()");
-  sql(url, fmt::format("ALTER DATABASE {} SET log_statement = 'all'", name.substr(0, name.find('\n'))));
+  sql(url,
+      fmt::format("ALTER DATABASE {} SET log_statement = 'all'", name.substr(0, name.find('\n'))));
 }
 
 std::vector<std::string> Postgres::asked() {
@@ -188,7 +200,8 @@ std::vector<std::string> Postgres::asked() {
     asked.push_back(line.substr(line.find(": ", line.find("LOG:  ") + 6) + 2));
   }
   read_of_log_ = log.size();
-  std::erase_if(asked, [](const std::string& text) { return text.find("'mark ") != std::string::npos; });
+  std::erase_if(asked,
+                [](const std::string& text) { return text.find("'mark ") != std::string::npos; });
   return asked;
 }
 

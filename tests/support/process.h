@@ -13,7 +13,8 @@
 
 namespace trammel::test {
 
-/// A program that a test has started, with its output. Ends with the test that owns it, whatever the test does.
+/// A program that a test has started, with its output. Ends with the test that owns it, whatever
+/// the test does.
 class Process {
  public:
   /// argv[0] is the program's path. Aborts when it cannot be started at all.
@@ -26,10 +27,12 @@ class Process {
   /// What it has written so far; all of it after wait().
   [[nodiscard]] std::string standard_output() const;
   [[nodiscard]] std::string standard_error() const;
-  /// Until a whole line of either stream contains `part`; false when the streams end or `limit` is over first.
+  /// Until a whole line of either stream contains `part`; false when the streams end or `limit` is
+  /// over first.
   [[nodiscard]] bool wait_for_line(const std::string& part, std::chrono::milliseconds limit);
   void signal(int number) const;
-  /// Until it has ended: its exit code, or 128 + the signal that ended it; empty when `limit` is over first.
+  /// Until it has ended: its exit code, or 128 + the signal that ended it; empty when `limit` is
+  /// over first.
   [[nodiscard]] std::optional<int> wait(std::chrono::milliseconds limit);
 
  private:

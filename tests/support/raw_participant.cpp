@@ -59,46 +59,56 @@ ParameterList RawParticipant::announcement() const {
   put32(lease, 0);
   ParameterList list;
   list.add(0x0015, {2, 3, 0, 0}).add(0x0016, {1, 15, 0, 0}).guid(0x0050, prefix_, 0x000001c1);
-  list.locator(0x0032, own_port_).locator(0x0031, own_port_).add(0x0002, lease).number(0x0058, 0x0c3f);
+  list.locator(0x0032, own_port_)
+      .locator(0x0031, own_port_)
+      .add(0x0002, lease)
+      .number(0x0058, 0x0c3f);
   list.add(0x002c, user_data);
   return list;
 }
 
-ParameterList RawParticipant::endpoint(std::uint32_t entity, const std::string& topic, const std::string& type) const {
+ParameterList RawParticipant::endpoint(std::uint32_t entity, const std::string& topic,
+                                       const std::string& type) const {
   PacketBytes reliable;
   put32(reliable, 2);
   put32(reliable, 0);
   put32(reliable, 100'000'000);
   ParameterList list;
-  list.guid(0x005a, prefix_, entity).guid(0x0050, prefix_, 0x000001c1).text(0x0005, topic).text(0x0007, type);
+  list.guid(0x005a, prefix_, entity)
+      .guid(0x0050, prefix_, 0x000001c1)
+      .text(0x0005, topic)
+      .text(0x0007, type);
   list.add(0x001a, reliable).locator(0x002f, own_port_);
   return list;
 }
 
 bool RawParticipant::learn(const PacketBytes& message) {
-  return any_submessage(message, [&](unsigned char id, unsigned char flags, const PacketBytes& body) {
-    constexpr std::size_t kHead = 20, kEncapsulation = 4;
-    if (id != 0x15 || (flags & 4) == 0 || body.size() < kHead + kEncapsulation) return false;
-    const PacketBytes announcer = {0x00, 0x01, 0x00, 0xc2};
-    if (!std::equal(announcer.begin(), announcer.end(), body.begin() + 8)) return false;
-    std::copy_n(message.begin() + 8, peer_.size(), peer_.begin());
-    for (std::size_t at = kHead + kEncapsulation; at + 4 <= body.size();) {
-      const std::uint32_t parameter = little(body, at, 2), length = little(body, at + 2, 2);
-      if (parameter == 1) break;
-      if (parameter == 0x31) data_port_ = static_cast<std::uint16_t>(little(body, at + 8, 4));
-      at += 4 + length;
-    }
-    return true;
-  });
+  return any_submessage(
+      message, [&](unsigned char id, unsigned char flags, const PacketBytes& body) {
+        constexpr std::size_t kHead = 20, kEncapsulation = 4;
+        if (id != 0x15 || (flags & 4) == 0 || body.size() < kHead + kEncapsulation) return false;
+        const PacketBytes announcer = {0x00, 0x01, 0x00, 0xc2};
+        if (!std::equal(announcer.begin(), announcer.end(), body.begin() + 8)) return false;
+        std::copy_n(message.begin() + 8, peer_.size(), peer_.begin());
+        for (std::size_t at = kHead + kEncapsulation; at + 4 <= body.size();) {
+          const std::uint32_t parameter = little(body, at, 2), length = little(body, at + 2, 2);
+          if (parameter == 1) break;
+          if (parameter == 0x31) data_port_ = static_cast<std::uint16_t>(little(body, at + 8, 4));
+          at += 4 + length;
+        }
+        return true;
+      });
 }
 
 bool RawParticipant::meet(std::chrono::milliseconds limit) {
   const auto deadline = Clock::now() + limit;
-  const PacketBytes announced = Packet(prefix_).data({0, kAnnouncerId, 1, {}, announcement().payload()}).bytes();
+  const PacketBytes announced =
+      Packet(prefix_).data({0, kAnnouncerId, 1, {}, announcement().payload()}).bytes();
   bool met = false;
   while (!met && Clock::now() < deadline) {
     send_to(port_, announced);
-    met = wait_for([this](const PacketBytes& message) { return learn(message); }, std::chrono::milliseconds(100));
+    met = wait_for([this](const PacketBytes& message) { return learn(message); },
+                   std::chrono::milliseconds(100));
   }
   return met;
 }
@@ -110,9 +120,11 @@ bool RawParticipant::become_writer(std::uint32_t entity, std::chrono::millisecon
   put_entity(own, entity);
   return wait_for(
       [&](const PacketBytes& message) {
-        return any_submessage(message, [&](unsigned char id, unsigned char, const PacketBytes& body) {
-          return id == 0x06 && body.size() > 8 && std::equal(own.begin(), own.end(), body.begin() + 4);
-        });
+        return any_submessage(message,
+                              [&](unsigned char id, unsigned char, const PacketBytes& body) {
+                                return id == 0x06 && body.size() > 8 &&
+                                       std::equal(own.begin(), own.end(), body.begin() + 4);
+                              });
       },
       limit);
 }
@@ -125,7 +137,8 @@ void RawParticipant::send_data(const PacketBytes& message) const { send_to(data_
 
 void RawParticipant::send_to(std::uint16_t port, const PacketBytes& message) const {
   const sockaddr_in name = loopback(port);
-  ::sendto(socket_, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&name), sizeof name);
+  ::sendto(socket_, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&name),
+           sizeof name);
 }
 
 std::optional<PacketBytes> RawParticipant::receive(std::chrono::milliseconds limit) const {
@@ -142,15 +155,17 @@ bool RawParticipant::wait_for(const std::function<bool(const PacketBytes&)>& wan
                               std::chrono::milliseconds limit) const {
   const auto deadline = Clock::now() + limit;
   while (true) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) return false;
     const auto message = receive(left);
     if (message && wanted(*message)) return true;
   }
 }
 
-bool any_submessage(const PacketBytes& message,
-                    const std::function<bool(unsigned char, unsigned char, const PacketBytes&)>& found) {
+bool any_submessage(
+    const PacketBytes& message,
+    const std::function<bool(unsigned char, unsigned char, const PacketBytes&)>& found) {
   for (std::size_t at = 20; at + 4 <= message.size();) {
     std::size_t length = little(message, at + 2, 2);
     if (length == 0 || at + 4 + length > message.size()) length = message.size() - at - 4;

@@ -10,7 +10,8 @@
 
 namespace trammel::test {
 
-inline constexpr std::uint32_t kAnnouncerId = 0x000100c2, kPublicationsId = 0x000003c2, kSubscriptionsId = 0x000004c2;
+inline constexpr std::uint32_t kAnnouncerId = 0x000100c2, kPublicationsId = 0x000003c2,
+                               kSubscriptionsId = 0x000004c2;
 inline constexpr std::uint32_t kAnnouncerReader = 0x000100c7, kPublicationsReader = 0x000003c7,
                                kSubscriptionsReader = 0x000004c7;
 
@@ -34,7 +35,8 @@ class RawParticipant {
   /// Parameters of an announcement that is complete.
   [[nodiscard]] ParameterList announcement() const;
   /// The parameters of a reliable endpoint without key.
-  [[nodiscard]] ParameterList endpoint(std::uint32_t entity, const std::string& topic, const std::string& type) const;
+  [[nodiscard]] ParameterList endpoint(std::uint32_t entity, const std::string& topic,
+                                       const std::string& type) const;
   /// Announces itself until the other one's announcement comes, at most `limit`.
   [[nodiscard]] bool meet(std::chrono::milliseconds limit);
   /// Becomes a writer of "Topic" of "Type" that a reader of the other one knows; after meet().
@@ -58,7 +60,8 @@ class RawParticipant {
 };
 
 /// Calls `found(id, flags, body)` for each submessage until it returns true.
-bool any_submessage(const PacketBytes& message,
-                    const std::function<bool(unsigned char, unsigned char, const PacketBytes&)>& found);
+bool any_submessage(
+    const PacketBytes& message,
+    const std::function<bool(unsigned char, unsigned char, const PacketBytes&)>& found);
 
 }  // namespace trammel::test

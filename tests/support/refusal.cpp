@@ -6,7 +6,9 @@
 namespace trammel::test {
 namespace {
 
-std::string shown(const std::optional<double>& number) { return number ? fmt::format("{:.6g}", *number) : ""; }
+std::string shown(const std::optional<double>& number) {
+  return number ? fmt::format("{:.6g}", *number) : "";
+}
 
 std::string quoted(const std::string& text) { return fmt::format("{:?}", text); }
 
@@ -77,19 +79,21 @@ Refusal Refusal::text(std::string is) const {
 }
 
 bool operator==(const Refusal& a, const Refusal& b) {
-  return a.refused_ == b.refused_ && a.code_ == b.code_ && a.file_ == b.file_ && a.field_ == b.field_ &&
-         a.text_ == b.text_ && a.row_ == b.row_ && shown(a.value_) == shown(b.value_) &&
-         shown(a.limit_) == shown(b.limit_);
+  return a.refused_ == b.refused_ && a.code_ == b.code_ && a.file_ == b.file_ &&
+         a.field_ == b.field_ && a.text_ == b.text_ && a.row_ == b.row_ &&
+         shown(a.value_) == shown(b.value_) && shown(a.limit_) == shown(b.limit_);
 }
 
 /// As it is written in a test.
 std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
   if (!refusal.refused_) return out << "Refusal::none()";
   out << "Refusal(" << quoted(refusal.file_);
-  if (refusal.row_ || !refusal.field_.empty()) out << ", " << (refusal.row_ ? std::to_string(*refusal.row_) : "{}");
+  if (refusal.row_ || !refusal.field_.empty())
+    out << ", " << (refusal.row_ ? std::to_string(*refusal.row_) : "{}");
   if (!refusal.field_.empty()) out << ", " << quoted(refusal.field_);
   out << ")";
-  if (refusal.code_ != ErrorCode::kRefused) out << ".of(ErrorCode::" << name_of(refusal.code_) << ")";
+  if (refusal.code_ != ErrorCode::kRefused)
+    out << ".of(ErrorCode::" << name_of(refusal.code_) << ")";
   if (refusal.limit_) {
     out << ".beyond(" << shown(refusal.value_) << ", " << shown(refusal.limit_) << ")";
   } else if (refusal.value_) {

@@ -8,11 +8,13 @@
 
 namespace trammel::test {
 
-/// What a refusal must say as data, whatever its words are: `Refusal("b.csv", 3, "q1_deg").beyond(241.2, 70)`.
+/// What a refusal must say as data, whatever its words are: `Refusal("b.csv", 3,
+/// "q1_deg").beyond(241.2, 70)`.
 class Refusal {
  public:
   Refusal() = default;
-  explicit Refusal(std::string file, std::optional<long> row = std::nullopt, std::string field = "");
+  explicit Refusal(std::string file, std::optional<long> row = std::nullopt,
+                   std::string field = "");
   [[nodiscard]] static Refusal none();  ///< nothing is refused
 
   [[nodiscard]] Refusal of(ErrorCode code) const;

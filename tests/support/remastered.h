@@ -14,7 +14,8 @@ struct Remastered {
   bool tool = false;        ///< was knocked by 1 mm as well
 };
 /// One of these sets of joints, each off by 0.2 to 90 mrad, in one world of four with the tool.
-[[nodiscard]] Remastered draw_remastered(const std::vector<std::vector<int>>& joints, hidden::Random& random);
+[[nodiscard]] Remastered draw_remastered(const std::vector<std::vector<int>>& joints,
+                                         hidden::Random& random);
 /// Wrist, elbow, two joints, all that a check can tell, and all six.
 [[nodiscard]] const std::vector<std::vector<int>>& sets_of_six_axes();
 [[nodiscard]] const std::vector<std::vector<int>>& sets_of_seven_axes();
@@ -22,7 +23,8 @@ struct Remastered {
 /// The joint (1-based) has lost its zero by that much.
 [[nodiscard]] hidden::Effect zero_off(const CheckedRobot& robot, int joint, double rad);
 /// What changed in the robot of that world.
-[[nodiscard]] std::vector<hidden::Effect> effects_of(const Remastered& world, const CheckedRobot& robot,
+[[nodiscard]] std::vector<hidden::Effect> effects_of(const Remastered& world,
+                                                     const CheckedRobot& robot,
                                                      hidden::Random& random);
 /// The same in a check of a plain arm.
 void apply(const Remastered& world, PlainCheck& check, hidden::Random& random);

@@ -13,9 +13,12 @@ void put_number(PacketBytes& bytes, std::int64_t number) {
   put32(bytes, static_cast<std::uint32_t>(number));
 }
 void put_entity(PacketBytes& bytes, std::uint32_t entity) {
-  for (unsigned i = 0; i < 4; ++i) bytes.push_back(static_cast<unsigned char>(entity >> 8 * (3 - i)));
+  for (unsigned i = 0; i < 4; ++i)
+    bytes.push_back(static_cast<unsigned char>(entity >> 8 * (3 - i)));
 }
-void put_bytes(PacketBytes& bytes, const PacketBytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
+void put_bytes(PacketBytes& bytes, const PacketBytes& more) {
+  bytes.insert(bytes.end(), more.begin(), more.end());
+}
 
 ParameterList& ParameterList::add(std::uint16_t id, PacketBytes value) {
   while (value.size() % 4 != 0) value.push_back(0);
@@ -87,9 +90,10 @@ Packet& Packet::data(const DataFields& fields) {
   put_bytes(body, fields.inline_qos);
   put_bytes(body, fields.payload);
   while (body.size() % 4 != 0) body.push_back(0);
-  return submessage(
-      0x15, static_cast<unsigned char>(1 | (fields.inline_qos.empty() ? 0 : 2) | (fields.payload.empty() ? 0 : 4)),
-      body);
+  return submessage(0x15,
+                    static_cast<unsigned char>(1 | (fields.inline_qos.empty() ? 0 : 2) |
+                                               (fields.payload.empty() ? 0 : 4)),
+                    body);
 }
 Packet& Packet::fragments(const FragmentFields& fields) {
   PacketBytes body;
@@ -105,8 +109,8 @@ Packet& Packet::fragments(const FragmentFields& fields) {
   put_bytes(body, fields.payload);
   return submessage(0x16, 1, body);
 }
-Packet& Packet::heartbeat(std::uint32_t reader, std::uint32_t writer, std::int64_t first, std::int64_t last,
-                          std::uint32_t count) {
+Packet& Packet::heartbeat(std::uint32_t reader, std::uint32_t writer, std::int64_t first,
+                          std::int64_t last, std::uint32_t count) {
   PacketBytes body;
   put_entity(body, reader);
   put_entity(body, writer);
@@ -115,7 +119,8 @@ Packet& Packet::heartbeat(std::uint32_t reader, std::uint32_t writer, std::int64
   put32(body, count);
   return submessage(0x07, 1, body);
 }
-Packet& Packet::gap(std::uint32_t reader, std::uint32_t writer, std::int64_t start, std::int64_t base) {
+Packet& Packet::gap(std::uint32_t reader, std::uint32_t writer, std::int64_t start,
+                    std::int64_t base) {
   PacketBytes body;
   put_entity(body, reader);
   put_entity(body, writer);
@@ -124,8 +129,8 @@ Packet& Packet::gap(std::uint32_t reader, std::uint32_t writer, std::int64_t sta
   put32(body, 0);
   return submessage(0x08, 1, body);
 }
-Packet& Packet::acknack(std::uint32_t reader, std::uint32_t writer, std::int64_t base, std::uint32_t bits,
-                        std::uint32_t count) {
+Packet& Packet::acknack(std::uint32_t reader, std::uint32_t writer, std::int64_t base,
+                        std::uint32_t bits, std::uint32_t count) {
   PacketBytes body;
   put_entity(body, reader);
   put_entity(body, writer);
@@ -135,8 +140,8 @@ Packet& Packet::acknack(std::uint32_t reader, std::uint32_t writer, std::int64_t
   put32(body, count);
   return submessage(0x06, 1, body);
 }
-Packet& Packet::nack_frag(std::uint32_t reader, std::uint32_t writer, std::int64_t number, std::uint32_t base,
-                          std::uint32_t count) {
+Packet& Packet::nack_frag(std::uint32_t reader, std::uint32_t writer, std::int64_t number,
+                          std::uint32_t base, std::uint32_t count) {
   PacketBytes body;
   put_entity(body, reader);
   put_entity(body, writer);

@@ -62,14 +62,14 @@ class Packet {
   Packet& to(const Prefix& participant);
   Packet& data(const DataFields& fields);
   Packet& fragments(const FragmentFields& fields);
-  Packet& heartbeat(std::uint32_t reader, std::uint32_t writer, std::int64_t first, std::int64_t last,
-                    std::uint32_t count);
+  Packet& heartbeat(std::uint32_t reader, std::uint32_t writer, std::int64_t first,
+                    std::int64_t last, std::uint32_t count);
   Packet& gap(std::uint32_t reader, std::uint32_t writer, std::int64_t start, std::int64_t base);
   Packet& acknack(std::uint32_t reader, std::uint32_t writer, std::int64_t base, std::uint32_t bits,
                   std::uint32_t count);
   /// Asks for the fragment `base`.
-  Packet& nack_frag(std::uint32_t reader, std::uint32_t writer, std::int64_t number, std::uint32_t base,
-                    std::uint32_t count);
+  Packet& nack_frag(std::uint32_t reader, std::uint32_t writer, std::int64_t number,
+                    std::uint32_t base, std::uint32_t count);
   [[nodiscard]] const PacketBytes& bytes() const { return bytes_; }
 
  private:

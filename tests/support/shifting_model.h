@@ -9,27 +9,30 @@
 #include "server/base/units.h"
 #include "tests/support/small_cell.h"
 
-/// A stand-in for a model: it moves every target by the same vector in the robot's base, turns nothing, and knows it to
-/// 10 µm. What a program becomes with it can be worked out by hand.
+/// A stand-in for a model: it moves every target by the same vector in the robot's base, turns
+/// nothing, and knows it to 10 µm. What a program becomes with it can be worked out by hand.
 namespace trammel::test {
 
 inline const Vector3 kShift_mm(0.1234567, -0.2345678, 0.3456789);
 
 /// A cell with the tool `spindle` of the shipped cell on the shipped robot.
 inline cam::CellTools spindle_only() {
-  const Pose X_FT = make_pose(
-      Eigen::Quaterniond(0.923879532511287, 0, -0.382683432365090, 0).normalized().toRotationMatrix(), {.1, 0, .15});
+  const Pose X_FT = make_pose(Eigen::Quaterniond(0.923879532511287, 0, -0.382683432365090, 0)
+                                  .normalized()
+                                  .toRotationMatrix(),
+                              {.1, 0, .15});
   return {{{"spindle", X_FT}}, {{"spindle", {100, {0, 0, .1}}}}};
 }
 
-inline Result<client::Answer<client::CorrectedTarget>> shift(const std::string&, const std::string&,
-                                                             const std::vector<client::TargetMm>& targets) {
+inline Result<client::Answer<client::CorrectedTarget>> shift(
+    const std::string&, const std::string&, const std::vector<client::TargetMm>& targets) {
   client::Answer<client::CorrectedTarget> answer;
   answer.model.id = "0123456789ab";
   for (const client::TargetMm& target : targets) {
     client::CorrectedTarget item;
     item.status = target.seed_rad.empty() ? "unreachable" : "ok";
-    item.message = target.seed_rad.empty() ? "no joints bring the tool there; conf 1 would reach it" : "";
+    item.message =
+        target.seed_rad.empty() ? "no joints bring the tool there; conf 1 would reach it" : "";
     item.commanded = target.pose;
     item.commanded.x_mm += kShift_mm.x();
     item.commanded.y_mm += kShift_mm.y();
@@ -51,12 +54,13 @@ struct Corrected {
   std::string refusal;
 };
 inline Corrected corrected_by_shift(cam::Dialect dialect, const std::vector<cam::SourceFile>& files,
-                                    const cam::ReadOptions& read = {}, cam::CorrectProgramOptions options = {},
+                                    const cam::ReadOptions& read = {},
+                                    cam::CorrectProgramOptions options = {},
                                     const cam::CellTools& cell = spindle_only()) {
   options.version = "0.1.0";
   options.date = "2026-11-22";
-  auto done =
-      cam::correct_program(cam::read_program(dialect, files, read), small_cell("cam")->robot, cell, shift, options);
+  auto done = cam::correct_program(cam::read_program(dialect, files, read),
+                                   small_cell("cam")->robot, cell, shift, options);
   if (!done) return {{}, sentence(done.error())};
   return {std::move(*done), ""};
 }
@@ -68,9 +72,10 @@ inline std::string without_inserted(const cam::CorrectedProgram& program, std::s
   int number = 1;
   for (std::size_t at = 0; at < text.size(); ++number) {
     const std::size_t end = std::min(text.find('\n', at), text.size() - 1) + 1;
-    const bool inserted = std::any_of(program.inserted.begin(), program.inserted.end(), [&](const auto& line) {
-      return line.file == program.files[file].name && line.line == number;
-    });
+    const bool inserted =
+        std::any_of(program.inserted.begin(), program.inserted.end(), [&](const auto& line) {
+          return line.file == program.files[file].name && line.line == number;
+        });
     if (!inserted) kept += text.substr(at, end - at);
     at = end;
   }

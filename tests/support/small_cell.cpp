@@ -8,7 +8,9 @@
 
 namespace trammel::test {
 
-std::string small_robot_yaml() { return read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"); }
+std::string small_robot_yaml() {
+  return read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml");
+}
 
 std::string small_cell_yaml(const std::string& name, const std::string& bias) {
   return fmt::format(
@@ -41,7 +43,8 @@ std::string small_batch_csv(const Cell& cell, const SmallBatch& batch) {
       q[i] = from_deg(value);
       csv += fmt::format("{:.6f},", value);
     }
-    Vector3 p = (cell.robot.flange_pose(q) * X_FT).translation() + batch.base_shift * Vector3::UnitX();
+    Vector3 p =
+        (cell.robot.flange_pose(q) * X_FT).translation() + batch.base_shift * Vector3::UnitX();
     for (int axis = 0; axis < 3; ++axis) p[axis] += noise(random);
     csv += fmt::format("{:.6f},{:.6f},{:.6f}", to_mm(p.x()), to_mm(p.y()), to_mm(p.z()));
     csv += batch.set.empty() ? "\n" : "," + batch.set + "\n";

@@ -12,12 +12,14 @@ namespace trammel::test {
 std::vector<ThreadOf> threads_of(pid_t process) {
   std::vector<ThreadOf> threads;
   std::error_code gone;
-  for (const auto& entry : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", gone)) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", gone)) {
     ThreadOf thread{std::stoi(entry.path().filename()), {}};
     std::ifstream(entry.path() / "comm") >> thread.name;
     threads.push_back(thread);
   }
-  std::sort(threads.begin(), threads.end(), [](const ThreadOf& a, const ThreadOf& b) { return a.id < b.id; });
+  std::sort(threads.begin(), threads.end(),
+            [](const ThreadOf& a, const ThreadOf& b) { return a.id < b.id; });
   return threads;
 }
 

@@ -15,8 +15,8 @@ struct ThreadOf {
 /// All of `process`, the first it had first.
 [[nodiscard]] std::vector<ThreadOf> threads_of(pid_t process);
 
-/// Stops one thread of another process while all its others go on, as a lock that is never free would. Goes on when
-/// this is destroyed.
+/// Stops one thread of another process while all its others go on, as a lock that is never free
+/// would. Goes on when this is destroyed.
 class StoppedThread {
  public:
   explicit StoppedThread(pid_t thread);

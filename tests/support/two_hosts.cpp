@@ -28,14 +28,15 @@ using std::chrono::milliseconds;
 constexpr const char* kInterface = "cable";
 constexpr std::size_t kLargestFrame = 65536;
 constexpr std::size_t kRemembered = 20000;  // frames
-constexpr int kIdleMs = 20;                 // the longest wait, after which it is seen whether to stop
+constexpr int kIdleMs = 20;  // the longest wait, after which it is seen whether to stop
 
 bool ip(std::vector<std::string> words) {
   words.insert(words.begin(), "/usr/sbin/ip");
   return run(words).exit_code == 0;
 }
 
-/// The end of an interface of this process's network namespace: its frames are read and written there. -1: none.
+/// The end of an interface of this process's network namespace: its frames are read and written
+/// there. -1: none.
 int open_interface() {
   const int end = ::open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (end < 0) return -1;
@@ -64,7 +65,9 @@ int open_interface_in(const std::string& name) {
 class TwoHosts::Line {
  public:
   Line(std::array<int, 2> ends, const LineFaults& faults)
-      : ends_(ends), faults_(faults), thread_([this](const std::stop_token& stop) { carry(stop); }) {}
+      : ends_(ends),
+        faults_(faults),
+        thread_([this](const std::stop_token& stop) { carry(stop); }) {}
   ~Line() {
     thread_.request_stop();
     thread_.join();
@@ -108,7 +111,8 @@ class TwoHosts::Line {
 
   [[nodiscard]] int until_next() const {
     if (underway_.empty()) return kIdleMs;
-    const auto left = std::chrono::ceil<milliseconds>(underway_.begin()->first - Clock::now()).count();
+    const auto left =
+        std::chrono::ceil<milliseconds>(underway_.begin()->first - Clock::now()).count();
     return static_cast<int>(std::clamp<std::int64_t>(left, 0, kIdleMs));
   }
 
@@ -118,8 +122,10 @@ class TwoHosts::Line {
       if (size <= 0) return;
       const auto now = Clock::now();
       if (now.time_since_epoch().count() < cut_until_ || uniform_(random_) < faults_.lost) continue;
-      const auto more = std::chrono::duration_cast<Clock::duration>(faults_.scatter * uniform_(random_));
-      underway_.emplace(now + faults_.delay + more, Frame{to, {buffer_.begin(), buffer_.begin() + size}});
+      const auto more =
+          std::chrono::duration_cast<Clock::duration>(faults_.scatter * uniform_(random_));
+      underway_.emplace(now + faults_.delay + more,
+                        Frame{to, {buffer_.begin(), buffer_.begin() + size}});
     }
   }
 
@@ -152,8 +158,9 @@ class TwoHosts::Line {
   std::atomic<std::size_t> repeated_{0};
   std::atomic<Clock::rep> cut_until_{0};
   std::atomic<std::uint64_t> carried_{0};
-  std::multimap<Clock::time_point, Frame> underway_;  // by when they arrive; of the thread, as all that follows
-  std::deque<Frame> past_;                            // as they were carried
+  std::multimap<Clock::time_point, Frame>
+      underway_;            // by when they arrive; of the thread, as all that follows
+  std::deque<Frame> past_;  // as they were carried
   std::vector<char> buffer_ = std::vector<char>(kLargestFrame);
   std::mt19937_64 random_{1};
   std::uniform_real_distribution<double> uniform_{0, 1};
@@ -178,7 +185,8 @@ std::string TwoHosts::set_up(const LineFaults& faults) {
   if (::access("/usr/sbin/ip", X_OK) != 0) return "iproute2 is not installed";
   std::array<int, 2> ends{-1, -1};
   for (std::size_t i = 0; i < 2; ++i) {
-    if (!ip({"netns", "add", names_.at(i)})) return "network namespaces cannot be made here: that takes root";
+    if (!ip({"netns", "add", names_.at(i)}))
+      return "network namespaces cannot be made here: that takes root";
     ends.at(i) = open_interface_in(names_.at(i));
     if (ends.at(i) < 0) return "/dev/net/tun makes no interfaces here";
   }

@@ -11,13 +11,14 @@ namespace trammel::test {
 
 /// What a bad line does to the frames that it carries, each way.
 struct LineFaults {
-  double lost = 0;                       ///< share, [0, 1]
-  std::chrono::milliseconds delay{0};    ///< of each
-  std::chrono::milliseconds scatter{0};  ///< at most that much more, so that frames overtake each other
+  double lost = 0;                     ///< share, [0, 1]
+  std::chrono::milliseconds delay{0};  ///< of each
+  std::chrono::milliseconds scatter{
+      0};  ///< at most that much more, so that frames overtake each other
 };
 
-/// Two hosts, 10.88.N.1 and 10.88.N.2, that see each other and nobody else: network namespaces whose cable is a thread
-/// of this process. They go with the test.
+/// Two hosts, 10.88.N.1 and 10.88.N.2, that see each other and nobody else: network namespaces
+/// whose cable is a thread of this process. They go with the test.
 class TwoHosts {
  public:
   explicit TwoHosts(const LineFaults& faults = {});
@@ -35,8 +36,8 @@ class TwoHosts {
   /// Frames that came through, both ways.
   [[nodiscard]] std::uint64_t carried() const;
   void wait_until_carried(std::uint64_t frames) const;
-  /// All frames that came from that host so far (the last 20,000) once more, as somebody on the line can send them; how
-  /// many these were.
+  /// All frames that came from that host so far (the last 20,000) once more, as somebody on the
+  /// line can send them; how many these were.
   std::size_t repeat_from(std::size_t host);
   /// The same command on that host.
   [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const;

@@ -20,7 +20,8 @@ std::string file_of(const std::string& series) {
 bool has_ur10() { return std::filesystem::exists(file_of("c")); }
 
 std::shared_ptr<const Cell> ur10_cell() {
-  return std::make_shared<const Cell>(demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
+  return std::make_shared<const Cell>(
+      demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
 }
 
 MeasurementBatch ur10_series(const std::string& name, int training, int stride, int held_stride) {

@@ -14,9 +14,9 @@ namespace trammel::test {
 /// Its cell: base and tool unknown.
 [[nodiscard]] std::shared_ptr<const Cell> ur10_cell();
 
-/// Series `name` (c or d) with every pose held out whose id ends in 7, 8 or 9; of the others every `stride`th, at most
-/// `training`. Of the poses held out every `held_stride`th.
-[[nodiscard]] MeasurementBatch ur10_series(const std::string& name, int training = 1 << 30, int stride = 1,
-                                           int held_stride = 1);
+/// Series `name` (c or d) with every pose held out whose id ends in 7, 8 or 9; of the others every
+/// `stride`th, at most `training`. Of the poses held out every `held_stride`th.
+[[nodiscard]] MeasurementBatch ur10_series(const std::string& name, int training = 1 << 30,
+                                           int stride = 1, int held_stride = 1);
 
 }  // namespace trammel::test

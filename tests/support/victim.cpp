@@ -56,8 +56,9 @@ void limit(int resource, rlim_t most) {
   wire::dds::TypeSupport type(new UnreadType);
   type.register_type(participant->get());
   auto* topic = (*participant)->create_topic("Topic", "Type", wire::dds::TOPIC_QOS_DEFAULT);
-  auto* reader =
-      (*participant)->create_subscriber(wire::subscriber_qos({}))->create_datareader(topic, wire::call_reader_qos(16));
+  auto* reader = (*participant)
+                     ->create_subscriber(wire::subscriber_qos({}))
+                     ->create_datareader(topic, wire::call_reader_qos(16));
   if (reader == nullptr || ::write(ready, "r", 1) != 1) ::_exit(1);
   while (true) ::pause();
 }

@@ -8,8 +8,8 @@
 
 namespace trammel::test {
 
-/// A participant with a reader of "Topic" in a process of its own, for packets that may end it. Limited in memory and
-/// processor time.
+/// A participant with a reader of "Topic" in a process of its own, for packets that may end it.
+/// Limited in memory and processor time.
 class Victim {
  public:
   static constexpr std::uint32_t kDomain = 41;

@@ -32,7 +32,8 @@ std::string shipped_cell_file() { return TRAMMEL_SOURCE_DIR "/config/cell-7.yaml
 
 std::string virtual_batch_csv(int poses, std::uint64_t seed) {
   const auto cell = shipped_cell();
-  const VirtualRobot robot = demand(read_virtual_robot(TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", cell));
+  const VirtualRobot robot =
+      demand(read_virtual_robot(TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", cell));
   SimulateOptions options;
   options.seed = seed;
   return to_csv(demand(simulate(robot, draw_joints(*cell, poses, seed), options)));

@@ -30,19 +30,23 @@ VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell) {
 VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad) {
   const std::vector<Parameter> parameters = robot.truth.parameters();
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (parameters[k].name == fmt::format("q{}", joint)) robot.truth.values(static_cast<Eigen::Index>(k)) += rad;
+    if (parameters[k].name == fmt::format("q{}", joint))
+      robot.truth.values(static_cast<Eigen::Index>(k)) += rad;
   }
   return robot;
 }
 
 VirtualRobot in_warmth(VirtualRobot robot, double temperature, double growth) {
-  const Eigen::Index first = add_source(robot.truth, demand(make_error_source("thermal_growth", *robot.truth.cell)));
+  const Eigen::Index first =
+      add_source(robot.truth, demand(make_error_source("thermal_growth", *robot.truth.cell)));
   robot.truth.values(first) = growth;
-  robot.course = {.seconds_per_pose = 20, .temperature_start = temperature, .temperature_end = temperature};
+  robot.course = {
+      .seconds_per_pose = 20, .temperature_start = temperature, .temperature_end = temperature};
   return robot;
 }
 
-MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed, bool orientation) {
+MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed,
+                          bool orientation) {
   const Eigen::MatrixXd q = demand(plan_poses(*robot.truth.cell, {poses, seed}));
   SimulateOptions options;
   options.seed = seed + 1000;

@@ -8,7 +8,8 @@
 #include "server/simulate/simulate.h"
 #include "tests/support/from_rows.h"
 
-/// The shipped virtual robot, measured. Tests see its batches; its truth stays inside the simulator.
+/// The shipped virtual robot, measured. Tests see its batches; its truth stays inside the
+/// simulator.
 namespace trammel::test {
 
 [[nodiscard]] std::shared_ptr<const Cell> cell_7();
@@ -17,7 +18,8 @@ namespace trammel::test {
 [[nodiscard]] VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell);
 /// The robot whose joint (1-based) has lost its zero by that much.
 [[nodiscard]] VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad);
-/// The robot on a day of that temperature (degrees Celsius, recorded), its links growing by so much (1/K).
+/// The robot on a day of that temperature (degrees Celsius, recorded), its links growing by so much
+/// (1/K).
 [[nodiscard]] VirtualRobot in_warmth(VirtualRobot robot, double temperature, double growth);
 /// `poses` poses of the cell's ranges as its tracker measures them.
 [[nodiscard]] MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed,

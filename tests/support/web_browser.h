@@ -15,14 +15,16 @@
 
 namespace trammel::test {
 
-/// A real browser (Debian's chromium) that does what WebDriver tells it, with a profile of its own. Ends with the test.
+/// A real browser (Debian's chromium) that does what WebDriver tells it, with a profile of its own.
+/// Ends with the test.
 class WebBrowser {
  public:
   static constexpr const char* kDriver = "/usr/bin/chromedriver";
   [[nodiscard]] static bool is_there() { return std::filesystem::exists(kDriver); }
 
   WebBrowser() : driver_({kDriver, "--port=0", "--log-level=SEVERE"}) {
-    EXPECT_TRUE(driver_.wait_for_line("started successfully on port", kLimit)) << driver_.standard_error();
+    EXPECT_TRUE(driver_.wait_for_line("started successfully on port", kLimit))
+        << driver_.standard_error();
     std::smatch found;
     const std::string said = driver_.standard_output();
     if (std::regex_search(said, found, std::regex("successfully on port ([0-9]+)")))
@@ -34,8 +36,10 @@ class WebBrowser {
     const nlohmann::json opened =
         ask("POST", "/session",
             {{"capabilities",
-              {{"alwaysMatch", {{"goog:chromeOptions", options}, {"goog:loggingPrefs", {{"browser", "ALL"}}}}}}}});
-    if (opened.contains("sessionId")) session_ = "/session/" + opened["sessionId"].get<std::string>();
+              {{"alwaysMatch",
+                {{"goog:chromeOptions", options}, {"goog:loggingPrefs", {{"browser", "ALL"}}}}}}}});
+    if (opened.contains("sessionId"))
+      session_ = "/session/" + opened["sessionId"].get<std::string>();
   }
   ~WebBrowser() {
     if (!session_.empty()) ask("DELETE", session_, nullptr);
@@ -49,13 +53,15 @@ class WebBrowser {
   void resize(int width, int height) {
     ask("POST", session_ + "/goog/cdp/execute",
         {{"cmd", "Emulation.setDeviceMetricsOverride"},
-         {"params", {{"width", width}, {"height", height}, {"deviceScaleFactor", 1}, {"mobile", false}}}});
+         {"params",
+          {{"width", width}, {"height", height}, {"deviceScaleFactor", 1}, {"mobile", false}}}});
   }
   /// Until it is loaded.
   void open(const std::string& address) { ask("POST", session_ + "/url", {{"url", address}}); }
   /// What JavaScript that runs in the page returns.
   nlohmann::json run(const std::string& script) {
-    return ask("POST", session_ + "/execute/sync", {{"script", script}, {"args", nlohmann::json::array()}});
+    return ask("POST", session_ + "/execute/sync",
+               {{"script", script}, {"args", nlohmann::json::array()}});
   }
   /// PNG.
   std::string screenshot() {
@@ -79,7 +85,8 @@ class WebBrowser {
     if (end == std::string::npos || at == std::string::npos || at > end) return false;
     return bytes.size() >= end + 4 + std::stoul(bytes.substr(at + 17, 20));
   }
-  nlohmann::json ask(const std::string& method, const std::string& path, const nlohmann::json& body) {
+  nlohmann::json ask(const std::string& method, const std::string& path,
+                     const nlohmann::json& body) {
     if (is_gone_) return {};
     const std::string text = body.is_null() ? "" : body.dump();
     const OpenConnection connection(port_);
@@ -95,10 +102,12 @@ class WebBrowser {
     is_gone_ = answer.code == 0;
     const nlohmann::json json = nlohmann::json::parse(answer.body, nullptr, false);
     EXPECT_EQ(answer.code, 200) << method << " " << path << "\n" << answer.body.substr(0, 400);
-    return answer.code == 200 && json.is_object() ? json.value("value", nlohmann::json()) : nlohmann::json();
+    return answer.code == 200 && json.is_object() ? json.value("value", nlohmann::json())
+                                                  : nlohmann::json();
   }
   static std::string decoded(const std::string& base64) {
-    static const std::string kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    static const std::string kDigits =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string bytes;
     unsigned value = 0;
     int bits = 0;

@@ -15,7 +15,8 @@
 #include "tests/support/virtual_robot.h"
 
 // The recipe of server/error_sources/README.md for adding a cause, followed to the letter: one file
-// (tests/error_sources/hose_pull.h) and one line that registers it. Nothing else anywhere knows of it.
+// (tests/error_sources/hose_pull.h) and one line that registers it. Nothing else anywhere knows of
+// it.
 
 namespace trammel {
 namespace {
@@ -30,14 +31,16 @@ class TheRecipe : public testing::Test {
     cell->model.error_sources = {"base", "geometry"};
     cell->model.bias = "none";
     cell_ = std::move(cell);
-    batch_ = test::with_held_out(pulled(test::demand(plan_poses(*cell_, {.count = 160, .seed = 3}))), 0.2, 1);
+    batch_ = test::with_held_out(
+        pulled(test::demand(plan_poses(*cell_, {.count = 160, .seed = 3}))), 0.2, 1);
   }
 
-  /// As a robot measures them that goes elsewhere than it was told: the effect is put in by hand, not by the cause.
+  /// As a robot measures them that goes elsewhere than it was told: the effect is put in by hand,
+  /// not by the cause.
   [[nodiscard]] MeasurementBatch pulled(const Eigen::MatrixXd& told) const {
     Eigen::MatrixXd gone = told;
-    gone.col(kJoint).array() +=
-        1.5e-4 * (3 * told.col(kJoint - 1).array()).sin() - 0.8e-4 * (3 * told.col(kJoint - 1).array()).cos();
+    gone.col(kJoint).array() += 1.5e-4 * (3 * told.col(kJoint - 1).array()).sin() -
+                                0.8e-4 * (3 * told.col(kJoint - 1).array()).cos();
     VirtualRobot robot{test::demand(make_physical_model(cell_, {"base"})), 13e-6, 61e-6, {}};
     robot.truth.values(0) = 1e-3;  // x0
     MeasurementBatch batch = test::demand(simulate(robot, gone, {}));
@@ -73,7 +76,8 @@ TEST_F(TheRecipe, OfOneFileAndOneLineIsFoundNamedExplainedAndAddedToTheModel) {
   EXPECT_NEAR(finding.parameters[1].value, -0.8e-4, finding.parameters[1].u95 + 1e-6);
 
   // People read its plain name and its advice; programs its spelling.
-  EXPECT_NE(diagnosis.sentence.find("hose pull in joint 3"), std::string::npos) << diagnosis.sentence;
+  EXPECT_NE(diagnosis.sentence.find("hose pull in joint 3"), std::string::npos)
+      << diagnosis.sentence;
   EXPECT_EQ(finding.action, "give the hoses more slack, or compensate them");
   EXPECT_EQ(diagnosis_json(diagnosis)["findings"][0]["cause"], "hose_pull");
   const std::string page = diagnosis_page(diagnosis, *cell_);

@@ -24,9 +24,11 @@ double inside(const VirtualRobot& robot, const CompensatedModel& model) {
   double count = 0;
   for (const Measurement& m : fresh.measurements) {
     const ErrorPrediction said = model.predict(m.context.q, m.context.tool, m.context.payload);
-    const Vector3 real_B = (robot.truth.X_WB.inverse() * robot.truth.pose_W(m.context)).translation();
+    const Vector3 real_B =
+        (robot.truth.X_WB.inverse() * robot.truth.pose_W(m.context)).translation();
     const Vector3 missed = real_B - said.X_BT_predicted.translation();
-    count += static_cast<double>((missed.array().abs() < 1.96 * said.true_stddev_B.array()).count());
+    count +=
+        static_cast<double>((missed.array().abs() < 1.96 * said.true_stddev_B.array()).count());
   }
   return count / (3.0 * static_cast<double>(fresh.measurements.size()));
 }

@@ -33,7 +33,9 @@ class Extend : public testing::Test {
     diagnosis_.batch.id = "b1";
   }
 
-  CheckedBatch checked(const MeasurementBatch& batch) const { return test::demand(check_against_cell(batch, *cell_)); }
+  CheckedBatch checked(const MeasurementBatch& batch) const {
+    return test::demand(check_against_cell(batch, *cell_));
+  }
 
   static constexpr const char* kGear = "gear_transmission:3@2";
   std::shared_ptr<const Cell> cell_;
@@ -81,7 +83,8 @@ TEST_F(Extend, DoesNotAddAnotherFormOfTheComplianceThatTheCellHasAlready) {
   carrying.model.error_sources = {"base", "compliance"};
   diagnosis_.sources_before = {"base", "compliance_linear"};
   diagnosis_.sources_after = {"base", "compliance_first_order", kGear};
-  EXPECT_EQ(added_sources(carrying.model.error_sources, diagnosis_), (std::vector<std::string>{kGear}));
+  EXPECT_EQ(added_sources(carrying.model.error_sources, diagnosis_),
+            (std::vector<std::string>{kGear}));
   carrying.model.error_sources = {"base"};
   diagnosis_.sources_before = {"base"};
   EXPECT_EQ(added_sources(carrying.model.error_sources, diagnosis_),
@@ -90,9 +93,13 @@ TEST_F(Extend, DoesNotAddAnotherFormOfTheComplianceThatTheCellHasAlready) {
 
 TEST_F(Extend, KeepsEveryCauseThatLowersTheErrorByItself) {
   VirtualRobot robot{
-      test::demand(make_physical_model(cell_, {"base", kGear, "encoder_eccentricity:2"})), 20e-6, 60e-6, {}};
+      test::demand(make_physical_model(cell_, {"base", kGear, "encoder_eccentricity:2"})),
+      20e-6,
+      60e-6,
+      {}};
   robot.truth.values.tail<4>() = Eigen::Vector4d(1e-4, 2e-4, 2e-4, 1e-4);
-  batch_ = test::with_held_out(test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
+  batch_ = test::with_held_out(
+      test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
   diagnosis_.sources_after = {"base", kGear, "encoder_eccentricity:2"};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
   EXPECT_EQ(extension.sources, diagnosis_.sources_after);
@@ -113,13 +120,15 @@ TEST_F(Extend, IsNotJudgedByAHeldOutPoseThatFitsNeitherModelAndSaysSo) {
   diagnosis_.sources_after = {"base", kGear};
   const auto [row, batch] = with_one_off(batch_, {0, 0, 0.02});
   const Extension counted = test::demand(extend(cell_, batch, diagnosis_, {}));
-  EXPECT_FALSE(counted.gain.beyond_chance()) << "a pose 20 mm off decides: " << to_string(counted.gain);
+  EXPECT_FALSE(counted.gain.beyond_chance())
+      << "a pose 20 mm off decides: " << to_string(counted.gain);
   diagnosis_.suspects = {{"bad", row, 0.02, "", true}};
   const Extension extension = test::demand(extend(cell_, batch, diagnosis_, {}));
   EXPECT_TRUE(extension.gain.beyond_chance()) << to_string(extension.gain);
   EXPECT_EQ(extension.gain.poses, 29);
   EXPECT_EQ(extension.gain.left_out.size(), 1U);
-  EXPECT_NE(to_string(extension.gain).find("judged without " + extension.gain.left_out.at(0)), std::string::npos);
+  EXPECT_NE(to_string(extension.gain).find("judged without " + extension.gain.left_out.at(0)),
+            std::string::npos);
   EXPECT_EQ(extension.after.parts().validation->poses, 30) << "it still counts in the figures";
 }
 
@@ -134,7 +143,8 @@ TEST_F(Extend, IsJudgedByAllPosesWhereMoreThanATenthFitNeitherModel) {
   diagnosis_.suspects.pop_back();
   EXPECT_EQ(judges_of(diagnosis_, rows).batch.measurements.size(), 27U);
   diagnosis_.suspects[0].held_out = false;
-  EXPECT_EQ(judges_of(diagnosis_, rows).left_out.size(), 2U) << "one that was learned from is not held out";
+  EXPECT_EQ(judges_of(diagnosis_, rows).left_out.size(), 2U)
+      << "one that was learned from is not held out";
 }
 
 TEST_F(Extend, IsJudgedAsAServiceJudgesAndNeverByFewerThanThirtyPoses) {
@@ -145,17 +155,19 @@ TEST_F(Extend, IsJudgedAsAServiceJudgesAndNeverByFewerThanThirtyPoses) {
   }
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
   EXPECT_TRUE(extension.gain.beyond_chance()) << to_string(extension.gain);
-  EXPECT_NE(extension.why_not().find("20 poses are held out to judge by in the joint ranges of the model without what "
-                                     "was found, 30 are needed"),
+  EXPECT_NE(extension.why_not().find("20 poses are held out to judge by in the joint ranges of the "
+                                     "model without what was found, 30 are needed"),
             std::string::npos)
       << extension.why_not();
 }
 
 TEST_F(Extend, FilesHoldOutWhatAServiceDrawsAndWhatTheBatchSays) {
   const CheckedBatch said = test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
-  EXPECT_EQ(said.held_out().measurements.size(), 30U + 18U) << "a fifth of those that the batch does not hold out";
+  EXPECT_EQ(said.held_out().measurements.size(), 30U + 18U)
+      << "a fifth of those that the batch does not hold out";
   for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kUnassigned;
-  const CheckedBatch drawn = test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
+  const CheckedBatch drawn =
+      test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
   EXPECT_EQ(drawn.held_out().measurements.size(), 34U);
 }
 
@@ -164,7 +176,8 @@ TEST_F(Extend, BeginsWithTheNominalModelWhereTheCellListsNoSources) {
   nominal.model.error_sources.clear();
   diagnosis_.sources_before = {};
   diagnosis_.sources_after = {"base"};
-  const Extension extension = test::demand(extend(std::make_shared<const Cell>(nominal), batch_, diagnosis_, {}));
+  const Extension extension =
+      test::demand(extend(std::make_shared<const Cell>(nominal), batch_, diagnosis_, {}));
   EXPECT_TRUE(extension.before.parts().physics.sources.empty());
   EXPECT_EQ(extension.after.provenance().level, "base");
 }
@@ -183,7 +196,8 @@ TEST_F(Extend, SaysWhatATrueCauseIsWorthOnAnotherDayWithAnInterval) {
   EXPECT_GT(extension.day->lower, 0.5);
 }
 
-/// The instrument drifts while it becomes warmer: growth of the arm goes with it in this batch, and on no other day.
+/// The instrument drifts while it becomes warmer: growth of the arm goes with it in this batch, and
+/// on no other day.
 MeasurementBatch drifting_as_it_warms(MeasurementBatch batch) {
   const auto rows = static_cast<double>(batch.measurements.size());
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
@@ -198,7 +212,8 @@ MeasurementBatch drifting_as_it_warms(MeasurementBatch batch) {
 
 TEST_F(Extend, ACauseThatFollowedTheClockOfThisBatchIsNotCarriedToAnotherDay) {
   diagnosis_.sources_after = {"base", kGear, "thermal_growth"};
-  const Extension extension = test::demand(extend(cell_, drifting_as_it_warms(batch_), diagnosis_, {}));
+  const Extension extension =
+      test::demand(extend(cell_, drifting_as_it_warms(batch_), diagnosis_, {}));
   EXPECT_EQ(extension.sources, (std::vector<std::string>{"base", kGear}));
   ASSERT_EQ(extension.left_out.size(), 1U);
   EXPECT_EQ(extension.left_out.front().source, "thermal_growth");
@@ -218,12 +233,15 @@ TEST_F(Extend, IsNotWorthwhileWhereOnlyThisBatchGains) {
 }
 
 TEST_F(Extend, WhatTheInstrumentDidIsNoGainOfAnotherDay) {
-  VirtualRobot robot{test::demand(make_physical_model(cell_, {"base", "tracker_moved@61"})), 20e-6, 60e-6, {}};
+  VirtualRobot robot{
+      test::demand(make_physical_model(cell_, {"base", "tracker_moved@61"})), 20e-6, 60e-6, {}};
   robot.truth.values(robot.truth.values.size() - 6) = 2e-3;
-  batch_ = test::with_held_out(test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
+  batch_ = test::with_held_out(
+      test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
   diagnosis_.sources_after = {"base", "tracker_moved@61"};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
-  EXPECT_LT(extension.gain.rms_after, 0.1 * extension.gain.rms_before) << "in this batch it is all of the error";
+  EXPECT_LT(extension.gain.rms_after, 0.1 * extension.gain.rms_before)
+      << "in this batch it is all of the error";
   ASSERT_TRUE(extension.day);
   EXPECT_NEAR(extension.day->share, 0, 0.05) << to_string(*extension.day);
 }
@@ -269,7 +287,8 @@ TEST_F(Extend, BeginsWithWhatTheModelInForceWasTrainedWith) {
   carrying.model.error_sources = {"base", "compliance"};
   const CompensatedModel model = test::demand(train(cell_, batch_, options));
   EXPECT_EQ(sources_in_force(model, carrying, checked(batch_)),
-            (std::vector<std::string>{"base", "tracker_moved@12", "gear_transmission:3@2", "compliance"}));
+            (std::vector<std::string>{"base", "tracker_moved@12", "gear_transmission:3@2",
+                                      "compliance"}));
   MeasurementBatch another = batch_;
   another.source_text += "\n";
   EXPECT_EQ(sources_in_force(model, carrying, checked(another)),
@@ -281,8 +300,9 @@ TEST_F(Extend, AMapWhoseSpectrumWasLearnedIsTheOneThatTheCellFileNames) {
   options.level = "base,compliance,joint_map:2";
   const CompensatedModel model = test::demand(train(cell_, batch_, options));
   const auto& sources = model.parts().physics.sources;
-  const auto map = std::find_if(sources.begin(), sources.end(),
-                                [](const auto& one) { return one->name().starts_with("joint_map:2@"); });
+  const auto map = std::find_if(sources.begin(), sources.end(), [](const auto& one) {
+    return one->name().starts_with("joint_map:2@");
+  });
   ASSERT_NE(map, sources.end());
   EXPECT_NE((*map)->name().find('+'), std::string::npos);
   const CompensatedModel read = test::demand(deserialize(serialize(model), "memory"));
@@ -300,9 +320,9 @@ TEST_F(Extend, AMapWhoseSpectrumWasLearnedIsTheOneThatTheCellFileNames) {
 }
 
 TEST(LastingSources, AreThoseThatBelongToTheRobotAndNotToTheBatch) {
-  EXPECT_EQ(
-      lasting_sources({"base", "tracker_moved@12", "gear_transmission:3@48.5", "joint_slip:2@40", "tracker_drift"}),
-      (std::vector<std::string>{"base", "gear_transmission:3@48.5"}));
+  EXPECT_EQ(lasting_sources({"base", "tracker_moved@12", "gear_transmission:3@48.5",
+                             "joint_slip:2@40", "tracker_drift"}),
+            (std::vector<std::string>{"base", "gear_transmission:3@48.5"}));
 }
 
 }  // namespace

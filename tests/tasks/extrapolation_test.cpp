@@ -19,7 +19,8 @@ namespace {
 /// The 6 dim (s) range of Table 5.3.
 JointRanges small_box() {
   JointRanges box;
-  for (const auto& [low, high] : {std::pair{-15, 15}, {-15, 15}, {-15, 30}, {-30, 30}, {-30, 30}, {-30, 30}}) {
+  for (const auto& [low, high] :
+       {std::pair{-15, 15}, {-15, 15}, {-15, 30}, {-30, 30}, {-30, 30}, {-30, 30}}) {
     box.emplace_back(from_deg(low), from_deg(high));
   }
   return box;
@@ -34,7 +35,8 @@ JointVector slope_of(const CalibrationResult& found, const MeasurementBatch& bat
   return extrapolation_slope(LeftOut(found, batch), found.model.cell->robot);
 }
 
-BiasModel learned(const CalibrationResult& found, const MeasurementBatch& batch, const std::string& kernel) {
+BiasModel learned(const CalibrationResult& found, const MeasurementBatch& batch,
+                  const std::string& kernel) {
   BiasProblem problem = leftover(found.model, batch);
   const BiasPhysics physics(found.model);
   for (const Measurement& m : batch.measurements) problem.features.push_back(physics.at(m.context));
@@ -51,7 +53,8 @@ CalibrationResult as_it_is(CalibrationResult found) {
   return found;
 }
 
-TEST(LeftOut, WithoutABlockTellsWhatIdentificationFromTheRestFindsHoweverUncertainTheLinksWeightsAre) {
+TEST(LeftOut,
+     WithoutABlockTellsWhatIdentificationFromTheRestFindsHoweverUncertainTheLinksWeightsAre) {
   const test::HeavyArm arm = test::draw_heavy_arm({.seed = 3, .payloads = 0});
   const MeasurementBatch batch = test::measured(arm, 200, 1);
   const std::vector<std::string> sources = {"base", "geometry", "self_weight", "compliance_linear"};
@@ -94,7 +97,8 @@ TEST(Extrapolation, ACompletePhysicsIsTrustedFarOut) {
 
 TEST(Extrapolation, ABiasWithParametersErrsFarOutAsPhysicsDoesAndSaysSo) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
-  const test::OutsideFigures figures = test::asked_outside(robot, small_box(), "M2", "se + parameters", 300, 2);
+  const test::OutsideFigures figures =
+      test::asked_outside(robot, small_box(), "M2", "se + parameters", 300, 2);
   for (const test::OutsideBand& band : figures.bands) {
     EXPECT_GT(band.coverage_95, 0.91) << band.from << " to " << band.to;
     EXPECT_LT(band.stddev, 3 * band.rms) << band.from << " to " << band.to;
@@ -108,28 +112,35 @@ TEST(Extrapolation, ABiasWithParametersErrsFarOutAsPhysicsDoesAndSaysSo) {
 
 TEST(Extrapolation, ABiasWithMapsSaysHowMuchItErrsFarOutInPlaceAndInDirection) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
-  const test::OutsideFigures figures = test::asked_outside(robot, small_box(), "M2", "se + joint_map", 300, 1);
+  const test::OutsideFigures figures =
+      test::asked_outside(robot, small_box(), "M2", "se + joint_map", 300, 1);
   for (const test::OutsideBand& band : figures.bands) {
-    // More than a range out too little is claimed: half of the true error, and no slope is learned of rotations.
+    // More than a range out too little is claimed: half of the true error, and no slope is learned
+    // of rotations.
     if (band.from >= 1) continue;
     EXPECT_GT(band.coverage_95, 0.88) << band.from << " to " << band.to;
     EXPECT_LT(band.stddev, 1.5 * band.rms) << band.from << " to " << band.to;
-    EXPECT_GT(band.rotation_coverage_95, band.from < 0.3 ? 0.83 : 0.65) << band.from << " to " << band.to;
+    EXPECT_GT(band.rotation_coverage_95, band.from < 0.3 ? 0.83 : 0.65)
+        << band.from << " to " << band.to;
   }
 }
 
 TEST(Extrapolation, WhatTheParametersLeaveUncertainIsNoGrowthOfWhatMapsMiss) {
   const auto cell = test::cell_7();
-  const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 80, 11);
+  const MeasurementBatch batch =
+      test::measured_within(test::chapter_5_robot(cell), small_box(), 80, 11);
   const CalibrationResult found = identified(cell, "M3", batch);
   const BiasModel bias = learned(found, batch, "se + joint_map");
   const JointVector slope = extrapolation_slope(LeftOut(found, batch), cell->robot, bias);
-  EXPECT_LT(slope.norm(), 0.1e-3);  // twice as much is what the parameters leave uncertain of the ends
+  EXPECT_LT(slope.norm(),
+            0.1e-3);  // twice as much is what the parameters leave uncertain of the ends
 }
 
-TEST(Extrapolation, AJointWhoseEndsLeaveNothingToIdentifyFromIsTrustedNoMoreThanTheWorstOfTheOthers) {
+TEST(Extrapolation,
+     AJointWhoseEndsLeaveNothingToIdentifyFromIsTrustedNoMoreThanTheWorstOfTheOthers) {
   const auto cell = test::cell_7();
-  // Joint 1 stood at either end of its range: without one of them half of the poses are left, otherwise two thirds.
+  // Joint 1 stood at either end of its range: without one of them half of the poses are left,
+  // otherwise two thirds.
   MeasurementBatch batch;
   for (const bool upper : {false, true}) {
     JointRanges box = small_box();
@@ -141,14 +152,16 @@ TEST(Extrapolation, AJointWhoseEndsLeaveNothingToIdentifyFromIsTrustedNoMoreThan
   CalibrationResult found = as_it_is(identified(cell, "M1", batch));
   const BiasModel bias = learned(found, batch, "se + joint_map");
   // Where the base is: as if two fifths of these poses had told it.
-  found.covariance(0, 0) = std::pow(std::hypot(cell->tracker.sigma, found.discrepancy), 2) / (0.4 * 90);
+  found.covariance(0, 0) =
+      std::pow(std::hypot(cell->tracker.sigma, found.discrepancy), 2) / (0.4 * 90);
   const LeftOut poses(found, batch);
   std::vector<Eigen::Index> half(45), third(30);
   std::iota(half.begin(), half.end(), 0);
   std::iota(third.begin(), third.end(), 0);
   ASSERT_FALSE(poses.without(half));
   ASSERT_TRUE(poses.without(third));
-  for (const JointVector& slope : {slope_of(found, batch), extrapolation_slope(poses, cell->robot, bias)}) {
+  for (const JointVector& slope :
+       {slope_of(found, batch), extrapolation_slope(poses, cell->robot, bias)}) {
     EXPECT_GT(slope.tail(5).maxCoeff(), 0.1e-3);
     EXPECT_EQ(slope(0), slope.tail(5).maxCoeff());
   }
@@ -160,7 +173,8 @@ TEST(Extrapolation, IsOfTheJointThatThePhysicsLacks) {
   const CalibrationResult found = identified(cell, "M3", batch);
   const JointVector complete = slope_of(found, batch);
   // Something that grows with joint 4 across the arm: its slope from 20 to 30 deg is 1.7 mm/rad.
-  for (Measurement& m : batch.measurements) m.p_W.x() += 2e-3 * m.context.q(3) * std::abs(m.context.q(3));
+  for (Measurement& m : batch.measurements)
+    m.p_W.x() += 2e-3 * m.context.q(3) * std::abs(m.context.q(3));
   const JointVector lacking = slope_of(as_it_is(found), batch);
   for (int j = 0; j < 6; ++j) {
     EXPECT_LT(complete(j), 0.15e-3) << j;
@@ -171,7 +185,8 @@ TEST(Extrapolation, IsOfTheJointThatThePhysicsLacks) {
 
 TEST(Extrapolation, ToFirstOrderIsWhatIdentifyingAnewFinds) {
   const auto cell = test::cell_7();
-  const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 200, 10);
+  const MeasurementBatch batch =
+      test::measured_within(test::chapter_5_robot(cell), small_box(), 200, 10);
   const CalibrationResult found = identified(cell, "M2", batch);
   MeasurementBatch rest = batch;
   const auto upper = [](const Measurement& m) { return m.context.q(1) > from_deg(5); };
@@ -184,7 +199,8 @@ TEST(Extrapolation, ToFirstOrderIsWhatIdentifyingAnewFinds) {
     square += (m.p_W - anew.model.pose_W(m.context).translation()).squaredNorm() / 3;
     distance += std::pow(m.context.q(1) - from_deg(5), 2);
   }
-  EXPECT_NEAR(slope_of(found, batch)(1), std::sqrt(square / distance), 0.35 * std::sqrt(square / distance));
+  EXPECT_NEAR(slope_of(found, batch)(1), std::sqrt(square / distance),
+              0.35 * std::sqrt(square / distance));
 }
 
 TEST(Extrapolation, ASuspectIsNotAsked) {

@@ -1,5 +1,5 @@
-// What may take the place of a good model by itself: batches that would make it worse, and batches that are a gain.
-// Each is measured on the virtual robot, by its true error before and after.
+// What may take the place of a good model by itself: batches that would make it worse, and batches
+// that are a gain. Each is measured on the virtual robot, by its true error before and after.
 #include "server/tasks/accept/gate.h"
 
 #include <gtest/gtest.h>
@@ -60,11 +60,13 @@ class GateTest : public testing::Test {
 };
 
 TEST_F(GateTest, ACornerMeasuredAfterTheTrackerWasSetUpElsewhereDoesNotReplaceAGoodModel) {
-  expect_not_worse({measured_on(robot_, {.poses = 25, .seed = 32, .corner = 0.3, .set_up_anew = true})});
+  expect_not_worse(
+      {measured_on(robot_, {.poses = 25, .seed = 32, .corner = 0.3, .set_up_anew = true})});
 }
 
 TEST_F(GateTest, NoisierPosesOverTheWholeRangeDoNotReplaceAGoodModel) {
-  expect_not_worse({measured_on(robot_, {.poses = 100, .seed = 33, .noise = 1.45, .set_up_anew = true})});
+  expect_not_worse(
+      {measured_on(robot_, {.poses = 100, .seed = 33, .noise = 1.45, .set_up_anew = true})});
 }
 
 TEST_F(GateTest, ASubmitterDoesNotChooseHisJudges) {
@@ -82,7 +84,8 @@ TEST_F(GateTest, ASubmitterDoesNotChooseHisJudges) {
 TEST_F(GateTest, JudgesThatAreSentAgainAsABatchOfTheirOwnDoNotTeachTheirOwnAnswers) {
   const MeasurementBatch first = first_day();
   MeasurementBatch judges = test::demand(check_against_cell(first, *cell_)).rows();
-  const std::set<int> rows = judging_rows(judges, TrainerOptions{}.validation_share, TrainerOptions{}.seed);
+  const std::set<int> rows =
+      judging_rows(judges, TrainerOptions{}.validation_share, TrainerOptions{}.seed);
   std::erase_if(judges.measurements, [&](const Measurement& m) { return !rows.contains(m.row); });
   judges.source_text.clear();
   LearningCell learning(cell_);
@@ -96,13 +99,17 @@ TEST_F(GateTest, AnArmThatWasIsNotLearnedAgainFromTheBatchesOfItsTime) {
   learning.submit(first_day());
   TrainOptions offline;
   offline.trained_at = unix_now();
-  const CompensatedModel changed = test::demand(
-      train(cell_, measured_on(with_joint_2_off(1e-3), {.poses = 120, .seed = 39, .set_up_anew = true}), offline));
-  const int version = test::demand(learning.trainer().import_model(cell_->name, serialize(changed)));
-  ASSERT_FALSE(learning.trainer().activate(cell_->name, version)) << "it is worse on what was measured before";
+  const CompensatedModel changed = test::demand(train(
+      cell_, measured_on(with_joint_2_off(1e-3), {.poses = 120, .seed = 39, .set_up_anew = true}),
+      offline));
+  const int version =
+      test::demand(learning.trainer().import_model(cell_->name, serialize(changed)));
+  ASSERT_FALSE(learning.trainer().activate(cell_->name, version))
+      << "it is worse on what was measured before";
   ASSERT_TRUE(learning.trainer().activate(cell_->name, version, {}, true))
       << "the arm has changed, and a person says so";
-  const JobProgress again = learning.finished(test::demand(learning.trainer().retrain(cell_->name, {"day-1"}, "", "")));
+  const JobProgress again =
+      learning.finished(test::demand(learning.trainer().retrain(cell_->name, {"day-1"}, "", "")));
   EXPECT_FALSE(again.in_force) << again.what;
   EXPECT_EQ(learning.in_force(), version);
 }
@@ -122,7 +129,8 @@ class TwoToolsTest : public GateTest {
     std::string text = one_tool.cell_yaml;
     const std::string tools = "\ntools:\n";
     text.insert(text.find(tools) + tools.size(),
-                "  probe: {xyz_mm: [130, 50, 270], q_wxyz: [0.923879532511287, 0, -0.382683432365090, 0]}\n");
+                "  probe: {xyz_mm: [130, 50, 270], q_wxyz: [0.923879532511287, 0, "
+                "-0.382683432365090, 0]}\n");
     use(test::demand(parse_cell(text, one_tool.robot_yaml, "cell.yaml")));
   }
 };
@@ -137,7 +145,8 @@ TEST_F(TwoToolsTest, ABatchThatShowsAChangedToolIsKeptOutThoughItTeachesAnotherT
   VirtualRobot bumped = robot_;
   bumped.truth.tools.at("spindle").translation() += Vector3(0.4e-3, 0, 0);
   MeasurementBatch day = measured_on(bumped, {.poses = 120, .seed = 43, .tool = "spindle"});
-  Measurement other = measured_on(robot_, {.poses = 20, .seed = 44, .tool = "probe"}).measurements.front();
+  Measurement other =
+      measured_on(robot_, {.poses = 20, .seed = 44, .tool = "probe"}).measurements.front();
   other.pose_id = "another";
   day.measurements.push_back(std::move(other));
   const JobProgress done = learning.submit(day);
@@ -151,21 +160,26 @@ TEST_F(TwoToolsTest, AReleasedBatchJudgesFromThenOn) {
   learning.submit(first_day("spindle"));
   VirtualRobot bumped = robot_;
   bumped.truth.tools.at("spindle").translation() += Vector3(0.4e-3, 0, 0);
-  const JobProgress kept_out = learning.submit(measured_on(bumped, {.poses = 120, .seed = 43, .tool = "spindle"}));
+  const JobProgress kept_out =
+      learning.submit(measured_on(bumped, {.poses = 120, .seed = 43, .tool = "spindle"}));
   ASSERT_EQ(kept_out.stage, JobStage::kFailed) << kept_out.what;
   Trainer& trainer = learning.trainer();
-  const auto released = trainer.retrain(cell_->name, {"day-2"}, "", "", Trainer::Quarantine::kReleased);
+  const auto released =
+      trainer.retrain(cell_->name, {"day-2"}, "", "", Trainer::Quarantine::kReleased);
   const JobProgress taken = learning.finished(test::demand(released));
   ASSERT_TRUE(taken.in_force) << taken.what;
-  const JobProgress again = learning.finished(test::demand(trainer.retrain(cell_->name, {"day-1"}, "", "")));
+  const JobProgress again =
+      learning.finished(test::demand(trainer.retrain(cell_->name, {"day-1"}, "", "")));
   EXPECT_FALSE(again.in_force) << again.what;
-  EXPECT_NE(again.what.find("held-out rms"), std::string::npos) << "held against day-2: " << again.what;
+  EXPECT_NE(again.what.find("held-out rms"), std::string::npos)
+      << "held against day-2: " << again.what;
 }
 
 TEST_F(TwoToolsTest, ABatchOfAnotherToolAloneTeachesThatTool) {
   LearningCell learning(cell_);
   learning.submit(first_day("spindle"));
-  const JobProgress done = learning.submit(measured_on(robot_, {.poses = 80, .seed = 36, .tool = "probe"}));
+  const JobProgress done =
+      learning.submit(measured_on(robot_, {.poses = 80, .seed = 36, .tool = "probe"}));
   EXPECT_TRUE(done.in_force) << done.what;
   EXPECT_TRUE(learning.model().check_trained_with("spindle", "spindle"));
   EXPECT_TRUE(learning.model().check_trained_with("probe", "spindle"));
@@ -176,7 +190,8 @@ TEST_F(GateTest, ManyGoodPosesAfterFewNoisyOnesGoInForceWhereverTheTrackerStands
     LearningCell learning(cell_);
     learning.submit(measured_on(robot_, {.poses = 40, .seed = 37, .noise = 2}));
     const double before = true_error(learning.model(), robot_);
-    const JobProgress done = learning.submit(measured_on(robot_, {.poses = 400, .seed = 38, .set_up_anew = anew}));
+    const JobProgress done =
+        learning.submit(measured_on(robot_, {.poses = 400, .seed = 38, .set_up_anew = anew}));
     EXPECT_TRUE(done.in_force) << done.what;
     EXPECT_LT(true_error(learning.model(), robot_), 0.5 * before);
   }
@@ -186,7 +201,8 @@ TEST_F(GateTest, AnArmThatHasChangedIsLearnedAnew) {
   const VirtualRobot changed = with_joint_2_off(1e-3);
   LearningCell learning(cell_);
   learning.submit(first_day());
-  const JobProgress done = learning.submit(measured_on(changed, {.poses = 120, .seed = 39, .set_up_anew = true}));
+  const JobProgress done =
+      learning.submit(measured_on(changed, {.poses = 120, .seed = 39, .set_up_anew = true}));
   EXPECT_TRUE(done.in_force) << done.what;
   EXPECT_LT(to_mm(true_error(learning.model(), changed)), 0.02);
 }
@@ -194,9 +210,11 @@ TEST_F(GateTest, AnArmThatHasChangedIsLearnedAnew) {
 TEST_F(GateTest, TheOutcomeSaysBeforeAfterLimitAndWhy) {
   LearningCell learning(cell_);
   learning.submit(first_day());
-  const JobProgress done = learning.submit(measured_on(robot_, {.poses = 100, .seed = 40, .noise = 1.45}));
+  const JobProgress done =
+      learning.submit(measured_on(robot_, {.poses = 100, .seed = 40, .noise = 1.45}));
   EXPECT_FALSE(done.in_force);
-  for (const char* part : {"not in force", "held-out rms", "before", "(version 1)", "limit", "activate"})
+  for (const char* part :
+       {"not in force", "held-out rms", "before", "(version 1)", "limit", "activate"})
     EXPECT_NE(done.what.find(part), std::string::npos) << part << " in: " << done.what;
 }
 
@@ -248,14 +266,17 @@ TEST_F(JudgeTest, WhereTheNewestSessionsDoNotFitOnlyTheyJudge) {
   const JudgingSession changed = session({.seed = 3}), again = session({.seed = 4});
   const auto today = [&](const std::vector<JudgingSession>& sessions, std::size_t first_new) {
     std::vector<std::string> ids;
-    for (const JudgingSession& one : sessions_of_today({present.model, &present, {}, sessions, first_new}))
+    for (const JudgingSession& one :
+         sessions_of_today({present.model, &present, {}, sessions, first_new}))
       ids.push_back(one.batch_id);
     return ids;
   };
   EXPECT_EQ(today({old, later}, 1), (std::vector<std::string>{"day-1", "day-2"}));
   EXPECT_EQ(today({old, changed, again}, 1), (std::vector<std::string>{"day-3", "day-4"}));
-  EXPECT_EQ(today({changed, old, later}, 2), (std::vector<std::string>{"day-1", "day-2"})) << "an arm that was";
-  EXPECT_EQ(today({old, changed, later}, 1), (std::vector<std::string>{"day-1", "day-2"})) << "one bad day";
+  EXPECT_EQ(today({changed, old, later}, 2), (std::vector<std::string>{"day-1", "day-2"}))
+      << "an arm that was";
+  EXPECT_EQ(today({old, changed, later}, 1), (std::vector<std::string>{"day-1", "day-2"}))
+      << "one bad day";
 }
 
 }  // namespace

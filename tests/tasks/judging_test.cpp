@@ -32,19 +32,22 @@ TEST(JudgingRows, AreAFifthAndOfAHundredPosesAtLeastThirtyFour) {
   EXPECT_EQ(judging_rows(batch_of(200), kShare, 1).size(), 40U);
   EXPECT_EQ(judging_rows(batch_of(200), kShare, 1), judging_rows(batch_of(200), kShare, 1));
   EXPECT_EQ(judging_rows(batch_of(8), kShare, 1).size(), 2U);
-  EXPECT_TRUE(judging_rows(batch_of(7), kShare, 1).empty()) << "each of a few poses is needed to learn from";
+  EXPECT_TRUE(judging_rows(batch_of(7), kShare, 1).empty())
+      << "each of a few poses is needed to learn from";
 }
 
 TEST(JudgingRows, AreThoseThatAPlainSplitDraws) {
   const MeasurementBatch batch = batch_of(200);
   std::set<int> drawn;
-  for (const Measurement& m : split_batch(batch, kShare, 7).validation.measurements) drawn.insert(m.row);
+  for (const Measurement& m : split_batch(batch, kShare, 7).validation.measurements)
+    drawn.insert(m.row);
   EXPECT_EQ(judging_rows(batch, kShare, 7), drawn) << "models of before judge by the same rows";
 }
 
 TEST(JudgingRows, TheSubmitterHoldsOutMoreButDoesNotChooseThem) {
   MeasurementBatch batch = batch_of(60);
-  for (int i = 0; i < 20; ++i) batch.measurements[static_cast<std::size_t>(i)].set = MeasurementSet::kValidation;
+  for (int i = 0; i < 20; ++i)
+    batch.measurements[static_cast<std::size_t>(i)].set = MeasurementSet::kValidation;
   const std::set<int> judges = judging_rows(batch, kShare, 1);
   EXPECT_EQ(judges.size(), 8U) << "a fifth of the other 40";
   for (int i = 0; i < 20; ++i) EXPECT_FALSE(judges.contains(i + 2));
@@ -92,7 +95,8 @@ TEST(JudgingSessions, ARowThatIsSentAgainUnderAnotherIdJudgesOnceAndIsNotLearned
   const std::set<int> sent_twice = rows_of(first.rows());
   judge_once(sessions);
   EXPECT_EQ(rows_of(sessions[0].judges), first_judges);
-  for (const int row : rows_of(sessions[1].judges)) EXPECT_FALSE(sent_twice.contains(row)) << "of the twenty new ones";
+  for (const int row : rows_of(sessions[1].judges))
+    EXPECT_FALSE(sent_twice.contains(row)) << "of the twenty new ones";
   EXPECT_FALSE(sessions[1].judges.measurements.empty());
   for (const int row : rows_of(without_older_judges(again, sessions).training()))
     EXPECT_FALSE(first_judges.contains(row)) << row;
@@ -133,7 +137,8 @@ TEST(LocatedErrors, DoNotDependOnWhereTheTrackerStood) {
   const LocatedErrors here = located_errors(model, judging_session(batch(false)));
   const LocatedErrors there = located_errors(model, judging_session(batch(true)));
   ASSERT_EQ(here.position.cols(), 34);
-  EXPECT_LT((here.position - there.position).cwiseAbs().maxCoeff(), 2e-6) << "gravity is turned a little";
+  EXPECT_LT((here.position - there.position).cwiseAbs().maxCoeff(), 2e-6)
+      << "gravity is turned a little";
   EXPECT_LT((here.rotation - there.rotation).cwiseAbs().maxCoeff(), 2e-6);
   EXPECT_LT(here.position.norm() / std::sqrt(34.0), 40e-6);
 }

@@ -41,7 +41,8 @@ MeasurementBatch seen_from(const Pose& moved, MeasurementBatch batch, const std:
 MeasurementBatch at_one_wrist(const VirtualRobot& robot, int poses, std::uint64_t seed) {
   Eigen::MatrixXd q = test::demand(plan_poses(*robot.truth.cell, {.count = poses, .seed = seed}));
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    // Joints 2, 3 and 5 turn about parallel axes: the tool keeps its inclination; joint 1 turns it about the vertical.
+    // Joints 2, 3 and 5 turn about parallel axes: the tool keeps its inclination; joint 1 turns it
+    // about the vertical.
     q.row(i).tail<3>() << 0, 0.4 - 0.5 * q(i, 1), 0;
     q(i, 2) = -0.5 * q(i, 1);
   }
@@ -91,12 +92,14 @@ void expect_same_bias(const Parts& now, const Parts& before) {
 }
 
 /// Everything that is not of the source `refitted` is what it was, bit for bit.
-void expect_kept(const CompensatedModel& refit, const CompensatedModel& model, const std::string& refitted) {
+void expect_kept(const CompensatedModel& refit, const CompensatedModel& model,
+                 const std::string& refitted) {
   const Parts& now = refit.parts();
   const Parts& before = model.parts();
   const std::vector<Eigen::Index> kept = kept_parameters(before.physics, refitted);
   EXPECT_EQ(now.physics.values(kept), before.physics.values(kept));
-  EXPECT_EQ(Eigen::MatrixXd(now.covariance(kept, kept)), Eigen::MatrixXd(before.covariance(kept, kept)));
+  EXPECT_EQ(Eigen::MatrixXd(now.covariance(kept, kept)),
+            Eigen::MatrixXd(before.covariance(kept, kept)));
   for (const Eigen::Index k : kept) {
     const auto at = static_cast<std::size_t>(k);
     EXPECT_EQ(now.parameters[at].value, before.parameters[at].value);
@@ -116,8 +119,8 @@ void expect_kept(const CompensatedModel& refit, const CompensatedModel& model, c
   EXPECT_EQ(now.extrapolation_slope, before.extrapolation_slope);
   EXPECT_EQ(now.prior_share_limit, before.prior_share_limit);
   EXPECT_EQ(now.temperature_mean, before.temperature_mean);
-  EXPECT_TRUE(std::includes(now.trained_with.begin(), now.trained_with.end(), before.trained_with.begin(),
-                            before.trained_with.end()));
+  EXPECT_TRUE(std::includes(now.trained_with.begin(), now.trained_with.end(),
+                            before.trained_with.begin(), before.trained_with.end()));
   EXPECT_EQ(now.provenance.batch_hash, before.provenance.batch_hash);
   EXPECT_EQ(now.provenance.training_poses, before.provenance.training_poses);
   ASSERT_EQ(now.provenance.refits.size(), before.provenance.refits.size() + 1);
@@ -137,7 +140,8 @@ TEST(Refit, ABaseIsFoundFromThreePositionsAndNothingElseMoves) {
     const MeasurementBatch fresh = test::measured(robot, 300, 73);
     const double before = model.evaluate(fresh).compensated.rms;
     const Evaluation after = refit.evaluate(seen_from(set_up_elsewhere(), fresh, "fresh"));
-    EXPECT_LT(after.compensated.rms, 2 * before) << "each of the three is known no better than that";
+    EXPECT_LT(after.compensated.rms, 2 * before)
+        << "each of the three is known no better than that";
     EXPECT_GT(after.coverage_95, 0.9);
   }
 }
@@ -162,10 +166,12 @@ TEST(Refit, ABaseFromTwentyPositionsAtOneWristIsAsGoodAsTheModelItself) {
   const CompensatedModel model = trained(cell, test::measured(robot, 120, 74), "M3", "none");
   for (const char* kernel : {"none", "se + parameters"}) {
     const CompensatedModel start = trained(cell, test::measured(robot, 120, 74), "M3", kernel);
-    const MeasurementBatch twenty = seen_from(set_up_elsewhere(), at_one_wrist(robot, 20, 75), "twenty");
+    const MeasurementBatch twenty =
+        seen_from(set_up_elsewhere(), at_one_wrist(robot, 20, 75), "twenty");
     const CompensatedModel refit = test::demand(train(cell, twenty, from(start, {"base"})));
     expect_kept(refit, start, "base");
-    const Evaluation after = refit.evaluate(seen_from(set_up_elsewhere(), test::measured(robot, 300, 76), "fresh"));
+    const Evaluation after =
+        refit.evaluate(seen_from(set_up_elsewhere(), test::measured(robot, 300, 76), "fresh"));
     EXPECT_LT(to_mm(after.compensated.rms), 0.030) << kernel;
     EXPECT_GT(after.coverage_95, 0.92) << kernel;
   }
@@ -195,7 +201,8 @@ TEST(Refit, AToolThatTheNewPosesDoNotHaveStaysKnown) {
   auto both = std::make_shared<Cell>(*test::cell_7());
   both->tools["probe"] = make_pose(rotation_exp({0, 0.3, 0}), {0.02, -0.01, 0.31});
   VirtualRobot robot = test::chapter_5_robot(both);
-  const auto measured_with = [&](const Pose& knocked, std::uint64_t seed, bool alternate, int count) {
+  const auto measured_with = [&](const Pose& knocked, std::uint64_t seed, bool alternate,
+                                 int count) {
     VirtualRobot now = robot;
     now.truth.tools["probe"] = knocked * now.truth.tools["probe"];
     const Eigen::MatrixXd joints = test::demand(plan_poses(*both, {.count = count, .seed = seed}));
@@ -211,7 +218,8 @@ TEST(Refit, AToolThatTheNewPosesDoNotHaveStaysKnown) {
     made.id = fmt::format("of-{}", seed);
     return made;
   };
-  const CompensatedModel model = trained(both, measured_with(Pose::Identity(), 80, true, 160), "M3,tool", "none");
+  const CompensatedModel model =
+      trained(both, measured_with(Pose::Identity(), 80, true, 160), "M3,tool", "none");
   const Pose knocked = make_pose(rotation_exp({1e-3, 0, 0}), {1e-3, -0.5e-3, 0.2e-3});
   const CompensatedModel refit =
       test::demand(train(both, measured_with(knocked, 81, false, 20), from(model, {"tool"})));
@@ -221,8 +229,10 @@ TEST(Refit, AToolThatTheNewPosesDoNotHaveStaysKnown) {
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     if (parameters[k].name.ends_with("[probe]")) continue;
     const auto at = static_cast<Eigen::Index>(k);
-    EXPECT_EQ(refit.parts().physics.values(at), model.parts().physics.values(at)) << parameters[k].name;
-    EXPECT_EQ(refit.parts().covariance(at, at), model.parts().covariance(at, at)) << parameters[k].name;
+    EXPECT_EQ(refit.parts().physics.values(at), model.parts().physics.values(at))
+        << parameters[k].name;
+    EXPECT_EQ(refit.parts().covariance(at, at), model.parts().covariance(at, at))
+        << parameters[k].name;
   }
   EXPECT_LT(to_mm(refit.evaluate(measured_with(knocked, 82, false, 200)).compensated.rms), 0.028);
 }
@@ -231,10 +241,12 @@ TEST(Refit, AToolThatIsElsewhereLeavesPosesInTheDomainOfABiasWithParameters) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   cell->tools["spindle"].reset();
   VirtualRobot robot = test::chapter_5_robot(test::cell_7());
-  const CompensatedModel model = trained(cell, test::measured(robot, 120, 92), "M2", "se + parameters");
+  const CompensatedModel model =
+      trained(cell, test::measured(robot, 120, 92), "M2", "se + parameters");
   const int in_domain = model.evaluate(test::measured(robot, 100, 93)).in_domain;
   robot.truth.tools["spindle"].translation() += Vector3(0.01, -0.005, 0.02);
-  const CompensatedModel refit = test::demand(train(cell, test::measured(robot, 25, 94), from(model, {"tool"})));
+  const CompensatedModel refit =
+      test::demand(train(cell, test::measured(robot, 25, 94), from(model, {"tool"})));
   const Evaluation after = refit.evaluate(test::measured(robot, 100, 93));
   EXPECT_EQ(after.in_domain, in_domain);
   EXPECT_GT(after.coverage_95, 0.9);
@@ -245,7 +257,8 @@ TEST(Refit, ABiasThatIsNamedIsLearnedAnewAndOneThatIsNotIsKept) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CompensatedModel model = trained(cell, test::measured(robot, 100, 83), "M2", "se");
-  const MeasurementBatch batch = seen_from(set_up_elsewhere(), test::measured(robot, 40, 84), "moved");
+  const MeasurementBatch batch =
+      seen_from(set_up_elsewhere(), test::measured(robot, 40, 84), "moved");
   TrainOptions options = from(model, {"base"});
   expect_kept(test::demand(train(cell, batch, options)), model, "base");
   options.bias = "matern52";
@@ -262,8 +275,10 @@ TEST(Refit, ABiasThatIsNamedIsLearnedAnewAndOneThatIsNotIsKept) {
 TEST(Refit, AModelFileWhoseBiasWasLearnedNowhereIsRefusedThoughItsHashFits) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
-  const CompensatedModel model = trained(cell, test::measured(robot, 40, 83), "M2", "se + parameters");
-  const MeasurementBatch batch = seen_from(set_up_elsewhere(), test::measured(robot, 30, 84), "moved");
+  const CompensatedModel model =
+      trained(cell, test::measured(robot, 40, 83), "M2", "se + parameters");
+  const MeasurementBatch batch =
+      seen_from(set_up_elsewhere(), test::measured(robot, 30, 84), "moved");
   const std::string text = serialize(test::demand(train(cell, batch, from(model, {"base"}))));
   const auto refusal = [&](const std::function<void(nlohmann::json & origin)>& change) {
     auto file = nlohmann::json::parse(text);
@@ -280,8 +295,9 @@ TEST(Refit, AModelFileWhoseBiasWasLearnedNowhereIsRefusedThoughItsHashFits) {
             Refusal("file", {}, "bias").text("base"));
   EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["X_WB"]["values"][0] = 5; }),
             Refusal("file", {}, "bias_origin: base").beyond(24, 1e-6));
-  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; }),
-            Refusal("file", {}, "bias_origin: tool spindle"));
+  EXPECT_EQ(
+      refusal([](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; }),
+      Refusal("file", {}, "bias_origin: tool spindle"));
   EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["covariance"]["values"][0] = -1e-3; }),
             Refusal("file", {}, "covariance").beyond(-1e-3, 0));
   EXPECT_EQ(refusal([](nlohmann::json& origin) {
@@ -333,16 +349,18 @@ TEST(Refit, AToolThatIsTurnedInTheCellFileAndNotNamedIsToldAsAFrameNotAsOrientat
 class MeasuredRobot : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_c.csv"))
+    if (!std::filesystem::exists(std::string(TRAMMEL_SOURCE_DIR) +
+                                 "/../shared/data/ur10_series_c.csv"))
       GTEST_SKIP() << "the measured UR10 is not at hand (../shared/data)";
   }
   static std::shared_ptr<const Cell> cell() {
-    return std::make_shared<const Cell>(test::demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
+    return std::make_shared<const Cell>(
+        test::demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
   }
   /// Every `stride`-th pose, at most `count`.
   static MeasurementBatch series(const std::string& name, std::size_t count, std::size_t stride) {
-    MeasurementBatch batch =
-        test::demand(read_batch_csv(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_" + name + ".csv"));
+    MeasurementBatch batch = test::demand(read_batch_csv(
+        std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_" + name + ".csv"));
     std::vector<Measurement> some;
     for (std::size_t i = 0; i < batch.measurements.size() && some.size() < count; i += stride)
       some.push_back(batch.measurements[i]);
@@ -359,7 +377,8 @@ TEST_F(MeasuredRobot, Ur10KeepsItsToolWhereOnlyTheBaseIsNamed) {
   expect_kept(base, c, "base");
   EXPECT_GT(to_mm(base.parts().physics.tools.at("tmac").translation().z()), 50);
   const CompensatedModel both = test::demand(train(cell(), d, from(c, {"base", "tool"})));
-  const Evaluation fresh = both.evaluate(test::demand(check_against_cell(series("d", 200, 5), *cell())).rows());
+  const Evaluation fresh =
+      both.evaluate(test::demand(check_against_cell(series("d", 200, 5), *cell())).rows());
   RecordProperty("base_and_tool_mm", fmt::format("{:.4f}", to_mm(fresh.compensated.rms)));
   RecordProperty("calibrated_mm", fmt::format("{:.4f}", to_mm(fresh.calibrated.rms)));
   EXPECT_LT(to_mm(fresh.calibrated.rms), 0.6);

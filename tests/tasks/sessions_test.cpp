@@ -34,14 +34,16 @@ CheckedBatch checked(MeasurementBatch batch, const std::string& id, const Cell& 
   return test::demand(check_against_cell(std::move(batch), cell));
 }
 
-/// Batches of 60 poses, the tracker set up anew for each; from session `changed` on (from 0) on another robot.
-CheckedBatch sessions_of(const VirtualRobot& robot, const VirtualRobot& after, int count, int changed,
-                         std::uint64_t seed, int poses = 60) {
+/// Batches of 60 poses, the tracker set up anew for each; from session `changed` on (from 0) on
+/// another robot.
+CheckedBatch sessions_of(const VirtualRobot& robot, const VirtualRobot& after, int count,
+                         int changed, std::uint64_t seed, int poses = 60) {
   std::vector<CheckedBatch> batches;
   for (int s = 0; s < count; ++s) {
-    const test::Day day{.poses = poses, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
-    batches.push_back(
-        checked(measured_on(s < changed ? robot : after, day), fmt::format("day-{}", s + 1), *robot.truth.cell));
+    const test::Day day{
+        .poses = poses, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+    batches.push_back(checked(measured_on(s < changed ? robot : after, day),
+                              fmt::format("day-{}", s + 1), *robot.truth.cell));
   }
   return joined(batches);
 }
@@ -51,8 +53,10 @@ TEST(Sessions, FiveOfSixtyPosesWithAMovedTrackerAreWorthThreeHundredOfOneSetUp) 
   const VirtualRobot robot = test::chapter_5_robot(cell);
   double several = 0, one = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const CheckedBatch alone = checked(measured_on(robot, {.poses = 300, .seed = 100 * seed}), "all", *cell);
-    several += true_error(test::demand(train(cell, sessions_of(robot, robot, 5, 5, 100 * seed), kPhysics)), robot);
+    const CheckedBatch alone =
+        checked(measured_on(robot, {.poses = 300, .seed = 100 * seed}), "all", *cell);
+    several += true_error(
+        test::demand(train(cell, sessions_of(robot, robot, 5, 5, 100 * seed), kPhysics)), robot);
     one += true_error(test::demand(train(cell, alone, kPhysics)), robot);
   }
   EXPECT_LT(several, 1.25 * one);
@@ -63,7 +67,8 @@ TEST(Sessions, AZeroLostBetweenTwoIsFoundAndDatedAndTheRestOfTheOldDataGoesOnCou
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (int joint = 2; joint <= 5; ++joint) {
     const VirtualRobot after = test::with_zero_off(robot, joint, 2e-4);
-    const CheckedBatch batch = sessions_of(robot, after, 4, 2, 1000 + static_cast<std::uint64_t>(joint));
+    const CheckedBatch batch =
+        sessions_of(robot, after, 4, 2, 1000 + static_cast<std::uint64_t>(joint));
     const CompensatedModel model = test::demand(train(cell, batch, kPhysics));
     const auto& parts = model.parts();
     ASSERT_EQ(parts.changes.size(), 1u) << "joint " << joint;
@@ -82,7 +87,8 @@ TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch batch = sessions_of(robot, test::with_zero_off(robot, 3, 2e-4), 4, 2, 1003);
-  const std::vector<SessionChange> changes = session_changes(test::demand(train(cell, batch, kPhysics)));
+  const std::vector<SessionChange> changes =
+      session_changes(test::demand(train(cell, batch, kPhysics)));
   ASSERT_EQ(changes.size(), 1u);
   const SessionChange& change = changes.front();
   EXPECT_EQ(change.cause, "joint_slip");
@@ -102,7 +108,8 @@ TEST(Sessions, WhereNoClockTellsTheirOrderTheModelSaysOnWhatItRests) {
   const auto model_of = [&](bool first_has_time) {
     std::vector<CheckedBatch> days;
     for (int s = 0; s < 3; ++s) {
-      const test::Day day{.poses = 60, .seed = 500 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+      const test::Day day{
+          .poses = 60, .seed = 500 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
       MeasurementBatch batch = measured_on(s < 2 ? robot : after, day);
       // Given as day 3, day 1, day 2; the clocks say otherwise.
       const double at = 1.7e9 + 86400.0 * s;
@@ -136,17 +143,20 @@ TEST(Sessions, NothingHasChangedWhereOnlyTheTrackerMoved) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const CompensatedModel model = test::demand(train(cell, sessions_of(robot, robot, 4, 4, 7000 * seed), kPhysics));
+    const CompensatedModel model =
+        test::demand(train(cell, sessions_of(robot, robot, 4, 4, 7000 * seed), kPhysics));
     EXPECT_TRUE(model.parts().changes.empty()) << model.parts().changes.front().source;
     EXPECT_EQ(model.parts().sessions.size(), 4u);
   }
 }
 
 /// Sessions as sessions_of() has them; the instrument of each measures lengths too long by `ppm`.
-CheckedBatch stretched_sessions(const VirtualRobot& robot, const std::vector<double>& ppm, std::uint64_t seed) {
+CheckedBatch stretched_sessions(const VirtualRobot& robot, const std::vector<double>& ppm,
+                                std::uint64_t seed) {
   std::vector<CheckedBatch> batches;
   for (std::size_t s = 0; s < ppm.size(); ++s) {
-    MeasurementBatch batch = measured_on(robot, {.poses = 60, .seed = seed + 17 * s, .set_up_anew = true});
+    MeasurementBatch batch =
+        measured_on(robot, {.poses = 60, .seed = seed + 17 * s, .set_up_anew = true});
     for (Measurement& m : batch.measurements) m.p_W *= 1 + 1e-6 * ppm[s];
     batches.push_back(checked(std::move(batch), fmt::format("day-{}", s + 1), *robot.truth.cell));
   }
@@ -156,8 +166,10 @@ CheckedBatch stretched_sessions(const VirtualRobot& robot, const std::vector<dou
 TEST(Sessions, AnInstrumentThatMeasuresTooLongInOneOfThemSpoilsNothing) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
-  const CompensatedModel good = test::demand(train(cell, stretched_sessions(robot, {0, 0, 0, 0}, 300), kPhysics));
-  const CompensatedModel model = test::demand(train(cell, stretched_sessions(robot, {0, 60, 0, 0}, 300), kPhysics));
+  const CompensatedModel good =
+      test::demand(train(cell, stretched_sessions(robot, {0, 0, 0, 0}, 300), kPhysics));
+  const CompensatedModel model =
+      test::demand(train(cell, stretched_sessions(robot, {0, 60, 0, 0}, 300), kPhysics));
   const auto& sessions = model.parts().sessions;
   EXPECT_NEAR(1e6 * sessions[1].scale, -60, 4);
   EXPECT_NEAR(1e6 * sessions[0].scale, 0, 4);
@@ -173,8 +185,8 @@ TEST(Sessions, AnInstrumentThatMeasuresTooLongInOneOfThemSpoilsNothing) {
   EXPECT_EQ(again.parts().sessions, sessions);
 }
 
-/// m, rms of what the model misses on another day of that robot whose instrument measures too long by `ppm`, with the
-/// best shift and turn taken off: nobody knows where the tracker stands.
+/// m, rms of what the model misses on another day of that robot whose instrument measures too long
+/// by `ppm`, with the best shift and turn taken off: nobody knows where the tracker stands.
 double missed_on_a_day(const CompensatedModel& model, const VirtualRobot& robot, double ppm) {
   const MeasurementBatch fresh = measured_on(robot, {.poses = 200, .seed = 999});
   const auto n = static_cast<Eigen::Index>(fresh.measurements.size());
@@ -182,7 +194,8 @@ double missed_on_a_day(const CompensatedModel& model, const VirtualRobot& robot,
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = fresh.measurements[static_cast<std::size_t>(i)];
     real.col(i) = (1 + 1e-6 * ppm) * m.p_W;
-    predicted.col(i) = model.predict(m.context.q, "spindle", "spindle").X_BT_predicted.translation();
+    predicted.col(i) =
+        model.predict(m.context.q, "spindle", "spindle").X_BT_predicted.translation();
   }
   const Pose X_WB = test::demand(fit_transform(real, predicted));
   return std::sqrt((real - X_WB * predicted).squaredNorm() / static_cast<double>(n));
@@ -193,8 +206,9 @@ TEST(Sessions, WhereTheBaseIsUnknownTheModelHasTheLengthsOfTheNewestSession) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   std::vector<CheckedBatch> batches;
   for (const double ppm : {0.0, 85.0}) {
-    MeasurementBatch batch = measured_on(
-        robot, {.poses = ppm == 0 ? 120 : 80, .seed = 60 + static_cast<std::uint64_t>(ppm), .set_up_anew = true});
+    MeasurementBatch batch = measured_on(robot, {.poses = ppm == 0 ? 120 : 80,
+                                                 .seed = 60 + static_cast<std::uint64_t>(ppm),
+                                                 .set_up_anew = true});
     for (Measurement& m : batch.measurements) m.p_W *= 1 + 1e-6 * ppm;
     batches.push_back(checked(std::move(batch), fmt::format("day-{}", batches.size() + 1), *cell));
   }
@@ -205,7 +219,8 @@ TEST(Sessions, WhereTheBaseIsUnknownTheModelHasTheLengthsOfTheNewestSession) {
   EXPECT_EQ(sessions.back().scale, 0);
   EXPECT_NEAR(1e6 * sessions.front().scale, 85, 6);
   for (const Note& note : notes_of(model))
-    EXPECT_TRUE(note.code != "session_scale" || note.text.find("ppm shorter than session day-2") != std::string::npos)
+    EXPECT_TRUE(note.code != "session_scale" ||
+                note.text.find("ppm shorter than session day-2") != std::string::npos)
         << note.text;
 }
 
@@ -220,8 +235,8 @@ TEST(Sessions, HaveTheSameScaleWhereTheDataAskForNoOther) {
 }
 
 /// On days of these temperatures, with links that grow by `growth` (1/K).
-CheckedBatch warm_sessions(const VirtualRobot& robot, const std::vector<double>& temperatures, double growth,
-                           std::uint64_t seed) {
+CheckedBatch warm_sessions(const VirtualRobot& robot, const std::vector<double>& temperatures,
+                           double growth, std::uint64_t seed) {
   std::vector<CheckedBatch> batches;
   for (const double temperature : temperatures) {
     const test::Day day{.poses = 80, .seed = seed + 17 * batches.size(), .set_up_anew = true};
@@ -259,8 +274,8 @@ TEST(Sessions, AnArmThatDoesNotGrowIsNotLearnedToThoughTheDaysDiffer) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const CompensatedModel model =
-        test::demand(train(cell, warm_sessions(robot, {20, 26, 22, 28, 18}, 0, 900 * seed), kPhysics));
+    const CompensatedModel model = test::demand(
+        train(cell, warm_sessions(robot, {20, 26, 22, 28, 18}, 0, 900 * seed), kPhysics));
     EXPECT_FALSE(growth_in(model)) << "seed " << seed;
   }
 }
@@ -273,7 +288,8 @@ TEST(Sessions, AnArmThatWearsIsNotTakenForOneThatGrows) {
       VirtualRobot robot = test::chapter_5_robot(cell);
       const std::vector<Parameter> parameters = robot.truth.parameters();
       for (std::size_t k = 0; k < parameters.size(); ++k)
-        if (parameters[k].name == "C3") robot.truth.values(static_cast<Eigen::Index>(k)) *= 1 + 0.02 * day;
+        if (parameters[k].name == "C3")
+          robot.truth.values(static_cast<Eigen::Index>(k)) *= 1 + 0.02 * day;
       const test::Day taken{.poses = 80, .seed = 60 + 17 * batches.size(), .set_up_anew = true};
       batches.push_back(checked(measured_on(test::in_warmth(robot, 24 + a_day * day, 0), taken),
                                 fmt::format("day-{}", day + 1), *cell));
@@ -288,7 +304,8 @@ TEST(Sessions, WhatGrowsWithTheTemperatureIsNotAskedOfABatchOfOneTemperature) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch days = warm_sessions(robot, {20, 26, 22, 28, 18}, 11.5e-6, 700);
   const CompensatedModel model = test::demand(train(cell, days, kPhysics));
-  EXPECT_EQ(level_with_additions(*cell, model, days.rows()), "base,geometry,compliance,thermal_growth");
+  EXPECT_EQ(level_with_additions(*cell, model, days.rows()),
+            "base,geometry,compliance,thermal_growth");
   const CheckedBatch one_day = warm_sessions(robot, {24}, 11.5e-6, 800);
   EXPECT_EQ(level_with_additions(*cell, model, one_day.rows()), std::nullopt);
 }
@@ -296,7 +313,8 @@ TEST(Sessions, WhatGrowsWithTheTemperatureIsNotAskedOfABatchOfOneTemperature) {
 TEST(Sessions, OfTwoDaysNobodyCanTellAGrowingArmFromAnotherScaleOfTheInstrument) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
-  const CompensatedModel model = test::demand(train(cell, warm_sessions(robot, {20, 28}, 11.5e-6, 700), kPhysics));
+  const CompensatedModel model =
+      test::demand(train(cell, warm_sessions(robot, {20, 28}, 11.5e-6, 700), kPhysics));
   EXPECT_FALSE(growth_in(model));
   EXPECT_TRUE(are_stretched(model.parts().sessions));
 }
@@ -308,7 +326,8 @@ TEST(Sessions, AZeroLostIsFoundBesideAnotherScale) {
   std::vector<CheckedBatch> batches;
   for (int s = 0; s < 4; ++s) {
     MeasurementBatch batch = measured_on(
-        s < 2 ? robot : after, {.poses = 60, .seed = 810 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true});
+        s < 2 ? robot : after,
+        {.poses = 60, .seed = 810 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true});
     for (Measurement& m : batch.measurements) m.p_W *= 1 + (s == 1 ? 6e-5 : 0);
     batches.push_back(checked(std::move(batch), fmt::format("day-{}", s + 1), *cell));
   }
@@ -319,15 +338,16 @@ TEST(Sessions, AZeroLostIsFoundBesideAnotherScale) {
 }
 
 /// Five sessions; in those of `elsewhere` (from 0) the reflector sits elsewhere on the tool.
-CheckedBatch sessions_with_reflector_off(const VirtualRobot& robot, const std::set<int>& elsewhere, const Vector3& by,
-                                         std::uint64_t seed) {
+CheckedBatch sessions_with_reflector_off(const VirtualRobot& robot, const std::set<int>& elsewhere,
+                                         const Vector3& by, std::uint64_t seed) {
   VirtualRobot other = robot;
   other.truth.tools.at("spindle").translation() += by;
   std::vector<CheckedBatch> batches;
   for (int s = 0; s < 5; ++s) {
-    const test::Day day{.poses = 60, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
-    batches.push_back(checked(measured_on(elsewhere.contains(s) ? other : robot, day), fmt::format("day-{}", s + 1),
-                              *robot.truth.cell));
+    const test::Day day{
+        .poses = 60, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+    batches.push_back(checked(measured_on(elsewhere.contains(s) ? other : robot, day),
+                              fmt::format("day-{}", s + 1), *robot.truth.cell));
   }
   return joined(batches);
 }
@@ -336,7 +356,8 @@ TEST(Sessions, AReflectorThatSatElsewhereForADaySpoilsNothing) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (const Vector3& by : {Vector3(1e-4, 0, 5e-5), Vector3(0.004, -0.002, 0.001)}) {
-    const CompensatedModel good = test::demand(train(cell, sessions_with_reflector_off(robot, {}, by, 600), kPhysics));
+    const CompensatedModel good =
+        test::demand(train(cell, sessions_with_reflector_off(robot, {}, by, 600), kPhysics));
     const CompensatedModel model =
         test::demand(train(cell, sessions_with_reflector_off(robot, {2}, by, 600), kPhysics));
     const auto& parts = model.parts();
@@ -362,15 +383,16 @@ TEST(Sessions, AReflectorThatStaysElsewhereIsAChangedTool) {
         test::demand(train(cell, sessions_with_reflector_off(robot, elsewhere, by, 700), kPhysics));
     ASSERT_EQ(model.parts().changes.size(), 1u);
     EXPECT_FALSE(is_of_one_session(model.parts().changes.front()));
-    EXPECT_EQ(model.parts().changes.front().source, fmt::format("tool_changed@{}", 60 * *elsewhere.begin() + 1));
+    EXPECT_EQ(model.parts().changes.front().source,
+              fmt::format("tool_changed@{}", 60 * *elsewhere.begin() + 1));
   }
 }
 
 TEST(Sessions, AZeroOfTheLastJointAndATurnedToolAreAmbiguous) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
-  const CompensatedModel model =
-      test::demand(train(cell, sessions_of(robot, test::with_zero_off(robot, 6, 1e-3), 3, 1, 500), kPhysics));
+  const CompensatedModel model = test::demand(
+      train(cell, sessions_of(robot, test::with_zero_off(robot, 6, 1e-3), 3, 1, 500), kPhysics));
   ASSERT_EQ(model.parts().changes.size(), 1u);
   EXPECT_EQ(model.parts().changes.front().source, "joint_slip:6@61");
   EXPECT_FALSE(model.parts().changes.front().could_also_be.empty());
@@ -391,7 +413,8 @@ TEST(Sessions, AColumnDividesAFileAsSeveralFilesDo) {
     }
   }
   const MeasurementBatch again = test::demand(parse_batch_csv(to_csv(all), "all.csv"));
-  const CompensatedModel model = test::demand(train(cell, test::demand(check_against_cell(again, *cell)), kPhysics));
+  const CompensatedModel model =
+      test::demand(train(cell, test::demand(check_against_cell(again, *cell)), kPhysics));
   ASSERT_EQ(model.parts().sessions.size(), 3u);
   EXPECT_EQ(model.parts().sessions.back().id, "set-up 3");
   EXPECT_LT(true_error(model, robot), 2e-5);
@@ -413,12 +436,14 @@ TEST(Sessions, OneTooSmallToSayWhereItsTrackerStoodIsLeftOutAndSaid) {
   MeasurementBatch few = measured_on(robot, {.poses = 2, .seed = 9, .set_up_anew = true});
   for (Measurement& m : few.measurements) m.R_WT.reset();
   const CheckedBatch first = checked(measured_on(robot, {.poses = 60}), "first", *cell);
-  const CompensatedModel model = test::demand(train(cell, joined({first, checked(few, "few", *cell)}), kPhysics));
+  const CompensatedModel model =
+      test::demand(train(cell, joined({first, checked(few, "few", *cell)}), kPhysics));
   const CompensatedModel alone = test::demand(train(cell, first, kPhysics));
   EXPECT_EQ(model.parts().physics.values, alone.parts().physics.values);
   ASSERT_EQ(model.parts().sessions_left_out.size(), 1u);
   EXPECT_EQ(model.parts().sessions_left_out.front().id, "few");
-  EXPECT_NE(notes_of(model).front().text.find("nothing was learned from session few: 2 positions"), std::string::npos);
+  EXPECT_NE(notes_of(model).front().text.find("nothing was learned from session few: 2 positions"),
+            std::string::npos);
 }
 
 TEST(Sessions, ANoisySessionCountsForLess) {
@@ -426,7 +451,8 @@ TEST(Sessions, ANoisySessionCountsForLess) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch good = checked(measured_on(robot, {.poses = 100, .seed = 3}), "good", *cell);
   const CheckedBatch noisy =
-      checked(measured_on(robot, {.poses = 100, .seed = 4, .noise = 8, .set_up_anew = true}), "noisy", *cell);
+      checked(measured_on(robot, {.poses = 100, .seed = 4, .noise = 8, .set_up_anew = true}),
+              "noisy", *cell);
   const CompensatedModel both = test::demand(train(cell, joined({good, noisy}), kPhysics));
   const CompensatedModel alone = test::demand(train(cell, good, kPhysics));
   EXPECT_NEAR(to_mm(both.parts().sessions.back().own_noise), 8 * to_mm(cell->tracker.sigma), 0.03);
@@ -439,8 +465,8 @@ TEST(Sessions, AnUnknownBaseAndToolAreFoundOverSessions) {
   const VirtualRobot robot = test::chapter_5_robot(located);
   std::vector<CheckedBatch> batches;
   for (std::uint64_t s = 1; s <= 3; ++s)
-    batches.push_back(
-        checked(measured_on(robot, {.poses = 60, .seed = s, .set_up_anew = true}), fmt::format("day-{}", s), *cell));
+    batches.push_back(checked(measured_on(robot, {.poses = 60, .seed = s, .set_up_anew = true}),
+                              fmt::format("day-{}", s), *cell));
   EXPECT_LT(true_error(test::demand(train(cell, joined(batches), kPhysics)), robot), 3e-5);
 }
 
@@ -454,8 +480,8 @@ TEST(Sessions, AFileOfOneThatTheModelKnowsIsEvaluatedWhereItsTrackerStood) {
   const InWorld world = test::demand(in_world_of(model, first.rows()));
   EXPECT_LT(model.evaluate(world.batch).compensated.rms, 3e-5);
   EXPECT_TRUE(world.located.empty());
-  const InWorld anew = test::demand(
-      in_world_of(model, sessions_of(robot, robot, 2, 2, 5000).rows()));  // day-1 again, measured elsewhere
+  const InWorld anew = test::demand(in_world_of(
+      model, sessions_of(robot, robot, 2, 2, 5000).rows()));  // day-1 again, measured elsewhere
   EXPECT_EQ(anew.located.size(), 2u);
   EXPECT_LT(model.evaluate(anew.batch).compensated.rms, 3e-5);
 }
@@ -469,8 +495,9 @@ TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
   for (std::size_t s = 0; s < steps.size(); ++s) {
     robot = test::with_zero_off(robot, 3, steps[s]);
     moved += steps[s];
-    batches.push_back(checked(measured_on(robot, {.poses = 40, .seed = 50 + s, .set_up_anew = true}),
-                              fmt::format("day-{}", s + 1), *cell));
+    batches.push_back(
+        checked(measured_on(robot, {.poses = 40, .seed = 50 + s, .set_up_anew = true}),
+                fmt::format("day-{}", s + 1), *cell));
   }
   const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
   ASSERT_EQ(model.parts().changes.size(), 1u);
@@ -478,7 +505,8 @@ TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
   EXPECT_NEAR(drift.rate, 6e-5, 4e-5);
   EXPECT_EQ(drift.steps.size(), steps.size() - 1);
   EXPECT_LT(true_error(model, robot), 1e-5);
-  EXPECT_NE(notes_of(model).front().text.find(fmt::format("it has moved by {:.2f}", 1e3 * moved)), std::string::npos)
+  EXPECT_NE(notes_of(model).front().text.find(fmt::format("it has moved by {:.2f}", 1e3 * moved)),
+            std::string::npos)
       << notes_of(model).front().text;
   const SessionChange told = session_changes(model).front();
   EXPECT_EQ(told.course, SessionChange::Course::kWanders);
@@ -495,7 +523,8 @@ TEST(Sessions, TenPosesAfterAToolChangeRefitTheToolAlone) {
   after.truth.tools.at("spindle").linear() =
       (rotation_exp(Vector3(3e-3, 1e-3, -2e-3)) * after.truth.tools.at("spindle").linear()).eval();
   const CheckedBatch many = checked(measured_on(robot, {.poses = 200, .seed = 3}), "many", *cell);
-  const CheckedBatch ten = checked(measured_on(after, {.poses = 10, .seed = 4, .set_up_anew = true}), "ten", *cell);
+  const CheckedBatch ten =
+      checked(measured_on(after, {.poses = 10, .seed = 4, .set_up_anew = true}), "ten", *cell);
   const CompensatedModel model = test::demand(train(cell, joined({many, ten}), kPhysics));
   ASSERT_EQ(model.parts().changes.size(), 1u);
   EXPECT_EQ(model.parts().changes.front().source, "tool_changed@201");
@@ -512,10 +541,12 @@ TEST(Sessions, AChangedToolIsNotTakenForANoisySessionHoweverManyPosesShowIt) {
     for (const int poses : {7, 8, 10, 12, 16, 20}) {
       std::vector<CheckedBatch> batches;
       for (std::uint64_t s = 0; s < 4; ++s) {
-        batches.push_back(checked(measured_on(robot, {.poses = 60, .seed = 900 + s, .set_up_anew = true}),
-                                  fmt::format("day-{}", s + 1), *cell));
+        batches.push_back(
+            checked(measured_on(robot, {.poses = 60, .seed = 900 + s, .set_up_anew = true}),
+                    fmt::format("day-{}", s + 1), *cell));
       }
-      batches.push_back(checked(measured_on(after, {.poses = poses, .seed = 950, .set_up_anew = true}), "few", *cell));
+      batches.push_back(checked(
+          measured_on(after, {.poses = poses, .seed = 950, .set_up_anew = true}), "few", *cell));
       const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
       EXPECT_LT(true_error(model, after), 3e-5) << poses << " poses, " << shift.transpose();
     }
@@ -527,8 +558,8 @@ TEST(Sessions, ANoisySessionIsNotTakenForAChange) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (const double noise : {3.0, 8.0}) {
     for (const int poses : {10, 20, 60}) {
-      const CheckedBatch quiet =
-          checked(measured_on(robot, {.poses = 120, .seed = 70, .set_up_anew = true}), "quiet", *cell);
+      const CheckedBatch quiet = checked(
+          measured_on(robot, {.poses = 120, .seed = 70, .set_up_anew = true}), "quiet", *cell);
       const test::Day day{.poses = poses, .seed = 71, .noise = noise, .set_up_anew = true};
       const CheckedBatch noisy = checked(measured_on(robot, day), "noisy", *cell);
       const CompensatedModel model = test::demand(train(cell, joined({quiet, noisy}), kPhysics));
@@ -543,10 +574,12 @@ TEST(Sessions, WhereTheBaseIsUnknownTheOrderOfTheSessionsAndAFewPosesMoreChangeN
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   std::vector<CheckedBatch> batches;
   for (std::uint64_t s = 0; s < 3; ++s) {
-    batches.push_back(checked(measured_on(robot, {.poses = 60, .seed = 30 + s, .set_up_anew = true}),
-                              fmt::format("day-{}", s + 1), *cell));
+    batches.push_back(
+        checked(measured_on(robot, {.poses = 60, .seed = 30 + s, .set_up_anew = true}),
+                fmt::format("day-{}", s + 1), *cell));
   }
-  const CheckedBatch few = checked(measured_on(robot, {.poses = 3, .seed = 40, .set_up_anew = true}), "few", *cell);
+  const CheckedBatch few =
+      checked(measured_on(robot, {.poses = 3, .seed = 40, .set_up_anew = true}), "few", *cell);
   const auto tip_B = [&](const std::vector<CheckedBatch>& sessions) -> Vector3 {
     const CompensatedModel model = test::demand(train(cell, joined(sessions), kPhysics));
     JointVector q(6);
@@ -568,9 +601,11 @@ TEST(Sessions, ThreePosesAfterACollisionNameTheJoint) {
   const CheckedBatch many = checked(measured_on(robot, {.poses = 200, .seed = 3}), "many", *cell);
   for (int joint = 2; joint <= 5; ++joint) {
     const VirtualRobot after = test::with_zero_off(robot, joint, 2e-3);
-    const CheckedBatch three =
-        checked(measured_on(after, {.poses = 3, .seed = 4 + static_cast<std::uint64_t>(joint), .set_up_anew = true}),
-                "three", *cell);
+    const CheckedBatch three = checked(
+        measured_on(
+            after,
+            {.poses = 3, .seed = 4 + static_cast<std::uint64_t>(joint), .set_up_anew = true}),
+        "three", *cell);
     const CompensatedModel model = test::demand(train(cell, joined({many, three}), kPhysics));
     ASSERT_FALSE(model.parts().changes.empty()) << "joint " << joint;
     EXPECT_EQ(model.parts().changes.front().source, fmt::format("joint_slip:{}@201", joint));
@@ -582,9 +617,11 @@ TEST(Sessions, OnePoseMoreDoesNoHarm) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch many = checked(measured_on(robot, {.poses = 60, .seed = 3}), "many", *cell);
-  const CheckedBatch one = checked(measured_on(robot, {.poses = 1, .seed = 5, .set_up_anew = true}), "one", *cell);
+  const CheckedBatch one =
+      checked(measured_on(robot, {.poses = 1, .seed = 5, .set_up_anew = true}), "one", *cell);
   const double before = true_error(test::demand(train(cell, many, kPhysics)), robot);
-  EXPECT_LT(true_error(test::demand(train(cell, joined({many, one}), kPhysics)), robot), 1.01 * before);
+  EXPECT_LT(true_error(test::demand(train(cell, joined({many, one}), kPhysics)), robot),
+            1.01 * before);
 }
 
 TEST(Sessions, ASecondToolTellsATurnedToolFromALostZero) {
@@ -594,9 +631,11 @@ TEST(Sessions, ASecondToolTellsATurnedToolFromALostZero) {
   two->tools["probe"] = probe;
   const std::shared_ptr<const Cell> cell = two;
   const VirtualRobot robot = test::chapter_5_robot(cell);
-  const auto measured_by_both = [&](const VirtualRobot& arm, std::uint64_t seed, const std::string& id) {
+  const auto measured_by_both = [&](const VirtualRobot& arm, std::uint64_t seed,
+                                    const std::string& id) {
     MeasurementBatch both = measured_on(arm, {.poses = 60, .seed = seed, .tool = "spindle"});
-    for (Measurement m : measured_on(arm, {.poses = 60, .seed = seed + 1, .tool = "probe"}).measurements) {
+    for (Measurement m :
+         measured_on(arm, {.poses = 60, .seed = seed + 1, .tool = "probe"}).measurements) {
       m.pose_id = "probe-" + m.pose_id;
       m.context.index = static_cast<int>(both.measurements.size());
       both.measurements.push_back(std::move(m));
@@ -608,8 +647,9 @@ TEST(Sessions, ASecondToolTellsATurnedToolFromALostZero) {
   knocked.truth.tools.at("probe").linear() =
       (rotation_exp(Vector3(0, 0, 1e-3)) * knocked.truth.tools.at("probe").linear()).eval();
   const auto change_of = [&](const VirtualRobot& after) {
-    const CompensatedModel model = test::demand(
-        train(cell, joined({measured_by_both(robot, 1, "before"), measured_by_both(after, 11, "after")}), kPhysics));
+    const CompensatedModel model = test::demand(train(
+        cell, joined({measured_by_both(robot, 1, "before"), measured_by_both(after, 11, "after")}),
+        kPhysics));
     return model.parts().changes;
   };
   const std::vector<Change> slipped = change_of(test::with_zero_off(robot, 6, 1e-3));

@@ -54,7 +54,8 @@ TEST(Train, HoldsOutTheRowsThatTheBatchCallsValidation) {
   ASSERT_TRUE(model.parts().validation);
   EXPECT_EQ(model.parts().validation->poses, 80);
   EXPECT_LT(to_mm(model.parts().validation->calibrated.rms), 0.026);
-  // Poses held out must not leak into the fit: spoiling them changes the figures, not the parameters.
+  // Poses held out must not leak into the fit: spoiling them changes the figures, not the
+  // parameters.
   for (std::size_t i = 120; i < 200; ++i) batch.measurements[i].p_W += Vector3(0.01, 0, 0);
   const CompensatedModel spoiled = test::demand(train(cell, batch, quick("M3", "none")));
   EXPECT_EQ(spoiled.parts().physics.values, model.parts().physics.values);
@@ -85,7 +86,8 @@ TEST(Train, WhereTwoRowsInFiveAreBadTheOthersAreLearnedAsIfTheyHadBeenAlone) {
   }
   ASSERT_EQ(good.measurements.size(), 36u);
   const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "none")));
-  EXPECT_EQ(model.parts().physics.values, test::demand(train(cell, good, quick("M3", "none"))).parts().physics.values);
+  EXPECT_EQ(model.parts().physics.values,
+            test::demand(train(cell, good, quick("M3", "none"))).parts().physics.values);
   EXPECT_EQ(model.parts().training.poses, 36);
   EXPECT_EQ(model.parts().suspects.size(), 24u);
 }
@@ -103,8 +105,8 @@ TEST(Train, ABadPoseIsNotLearned) {
 
 TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
   const auto cell = test::cell_7();
-  const VirtualRobot robot =
-      test::demand(read_virtual_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/truth/chapter-6.yaml", cell));
+  const VirtualRobot robot = test::demand(
+      read_virtual_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/truth/chapter-6.yaml", cell));
   const Eigen::MatrixXd q = test::demand(plan_poses(*cell, {.count = 250, .seed = 51}));
   std::vector<PoseContext> poses(250);
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -125,7 +127,8 @@ TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
   EXPECT_GT(unsaid.coverage_95, 0.9);
   EXPECT_GT(unsaid.calibrated.rms, 1.2 * model.parts().training.calibrated.rms);
   // A clock that counts from another day is the same session.
-  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].time = 1.7e9 + 20.0 * static_cast<double>(i);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    poses[i].time = 1.7e9 + 20.0 * static_cast<double>(i);
   MeasurementBatch later = test::demand(simulate(robot, poses, {}));
   for (std::size_t i = 0; i < poses.size(); ++i) {
     later.measurements[i].context.temperature = 20.5 + 0.02 * static_cast<double>(i);
@@ -144,7 +147,8 @@ TEST(Train, ATrackerThatMovedIsNoPartOfWhatIsServed) {
     m.p_W = moved * m.p_W;
     m.R_WT = (moved.linear() * *m.R_WT).eval();
   }
-  const CompensatedModel model = test::demand(train(cell, batch, quick("M3,tracker_moved@91", "none")));
+  const CompensatedModel model =
+      test::demand(train(cell, batch, quick("M3,tracker_moved@91", "none")));
   EXPECT_LT(to_mm(model.parts().training.calibrated.rms), 0.024);
   // Another day's batch, the tracker where it was at first.
   const Evaluation fresh = model.evaluate(test::measured(test::chapter_5_robot(cell), 300, 48));
@@ -155,21 +159,27 @@ TEST(Train, AutoTakesNoBiasWhereThePhysicsIsCompleteAndThePhysicsItselfWhereItIs
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   for (const std::uint64_t seed : {61, 62, 63}) {
-    const CompensatedModel complete = test::demand(train(cell, test::measured(robot, 120, seed), quick("M3", "auto")));
+    const CompensatedModel complete =
+        test::demand(train(cell, test::measured(robot, 120, seed), quick("M3", "auto")));
     ASSERT_TRUE(complete.parts().bias_choice);
-    EXPECT_EQ(complete.parts().bias_choice->kernel, "none") << complete.parts().bias_choice->sentence;
+    EXPECT_EQ(complete.parts().bias_choice->kernel, "none")
+        << complete.parts().bias_choice->sentence;
     EXPECT_FALSE(complete.parts().bias);
   }
   const MeasurementBatch batch = test::measured(robot, 80, 64);
   const CompensatedModel lacking = test::demand(train(cell, batch, quick("M2", "auto")));
-  EXPECT_EQ(lacking.parts().bias_choice->kernel, "se + parameters") << lacking.parts().bias_choice->sentence;
+  EXPECT_EQ(lacking.parts().bias_choice->kernel, "se + parameters")
+      << lacking.parts().bias_choice->sentence;
   EXPECT_NE(lacking.parts().bias_choice->sentence.find("diagnose"), std::string::npos);
   EXPECT_LT(to_mm(lacking.evaluate(test::measured(robot, 300, 65)).compensated.rms), 0.026);
   const CompensatedModel stored = test::demand(deserialize(serialize(lacking), "memory"));
   EXPECT_EQ(stored.provenance().hash, lacking.provenance().hash);
-  ASSERT_EQ(stored.parts().bias_choice->candidates.size(), lacking.parts().bias_choice->candidates.size());
-  EXPECT_EQ(stored.parts().bias_choice->candidates[1].gain, lacking.parts().bias_choice->candidates[1].gain);
-  EXPECT_EQ(test::demand(train(cell, batch, quick("M2", "auto"))).provenance().hash, lacking.provenance().hash);
+  ASSERT_EQ(stored.parts().bias_choice->candidates.size(),
+            lacking.parts().bias_choice->candidates.size());
+  EXPECT_EQ(stored.parts().bias_choice->candidates[1].gain,
+            lacking.parts().bias_choice->candidates[1].gain);
+  EXPECT_EQ(test::demand(train(cell, batch, quick("M2", "auto"))).provenance().hash,
+            lacking.provenance().hash);
   EXPECT_FALSE(test::demand(train(cell, batch, quick("M2", "se"))).parts().bias_choice);
 }
 
@@ -178,7 +188,8 @@ TEST(Train, GivesUpWhenAsked) {
   TrainOptions options = quick("M1", "se");
   int calls = 0;
   options.progress = [&](const std::string&, double) { return ++calls < 2; };
-  const Result<CompensatedModel> given_up = train(cell, test::measured(test::chapter_5_robot(cell), 60, 43), options);
+  const Result<CompensatedModel> given_up =
+      train(cell, test::measured(test::chapter_5_robot(cell), 60, 43), options);
   ASSERT_FALSE(given_up);
   EXPECT_EQ(calls, 2);
 }
@@ -223,12 +234,14 @@ TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointM
   for (const char* spec : {"joint_map:1@9", "joint_map:2@7", "joint_map:3@8"}) {
     const ErrorSourcePtr map = test::demand(make_error_source(spec, *cell));
     const Eigen::Index first = add_source(robot.truth, map);
-    robot.truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size())).setConstant(4e-5);
+    robot.truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size()))
+        .setConstant(4e-5);
   }
   const MeasurementBatch batch = test::measured(robot, 100, 61);
   const MeasurementBatch fresh = test::measured(robot, 200, 62);
   const Evaluation plain = test::demand(train(cell, batch, quick("M3", "se"))).evaluate(fresh);
-  const Evaluation mapped = test::demand(train(cell, batch, quick("M3", "se + joint_map"))).evaluate(fresh);
+  const Evaluation mapped =
+      test::demand(train(cell, batch, quick("M3", "se + joint_map"))).evaluate(fresh);
   EXPECT_GT(to_mm(plain.compensated.rms), 0.15);
   EXPECT_LT(mapped.compensated.rms, 0.5 * plain.compensated.rms);
   EXPECT_GT(mapped.coverage_95, 0.91);
@@ -261,23 +274,27 @@ TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> turn(0.0, 0.02);  // rad, four times what gives way
   for (Measurement& m : batch.measurements) {
-    for (const Vector3& axis : {Vector3(Vector3::UnitX()), Vector3(Vector3::UnitY()), Vector3(Vector3::UnitZ())})
+    for (const Vector3& axis :
+         {Vector3(Vector3::UnitX()), Vector3(Vector3::UnitY()), Vector3(Vector3::UnitZ())})
       m.R_WT = Matrix3(Eigen::AngleAxisd(turn(random), axis) * *m.R_WT);
   }
   parts = judged();
   ASSERT_TRUE(parts.bias);
   EXPECT_FALSE(parts.rotation_bias);
-  EXPECT_NE(parts.bias_choice->sentence.find("of the orientations it explains nothing"), std::string::npos)
+  EXPECT_NE(parts.bias_choice->sentence.find("of the orientations it explains nothing"),
+            std::string::npos)
       << parts.bias_choice->sentence;
 }
 
-/// m per axis: what a model says that it errs by, rms over fresh poses; and whether it says that its sigma is too
-/// large.
+/// m per axis: what a model says that it errs by, rms over fresh poses; and whether it says that
+/// its sigma is too large.
 std::pair<double, bool> promised(const CompensatedModel& model, const VirtualRobot& robot) {
   std::vector<PoseContext> fresh;
-  for (const Measurement& m : test::measured(robot, 60, 900, false).measurements) fresh.push_back(m.context);
+  for (const Measurement& m : test::measured(robot, 60, 900, false).measurements)
+    fresh.push_back(m.context);
   double sum = 0;
-  for (const ErrorPrediction& one : model.predict_all(fresh)) sum += one.true_stddev_B.squaredNorm();
+  for (const ErrorPrediction& one : model.predict_all(fresh))
+    sum += one.true_stddev_B.squaredNorm();
   const std::vector<Note> notes = notes_of(model);
   const bool said = std::any_of(notes.begin(), notes.end(), [](const Note& note) {
     return note.code == "sigma_overstated" && note.severity == Note::Severity::kInfo;
@@ -291,12 +308,14 @@ TEST(Train, WhatAnOverstatedSigmaHidesIsPromisedAsTheArmsErrorAndSaidWhereItChan
   const MeasurementBatch good = test::measured(robot, 400, 5, false);
   MeasurementBatch bent = good;  // as no cause bends it
   for (Measurement& m : bent.measurements)
-    m.p_W += 1.2e-4 * Vector3(std::sin(7 * m.context.q(1)), std::cos(6 * m.context.q(2)), std::sin(8 * m.context.q(0)));
+    m.p_W += 1.2e-4 * Vector3(std::sin(7 * m.context.q(1)), std::cos(6 * m.context.q(2)),
+                              std::sin(8 * m.context.q(0)));
   cell->tracker.sigma *= 20;
   const auto [hidden, said] = promised(test::demand(train(cell, bent, quick("M3", "none"))), robot);
   EXPECT_GT(to_mm(hidden), 0.08) << "the arm errs by as much";
   EXPECT_TRUE(said);
-  const auto [none, said_of_none] = promised(test::demand(train(cell, good, quick("M3", "none"))), robot);
+  const auto [none, said_of_none] =
+      promised(test::demand(train(cell, good, quick("M3", "none"))), robot);
   EXPECT_LT(to_mm(none), 0.12);
   EXPECT_FALSE(said_of_none) << "the parameters are promised with more than that";
 }
@@ -308,13 +327,16 @@ TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
             Refusal("", {}, "bias").text("se * joint_map"));
 }
 
-/// A real robot with base and tool unknown, a fifth of its poses; `ur10_benchmark` has the figures of all.
+/// A real robot with base and tool unknown, a fifth of its poses; `ur10_benchmark` has the figures
+/// of all.
 class RealRobot : public testing::Test {
  protected:
   static MeasurementBatch series(const std::string& name, int training) {
     return test::ur10_series(name, training, 6, 6);
   }
-  static Evaluation held_out(const CompensatedModel& model) { return model.parts().validation.value(); }
+  static Evaluation held_out(const CompensatedModel& model) {
+    return model.parts().validation.value();
+  }
   void SetUp() override {
     if (!test::has_ur10()) GTEST_SKIP() << "the measured UR10 is not at hand (../shared/data)";
   }
@@ -322,18 +344,20 @@ class RealRobot : public testing::Test {
 
 TEST_F(RealRobot, IsExplainedByGeometryAndComplianceAndCompensatedByABias) {
   for (const char* name : {"c", "d"}) {
-    const Evaluation shown =
-        held_out(test::demand(train(test::ur10_cell(), series(name, 200), quick("M3", "matern52"))));
+    const Evaluation shown = held_out(
+        test::demand(train(test::ur10_cell(), series(name, 200), quick("M3", "matern52"))));
     EXPECT_LE(to_mm(shown.nominal.rms), 1.05) << name;
     EXPECT_LE(to_mm(shown.calibrated.rms), 0.52) << name;
     EXPECT_LE(to_mm(shown.compensated.rms), 0.37) << name;
   }
 }
 
-const char* const kJointMaps = "M3,joint_map:1,joint_map:2,joint_map:3,joint_map:4,joint_map:5,joint_map:6";
+const char* const kJointMaps =
+    "M3,joint_map:1,joint_map:2,joint_map:3,joint_map:4,joint_map:5,joint_map:6";
 
 TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeaves) {
-  const CompensatedModel c = test::demand(train(test::ur10_cell(), series("c", 200), quick(kJointMaps, "none")));
+  const CompensatedModel c =
+      test::demand(train(test::ur10_cell(), series("c", 200), quick(kJointMaps, "none")));
   EXPECT_LE(to_mm(held_out(c).calibrated.rms), 0.17);
 }
 

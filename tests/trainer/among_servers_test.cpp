@@ -1,4 +1,5 @@
-// What a trainer does where another server has the same record: what it reads of it, and when it takes a job.
+// What a trainer does where another server has the same record: what it reads of it, and when it
+// takes a job.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +48,9 @@ class AmongServers : public testing::Test {
     StoredJob job;
     job.cell = cell;
     job.batch_ids = {id};
-    return demand(other_->add_batch({cell, id, csv, sha256_hex(csv), "client:" + id, 1700000000, 40}, job)).id;
+    return demand(other_->add_batch(
+                      {cell, id, csv, sha256_hex(csv), "client:" + id, 1700000000, 40}, job))
+        .id;
   }
   void heard(const JobProgress& progress) {
     if (progress.stage != JobStage::kDone && progress.stage != JobStage::kFailed) return;
@@ -60,8 +63,9 @@ class AmongServers : public testing::Test {
     return changed_.wait_for(lock, kLimit, [&] { return finished_.contains(job); });
   }
   static std::ptrdiff_t count(const std::vector<std::string>& asked, const std::string& part) {
-    return std::count_if(asked.begin(), asked.end(),
-                         [&](const std::string& one) { return one.find(part) != std::string::npos; });
+    return std::count_if(asked.begin(), asked.end(), [&](const std::string& one) {
+      return one.find(part) != std::string::npos;
+    });
   }
 
   test::Postgres& postgres_ = test::Postgres::of_program();
@@ -94,7 +98,9 @@ TEST_F(AmongServers, OfACellThatAnotherServerWorksForOneJobIsTriedAndTheOthersWa
   static_cast<void>(postgres_.asked());
   static_cast<void>(demand(trainer_->start()));
   while (trainer_->queued_jobs() > 0) continue;
-  EXPECT_LT(count(postgres_.asked(), "job_claims JOIN jobs ON jobs.id = job_claims.job WHERE jobs.cell"), 10)
+  EXPECT_LT(
+      count(postgres_.asked(), "job_claims JOIN jobs ON jobs.id = job_claims.job WHERE jobs.cell"),
+      10)
       << "it asked whether the cell is free";
   ASSERT_TRUE(other_->set_job_failed(jobs.front(), "over"));
   for (const std::int64_t job : jobs) EXPECT_TRUE(is_finished(job));
@@ -114,7 +120,9 @@ TEST_F(AmongServers, AJobOfACellThatTheRecordDescribesOtherwiseNowIsLeftToOthers
         if (progress.stage != JobStage::kTraining || begun.exchange(true)) return;
         EXPECT_TRUE(describe_cell(url_, "cell-7", "other", "anna"));
         const auto until = std::chrono::steady_clock::now() + kLimit;
-        while (!trainer_->cell_troubles().contains("cell-7") && std::chrono::steady_clock::now() < until) continue;
+        while (!trainer_->cell_troubles().contains("cell-7") &&
+               std::chrono::steady_clock::now() < until)
+          continue;
         is_apart = true;
       },
       nullptr);

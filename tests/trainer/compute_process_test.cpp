@@ -1,5 +1,5 @@
-// Jobs that are computed in a process of their own: what a job makes is the same there, and what happens to that
-// process happens to nobody else.
+// Jobs that are computed in a process of their own: what a job makes is the same there, and what
+// happens to that process happens to nobody else.
 #include "server/trainer/compute/compute_process.h"
 
 #include <fcntl.h>
@@ -31,7 +31,8 @@ namespace trammel {
 namespace {
 
 constexpr std::chrono::seconds kLimit{120};
-constexpr const char* kSlowBias = "se * periodic + matern52 * linear + rational_quadratic + se(sincos)";
+constexpr const char* kSlowBias =
+    "se * periodic + matern52 * linear + rational_quadratic + se(sincos)";
 
 bool is_over(const JobProgress& progress) {
   return progress.stage == JobStage::kDone || progress.stage == JobStage::kFailed;
@@ -84,7 +85,9 @@ class ComputeProcessTest : public testing::Test {
   JobProgress finished(std::int64_t job) {
     return wait_for([job](const JobProgress& p) { return p.job == job && is_over(p); });
   }
-  std::string csv(const test::SmallBatch& batch = {}) { return test::small_batch_csv(*cells_.at("cell-7"), batch); }
+  std::string csv(const test::SmallBatch& batch = {}) {
+    return test::small_batch_csv(*cells_.at("cell-7"), batch);
+  }
   std::int64_t submit(const std::string& id, const test::SmallBatch& batch = {}) {
     return test::demand(trainer_->submit("cell-7", id, csv(batch), "client:" + id));
   }
@@ -92,7 +95,9 @@ class ComputeProcessTest : public testing::Test {
   std::int64_t long_job() {
     finished(submit("large", {.poses = 900}));
     const std::int64_t job = test::demand(trainer_->retrain("cell-7", {"large"}, "", kSlowBias));
-    wait_for([job](const JobProgress& p) { return p.job == job && p.stage == JobStage::kTraining && p.share > 0; });
+    wait_for([job](const JobProgress& p) {
+      return p.job == job && p.stage == JobStage::kTraining && p.share > 0;
+    });
     return job;
   }
   pid_t child() {
@@ -172,8 +177,9 @@ TEST_F(ComputeProcessTest, ACrashIsToldAndTheJobIsTriedAgain) {
   const std::int64_t job = 2;
   whenever_computed(job, SIGKILL, 1);
   ASSERT_EQ(test::demand(trainer_->retrain("cell-7", {"a"}, "", "se + matern32")), job);
-  const JobProgress told =
-      wait_for([](const JobProgress& p) { return p.job == 2 && p.stage == JobStage::kQueued && !p.what.empty(); });
+  const JobProgress told = wait_for([](const JobProgress& p) {
+    return p.job == 2 && p.stage == JobStage::kQueued && !p.what.empty();
+  });
   EXPECT_NE(told.what.find("signal 9"), std::string::npos) << told.what;
   EXPECT_EQ(finished(job).stage, JobStage::kDone);
   EXPECT_EQ(store_->job(job)->attempts, 2);
@@ -197,7 +203,8 @@ TEST_F(ComputeProcessTest, AJobThatCrashesThreeTimesFailsAndTheNextOneIsComputed
 }
 
 TEST_F(ComputeProcessTest, WhatAProcessSaidBeforeItDiedIsInTheReasonWithoutEscapes) {
-  options_.compute.program = {"/bin/sh", "-c", "printf 'one\\ncheck \\033[31mfailed\\n' >&2; kill -ABRT $$"};
+  options_.compute.program = {"/bin/sh", "-c",
+                              "printf 'one\\ncheck \\033[31mfailed\\n' >&2; kill -ABRT $$"};
   open_anew();
   start();
   const JobProgress failed = finished(submit("a"));
@@ -207,12 +214,14 @@ TEST_F(ComputeProcessTest, WhatAProcessSaidBeforeItDiedIsInTheReasonWithoutEscap
 }
 
 TEST_F(ComputeProcessTest, AProcessThatAnswersNonsenseEndsItsJobAndNothingElse) {
-  for (const char* nonsense : {"head -c 200000 /dev/zero >&3", "head -c 200000 /dev/urandom >&3",
-                               "printf '\\002\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0[]' >&3", "exit 0"}) {
+  for (const char* nonsense :
+       {"head -c 200000 /dev/zero >&3", "head -c 200000 /dev/urandom >&3",
+        "printf '\\002\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0[]' >&3", "exit 0"}) {
     options_.compute.program = {"/bin/sh", "-c", nonsense};
     open_anew();
     start();
-    const std::int64_t job = submit(std::string("a") + std::to_string(std::hash<std::string>()(nonsense)));
+    const std::int64_t job =
+        submit(std::string("a") + std::to_string(std::hash<std::string>()(nonsense)));
     EXPECT_EQ(finished(job).outcome.verdict, JobVerdict::kBroken) << nonsense;
   }
 }
@@ -222,8 +231,9 @@ TEST_F(ComputeProcessTest, AProcessThatStandsStillIsEndedAndTold) {
   const std::int64_t job = long_job();
   const test::Watched watched(child());
   ::kill(child(), SIGSTOP);
-  const JobProgress told =
-      wait_for([job](const JobProgress& p) { return p.job == job && p.stage == JobStage::kQueued && !p.what.empty(); });
+  const JobProgress told = wait_for([job](const JobProgress& p) {
+    return p.job == job && p.stage == JobStage::kQueued && !p.what.empty();
+  });
   EXPECT_NE(told.what.find("hung"), std::string::npos) << told.what;
   EXPECT_TRUE(watched.ends(kLimit));
   ASSERT_TRUE(trainer_->cancel(job));
@@ -247,7 +257,8 @@ TEST_F(ComputeProcessTest, AJobThatAsksForMoreMemoryThanItMayHaveFailsWithTheLim
   open_anew();
   start();
   finished(submit("large", {.poses = 900}));
-  const JobProgress failed = finished(test::demand(trainer_->retrain("cell-7", {"large"}, "", "se + joint_map")));
+  const JobProgress failed =
+      finished(test::demand(trainer_->retrain("cell-7", {"large"}, "", "se + joint_map")));
   EXPECT_EQ(failed.stage, JobStage::kFailed);
   EXPECT_EQ(failed.outcome.verdict, JobVerdict::kOverLimit) << failed.what;
   EXPECT_EQ(failed.outcome.code, ErrorCode::kTooLarge);
@@ -295,7 +306,9 @@ TEST_F(ComputeProcessTest, StoppingEndsTheProcessAndTheJobWaitsForTheNextStart) 
   }
   open_anew();
   start();
-  wait_for([job](const JobProgress& p) { return p.job == job && p.stage == JobStage::kTraining && p.share > 0; });
+  wait_for([job](const JobProgress& p) {
+    return p.job == job && p.stage == JobStage::kTraining && p.share > 0;
+  });
   ASSERT_TRUE(trainer_->cancel(job));
 }
 
@@ -320,7 +333,8 @@ TEST_F(ComputeProcessTest, TheProcessInheritsNothingAndStandsBehindOthers) {
   const test::Watched watched(pid);
   EXPECT_EQ(watched.descriptors(), (std::vector{0, 1, 2, 3}));
   EXPECT_EQ(watched.status("SigBlk"), "0000000000000000");
-  EXPECT_EQ(std::stoull(watched.status("SigIgn"), nullptr, 16) & 0x7FFFFFFF, 0u) << "but the C library's own two";
+  EXPECT_EQ(std::stoull(watched.status("SigIgn"), nullptr, 16) & 0x7FFFFFFF, 0u)
+      << "but the C library's own two";
   EXPECT_EQ(watched.status("Threads"), "1");
   EXPECT_EQ(::getpgid(pid), pid) << "a terminal's Ctrl-C is for the service";
   EXPECT_GT(::getpriority(PRIO_PROCESS, static_cast<id_t>(pid)), 0);
@@ -334,7 +348,8 @@ TEST_F(ComputeProcessTest, AThousandBatchesAreTakenWhileATrainingRuns) {
   const std::int64_t job = long_job();
   const std::string text = csv({.poses = 12, .seed = 3});
   for (int i = 0; i < 1000; ++i) {
-    const auto taken = trainer_->submit("cell-7", std::to_string(i), text, "client:" + std::to_string(i));
+    const auto taken =
+        trainer_->submit("cell-7", std::to_string(i), text, "client:" + std::to_string(i));
     ASSERT_TRUE(taken) << sentence(taken.error());
   }
   EXPECT_EQ(trainer_->queued_jobs(), 1000);
@@ -363,10 +378,12 @@ TEST_F(ComputeProcessTest, WhatTheDiskHasNoRoomForIsStoredWhenThereIs) {
   wait_for([](const JobProgress& p) { return p.job == 2 && p.stage == JobStage::kTraining; });
   disk_->refuse_writing(SQLITE_FULL);
   full.set_value();
-  const JobProgress waits = wait_for([](const JobProgress& p) { return p.what.starts_with("waits for the disk"); });
+  const JobProgress waits =
+      wait_for([](const JobProgress& p) { return p.what.starts_with("waits for the disk"); });
   EXPECT_EQ(waits.job, 2);
   EXPECT_EQ(registry_->in_force("cell-7")->version, 1) << "it serves";
-  EXPECT_FALSE(trainer_->submit("cell-7", "b", csv({.seed = 2}), "client:b")) << "not accepted where it is not stored";
+  EXPECT_FALSE(trainer_->submit("cell-7", "b", csv({.seed = 2}), "client:b"))
+      << "not accepted where it is not stored";
   disk_->work_again();
   for (const std::int64_t job : {2, 3}) {
     EXPECT_EQ(finished(job).stage, JobStage::kDone) << "nothing accepted is lost";

@@ -26,7 +26,8 @@ class DarkCellsTest : public testing::Test {
     job.cell = cell;
     job.batch_ids = {fmt::format("b{}", poses)};
     const auto added = demand(store->add_batch({cell, job.batch_ids[0], csv, csv, csv, 1, 1}, job));
-    ASSERT_TRUE(store->add_model(cell, test::nominal_model(cells_.at(cell), poses), added.id, true, "made"));
+    ASSERT_TRUE(store->add_model(cell, test::nominal_model(cells_.at(cell), poses), added.id, true,
+                                 "made"));
   }
   CellAtStart at_start(const std::string& cell) {
     for (CellAtStart& one : demand(cells_at_start(path_, cells_)))
@@ -43,7 +44,8 @@ class DarkCellsTest : public testing::Test {
 
   test::TemporaryFolder folder_;
   const std::string path_ = folder_.file("trammel.db");
-  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")}, {"cell-8", test::small_cell("cell-8")}};
+  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")},
+                        {"cell-8", test::small_cell("cell-8")}};
 };
 
 TEST_F(DarkCellsTest, CellsWithAModelAreServedAndOthersHaveNoneYet) {
@@ -67,7 +69,8 @@ TEST_F(DarkCellsTest, AModelWhoseTextIsBadWouldBeServedFromItsCopyAndThatIsSaid)
   serve("cell-7", 40);
   damage("\"training_poses\":40", "\"training_poses\":99");
   EXPECT_EQ(at_start("cell-7").state, State::kCopyServed);
-  EXPECT_NE(at_start("cell-7").why.find("version 1 is served from its copy " + path_), std::string::npos)
+  EXPECT_NE(at_start("cell-7").why.find("version 1 is served from its copy " + path_),
+            std::string::npos)
       << at_start("cell-7").why;
 }
 

@@ -24,12 +24,14 @@ class EarlierSessions : public testing::Test {
     job.cell = "cell-7";
     job.batch_ids = {id};
     const std::string csv = "q1_deg\n" + id + "\n";
-    const auto added =
-        demand(store_->add_batch({"cell-7", id, csv, sha256_hex(csv), "client:1", accepted_at, 12}, job));
+    const auto added = demand(
+        store_->add_batch({"cell-7", id, csv, sha256_hex(csv), "client:1", accepted_at, 12}, job));
     const int poses = 40 + static_cast<int>(added.id);
-    ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, poses), added.id, true, "made"));
+    ASSERT_TRUE(
+        store_->add_model("cell-7", test::nominal_model(cell_, poses), added.id, true, "made"));
   }
-  [[nodiscard]] std::vector<std::string> earlier_than(const std::string& id, const SessionRule& rule) const {
+  [[nodiscard]] std::vector<std::string> earlier_than(const std::string& id,
+                                                      const SessionRule& rule) const {
     StoredJob job;
     job.cell = "cell-7";
     job.batch_ids = {id};
@@ -42,11 +44,13 @@ class EarlierSessions : public testing::Test {
   const std::int64_t now_ = unix_now();
 };
 
-TEST_F(EarlierSessions, AreInTheWindowOfDaysByTheirOwnTimeInWhateverOrderServersWithOtherClocksTookThem) {
+TEST_F(EarlierSessions,
+       AreInTheWindowOfDaysByTheirOwnTimeInWhateverOrderServersWithOtherClocksTookThem) {
   learned("yesterday", now_ - kDay);
   learned("last-year", now_ - 365 * kDay);
   learned("today", now_);
-  EXPECT_EQ(earlier_than("today", {SessionRule::Kind::kDays, 30}), std::vector<std::string>{"yesterday"});
+  EXPECT_EQ(earlier_than("today", {SessionRule::Kind::kDays, 30}),
+            std::vector<std::string>{"yesterday"});
 }
 
 TEST_F(EarlierSessions, HaveNoneWhoseTextIsPruned) {

@@ -33,7 +33,9 @@ class TrainerFaults : public testing::Test {
     trainer_->set_listeners(
         [this](const JobProgress& progress) { tell([&] { reports_.push_back(progress); }); },
         [](const ServedModel&, bool) {},
-        [this](const std::string& trouble, bool over) { tell([&] { troubles_.emplace_back(trouble, over); }); });
+        [this](const std::string& trouble, bool over) {
+          tell([&] { troubles_.emplace_back(trouble, over); });
+        });
     notices_ = demand(trainer_->start());
   }
   void stop() {
@@ -67,14 +69,16 @@ class TrainerFaults : public testing::Test {
     });
   }
   Result<std::int64_t> submit(const std::string& id, std::uint64_t seed = 1) {
-    return trainer_->submit("cell-7", id, test::small_batch_csv(*cells_.at("cell-7"), {.seed = seed}), "client:" + id);
+    return trainer_->submit(
+        "cell-7", id, test::small_batch_csv(*cells_.at("cell-7"), {.seed = seed}), "client:" + id);
   }
   int served(const std::string& cell = "cell-7") {
     const auto model = registry_->in_force(cell);
     return model ? model->version : 0;
   }
   void damage(const std::string& which) {
-    SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'damaged' WHERE " + which);
+    SQLite::Database(path_, SQLite::OPEN_READWRITE)
+        .exec("UPDATE models SET content = 'damaged' WHERE " + which);
     std::filesystem::remove_all(path_ + ".models");
   }
   void add_models(const std::string& cell, int count) {
@@ -85,7 +89,8 @@ class TrainerFaults : public testing::Test {
 
   test::TemporaryFolder folder_;
   const std::string path_ = folder_.file("trammel.db");
-  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")}, {"cell-8", test::small_cell("cell-8")}};
+  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")},
+                        {"cell-8", test::small_cell("cell-8")}};
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<JobProgress> reports_;                    // guarded by mutex_
@@ -157,7 +162,8 @@ TEST_F(TrainerFaults, WhereTheModelInForceIsDamagedTheNewestGoodOneIsServedAndTh
   EXPECT_EQ(served("cell-7"), 1);
   EXPECT_EQ(served("cell-8"), 1);
   ASSERT_EQ(notices_.size(), 1u);
-  EXPECT_NE(notices_.front().find("cell-7: version 1 is served instead"), std::string::npos) << notices_.front();
+  EXPECT_NE(notices_.front().find("cell-7: version 1 is served instead"), std::string::npos)
+      << notices_.front();
   ASSERT_TRUE(trainer_->activate("cell-7", 1));
   EXPECT_TRUE(trainer_->activate("cell-8", 1));
 }

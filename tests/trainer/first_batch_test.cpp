@@ -22,16 +22,19 @@ TEST(FirstBatch, OneThatWasReadWronglyIsKeptOutAndTheReadingThatFitsIsNamed) {
   for (Measurement& m : mirrored.measurements) m.p_W.y() *= -1;
   const JobProgress job = cell.submit(std::move(mirrored));
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
-  EXPECT_NE(job.what.find("read with the other sign of y_mm they would fit"), std::string::npos) << job.what;
+  EXPECT_NE(job.what.find("read with the other sign of y_mm they would fit"), std::string::npos)
+      << job.what;
   EXPECT_EQ(cell.in_force(), 0) << "nothing is learned";
   const auto kept_out = test::demand(cell.trainer().quarantined("cell-7"));
   ASSERT_EQ(kept_out.size(), 1u) << "the batch is stored";
   EXPECT_EQ(kept_out.front().id, "day-1");
 
-  EXPECT_EQ(cell.submit(measured(2)).outcome.verdict, JobVerdict::kInForce) << "the same as it was meant";
+  EXPECT_EQ(cell.submit(measured(2)).outcome.verdict, JobVerdict::kInForce)
+      << "the same as it was meant";
 }
 
-TEST(FirstBatch, OneOfAnotherToolIsLearnedOnceSomebodyWhoKnowsHasReleasedItAndWaitsForHimToActivateIt) {
+TEST(FirstBatch,
+     OneOfAnotherToolIsLearnedOnceSomebodyWhoKnowsHasReleasedItAndWaitsForHimToActivateIt) {
   auto without_bias = std::make_shared<Cell>(*test::cell_7());
   without_bias->model.bias = "none";
   LearningCell cell(without_bias);
@@ -40,9 +43,12 @@ TEST(FirstBatch, OneOfAnotherToolIsLearnedOnceSomebodyWhoKnowsHasReleasedItAndWa
   const JobProgress job = cell.submit(std::move(other));
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
   EXPECT_NE(job.what.find("another point of the tool"), std::string::npos) << job.what;
-  const auto again = test::demand(cell.trainer().retrain("cell-7", {"day-1"}, "", "", Trainer::Quarantine::kReleased));
-  EXPECT_EQ(cell.finished(again).outcome.verdict, JobVerdict::kUndecided) << cell.finished(again).what;
-  EXPECT_NE(cell.finished(again).what.find("no robot is so far off its drawing"), std::string::npos);
+  const auto again = test::demand(
+      cell.trainer().retrain("cell-7", {"day-1"}, "", "", Trainer::Quarantine::kReleased));
+  EXPECT_EQ(cell.finished(again).outcome.verdict, JobVerdict::kUndecided)
+      << cell.finished(again).what;
+  EXPECT_NE(cell.finished(again).what.find("no robot is so far off its drawing"),
+            std::string::npos);
   EXPECT_EQ(cell.in_force(), 0);
 }
 
@@ -51,8 +57,10 @@ TEST(FirstBatch, OneInWhichSomethingJumpsHalfwayIsKeptOutWithItsPose) {
   LearningCell cell(nominal);
   const VirtualRobot robot = test::chapter_5_robot(nominal);
   MeasurementBatch batch = test::measured_on(robot, {.poses = 120, .seed = 7});
-  const MeasurementBatch later = test::measured_on(test::with_zero_off(robot, 3, 1e-3), {.poses = 120, .seed = 7});
-  std::copy(later.measurements.begin() + 60, later.measurements.end(), batch.measurements.begin() + 60);
+  const MeasurementBatch later =
+      test::measured_on(test::with_zero_off(robot, 3, 1e-3), {.poses = 120, .seed = 7});
+  std::copy(later.measurements.begin() + 60, later.measurements.end(),
+            batch.measurements.begin() + 60);
   const std::string pose = batch.measurements[60].pose_id;
   const JobProgress job = cell.submit(std::move(batch));
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
@@ -74,7 +82,8 @@ TEST(FirstBatch, AModelThatLeavesHundredsOfSigmaWaitsForAPerson) {
   const JobProgress job = cell.submit(std::move(bent));
   EXPECT_EQ(cell.in_force(), 0) << job.what;
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kUndecided) << job.what;
-  EXPECT_NE(job.outcome.why.find("times the stated sigma is left"), std::string::npos) << job.outcome.why;
+  EXPECT_NE(job.outcome.why.find("times the stated sigma is left"), std::string::npos)
+      << job.outcome.why;
 }
 
 TEST(FirstBatch, ThreeBadRowsInTenAreNamedAndAPersonDecides) {
@@ -84,12 +93,14 @@ TEST(FirstBatch, ThreeBadRowsInTenAreNamedAndAPersonDecides) {
   MeasurementBatch bad = measured(8);
   for (std::size_t i = 0; i < bad.measurements.size(); ++i) {
     const auto k = static_cast<double>(i);
-    if (i % 10 < 3) bad.measurements[i].p_W += 0.03 * Vector3(std::sin(7 * k), std::cos(5 * k), std::sin(3 * k));
+    if (i % 10 < 3)
+      bad.measurements[i].p_W += 0.03 * Vector3(std::sin(7 * k), std::cos(5 * k), std::sin(3 * k));
   }
   const JobProgress job = cell.submit(std::move(bad));
   EXPECT_EQ(cell.in_force(), 0) << job.what;
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kUndecided) << job.what;
-  EXPECT_NE(job.outcome.why.find("of the measured rows do not fit the others"), std::string::npos) << job.outcome.why;
+  EXPECT_NE(job.outcome.why.find("of the measured rows do not fit the others"), std::string::npos)
+      << job.outcome.why;
 }
 
 TEST(FirstBatch, ALaterOneThatWasReadWronglyIsNamedLikewise) {

@@ -26,10 +26,11 @@ using test::GaugedArm;
 
 constexpr double kSigma = 0.05;  // mm
 
-CheckedBatch checked(const GaugedArm& arm, const std::vector<test::GaugeRow>& rows, std::uint64_t seed,
-                     double held_out = 0) {
-  return demand(check_against_cell(demand(parse_batch_csv(test::gauge_text(rows, kSigma, seed), "wires.csv")),
-                                   *arm.cell, drawn(held_out, 1)));
+CheckedBatch checked(const GaugedArm& arm, const std::vector<test::GaugeRow>& rows,
+                     std::uint64_t seed, double held_out = 0) {
+  return demand(
+      check_against_cell(demand(parse_batch_csv(test::gauge_text(rows, kSigma, seed), "wires.csv")),
+                         *arm.cell, drawn(held_out, 1)));
 }
 
 TrainOptions without_bias() {
@@ -41,17 +42,18 @@ TrainOptions without_bias() {
 TEST(TrainedFromTouches, APlaneThatIsToldAskewWaitsForAPerson) {
   const auto stops = [](double askew_deg) {
     const double askew = from_deg(askew_deg);
-    const GaugedArm arm =
-        test::gauged_arm(23, {},
-                         fmt::format("{{table: {{xyz_mm: [1200, 0, 300], plane_normal: [{:.9f}, 0, {:.9f}]}}}}",
-                                     std::sin(askew), std::cos(askew)));
+    const GaugedArm arm = test::gauged_arm(
+        23, {},
+        fmt::format("{{table: {{xyz_mm: [1200, 0, 300], plane_normal: [{:.9f}, 0, {:.9f}]}}}}",
+                    std::sin(askew), std::cos(askew)));
     std::vector<test::GaugeRow> rows = test::position_rows(arm, 160, 23);
     for (std::size_t i = 0; i < rows.size(); i += 2) {
       rows[i].column = "touch_mm";
       rows[i].anchor = "table";
       rows[i].value_mm = rows[i].p_mm.z() - 300;
     }
-    const std::vector<Note> notes = notes_of(demand(train(arm.cell, checked(arm, rows, 23), without_bias())));
+    const std::vector<Note> notes =
+        notes_of(demand(train(arm.cell, checked(arm, rows, 23), without_bias())));
     return std::count_if(notes.begin(), notes.end(), [](const Note& note) {
       return note.severity == Note::Severity::kStop &&
              (note.code == "left_over_sigma" || note.code == "rows_do_not_fit");
@@ -88,7 +90,8 @@ TEST_F(TrainedFromWires, FiguresAreThoseOfDistancesAndNeverOfPositions) {
   EXPECT_GT(validation->gauges->nominal, 5e-4);
   EXPECT_LT(validation->gauges->compensated, 1.6 * kSigma * 1e-3);
   EXPECT_GE(validation->gauges->coverage_95, 0.85);
-  EXPECT_TRUE(model_->provenance().level.starts_with("base,anchors,geometry,compliance")) << model_->provenance().level;
+  EXPECT_TRUE(model_->provenance().level.starts_with("base,anchors,geometry,compliance"))
+      << model_->provenance().level;
 }
 
 TEST_F(TrainedFromWires, IsReadFromItsFileAsItWas) {
@@ -105,23 +108,30 @@ TEST_F(TrainedFromWires, IsReadFromItsFileAsItWas) {
 }
 
 TEST_F(TrainedFromWires, WhatWorksWithPositionsRefusesTheBatchAndSaysWhatToDo) {
-  const auto says = [](const auto& result) { return result ? std::string("took it") : result.error().message; };
-  EXPECT_NE(says(diagnose(arm_.cell, *batch_, {})).find("diagnose works with positions alone"), std::string::npos);
-  EXPECT_NE(says(check_health(*model_, *batch_, {})).find("a check works with positions alone"), std::string::npos);
+  const auto says = [](const auto& result) {
+    return result ? std::string("took it") : result.error().message;
+  };
+  EXPECT_NE(says(diagnose(arm_.cell, *batch_, {})).find("diagnose works with positions alone"),
+            std::string::npos);
+  EXPECT_NE(says(check_health(*model_, *batch_, {})).find("a check works with positions alone"),
+            std::string::npos);
   TrainOptions with_bias = without_bias();
   with_bias.bias = "se";
   const auto with_kernel = train(arm_.cell, *batch_, with_bias);
   EXPECT_NE(says(with_kernel).find("is learned from positions"), std::string::npos);
   EXPECT_NE(with_kernel.error().next.find("--bias none"), std::string::npos);
-  EXPECT_NE(says(learn_bias(*model_, *batch_, with_bias)).find("positions alone"), std::string::npos);
+  EXPECT_NE(says(learn_bias(*model_, *batch_, with_bias)).find("positions alone"),
+            std::string::npos);
   TrainOptions refit = without_bias();
   refit.from = *model_;
   EXPECT_NE(says(train(arm_.cell, *batch_, refit)).find("positions alone"), std::string::npos);
   const BatchText sent{"wires", batch_->rows().source_text, 0};
-  EXPECT_NE(says(received_batch(sent, *arm_.cell, drawn(0, 1))).find("the service works with positions alone"),
+  EXPECT_NE(says(received_batch(sent, *arm_.cell, drawn(0, 1)))
+                .find("the service works with positions alone"),
             std::string::npos);
   const CheckedBatch positions = checked(arm_, test::position_rows(arm_, 30, 23), 23);
-  EXPECT_NE(says(train(arm_.cell, joined({*batch_, positions}), without_bias())).find("set-ups of the instrument"),
+  EXPECT_NE(says(train(arm_.cell, joined({*batch_, positions}), without_bias()))
+                .find("set-ups of the instrument"),
             std::string::npos);
 }
 
@@ -145,9 +155,10 @@ TEST(TrainedFromPositions, IsHeldAgainstDistancesToKnownAnchors) {
   EXPECT_LT(evaluation.gauges->compensated, 1.5 * kSigma * 1e-3);
   EXPECT_GE(evaluation.gauges->coverage_95, 0.85);
 
-  const GaugedArm unknown = test::gauged_arm(24, test::three_corners(), test::unknown_places(test::three_corners()));
-  const CompensatedModel knows_none =
-      demand(train(unknown.cell, checked(unknown, test::position_rows(unknown, 150, 24), 24), without_bias()));
+  const GaugedArm unknown =
+      test::gauged_arm(24, test::three_corners(), test::unknown_places(test::three_corners()));
+  const CompensatedModel knows_none = demand(train(
+      unknown.cell, checked(unknown, test::position_rows(unknown, 150, 24), 24), without_bias()));
   const auto refused_batch = in_world_of(knows_none, wires);
   ASSERT_FALSE(refused_batch);
   EXPECT_NE(refused_batch.error().message.find("does not know where anchor"), std::string::npos);
@@ -157,7 +168,8 @@ TEST(TrainedFromBoth, TellsTheFiguresOfEachKindByItself) {
   const GaugedArm arm = test::gauged_arm(26, test::three_corners());
   std::vector<test::GaugeRow> rows = test::position_rows(arm, 60, 26);
   for (test::GaugeRow& row : test::wire_rows(arm, 90, 27)) rows.push_back(std::move(row));
-  const CompensatedModel model = demand(train(arm.cell, checked(arm, rows, 26, 0.2), without_bias()));
+  const CompensatedModel model =
+      demand(train(arm.cell, checked(arm, rows, 26, 0.2), without_bias()));
   const Evaluation& validation = model.parts().validation.value();
   ASSERT_TRUE(validation.gauges);
   EXPECT_EQ(validation.poses + validation.gauges->rows, 30);

@@ -18,7 +18,9 @@ std::shared_ptr<const Cell> cell_of(const SessionRule& rule = {}) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   cell->model.bias = "none";
   cell->sessions = rule;
-  cell->cell_yaml += rule.kind == SessionRule::Kind::kLast ? fmt::format("sessions: {{last: {}}}\n", rule.count) : "";
+  cell->cell_yaml += rule.kind == SessionRule::Kind::kLast
+                         ? fmt::format("sessions: {{last: {}}}\n", rule.count)
+                         : "";
   return cell;
 }
 
@@ -53,11 +55,13 @@ TEST(LearningFromSessions, AZeroThatWasLostGoesInForceAndIsDated) {
   LearningCell learning(cell);
   learning.submit(measured_on(robot, {.poses = 200, .seed = 1}));
   const double before = true_error(learning.model(), after);
-  const JobProgress end = learning.submit(measured_on(after, {.poses = 110, .seed = 2, .set_up_anew = true}));
+  const JobProgress end =
+      learning.submit(measured_on(after, {.poses = 110, .seed = 2, .set_up_anew = true}));
   EXPECT_TRUE(end.in_force) << end.what;
   EXPECT_LT(true_error(learning.model(), after), 0.02 * before);
   ASSERT_EQ(learning.model().parts().changes.size(), 1u);
-  EXPECT_EQ(learning.model().parts().sessions[learning.model().parts().changes.front().session].id, "day-2");
+  EXPECT_EQ(learning.model().parts().sessions[learning.model().parts().changes.front().session].id,
+            "day-2");
 }
 
 TEST(LearningFromSessions, AnImportedModelThatIsWorseIsPutInForceByForceOnly) {
@@ -66,10 +70,12 @@ TEST(LearningFromSessions, AnImportedModelThatIsWorseIsPutInForceByForceOnly) {
   LearningCell learning(cell), elsewhere(cell);
   learning.submit(measured_on(robot, {.poses = 200, .seed = 1}));
   elsewhere.submit(measured_on(robot, {.poses = 40, .seed = 2, .noise = 6}));
-  const int version = test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.model())));
+  const int version =
+      test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.model())));
   const Status refused = learning.trainer().activate("cell-7", version);
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("mm before (version 1)"), std::string::npos) << refused.error().message;
+  EXPECT_NE(refused.error().message.find("mm before (version 1)"), std::string::npos)
+      << refused.error().message;
   EXPECT_NE(refused.error().next.find("--force"), std::string::npos);
   EXPECT_EQ(refused.error().field, "after_mm");
   ASSERT_TRUE(refused.error().value && refused.error().limit) << "the figures as data";
@@ -105,7 +111,8 @@ TEST(LearningFromSessions, AnImportedModelThatIsBetterNeedsNoForce) {
   LearningCell learning(cell), elsewhere(cell);
   learning.submit(measured_on(robot, {.poses = 120, .seed = 1, .noise = 3}));
   elsewhere.submit(measured_on(robot, {.poses = 300, .seed = 2}));
-  const int version = test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.model())));
+  const int version =
+      test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.model())));
   EXPECT_TRUE(learning.trainer().activate("cell-7", version));
 }
 
@@ -115,7 +122,8 @@ TEST(LearningFromSessions, AnImportedModelOfAFewPosesIsPutInForceByForceOnly) {
   LearningCell learning(cell), elsewhere(cell);
   learning.submit(measured_on(robot, {.poses = 100, .seed = 1}));
   elsewhere.submit(measured_on(robot, {.poses = 6, .seed = 2, .corner = 0.2}));
-  const int version = test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.version(1))));
+  const int version =
+      test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.version(1))));
   const Status refused = learning.trainer().activate("cell-7", version);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().next.find("--force"), std::string::npos);
@@ -128,7 +136,8 @@ TEST(LearningFromSessions, AFirstBatchOfSeveralSetUpsIsJudgedInEachOfThem) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     MeasurementBatch all;
     for (int s = 0; s < 3; ++s) {
-      const Day day{.poses = 60, .seed = 100 * seed + static_cast<std::uint64_t>(s), .set_up_anew = s < 2};
+      const Day day{
+          .poses = 60, .seed = 100 * seed + static_cast<std::uint64_t>(s), .set_up_anew = s < 2};
       MeasurementBatch part = measured_on(robot, day);
       for (Measurement& m : part.measurements) {
         m.session_id = fmt::format("set-up {}", s);

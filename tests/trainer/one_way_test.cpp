@@ -1,5 +1,5 @@
-// How often a batch is parsed, checked and split on its way. The linker leads these calls here first (`--wrap` in
-// tests/CMakeLists.txt), so that the library that runs is the one that ships.
+// How often a batch is parsed, checked and split on its way. The linker leads these calls here
+// first (`--wrap` in tests/CMakeLists.txt), so that the library that runs is the one that ships.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -40,18 +40,24 @@ std::map<std::string, Calls> seen() {
 }  // namespace
 
 Result<MeasurementBatch> real_parse(const std::string& text, const std::string& where) asm(
-    "__real__ZN7trammel15parse_batch_csvERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEES7_");
+    "__real__ZN7trammel15parse_batch_csvERKNSt7__cxx1112basic_stringIcSt11char_"
+    "traitsIcESaIcEEES7_");
 Result<MeasurementBatch> wrap_parse(const std::string& text, const std::string& where) asm(
-    "__wrap__ZN7trammel15parse_batch_csvERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEES7_");
+    "__wrap__ZN7trammel15parse_batch_csvERKNSt7__cxx1112basic_stringIcSt11char_"
+    "traitsIcESaIcEEES7_");
 Result<MeasurementBatch> wrap_parse(const std::string& text, const std::string& where) {
   count(where.starts_with("batch ") ? where.substr(6) : where, &Calls::parsed);
   return real_parse(text, where);
 }
 
-Result<CheckedBatch> real_check(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) asm(
-    "__real__ZN7trammel18check_against_cellENS_16MeasurementBatchERKNS_4CellERKSt8functionIFSt6vectorIbSaIbEERKS0_EE");
-Result<CheckedBatch> wrap_check(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) asm(
-    "__wrap__ZN7trammel18check_against_cellENS_16MeasurementBatchERKNS_4CellERKSt8functionIFSt6vectorIbSaIbEERKS0_EE");
+Result<CheckedBatch>
+real_check(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) asm(
+    "__real__ZN7trammel18check_against_cellENS_16MeasurementBatchERKNS_"
+    "4CellERKSt8functionIFSt6vectorIbSaIbEERKS0_EE");
+Result<CheckedBatch>
+wrap_check(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) asm(
+    "__wrap__ZN7trammel18check_against_cellENS_16MeasurementBatchERKNS_"
+    "4CellERKSt8functionIFSt6vectorIbSaIbEERKS0_EE");
 Result<CheckedBatch> wrap_check(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) {
   count(batch.id, &Calls::checked);
   return real_check(std::move(batch), cell, hold_out);
@@ -69,13 +75,15 @@ BatchSplit wrap_split(const MeasurementBatch& batch, const std::vector<bool>& he
 namespace {
 
 constexpr Calls kOnce{1, 1, 1};
-constexpr Calls kOnceEach{2, 2, 2};  // when it is accepted, and when its turn comes: meanwhile the store alone has it
+constexpr Calls kOnceEach{
+    2, 2, 2};  // when it is accepted, and when its turn comes: meanwhile the store alone has it
 
 class OneWay : public testing::Test {
  protected:
   OneWay() : cell_(test::small_cell("cell-7")), learning_(cell_) {}
   JobProgress submit(const test::SmallBatch& batch, const std::string& name) {
-    MeasurementBatch measured = test::demand(parse_batch_csv(test::small_batch_csv(*cell_, batch), name));
+    MeasurementBatch measured =
+        test::demand(parse_batch_csv(test::small_batch_csv(*cell_, batch), name));
     static_cast<void>(seen());
     return learning_.submit(std::move(measured));
   }
@@ -107,8 +115,8 @@ TEST_F(OneWay, BatchesThatAreTrainedAgainTogetherAreEachReadOnce) {
   submit({.poses = 120}, "a");
   submit({.poses = 120, .noise = 10e-6, .seed = 2}, "b");
   static_cast<void>(seen());
-  const JobProgress again =
-      learning_.finished(test::demand(learning_.trainer().retrain("cell-7", {"day-1", "day-2"}, "", "")));
+  const JobProgress again = learning_.finished(
+      test::demand(learning_.trainer().retrain("cell-7", {"day-1", "day-2"}, "", "")));
   ASSERT_EQ(again.stage, JobStage::kDone) << again.what;
   const auto all = seen();
   EXPECT_EQ(of(all, "day-1"), kOnce);
@@ -118,7 +126,8 @@ TEST_F(OneWay, BatchesThatAreTrainedAgainTogetherAreEachReadOnce) {
 TEST_F(OneWay, ADiagnosisThatIsAppliedReadsItsBatchOnce) {
   submit({.poses = 120}, "a");
   static_cast<void>(seen());
-  const JobProgress done = learning_.finished(test::demand(learning_.trainer().diagnose("cell-7", "day-1", "", true)));
+  const JobProgress done =
+      learning_.finished(test::demand(learning_.trainer().diagnose("cell-7", "day-1", "", true)));
   ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
   EXPECT_EQ(of(seen(), "day-1"), kOnce);
 }
@@ -126,7 +135,8 @@ TEST_F(OneWay, ADiagnosisThatIsAppliedReadsItsBatchOnce) {
 TEST_F(OneWay, ABatchThatIsSentToBeDiagnosedIsReadAsItIsAcceptedAndOnItsTurn) {
   const std::string csv = test::small_batch_csv(*cell_, {.poses = 60});
   static_cast<void>(seen());
-  const JobProgress done = learning_.finished(test::demand(learning_.trainer().diagnose("cell-7", "", csv, false)));
+  const JobProgress done =
+      learning_.finished(test::demand(learning_.trainer().diagnose("cell-7", "", csv, false)));
   ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
   const auto all = seen();
   ASSERT_EQ(all.size(), 1U);

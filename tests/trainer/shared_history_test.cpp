@@ -19,7 +19,8 @@ class SharedHistory : public testing::Test {
   static void SetUpTestSuite() { test::Postgres::of_program(); }
   SharedHistory() {
     for (int poses = 1; poses <= 3; ++poses)
-      EXPECT_TRUE(store_->add_model("cell-7", test::nominal_model(cells_.at("cell-7"), poses), 0, true, "made"));
+      EXPECT_TRUE(store_->add_model("cell-7", test::nominal_model(cells_.at("cell-7"), poses), 0,
+                                    true, "made"));
     EXPECT_TRUE(demand(trainer_.take_up()).empty());
   }
   int served() {
@@ -38,16 +39,16 @@ TEST_F(SharedHistory, ARollbackStepsPastNoVersionThatOnlyCannotBeReadNow) {
   ASSERT_TRUE(registry_.version("cell-7", 1));  // in memory, as version 2 is not
   {
     test::Process somebody({"/usr/bin/psql", url_, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
-                            "LOCK TABLE models IN ACCESS EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
-                            "SELECT pg_sleep(60)"});
+                            "LOCK TABLE models IN ACCESS EXCLUSIVE MODE", "-c", "SELECT 'locked'",
+                            "-c", "SELECT pg_sleep(60)"});
     ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
     const auto refused = trainer_.rollback("cell-7", {"r", "roll back cell-7"});
     ASSERT_FALSE(refused) << "version " << *refused;
     EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
   }
   test::Postgres::of_program().sql(url_,
-                                   "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation = "
-                                   "'models'::regclass AND mode = 'AccessExclusiveLock'");
+                                   "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation "
+                                   "= 'models'::regclass AND mode = 'AccessExclusiveLock'");
   EXPECT_EQ(demand(trainer_.rollback("cell-7", {"r", "roll back cell-7"})), 2);
   EXPECT_EQ(served(), 2);
 }
@@ -58,7 +59,8 @@ TEST_F(SharedHistory, AModelThatIsJudgedWhileOthersDecideAllTheTimeIsTriedAgainA
   StoredJob asked;
   asked.cell = "cell-7";
   asked.batch_ids = {"b1"};
-  asked = demand(store_->add_batch({"cell-7", "b1", "q1_deg\n", "hash", "client:1", 1700000000, 1}, asked));
+  asked = demand(
+      store_->add_batch({"cell-7", "b1", "q1_deg\n", "hash", "client:1", 1700000000, 1}, asked));
   ASSERT_TRUE(store_->set_job_running(asked.id));
   const CellBook cells(cells_);
   ModelRegistry registry;

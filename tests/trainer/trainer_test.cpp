@@ -63,7 +63,8 @@ class Watch {
     const std::lock_guard lock(mutex_);
     return std::find_if(reports_.begin(), reports_.end(),
                         [job](const JobProgress& p) {
-                          return p.job == job && (p.stage == JobStage::kDone || p.stage == JobStage::kFailed);
+                          return p.job == job &&
+                                 (p.stage == JobStage::kDone || p.stage == JobStage::kFailed);
                         }) -
            reports_.begin();
   }
@@ -143,7 +144,8 @@ class TrainerTest : public testing::Test {
 
   test::TemporaryFolder folder_;
   TrainerOptions options_;
-  std::map<std::string, std::shared_ptr<const Cell>> cells_ = {{"cell-7", test::small_cell("cell-7")}};
+  std::map<std::string, std::shared_ptr<const Cell>> cells_ = {
+      {"cell-7", test::small_cell("cell-7")}};
   Watch watch_;
   std::mutex models_mutex_;
   std::vector<std::pair<int, bool>> models_;  // guarded by models_mutex_
@@ -158,8 +160,8 @@ TEST_F(TrainerTest, MakesAnAcceptedBatchTheModelInForce) {
   EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
   EXPECT_TRUE(done.in_force) << done.what;
   EXPECT_EQ(done.model_version, 1);
-  EXPECT_EQ(watch_.stages(done.job),
-            (std::vector{JobStage::kQueued, JobStage::kTraining, JobStage::kStoring, JobStage::kDone}));
+  EXPECT_EQ(watch_.stages(done.job), (std::vector{JobStage::kQueued, JobStage::kTraining,
+                                                  JobStage::kStoring, JobStage::kDone}));
   ASSERT_EQ(in_force(), 1);
   EXPECT_EQ(registry_->in_force("cell-7")->model.provenance().batch_id, "lt-07");
   EXPECT_EQ(models_heard(), (std::vector<std::pair<int, bool>>{{1, true}}));
@@ -230,11 +232,14 @@ TEST_F(TrainerTest, ARowHeldOutOnceIsHeldOutInEveryTrainingOfItsBatch) {
   ASSERT_EQ(train("b", second).stage, JobStage::kDone);
   const JobProgress again = retrain({"a", "b"});
   ASSERT_EQ(again.stage, JobStage::kDone) << again.what;
-  const auto trained_on = [this](int version) { return store_->model("cell-7", version)->parts().bias->q; };
+  const auto trained_on = [this](int version) {
+    return store_->model("cell-7", version)->parts().bias->q;
+  };
   const Eigen::MatrixXd of_both = trained_on(3);
   ASSERT_EQ(of_both.rows(), 64);
   EXPECT_EQ(of_both.topRows(32), trained_on(1));
-  EXPECT_EQ(of_both, trained_on(2)) << "the training of the second batch learns from the first, too";
+  EXPECT_EQ(of_both, trained_on(2))
+      << "the training of the second batch learns from the first, too";
 }
 
 TEST_F(TrainerTest, TheSameRequestAgainIsTheSameJobHoweverManyWait) {
@@ -275,7 +280,8 @@ TEST_F(TrainerTest, RefusedInputStoresNothing) {
   EXPECT_FALSE(trainer_->submit("cell-7", std::string(257, 'x'), good, "r"));
   EXPECT_FALSE(trainer_->submit("cell-7", "a", "no,batch\n1,2\n", "r"));
   std::string beyond = good;
-  beyond.replace(beyond.find('\n') + 1, beyond.find(',', beyond.find('\n')) - beyond.find('\n') - 1, "999.0");
+  beyond.replace(beyond.find('\n') + 1, beyond.find(',', beyond.find('\n')) - beyond.find('\n') - 1,
+                 "999.0");
   EXPECT_FALSE(trainer_->submit("cell-7", "a", beyond, "r"));
   EXPECT_TRUE(store_->batches("cell-7")->empty());
   EXPECT_TRUE(store_->unfinished_jobs()->empty());
@@ -308,9 +314,10 @@ TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor
   submit("a");
   std::string kernel = "se", sources = "M1";
   for (int i = 0; i < 40; ++i) kernel += " + se";
-  for (int i = 0; i < 600; ++i) sources += fmt::format(",gear_transmission:{}@{}", 1 + i % 6, 1 + i / 6);
-  const auto refused_with = [this](const std::vector<std::string>& batches, const std::string& level,
-                                   const std::string& bias) {
+  for (int i = 0; i < 600; ++i)
+    sources += fmt::format(",gear_transmission:{}@{}", 1 + i % 6, 1 + i / 6);
+  const auto refused_with = [this](const std::vector<std::string>& batches,
+                                   const std::string& level, const std::string& bias) {
     const auto job = trainer_->retrain("cell-7", batches, level, bias);
     EXPECT_EQ(job ? ErrorCode::kInternal : job.error().code, ErrorCode::kTooLarge);
     return job ? 0 : job.error().limit.value_or(0);
@@ -421,7 +428,8 @@ TEST_F(TrainerTest, TheOutcomeOfAJobIsDataAndSurvivesARestart) {
   start();
   const JobProgress first = train("lt-07");
   const JobProgress worse = retrain({"lt-07"}, "M0");
-  const JobProgress found = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", false).value());
+  const JobProgress found =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", false).value());
   EXPECT_EQ(first.outcome.verdict, JobVerdict::kInForce);
   EXPECT_GT(*first.outcome.before, 1e-3) << "nominal, m";
   EXPECT_LT(*first.outcome.after, 1e-4) << "m";
@@ -459,13 +467,16 @@ TEST_F(TrainerTest, AJobThatWaitsIsCancelledAtOnce) {
 TEST_F(TrainerTest, TheCellsHaveTheirTurnsHoweverManyJobsOneOfThemHas) {
   cells_["cell-8"] = test::small_cell("cell-8");
   make_trainer();
-  for (int i = 0; i < 5; ++i) submit(std::to_string(i), {.seed = static_cast<std::uint64_t>(i + 1)});
+  for (int i = 0; i < 5; ++i)
+    submit(std::to_string(i), {.seed = static_cast<std::uint64_t>(i + 1)});
   const std::int64_t other =
-      trainer_->submit("cell-8", "a", test::small_batch_csv(*cells_.at("cell-8"), {}), "client:a").value();
+      trainer_->submit("cell-8", "a", test::small_batch_csv(*cells_.at("cell-8"), {}), "client:a")
+          .value();
   start();
   watch_.wait_until_finished(5);
   watch_.wait_until_finished(other);
-  EXPECT_LT(watch_.place_of_the_end(other), watch_.place_of_the_end(2)) << "one job of the other cell was before it";
+  EXPECT_LT(watch_.place_of_the_end(other), watch_.place_of_the_end(2))
+      << "one job of the other cell was before it";
   EXPECT_LT(watch_.place_of_the_end(1), watch_.place_of_the_end(2));
 }
 
@@ -493,7 +504,8 @@ TEST_F(TrainerTest, ACellThatIsAddedWhileItServesIsTrainedFromTheJobsThatWaitedF
   EXPECT_EQ(trainer_->cells().size(), 2u);
   EXPECT_TRUE(watch_.wait_until_finished(job).in_force);
   EXPECT_EQ(registry_->version_in_force("cell-7"), 1);
-  EXPECT_TRUE(trainer_->submit("cell-7", "lt-08", test::small_batch_csv(*added.at("cell-7"), {.seed = 2}), "client:2"));
+  EXPECT_TRUE(trainer_->submit(
+      "cell-7", "lt-08", test::small_batch_csv(*added.at("cell-7"), {.seed = 2}), "client:2"));
 }
 
 TEST_F(TrainerTest, ServesWhatWasInForceAfterARestart) {
@@ -582,8 +594,9 @@ TEST_F(TrainerTest, WhereNoModelCanBeLoadedTheRecordOfTheOneInForceJudges) {
   ASSERT_EQ(in_force(), 0);
   const JobProgress worse = train("fourth", {.noise = 3e-4, .seed = 4});
   EXPECT_FALSE(worse.in_force) << worse.what;
-  EXPECT_NE(worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
-            std::string::npos)
+  EXPECT_NE(
+      worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
+      std::string::npos)
       << worse.what;
 }
 
@@ -615,7 +628,8 @@ TEST_F(TrainerTest, ImportsAModelIntoTheHistoryButNotIntoForce) {
   EXPECT_EQ(*version, 2);
   EXPECT_EQ(in_force(), 1);
   EXPECT_EQ(trainer_->import_model("cell-7", text).value(), 2) << "the same again is the same";
-  EXPECT_EQ(trainer_->activate("cell-7", 2).error().code, ErrorCode::kRefused) << "it is worse on what was measured";
+  EXPECT_EQ(trainer_->activate("cell-7", 2).error().code, ErrorCode::kRefused)
+      << "it is worse on what was measured";
   EXPECT_EQ(in_force(), 1);
   EXPECT_TRUE(trainer_->activate("cell-7", 2, {}, true)) << "a person wants it all the same";
   EXPECT_EQ(in_force(), 2);
@@ -623,15 +637,17 @@ TEST_F(TrainerTest, ImportsAModelIntoTheHistoryButNotIntoForce) {
 
 TEST_F(TrainerTest, RefusesToImportWhatIsNotOfTheCell) {
   start();
-  EXPECT_FALSE(trainer_->import_model("cell-7", serialize(test::nominal_model(test::small_cell("cell-8"), 7))));
+  EXPECT_FALSE(trainer_->import_model(
+      "cell-7", serialize(test::nominal_model(test::small_cell("cell-8"), 7))));
   EXPECT_FALSE(trainer_->import_model("cell-7", "no model"));
   EXPECT_TRUE(store_->models("cell-7")->empty());
 }
 
 /// Joint 3 of the small cell oscillates, which its error sources do not know.
-MeasurementBatch batch_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell, int poses = 120,
-                                               std::uint64_t seed = 1) {
-  VirtualRobot robot{make_physical_model(cell, {"base", "gear_transmission:3@2"}).value(), 20e-6, 60e-6, {}};
+MeasurementBatch batch_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell,
+                                               int poses = 120, std::uint64_t seed = 1) {
+  VirtualRobot robot{
+      make_physical_model(cell, {"base", "gear_transmission:3@2"}).value(), 20e-6, 60e-6, {}};
   robot.truth.values(0) = 1e-3;
   robot.truth.values.tail<2>() = Eigen::Vector2d(1e-4, 2e-4);
   return simulate(robot, plan_poses(*cell, {poses, seed}).value(), {}).value();
@@ -675,22 +691,28 @@ TEST_F(TrainerTest, WhereNoModelIsInForceItsOwnPosesAloneJudgeAnExtensionAsOnFil
   MeasurementBatch noisy = batch_of_an_oscillating_joint(cell, 60, 2);
   for (std::size_t i = 0; i < noisy.measurements.size(); ++i) {
     const auto k = static_cast<double>(i);
-    noisy.measurements[i].p_W += 3e-3 * Vector3(std::sin(37 * k), std::cos(53 * k), std::sin(29 * k));
+    noisy.measurements[i].p_W +=
+        3e-3 * Vector3(std::sin(37 * k), std::cos(53 * k), std::sin(29 * k));
   }
-  watch_.wait_until_finished(trainer_->submit("cell-7", "noisy", to_csv(noisy), "client:1").value());
+  watch_.wait_until_finished(
+      trainer_->submit("cell-7", "noisy", to_csv(noisy), "client:1").value());
   ASSERT_EQ(in_force(), 0) << "its model waits for a person";
 
   const std::string text = to_csv(batch_of_an_oscillating_joint(cell, 60, 1));
-  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "", text, true).value());
-  const CheckedBatch batch = test::demand(
-      check_against_cell(test::demand(parse_batch_csv(text, "b.csv")), *cell, held_out_to_extend(options_.seed)));
+  const JobProgress done =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "", text, true).value());
+  const CheckedBatch batch = test::demand(check_against_cell(
+      test::demand(parse_batch_csv(text, "b.csv")), *cell, held_out_to_extend(options_.seed)));
   DiagnoseOptions options;
   options.seed = options_.seed;
   TrainOptions training;
   training.seed = options_.seed;
-  const Applied on_files = test::demand(applied(cell, batch, test::demand(diagnose(cell, batch, options)), training));
-  EXPECT_NE(on_files.why_not.find("12 poses are held out to judge by"), std::string::npos) << on_files.why_not;
-  EXPECT_NE(done.what.find(on_files.why_not), std::string::npos) << done.what << "\non files: " << on_files.why_not;
+  const Applied on_files =
+      test::demand(applied(cell, batch, test::demand(diagnose(cell, batch, options)), training));
+  EXPECT_NE(on_files.why_not.find("12 poses are held out to judge by"), std::string::npos)
+      << on_files.why_not;
+  EXPECT_NE(done.what.find(on_files.why_not), std::string::npos)
+      << done.what << "\non files: " << on_files.why_not;
 }
 
 TEST_F(TrainerTest, ACheckSaysWhatItSaysOnFilesWithTheNotesOfTheModelInForce) {
@@ -701,9 +723,11 @@ TEST_F(TrainerTest, ACheckSaysWhatItSaysOnFilesWithTheNotesOfTheModelInForce) {
   const std::int64_t job = trainer_->check("cell-7", "", text, {}).value();
   const JobProgress done = watch_.wait_until_finished(job);
   ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
-  const CheckedBatch batch = test::demand(check_against_cell(test::demand(parse_batch_csv(text, "b.csv")), *cell));
+  const CheckedBatch batch =
+      test::demand(check_against_cell(test::demand(parse_batch_csv(text, "b.csv")), *cell));
   const CompensatedModel& model = registry_->in_force("cell-7")->model;
-  const auto on_files = check_json(test::demand(check_robot(model, *cell, batch, {})), batch, model);
+  const auto on_files =
+      check_json(test::demand(check_robot(model, *cell, batch, {})), batch, model);
   const auto told = nlohmann::ordered_json::parse(trainer_->diagnosis(job)->findings);
   ASSERT_FALSE(on_files["notes"].empty()) << "nobody has confirmed the robot file";
   for (const auto& [key, value] : on_files.items()) EXPECT_TRUE(told.contains(key)) << key;
@@ -714,13 +738,18 @@ TEST_F(TrainerTest, ACheckSaysWhatItSaysOnFilesWithTheNotesOfTheModelInForce) {
 TEST_F(TrainerTest, APoseHeldOutThatFitsNeitherModelDoesNotJudgeAnExtensionAndIsNamed) {
   start();
   MeasurementBatch batch = batch_of_an_oscillating_joint(cells_.at("cell-7"));
-  const MeasurementBatch drawn = test::with_held_out(batch, options_.validation_share, options_.seed);
-  const auto held_out = std::find_if(drawn.measurements.begin(), drawn.measurements.end(),
-                                     [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
-  Measurement& bad = batch.measurements.at(static_cast<std::size_t>(held_out - drawn.measurements.begin()));
+  const MeasurementBatch drawn =
+      test::with_held_out(batch, options_.validation_share, options_.seed);
+  const auto held_out =
+      std::find_if(drawn.measurements.begin(), drawn.measurements.end(),
+                   [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
+  Measurement& bad =
+      batch.measurements.at(static_cast<std::size_t>(held_out - drawn.measurements.begin()));
   bad.p_W.z() += 0.02;
-  watch_.wait_until_finished(trainer_->submit("cell-7", "lt-07", to_csv(batch), "client:1").value());
-  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  watch_.wait_until_finished(
+      trainer_->submit("cell-7", "lt-07", to_csv(batch), "client:1").value());
+  const JobProgress done =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
   EXPECT_TRUE(done.in_force) << "one pose 20 mm off decided: " << done.what;
   EXPECT_NE(done.what.find("judged without " + bad.pose_id), std::string::npos) << done.what;
 }
@@ -729,11 +758,13 @@ TEST_F(TrainerTest, WhatTheModelInForceHasAlreadyIsNotFoundAgain) {
   start();
   const std::string oscillating = csv_of_an_oscillating_joint(cells_.at("cell-7"));
   watch_.wait_until_finished(trainer_->submit("cell-7", "lt-07", oscillating, "client:1").value());
-  const JobProgress first = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  const JobProgress first =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
   ASSERT_TRUE(first.in_force) << first.what;
   EXPECT_NE(first.what.find("better beyond chance"), std::string::npos) << first.what;
   EXPECT_NE(first.what.find("(version 1)"), std::string::npos) << first.what;
-  const JobProgress again = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  const JobProgress again =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
   EXPECT_FALSE(again.in_force);
   EXPECT_NE(again.what.find("nothing applied"), std::string::npos) << again.what;
   EXPECT_NE(again.what.find("version 2 stays in force"), std::string::npos) << again.what;
@@ -744,7 +775,8 @@ TEST_F(TrainerTest, WhatTheModelInForceHasAlreadyIsNotFoundAgain) {
 TEST_F(TrainerTest, ADiagnosisThatNamesNothingAppliesNothing) {
   start();
   train("lt-07");
-  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  const JobProgress done =
+      watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
   EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
   EXPECT_NE(done.what.find("nothing applied"), std::string::npos) << done.what;
   EXPECT_EQ(in_force(), 1);
@@ -787,7 +819,8 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsR
   make_trainer();
   submit("lt-07");
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
-  const auto released = [this](const std::vector<std::string>& ids, const std::string& level, const std::string& bias) {
+  const auto released = [this](const std::vector<std::string>& ids, const std::string& level,
+                               const std::string& bias) {
     const auto job = trainer_->retrain("cell-7", ids, level, bias, Trainer::Quarantine::kReleased);
     EXPECT_EQ(trainer_->quarantined("")->size(), 1u) << "asking releases nothing";
     return job;
@@ -818,18 +851,22 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereItsModelIsJudgedAndFoundNotBette
   EXPECT_FALSE(done.in_force) << done.what;
   EXPECT_NE(done.what.find("lt-08 stays there"), std::string::npos) << done.what;
   EXPECT_EQ(trainer_->quarantined("")->size(), 1u);
-  ASSERT_FALSE(trainer_->activate("cell-7", done.model_version)) << "it is worse on what was measured";
-  ASSERT_TRUE(trainer_->activate("cell-7", done.model_version, {}, true)) << "a person may know better";
+  ASSERT_FALSE(trainer_->activate("cell-7", done.model_version))
+      << "it is worse on what was measured";
+  ASSERT_TRUE(trainer_->activate("cell-7", done.model_version, {}, true))
+      << "a person may know better";
   EXPECT_TRUE(trainer_->quarantined("")->empty());
 }
 
 TEST_F(TrainerTest, AModelOfOldMeasurementsIsAsOldAsTheyAre) {
   const std::int64_t yesterday = 1'600'000'000;
-  const auto stored = [&](const std::string& id, std::int64_t accepted_at, const std::string& text) {
+  const auto stored = [&](const std::string& id, std::int64_t accepted_at,
+                          const std::string& text) {
     StoredJob job;
     job.cell = "cell-7";
     job.batch_ids = {id};
-    const auto added = store_->add_batch({"cell-7", id, text, sha256_hex(text), id, accepted_at, 40}, job);
+    const auto added =
+        store_->add_batch({"cell-7", id, text, sha256_hex(text), id, accepted_at, 40}, job);
     ASSERT_TRUE(added) << added.error().message;
     ASSERT_TRUE(store_->set_job_failed(added->id, "not by itself"));
   };
@@ -838,7 +875,8 @@ TEST_F(TrainerTest, AModelOfOldMeasurementsIsAsOldAsTheyAre) {
   std::string with_time;
   for (std::size_t at = 0; at < timed.size();) {
     const std::size_t end = timed.find('\n', at);
-    with_time += timed.substr(at, end - at) + (row == 0 ? ",time_s\n" : fmt::format(",{}\n", 1'500'000'000 + row));
+    with_time += timed.substr(at, end - at) +
+                 (row == 0 ? ",time_s\n" : fmt::format(",{}\n", 1'500'000'000 + row));
     at = end + 1;
     ++row;
   }
@@ -850,9 +888,11 @@ TEST_F(TrainerTest, AModelOfOldMeasurementsIsAsOldAsTheyAre) {
     EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
     return store_->model("cell-7", done.model_version)->provenance().measured_at.value_or(0);
   };
-  EXPECT_EQ(measured_at(retrain({"older"})), yesterday - 1000) << "when it was received, not when it was trained";
+  EXPECT_EQ(measured_at(retrain({"older"})), yesterday - 1000)
+      << "when it was received, not when it was trained";
   EXPECT_EQ(measured_at(retrain({"old", "older"})), yesterday) << "the newest of several";
-  EXPECT_EQ(measured_at(retrain({"timed"})), 1'500'000'000 + row - 1) << "when it was measured, where it says so";
+  EXPECT_EQ(measured_at(retrain({"timed"})), 1'500'000'000 + row - 1)
+      << "when it was measured, where it says so";
   const std::string exported = serialize(store_->model("cell-7", 1).value());
   ASSERT_TRUE(trainer_->activate("cell-7", 1));
   EXPECT_EQ(registry_->in_force("cell-7")->model.provenance().measured_at, yesterday - 1000);
@@ -888,8 +928,10 @@ std::string with_orientations(const std::string& csv, const Cell& cell, bool in_
   auto batch = parse_batch_csv(csv, "batch.csv");
   EXPECT_TRUE(batch);
   for (Measurement& m : batch->measurements) {
-    const Eigen::Quaterniond q((cell.robot.flange_pose(m.context.q) * *cell.tools.begin()->second).linear());
-    m.R_WT = in_xyzw_order ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix() : q.toRotationMatrix();
+    const Eigen::Quaterniond q(
+        (cell.robot.flange_pose(m.context.q) * *cell.tools.begin()->second).linear());
+    m.R_WT = in_xyzw_order ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix()
+                           : q.toRotationMatrix();
   }
   return to_csv(*batch);
 }
@@ -898,7 +940,8 @@ TEST_F(TrainerTest, OrientationsInAnotherOrderBecomeNoModelNeitherFirstNorLater)
   start();
   const Cell& cell = *cells_.at("cell-7");
   const auto trained = [&](const std::string& id, std::uint64_t seed, bool in_xyzw_order) {
-    const auto job = trainer_->submit("cell-7", id, with_orientations(csv({.seed = seed}), cell, in_xyzw_order), id);
+    const auto job = trainer_->submit(
+        "cell-7", id, with_orientations(csv({.seed = seed}), cell, in_xyzw_order), id);
     EXPECT_TRUE(job) << job.error().message;
     return watch_.wait_until_finished(job.value_or(0));
   };
@@ -929,7 +972,9 @@ TEST_F(TrainerTest, ABatchOfATrackerThatWasSetUpElsewhereIsLearnedFromAndSaysSo)
   EXPECT_NE(done.what.find("stands elsewhere"), std::string::npos) << done.what;
 }
 
-TEST_F(TrainerTest, AnUnknownJobIsNotFound) { EXPECT_EQ(trainer_->progress(77).error().code, ErrorCode::kNotFound); }
+TEST_F(TrainerTest, AnUnknownJobIsNotFound) {
+  EXPECT_EQ(trainer_->progress(77).error().code, ErrorCode::kNotFound);
+}
 
 }  // namespace
 }  // namespace trammel

@@ -1,5 +1,6 @@
-// Who waits for whom: while one cell's model is judged, or put in force, nobody else does. The linker leads judge()
-// here first (`--wrap` in tests/CMakeLists.txt), so that a test can hold it up.
+// Who waits for whom: while one cell's model is judged, or put in force, nobody else does. The
+// linker leads judge() here first (`--wrap` in tests/CMakeLists.txt), so that a test can hold it
+// up.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -122,7 +123,8 @@ class Waiting : public testing::Test {
   }
 
   test::TemporaryFolder folder_;
-  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")}, {"cell-8", test::small_cell("cell-8")}};
+  ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")},
+                        {"cell-8", test::small_cell("cell-8")}};
   std::unique_ptr<Store> store_;
   ModelRegistry registry_;
   Gate publishing_;  // of models of cell-7
@@ -141,21 +143,25 @@ TEST_F(Waiting, AModelOfAnyCellCanBePutInForceWhileAnotherOneIsJudged) {
   EXPECT_EQ(registry_.in_force("cell-8")->version, 2);
   EXPECT_TRUE(ends([&] { return trainer_->rollback("cell-8"); }));
   EXPECT_EQ(registry_.in_force("cell-8")->version, 1);
-  EXPECT_TRUE(ends([&] { return trainer_->activate("cell-7", 2); })) << "its own cell does not wait either";
+  EXPECT_TRUE(ends([&] { return trainer_->activate("cell-7", 2); }))
+      << "its own cell does not wait either";
   EXPECT_TRUE(ends([&] { return trainer_->progress(third); }));
   EXPECT_TRUE(ends([&] {
-    return trainer_->submit("cell-8", "third", test::small_batch_csv(*cells_.at("cell-8"), {.seed = 3}), "client:3");
+    return trainer_->submit("cell-8", "third",
+                            test::small_batch_csv(*cells_.at("cell-8"), {.seed = 3}), "client:3");
   }));
   const int before = judging.passed();
   judging.open();
   EXPECT_EQ(finished(third).stage, JobStage::kDone);
-  EXPECT_GT(judging.passed(), before) << "what is in force has changed meanwhile: it is judged against that";
+  EXPECT_GT(judging.passed(), before)
+      << "what is in force has changed meanwhile: it is judged against that";
 }
 
 TEST_F(Waiting, AModelOfOneCellCanBePutInForceWhileThatOfAnotherIsPublished) {
   train_all();
   publishing_.shut();
-  auto activated = std::async(std::launch::async, [&] { return trainer_->activate("cell-7", 2).has_value(); });
+  auto activated =
+      std::async(std::launch::async, [&] { return trainer_->activate("cell-7", 2).has_value(); });
   ASSERT_TRUE(publishing_.somebody_waits());
   EXPECT_EQ(registry_.in_force("cell-7")->version, 2) << "it serves already";
   const bool other = ends([&] { return trainer_->activate("cell-8", 2); });

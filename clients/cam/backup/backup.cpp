@@ -38,20 +38,23 @@ std::string yaml_pose(const Pose& X) {
   const Vector3 p = X.translation() * to_mm(1);
   Eigen::Quaterniond q(X.linear());
   if (q.w() < 0) q.coeffs() *= -1;
-  return fmt::format("{{xyz_mm: [{:.6g}, {:.6g}, {:.6g}], q_wxyz: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]}}", p.x() + 0.0,
-                     p.y() + 0.0, p.z() + 0.0, q.w() + 0.0, q.x() + 0.0, q.y() + 0.0, q.z() + 0.0);
+  return fmt::format(
+      "{{xyz_mm: [{:.6g}, {:.6g}, {:.6g}], q_wxyz: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]}}", p.x() + 0.0,
+      p.y() + 0.0, p.z() + 0.0, q.w() + 0.0, q.x() + 0.0, q.y() + 0.0, q.z() + 0.0);
 }
 
 std::string yaml_load(const StatedLoad& load) {
   const Vector3 p = load.p_F * to_mm(1);
-  return fmt::format("{{mass_kg: {:.6g}, cog_mm: [{:.6g}, {:.6g}, {:.6g}]}}", load.mass, p.x() + 0.0, p.y() + 0.0,
-                     p.z() + 0.0);
+  return fmt::format("{{mass_kg: {:.6g}, cog_mm: [{:.6g}, {:.6g}, {:.6g}]}}", load.mass,
+                     p.x() + 0.0, p.y() + 0.0, p.z() + 0.0);
 }
 
 class Backup {
  public:
   Backup(const std::string& parameters, const std::string& where)
-      : where_(where), is_text_(check_texts({{where, parameters}})), instances_(parameter_instances(parameters)) {}
+      : where_(where),
+        is_text_(check_texts({{where, parameters}})),
+        instances_(parameter_instances(parameters)) {}
 
   Result<ControllerRobot> robot(const std::string& unit, const std::string& next) {
     if (!is_text_) return tl::make_unexpected(is_text_.error());
@@ -93,11 +96,13 @@ class Backup {
         .next(next);
   }
 
-  /// `use_joint_0`, ...: a SCARA has four. No robot has fewer than three, so parameters that name fewer do not say it.
+  /// `use_joint_0`, ...: a SCARA has four. No robot has fewer than three, so parameters that name
+  /// fewer do not say it.
   static int axes_of(const ParameterInstance& robot) {
     constexpr int kFewest = 3;
     int named = 0;
-    for (std::size_t k = 0; k < kAxes; ++k) named += robot.text(fmt::format("use_joint_{}", k)).empty() ? 0 : 1;
+    for (std::size_t k = 0; k < kAxes; ++k)
+      named += robot.text(fmt::format("use_joint_{}", k)).empty() ? 0 : 1;
     return named >= kFewest ? named : 0;
   }
 
@@ -108,19 +113,22 @@ class Backup {
     if (name.empty()) return {};
     const ParameterInstance* joint = named(instances_, "JOINT", name);
     const std::string used = joint != nullptr ? joint->text("use_arm") : "";
-    std::vector<const ParameterInstance*> found = {named(instances_, "ARM", used.empty() ? name : used), joint};
+    std::vector<const ParameterInstance*> found = {
+        named(instances_, "ARM", used.empty() ? name : used), joint};
     found.erase(std::remove(found.begin(), found.end(), nullptr), found.end());
     return found;
   }
 
-  /// `-coupled_upper_joint_bound 1.2`: bounds that depend on another axis are those of a parallel arm.
+  /// `-coupled_upper_joint_bound 1.2`: bounds that depend on another axis are those of a parallel
+  /// arm.
   void find_couplings(const ParameterInstance& robot) {
     static const std::set<std::string> kNot = {"",    "0",   "no",    "No",    "NO",   "off",
                                                "Off", "OFF", "false", "False", "FALSE"};
     for (std::size_t k = 0; k < kAxes; ++k) {
       for (const ParameterInstance* of : parameters_of(robot, k)) {
         for (const auto& [name, value] : of->values) {
-          const bool coupled = name.find("coupl") != std::string::npos || name.find("parallel") != std::string::npos;
+          const bool coupled =
+              name.find("coupl") != std::string::npos || name.find("parallel") != std::string::npos;
           if (coupled && !kNot.contains(value))
             cell_.couplings.push_back({static_cast<int>(k), name, value, where_, of->line});
         }
@@ -128,14 +136,17 @@ class Backup {
     }
   }
 
-  /// The number of an attribute; `otherwise` where it is left at what the controller takes by default.
-  Status number(const ParameterInstance& of, const std::string& attribute, double otherwise, double& value) const {
+  /// The number of an attribute; `otherwise` where it is left at what the controller takes by
+  /// default.
+  Status number(const ParameterInstance& of, const std::string& attribute, double otherwise,
+                double& value) const {
     value = otherwise;
     const auto found = of.values.find(attribute);
     if (found == of.values.end()) return {};
     const auto written = read_number(found->second);
     if (!written) {
-      return refused("-{} {} of {}: expected a number", attribute, shown_short(found->second), of.type)
+      return refused("-{} {} of {}: expected a number", attribute, shown_short(found->second),
+                     of.type)
           .in(where_)
           .at_row(of.line)
           .of(attribute)
@@ -146,8 +157,8 @@ class Backup {
   }
 
   Status read_base(const ParameterInstance& robot) {
-    static constexpr std::array<const char*, 7> kParts = {"pos_x",     "pos_y",     "pos_z",    "orient_u0",
-                                                          "orient_u1", "orient_u2", "orient_u3"};
+    static constexpr std::array<const char*, 7> kParts = {
+        "pos_x", "pos_y", "pos_z", "orient_u0", "orient_u1", "orient_u2", "orient_u3"};
     std::array<double, 7> v{};
     for (std::size_t k = 0; k < kParts.size(); ++k) {
       TRY(number(robot, fmt::format("base_frame_{}", kParts[k]), k == 3 ? 1 : 0, v[k]));
@@ -163,7 +174,8 @@ class Backup {
     cell_.X_WB = make_pose(q.normalized().toRotationMatrix(), {v[0], v[1], v[2]});
     cell_.carried_by = robot.text("base_frame_coordinated");
     if (!cell_.carried_by.empty())
-      cell_.notes.push_back(fmt::format("{} carries the robot: its base frame moves", shown(cell_.carried_by)));
+      cell_.notes.push_back(
+          fmt::format("{} carries the robot: its base frame moves", shown(cell_.carried_by)));
     return {};
   }
 
@@ -171,9 +183,10 @@ class Backup {
     for (std::size_t k = 0; k < kAxes; ++k) {
       const std::vector<const ParameterInstance*> all = parameters_of(robot, k);
       const ParameterInstance* arm = all.empty() || all[0]->type != "ARM" ? nullptr : all[0];
-      if (arm == nullptr || !arm->values.contains("upper_joint_bound") || !arm->values.contains("lower_joint_bound")) {
-        cell_.notes.push_back(
-            fmt::format("the bounds of axis {} are not in the parameters: no ranges are taken", k + 1));
+      if (arm == nullptr || !arm->values.contains("upper_joint_bound") ||
+          !arm->values.contains("lower_joint_bound")) {
+        cell_.notes.push_back(fmt::format(
+            "the bounds of axis {} are not in the parameters: no ranges are taken", k + 1));
         cell_.limits.clear();
         return {};
       }
@@ -192,12 +205,15 @@ class Backup {
     return {};
   }
 
-  /// Absolute Accuracy is in use where the robot refers to its calibration, `r1_calib`, not to `r1_uncalib`.
+  /// Absolute Accuracy is in use where the robot refers to its calibration, `r1_calib`, not to
+  /// `r1_uncalib`.
   void read_calibration(const ParameterInstance& robot) {
     const std::string used = robot.text("use_robot_calib");
     if (used.empty())
-      cell_.notes.push_back("the parameters do not name a calibration (use_robot_calib): it is taken as not in use");
-    cell_.controller_compensates = used.find("calib") != std::string::npos && used.find("uncalib") == std::string::npos;
+      cell_.notes.push_back(
+          "the parameters do not name a calibration (use_robot_calib): it is taken as not in use");
+    cell_.controller_compensates =
+        used.find("calib") != std::string::npos && used.find("uncalib") == std::string::npos;
   }
 
   static Status check_texts(std::vector<SourceFile> files) {
@@ -231,8 +247,9 @@ class Backup {
       const auto [known, fresh] = cell_.frames.emplace(frame.name, frame.X_BO);
       if (fresh) where[frame.name] = one.where;
       if (known->second.isApprox(frame.X_BO, 1e-9)) continue;
-      cell_.notes.push_back("left out: " + two_values("work object", frame.name, pose_text(known->second),
-                                                      where[frame.name], pose_text(frame.X_BO), one.where));
+      cell_.notes.push_back("left out: " + two_values("work object", frame.name,
+                                                      pose_text(known->second), where[frame.name],
+                                                      pose_text(frame.X_BO), one.where));
       doubtful.insert(frame.name);
     }
     for (const std::string& name : doubtful) cell_.frames.erase(name);
@@ -246,8 +263,9 @@ class Backup {
       const auto [known, fresh] = cell_.loads.emplace(one.name, one.load);
       if (fresh) where[one.name] = one.where;
       if (known->second.mass == one.load.mass && known->second.p_F == one.load.p_F) continue;
-      cell_.notes.push_back("left out: " + two_values("load", one.name, yaml_load(known->second), where[one.name],
-                                                      yaml_load(one.load), one.where));
+      cell_.notes.push_back("left out: " + two_values("load", one.name, yaml_load(known->second),
+                                                      where[one.name], yaml_load(one.load),
+                                                      one.where));
       doubtful.insert(one.name);
     }
     for (const std::string& name : doubtful) cell_.loads.erase(name);
@@ -266,16 +284,17 @@ class Backup {
     if (stated.load && is_placeholder(*stated.load)) stated.load.reset();
     const auto [known, fresh] = cell_.tools.emplace(tool.name, stated);
     if (known->second.X_FT.isApprox(stated.X_FT, 1e-9)) return {};
-    return refused("{}", two_values("tool", tool.name, pose_text(known->second.X_FT), known->second.where,
-                                    pose_text(stated.X_FT), stated.where))
+    return refused("{}", two_values("tool", tool.name, pose_text(known->second.X_FT),
+                                    known->second.where, pose_text(stated.X_FT), stated.where))
         .of("tooldata")
         .with_text(tool.name);
   }
 
   static std::string two_values(const char* what, const std::string& name, const std::string& one,
-                                const std::string& at_one, const std::string& other, const std::string& at_other) {
-    return fmt::format("{} {} has two values in the modules, {} ({}) and {} ({})", what, shown(name), one,
-                       shown(at_one), other, shown(at_other));
+                                const std::string& at_one, const std::string& other,
+                                const std::string& at_other) {
+    return fmt::format("{} {} has two values in the modules, {} ({}) and {} ({})", what,
+                       shown(name), one, shown(at_one), other, shown(at_other));
   }
 
   const std::string where_;
@@ -289,14 +308,16 @@ bool same(const Pose& a, const Pose& b) {
          to_deg(pose_difference(a, b).tail<3>().norm()) <= kSameDeg;
 }
 
-void compare_tools(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+void compare_tools(const ControllerCell& controller, const Cell& cell,
+                   std::vector<std::string>& found) {
   for (const auto& [name, tool] : controller.tools) {
     const auto known = cell.tools.find(name);
     if (known == cell.tools.end()) {
-      found.push_back(fmt::format("tool {} ({}) is not in the cell", shown(name), shown(tool.where)));
+      found.push_back(
+          fmt::format("tool {} ({}) is not in the cell", shown(name), shown(tool.where)));
     } else if (known->second && !same(tool.X_FT, *known->second)) {
-      found.push_back(fmt::format("tool {} is {} in the controller, {} in the cell: {}", shown(name),
-                                  yaml_pose(tool.X_FT), yaml_pose(*known->second),
+      found.push_back(fmt::format("tool {} is {} in the controller, {} in the cell: {}",
+                                  shown(name), yaml_pose(tool.X_FT), yaml_pose(*known->second),
                                   apart_text(tool.X_FT, *known->second)));
     }
   }
@@ -306,7 +327,8 @@ void compare_tools(const ControllerCell& controller, const Cell& cell, std::vect
   }
 }
 
-void compare_loads(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+void compare_loads(const ControllerCell& controller, const Cell& cell,
+                   std::vector<std::string>& found) {
   for (const auto& [name, tool] : controller.tools) {
     const auto known = cell.payloads.find(name);
     if (!tool.load || known == cell.payloads.end()) continue;
@@ -314,12 +336,14 @@ void compare_loads(const ControllerCell& controller, const Cell& cell, std::vect
     const double centre = to_mm((tool.load->p_F - known->second.p_FoCog_F).norm());
     if (mass <= kSameMassKg && centre <= kSameCentreMm) continue;
     found.push_back(fmt::format(
-        "load of tool {} is {} in the controller, {} in the cell: {:.3f} kg and {:.1f} mm apart", shown(name),
-        yaml_load(*tool.load), yaml_load({known->second.mass, known->second.p_FoCog_F}), mass, centre));
+        "load of tool {} is {} in the controller, {} in the cell: {:.3f} kg and {:.1f} mm apart",
+        shown(name), yaml_load(*tool.load),
+        yaml_load({known->second.mass, known->second.p_FoCog_F}), mass, centre));
   }
 }
 
-void compare_limits(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+void compare_limits(const ControllerCell& controller, const Cell& cell,
+                    std::vector<std::string>& found) {
   std::vector<int> turning;
   for (int j = 0; j < cell.robot.size(); ++j) {
     if (cell.robot.joint(j).type == JointType::kRevolute) turning.push_back(j);
@@ -329,21 +353,25 @@ void compare_limits(const ControllerCell& controller, const Cell& cell, std::vec
     const auto& [lower, upper] = controller.limits[k];
     const Joint& joint = cell.robot.joint(turning[k]);
     // The cell may plan for less than the controller allows, never for more.
-    const double low =
-        cell.joint_ranges.empty() ? joint.lower : cell.joint_ranges[static_cast<std::size_t>(turning[k])].first;
-    const double high =
-        cell.joint_ranges.empty() ? joint.upper : cell.joint_ranges[static_cast<std::size_t>(turning[k])].second;
+    const double low = cell.joint_ranges.empty()
+                           ? joint.lower
+                           : cell.joint_ranges[static_cast<std::size_t>(turning[k])].first;
+    const double high = cell.joint_ranges.empty()
+                            ? joint.upper
+                            : cell.joint_ranges[static_cast<std::size_t>(turning[k])].second;
     if (to_deg(lower - low) <= kSameLimitDeg && to_deg(high - upper) <= kSameLimitDeg) continue;
     found.push_back(
-        fmt::format("axis {} may go from {:.2f} to {:.2f} deg in the controller, from {:.2f} to {:.2f} in the cell",
+        fmt::format("axis {} may go from {:.2f} to {:.2f} deg in the controller, from {:.2f} to "
+                    "{:.2f} in the cell",
                     k + 1, to_deg(lower), to_deg(upper), to_deg(low), to_deg(high)));
   }
 }
 
 }  // namespace
 
-Result<ControllerRobot> read_controller_robot(const std::string& parameters, const std::string& where,
-                                              const std::string& unit, const std::string& next) {
+Result<ControllerRobot> read_controller_robot(const std::string& parameters,
+                                              const std::string& where, const std::string& unit,
+                                              const std::string& next) {
   return Backup(parameters, where).robot(unit, next);
 }
 
@@ -357,17 +385,21 @@ std::string unit_of_task(const std::string& parameters, const std::string& task)
     if (one.type == "ROBOT") robots.push_back(one.text("name"));
   }
   if (robots.size() < 2 || number_of(task).empty()) return "";
-  const auto same = std::find_if(robots.begin(), robots.end(),
-                                 [&](const std::string& robot) { return number_of(robot) == number_of(task); });
+  const auto same = std::find_if(robots.begin(), robots.end(), [&](const std::string& robot) {
+    return number_of(robot) == number_of(task);
+  });
   return same == robots.end() ? "" : *same;
 }
 
 StatedRobot stated_by(const ControllerRobot& robot) {
   StatedRobot stated;
-  if (robot.carried_by.empty()) stated.bases.push_back({robot.X_WB, "base_frame", robot.file, robot.line});
+  if (robot.carried_by.empty())
+    stated.bases.push_back({robot.X_WB, "base_frame", robot.file, robot.line});
   if (robot.axes > 0)
-    stated.numbers.push_back({ArmNumber::kAxes, static_cast<double>(robot.axes), "use_joint", robot.file, robot.line});
-  if (!robot.robot_type.empty()) stated.types.push_back({robot.robot_type, "use_robot_type", robot.file, robot.line});
+    stated.numbers.push_back(
+        {ArmNumber::kAxes, static_cast<double>(robot.axes), "use_joint", robot.file, robot.line});
+  if (!robot.robot_type.empty())
+    stated.types.push_back({robot.robot_type, "use_robot_type", robot.file, robot.line});
   stated.couplings = robot.couplings;
   return stated;
 }
@@ -379,47 +411,57 @@ Status check_robot(const ControllerRobot& controller, const Chain& robot) {
 }
 
 Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
-                                   const std::vector<SourceFile>& modules, const std::string& unit) {
+                                   const std::vector<SourceFile>& modules,
+                                   const std::string& unit) {
   return Backup(parameters, where).read(modules, unit);
 }
 
-std::string cell_file_of(const ControllerCell& controller, const std::string& name, const std::string& robot) {
-  std::string text = fmt::format("# From the backup of an ABB controller: {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
-                                 shown(controller.unit), shown(controller.robot_type), name, robot);
-  text += fmt::format("base: {}   # in the controller's world; of the tracker's: null finds it from the data\n",
-                      yaml_pose(controller.X_WB));
+std::string cell_file_of(const ControllerCell& controller, const std::string& name,
+                         const std::string& robot) {
+  std::string text = fmt::format(
+      "# From the backup of an ABB controller: {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
+      shown(controller.unit), shown(controller.robot_type), name, robot);
+  text += fmt::format(
+      "base: {}   # in the controller's world; of the tracker's: null finds it from the data\n",
+      yaml_pose(controller.X_WB));
   text += "tools:\n";
-  for (const auto& [tool, stated] : controller.tools) text += fmt::format("  {}: {}\n", tool, yaml_pose(stated.X_FT));
+  for (const auto& [tool, stated] : controller.tools)
+    text += fmt::format("  {}: {}\n", tool, yaml_pose(stated.X_FT));
   std::string payloads;
   for (const auto& [tool, stated] : controller.tools) {
     if (stated.load) payloads += fmt::format("  {}: {}\n", tool, yaml_load(*stated.load));
   }
   for (const auto& [load, stated] : controller.loads) {
-    if (!controller.tools.contains(load)) payloads += fmt::format("  {}: {}\n", load, yaml_load(stated));
+    if (!controller.tools.contains(load))
+      payloads += fmt::format("  {}: {}\n", load, yaml_load(stated));
   }
   if (!payloads.empty()) text += "payloads:\n" + payloads;
   if (!controller.limits.empty()) {
     std::vector<std::string> ranges;
     for (std::size_t k = 0; k < controller.limits.size(); ++k)
-      ranges.push_back(fmt::format("q{}: [{:.6g}, {:.6g}]", k + 1, to_deg(controller.limits[k].first),
+      ranges.push_back(fmt::format("q{}: [{:.6g}, {:.6g}]", k + 1,
+                                   to_deg(controller.limits[k].first),
                                    to_deg(controller.limits[k].second)));
     text += fmt::format("joint_ranges_deg: {{{}}}\n", fmt::join(ranges, ", "));
   }
   return text + fmt::format("controller_compensates: {}\n", controller.controller_compensates);
 }
 
-std::vector<std::string> differences(const ControllerCell& controller, const Cell& cell, bool cell_compensates) {
+std::vector<std::string> differences(const ControllerCell& controller, const Cell& cell,
+                                     bool cell_compensates) {
   std::vector<std::string> found;
   if (cell.X_WB && !same(controller.X_WB, *cell.X_WB)) {
-    found.push_back(fmt::format("the base is {} in the controller, {} in the cell: {}", yaml_pose(controller.X_WB),
-                                yaml_pose(*cell.X_WB), apart_text(controller.X_WB, *cell.X_WB)));
+    found.push_back(fmt::format("the base is {} in the controller, {} in the cell: {}",
+                                yaml_pose(controller.X_WB), yaml_pose(*cell.X_WB),
+                                apart_text(controller.X_WB, *cell.X_WB)));
   }
   compare_tools(controller, cell, found);
   compare_loads(controller, cell, found);
   compare_limits(controller, cell, found);
   if (controller.controller_compensates != cell_compensates) {
-    found.push_back(fmt::format("the controller's own calibration is {} use, the cell says controller_compensates: {}",
-                                controller.controller_compensates ? "in" : "not in", cell_compensates));
+    found.push_back(fmt::format(
+        "the controller's own calibration is {} use, the cell says controller_compensates: {}",
+        controller.controller_compensates ? "in" : "not in", cell_compensates));
   }
   return found;
 }

@@ -9,29 +9,35 @@
 #include "clients/cam/program.h"
 #include "server/robot/cell.h"
 
-/// A cell as an ABB controller has it: its backup holds the system parameters (SYSPAR/MOC.cfg) and the modules.
+/// A cell as an ABB controller has it: its backup holds the system parameters (SYSPAR/MOC.cfg) and
+/// the modules.
 namespace trammel::cam {
 
 /// A robot as the system parameters have it.
 struct ControllerRobot {
-  std::string unit;                               ///< mechanical unit: `ROB_1`
-  std::string robot_type;                         ///< as the parameters name it
-  std::string file;                               ///< the parameters
-  int line = 0;                                   ///< of the robot in them
-  int axes = 0;                                   ///< that it names; 0: not known
-  Pose X_WB = Pose::Identity();                   ///< base frame, seen from the controller's world
-  std::vector<StatedCoupling> couplings;          ///< axes that follow another one
-  std::string carried_by;                         ///< the unit that moves the base frame; empty: none does
-  std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty where the parameters do not say all
-  bool controller_compensates = false;            ///< Absolute Accuracy is in use
-  std::vector<std::string> notes;                 ///< what was passed over, and why
+  std::string unit;                       ///< mechanical unit: `ROB_1`
+  std::string robot_type;                 ///< as the parameters name it
+  std::string file;                       ///< the parameters
+  int line = 0;                           ///< of the robot in them
+  int axes = 0;                           ///< that it names; 0: not known
+  Pose X_WB = Pose::Identity();           ///< base frame, seen from the controller's world
+  std::vector<StatedCoupling> couplings;  ///< axes that follow another one
+  std::string carried_by;                 ///< the unit that moves the base frame; empty: none does
+  std::vector<std::pair<double, double>>
+      limits;  ///< rad, of each axis; empty where the parameters do not say all
+  bool controller_compensates = false;  ///< Absolute Accuracy is in use
+  std::vector<std::string> notes;       ///< what was passed over, and why
 };
 
-/// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only one. Refuses
-/// parameters without a robot, several robots where none is chosen (`next` says how one is), and numbers that are none.
-[[nodiscard]] Result<ControllerRobot> read_controller_robot(const std::string& parameters, const std::string& where,
-                                                            const std::string& unit, const std::string& next);
-/// The robot of a task of RAPID, by their numbers: `ROB_2` of `TASK2`; empty: none has it, or there is but one robot.
+/// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only
+/// one. Refuses parameters without a robot, several robots where none is chosen (`next` says how
+/// one is), and numbers that are none.
+[[nodiscard]] Result<ControllerRobot> read_controller_robot(const std::string& parameters,
+                                                            const std::string& where,
+                                                            const std::string& unit,
+                                                            const std::string& next);
+/// The robot of a task of RAPID, by their numbers: `ROB_2` of `TASK2`; empty: none has it, or there
+/// is but one robot.
 [[nodiscard]] std::string unit_of_task(const std::string& parameters, const std::string& task);
 /// Where the robot stands, unless another unit carries it, its axes and its type.
 [[nodiscard]] StatedRobot stated_by(const ControllerRobot& robot);
@@ -51,19 +57,21 @@ struct ControllerCell : ControllerRobot {
   std::map<std::string, StatedLoad> loads;  ///< loaddata
 };
 
-/// The robot, and what the modules declare. Refuses what read_controller_robot() does, and a tool that has two values
-/// in the modules; a work object or load that has two is left out, with a note. W of the backup's numbers is the
-/// controller's world.
-[[nodiscard]] Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
-                                                 const std::vector<SourceFile>& modules, const std::string& unit);
+/// The robot, and what the modules declare. Refuses what read_controller_robot() does, and a tool
+/// that has two values in the modules; a work object or load that has two is left out, with a note.
+/// W of the backup's numbers is the controller's world.
+[[nodiscard]] Result<ControllerCell> read_backup(const std::string& parameters,
+                                                 const std::string& where,
+                                                 const std::vector<SourceFile>& modules,
+                                                 const std::string& unit);
 
 /// A cell file (YAML) of it. `robot`: the path of the robot file, as it is to stand there.
 [[nodiscard]] std::string cell_file_of(const ControllerCell& controller, const std::string& name,
                                        const std::string& robot);
 
-/// One sentence for each thing of the controller that an existing cell has otherwise, with both values and how far they
-/// are apart.
-[[nodiscard]] std::vector<std::string> differences(const ControllerCell& controller, const Cell& cell,
-                                                   bool cell_compensates);
+/// One sentence for each thing of the controller that an existing cell has otherwise, with both
+/// values and how far they are apart.
+[[nodiscard]] std::vector<std::string> differences(const ControllerCell& controller,
+                                                   const Cell& cell, bool cell_compensates);
 
 }  // namespace trammel::cam

@@ -22,7 +22,8 @@ std::vector<Line> joined_lines(std::string_view text) {
     std::string_view line = text.substr(at, end - at);
     at = end + 1;
     ++number;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ' || line.back() == '\t')) line.remove_suffix(1);
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ' || line.back() == '\t'))
+      line.remove_suffix(1);
     const bool on = !line.empty() && line.back() == '\\';
     if (on) line.remove_suffix(1);
     if (goes_on)
@@ -39,8 +40,8 @@ bool is_blank(char c) { return c == ' ' || c == '\t'; }
 /// `ROBOT:` alone on its line.
 std::string header(const std::string& line) {
   if (line.size() < 2 || line.back() != ':') return "";
-  const bool plain =
-      std::all_of(line.begin(), line.end() - 1, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+  const bool plain = std::all_of(line.begin(), line.end() - 1,
+                                 [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
   return plain ? line.substr(0, line.size() - 1) : "";
 }
 
@@ -55,7 +56,8 @@ void read_values(const std::string& line, ParameterInstance& instance) {
     return line.substr(begin, at - begin);
   };
   const auto is_attribute = [&] {
-    return at + 1 < line.size() && line[at] == '-' && std::isalpha(static_cast<unsigned char>(line[at + 1])) != 0;
+    return at + 1 < line.size() && line[at] == '-' &&
+           std::isalpha(static_cast<unsigned char>(line[at + 1])) != 0;
   };
   for (skip(); at < line.size(); skip()) {
     if (!is_attribute()) {

@@ -12,7 +12,8 @@ namespace trammel::cam::fanuc {
 
 namespace {
 
-std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told, const Pose& X_BW) {
+std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told,
+                           const Pose& X_BW) {
   if (!told.X) return told.by_program ? told.why : "";
   return against_row(row, X, X_BW * *told.X, told.where);
 }
@@ -22,7 +23,8 @@ std::string why_not_by_row(const std::string& row, const Pose& X, const Told& to
 void Controller::note_register(const Pieces& statement, std::size_t equals, const std::string& name,
                                const std::string& where, std::size_t file) {
   Register& set = registers[name];
-  const bool element = equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
+  const bool element =
+      equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
   const std::optional<double> now = constant_at(statement, equals + 1);
   const int index = element ? static_cast<int>(number(statement[4])) : 0;
   if (!element || !now || index < 1 || index > 6) {
@@ -30,10 +32,13 @@ void Controller::note_register(const Pieces& statement, std::size_t equals, cons
     return;
   }
   std::optional<double>& value = set.elements[static_cast<std::size_t>(index - 1)];
-  const auto took_it = [&](const auto& one) { return one.second.from == name && one.second.file == file; };
+  const auto took_it = [&](const auto& one) {
+    return one.second.from == name && one.second.file == file;
+  };
   if (!value && std::any_of(settings.begin(), settings.end(), took_it))
     set.changed = fmt::format("{} is set behind where it is taken ({})", name, where);
-  if (value && *value != *now) set.changed = fmt::format("{} is set several times ({})", name, where);
+  if (value && *value != *now)
+    set.changed = fmt::format("{} is set several times ({})", name, where);
   value = now;
 }
 
@@ -62,8 +67,8 @@ Told Controller::setting(const std::string& name) {
     if (from->elements[k]) numbers.push_back(*from->elements[k]);
   }
   if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
-  const std::string why =
-      fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(set->from));
+  const std::string why = fmt::format(
+      "{} comes from {}, whose value is not constant in the program", name, shown(set->from));
   // What no file says of a register a row may say.
   const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
   return {{}, why, !open, ""};
@@ -73,11 +78,15 @@ Told Controller::setting(const std::string& name) {
 Told Controller::by_system(const std::string& name) {
   const auto known = system.find(name);
   if (known == system.end())
-    return {{}, fmt::format("{} is not in the files handed over: --frames tells its value", name), false, ""};
+    return {{},
+            fmt::format("{} is not in the files handed over: --frames tells its value", name),
+            false,
+            ""};
   const SystemFrame& frame = known->second;
   if (!frame.why_not.empty()) return {{}, frame.why_not, true, ""};
   taken.emplace(name, frame.file);
-  return {frame.X, "", true, fmt::format("{} line {}", frame.file, frame.line), frame.file, frame.line};
+  return {frame.X,    "",        true, fmt::format("{} line {}", frame.file, frame.line),
+          frame.file, frame.line};
 }
 
 ProgramFrame Controller::frame_of(const std::string& number_text, const ReadOptions& options) {
@@ -97,7 +106,8 @@ ProgramFrame Controller::frame_of(const std::string& number_text, const ReadOpti
   return frame;
 }
 
-ProgramTool Controller::tool_of(const std::string& number_text, const ReadOptions& options, const std::string& file) {
+ProgramTool Controller::tool_of(const std::string& number_text, const ReadOptions& options,
+                                const std::string& file) {
   ProgramTool tool;
   tool.name = fmt::format("UTOOL[{}]", number_text);
   if (number_text == "0") {

@@ -51,8 +51,8 @@ struct Controller {
   std::set<std::string> programs;             ///< that are read, by name
 
   /// `PR[5,1]=100`, `PR[5]=LPOS`, of the file of that number.
-  void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where,
-                     std::size_t file);
+  void note_register(const Pieces& statement, std::size_t equals, const std::string& name,
+                     const std::string& where, std::size_t file);
   /// A frame or tool by its number.
   [[nodiscard]] ProgramFrame frame_of(const std::string& number_text, const ReadOptions& options);
   /// `file`: of the program that has it.

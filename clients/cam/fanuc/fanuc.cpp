@@ -46,16 +46,19 @@ constexpr std::array<const char*, 6> kJoints = {"J1", "J2", "J3", "J4", "J5", "J
 /// What UFRAME_NUM and UTOOL_NUM select: a number; empty: not set; else why it is not known.
 struct Selected {
   std::string frame, tool;
-  std::string beside;  ///< a program that may select another one at any time, as the statement that starts it; or empty
+  std::string beside;  ///< a program that may select another one at any time, as the statement that
+                       ///< starts it; or empty
   std::string follows;  ///< what moves the targets at run time, `Track TAST[1]`; or empty
   bool operator==(const Selected&) const = default;
 };
 
-constexpr const char* kDecided = "a branch, a jump or a loop of the program, or a caller, decides it";
+constexpr const char* kDecided =
+    "a branch, a jump or a loop of the program, or a caller, decides it";
 
 class File {
  public:
-  File(std::size_t index, Program& program, Sites& sites, Controller& controller, const ReadOptions& options)
+  File(std::size_t index, Program& program, Sites& sites, Controller& controller,
+       const ReadOptions& options)
       : index_(index),
         program_(program),
         sites_(sites),
@@ -81,7 +84,8 @@ class File {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t statements() const { return statements_.size(); }
 
-  /// What a statement does to the order, when all files are read. A call on a condition makes a block.
+  /// What a statement does to the order, when all files are read. A call on a condition makes a
+  /// block.
   [[nodiscard]] std::vector<Step> steps_of(std::size_t s) {
     const Pieces& statement = statements_[s];
     note_load(statement);
@@ -93,7 +97,8 @@ class File {
     Step step = fanuc::step_of(statement);
     const bool jumps = step.kind == Step::Kind::kJump || step.kind == Step::Kind::kJumpMaybe;
     jumps_anywhere_ |= jumps && !is_number(step.label);
-    if (jumps || step.kind == Step::Kind::kLabel) step.label = fmt::format("{}:{}", index_, step.label);
+    if (jumps || step.kind == Step::Kind::kLabel)
+      step.label = fmt::format("{}:{}", index_, step.label);
     return {step};
   }
 
@@ -113,10 +118,12 @@ class File {
     for (const auto& known : positions_) {
       const auto& [begin, position] = known;
       const std::string& name = position.name;
-      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
-                                      [&](const LeftAlone& left) { return left.file == index_ && left.name == name; });
+      const bool listed = std::any_of(
+          program_.left.begin(), program_.left.end(),
+          [&](const LeftAlone& left) { return left.file == index_ && left.name == name; });
       if (!used_.contains(begin) && !listed)
-        program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});
+        program_.left.push_back(
+            {position.name, index_, position.line, "", "no motion in these files goes to it"});
     }
   }
 
@@ -138,10 +145,12 @@ class File {
     for (std::size_t k = 0; k < 6; ++k) {
       const char* name = joints ? kJoints[k] : kPose[k];
       const auto value = group.values.find(name);
-      const auto written = value == group.values.end() ? std::nullopt : read_number(value->second.text);
+      const auto written =
+          value == group.values.end() ? std::nullopt : read_number(value->second.text);
       if (!written) return fmt::format("it does not say {}", name);
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{value->second.begin, value->second.end}, {}, {{k, written->style}}});
+      target.rewrites.push_back(
+          {{value->second.begin, value->second.end}, {}, {{k, written->style}}});
     }
     if (!joints) target.configuration = fanuc::configuration_of(group.config);
     return "";
@@ -154,24 +163,29 @@ class File {
     bool scheduled = true;
     for (std::size_t at = 0; at < pieces.size(); ++at) {
       if (pieces[at].is("LINE_TRACK")) line_tracking_ = pieces[at].line;
-      if (pieces[at].is("LINE_TRACK_SCHEDULE_NUMBER") && at + 2 < pieces.size()) scheduled = !pieces[at + 2].is("0");
+      if (pieces[at].is("LINE_TRACK_SCHEDULE_NUMBER") && at + 2 < pieces.size())
+        scheduled = !pieces[at + 2].is("0");
     }
     if (!scheduled) line_tracking_ = 0;
   }
 
   void select(const Pieces& statement, Selected& selected) const {
-    const bool monitors = statement.size() > 1 && statement[0].is("MONITOR") && !statement[1].is("END");
-    const bool names = statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
+    const bool monitors =
+        statement.size() > 1 && statement[0].is("MONITOR") && !statement[1].is("END");
+    const bool names =
+        statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
     if (monitors) selected.beside = fmt::format("MONITOR {}", shown(statement[1].text));
     if (names) selected.beside = fmt::format("{}={}", statement[0].text, shown(statement[2].text));
-    const bool offset = statement.size() > 2 && (statement[0].is("Touch") || statement[0].is("MP")) &&
+    const bool offset = statement.size() > 2 &&
+                        (statement[0].is("Touch") || statement[0].is("MP")) &&
                         (statement[1].is("Offset") || statement[1].is("OFFSET"));
     static const std::set<std::string_view> kFollows = {"Track", "TRACK", "SOFTFLOAT"};
     if (offset || (statement.size() > 1 && kFollows.contains(statement[0].text))) {
       const Piece& last = statement[offset ? 2 : 1];
       const bool ends = last.is("End") || last.is("END");
       const std::string what = last.is("[") ? "" : " " + shown(statement[1].text);
-      selected.follows = ends ? "" : fmt::format("{}{} (line {})", statement[0].text, what, statement[0].line);
+      selected.follows =
+          ends ? "" : fmt::format("{}{} (line {})", statement[0].text, what, statement[0].line);
     }
     if (statement[0].is("TORQ_LIMIT") && statement.size() > 1) {
       constexpr double kWhole = 100;  // percent
@@ -180,14 +194,16 @@ class File {
       selected.follows = ends ? "" : fmt::format("TORQ_LIMIT (line {})", statement[0].line);
     }
     for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
-      const bool calls = statement[at].is("CALL") && !controller_.programs.contains(called_by(statement));
+      const bool calls =
+          statement[at].is("CALL") && !controller_.programs.contains(called_by(statement));
       if (!calls && !statement[at].is("RUN")) continue;
       selected.frame = selected.tool =
           fmt::format("{} {} may select another one", statement[at].text, statement[at + 1].text);
     }
     if (const std::string macro = macro_in(statement); !macro.empty())
       selected.frame = selected.tool =
-          fmt::format("{} (line {}) is not known here: it may select another one", shown(macro), statement[0].line);
+          fmt::format("{} (line {}) is not known here: it may select another one", shown(macro),
+                      statement[0].line);
     if (statement[0].is("LBL") && jumps_anywhere_) selected.frame = selected.tool = kDecided;
     select_number(statement, selected);
   }
@@ -206,9 +222,10 @@ class File {
     }
     if (equals >= statement.size() || (others && !ours)) return;
     const std::optional<double> constant = constant_at(statement, equals + 1);
-    const std::string now = constant ? fmt::format("{:g}", *constant)
-                                     : fmt::format("{} is set at run time ({} line {})", statement[at].text,
-                                                   program_.files[index_].name, statement[at].line);
+    const std::string now =
+        constant ? fmt::format("{:g}", *constant)
+                 : fmt::format("{} is set at run time ({} line {})", statement[at].text,
+                               program_.files[index_].name, statement[at].line);
     std::string& number = frame ? selected.frame : selected.tool;
     number = at == 0 || number == now ? now : kDecided;
   }
@@ -222,7 +239,8 @@ class File {
     for (std::size_t at = 0; at + 2 < statement.size(); ++at) {
       if (!statement[at].is("PAYLOAD")) continue;
       Controller::Statements& set = controller_.loads[indexed(statement, at)];
-      if (set.count++ == 0) set.first = fmt::format("{} line {}", program_.files[index_].name, statement[at].line);
+      if (set.count++ == 0)
+        set.first = fmt::format("{} line {}", program_.files[index_].name, statement[at].line);
     }
   }
 
@@ -236,7 +254,8 @@ class File {
     if (equals + 1 >= statement.size()) return;
     const std::string word(statement[0].text);
     const std::string name = indexed(statement, 0);
-    const std::string where = fmt::format("{} line {}", program_.files[index_].name, statement[0].line);
+    const std::string where =
+        fmt::format("{} line {}", program_.files[index_].name, statement[0].line);
     note_reading(statement, equals, name);
     if (name.empty()) return;
     const std::string why = fmt::format("{} is set at run time ({})", name, where);
@@ -245,9 +264,11 @@ class File {
       if (begin > 0) controller_.registers[name].changed = why;
     } else if (word == "UFRAME" || word == "UTOOL") {
       const std::string from = indexed(statement, equals + 1);
-      Setting& set = controller_.settings.try_emplace(name, Setting{from, where, index_}).first->second;
+      Setting& set =
+          controller_.settings.try_emplace(name, Setting{from, where, index_}).first->second;
       if (set.from != from || begin > 0 || name.ends_with("[*]")) set.changed = why;
-    } else if ((word == "$MNUFRAME" || word == "$MNUTOOL") && statement.size() > 4 && statement[2].is("1")) {
+    } else if ((word == "$MNUFRAME" || word == "$MNUTOOL") && statement.size() > 4 &&
+               statement[2].is("1")) {
       const bool one = statement[4].kind == Piece::Kind::kNumber;
       const std::string own = fmt::format("{}[{}]", word.substr(3), one ? statement[4].text : "*");
       controller_.settings[own].changed = fmt::format("{} is set at run time ({})", word, where);
@@ -276,30 +297,33 @@ class File {
   std::size_t add_frame(ProgramFrame frame) { return add_once(program_, std::move(frame)); }
   std::size_t add_tool(ProgramTool tool) { return add_once(program_, std::move(tool)); }
 
-  /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the controller stops.
+  /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the
+  /// controller stops.
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
-    if (why.empty()) return add_frame(controller_.frame_of(number_text == "F" ? selected : number_text, options_));
+    if (why.empty())
+      return add_frame(controller_.frame_of(number_text == "F" ? selected : number_text, options_));
     return add_frame({fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why});
   }
   std::size_t tool_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UT", "UTOOL_NUM", number_text, selected);
     if (why.empty())
-      return add_tool(
-          controller_.tool_of(number_text == "F" ? selected : number_text, options_, program_.files[index_].name));
+      return add_tool(controller_.tool_of(number_text == "F" ? selected : number_text, options_,
+                                          program_.files[index_].name));
     ProgramTool tool;
     tool.name = fmt::format("UTOOL[{}]", number_text);
     tool.why_not = why;
     return add_tool(std::move(tool));
   }
-  /// Of a point with its own number, beside what is selected where a motion goes to it; empty: they agree.
-  static std::string why_not_there(const char* own, const char* word, const std::string& number_text,
-                                   const std::string& selected) {
+  /// Of a point with its own number, beside what is selected where a motion goes to it; empty: they
+  /// agree.
+  static std::string why_not_there(const char* own, const char* word,
+                                   const std::string& number_text, const std::string& selected) {
     if (number_text.empty()) return fmt::format("the point does not say its {}", own);
     if (number_text != "F") {
       if (!is_number(number_text) || !is_number(selected) || number_text == selected) return "";
-      return fmt::format("the point has {} : {}, and {} is {} there: the controller stops", own, number_text, word,
-                         selected);
+      return fmt::format("the point has {} : {}, and {} is {} there: the controller stops", own,
+                         number_text, word, selected);
     }
     if (is_number(selected)) return "";
     return selected.empty() ? fmt::format("{} : F, and no {} is set before it", own, word)
@@ -319,27 +343,32 @@ class File {
     const bool elsewhere = !statement[1].is("P") && !statement[1].is("PR");
     if (elsewhere && (statement[1].kind != Piece::Kind::kWord || !statement[2].is("["))) return;
     const bool goes_on = statement[0].is("A") && last_motion_ == "A";
-    program_.moves.push_back({index_, statement[0].line, {}, statement[0].is("C") || statement[0].is("A")});
+    program_.moves.push_back(
+        {index_, statement[0].line, {}, statement[0].is("C") || statement[0].is("A")});
     program_.moves.back().arc_goes_on = goes_on;
     last_motion_ = std::string(statement[0].text);
     note_speed(statement);
-    if (elsewhere) return leave(statement, std::string(statement[1].text), "it is no point of /POS");
+    if (elsewhere)
+      return leave(statement, std::string(statement[1].text), "it is no point of /POS");
     std::string why;
     if (line_tracking_ != 0)
-      why = fmt::format("LINE_TRACK (line {}): it is seen from a conveyor that moves, not from the user frame",
-                        line_tracking_);
+      why = fmt::format(
+          "LINE_TRACK (line {}): it is seen from a conveyor that moves, not from the user frame",
+          line_tracking_);
     if (!selected.follows.empty()) why = selected.follows + " moves it at run time";
     for (const Piece& piece : statement) {
-      if (piece.is("Track") || piece.is("TRACK")) why = fmt::format("{} moves it at run time", piece.text);
-      if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") || piece.is("TOOL_OFFSET") ||
-          piece.is("VOFFSET") || piece.is("INC"))
+      if (piece.is("Track") || piece.is("TRACK"))
+        why = fmt::format("{} moves it at run time", piece.text);
+      if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") ||
+          piece.is("TOOL_OFFSET") || piece.is("VOFFSET") || piece.is("INC"))
         why = fmt::format("{} displaces it at run time", piece.text);
       if (piece.is("RTCP")) why = "the tool stands and the robot holds the work piece (RTCP)";
       if (piece.is("Skip") || piece.is("SKIP") || piece.is("Search"))
         why = fmt::format("a sensor may end the motion ({})", piece.text);
     }
     for (std::size_t at = 1; at + 2 < statement.size(); ++at) {
-      if ((!statement[at].is("P") && !statement[at].is("PR")) || !statement[at + 1].is("[")) continue;
+      if ((!statement[at].is("P") && !statement[at].is("PR")) || !statement[at + 1].is("["))
+        continue;
       if (at > 1 && statement[at - 1].is(",")) continue;  // the register of an offset
       const std::string name = indexed(statement, at);
       if (statement[at].is("PR")) {
@@ -376,8 +405,9 @@ class File {
       const bool joint = statement[0].is("J");
       sites_.add(index_, begin, known,
                  {tool_of(robot.tool, with(selected.tool, selected.beside)),
-                  frame_of(robot.frame, with(selected.frame, selected.beside)), std::string(statement[0].text), index_,
-                  statement[0].line, program_.moves.size() - 1, !joint});
+                  frame_of(robot.frame, with(selected.frame, selected.beside)),
+                  std::string(statement[0].text), index_, statement[0].line,
+                  program_.moves.size() - 1, !joint});
       used_.insert(begin);
     }
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
@@ -434,7 +464,8 @@ void read_motions(std::vector<File>& files) {
       },
       File::join);
   for (std::size_t step = 0; step < steps.size(); ++step) {
-    if (places[step].is_one) files[places[step].file].motion(places[step].statement, selected[step]);
+    if (places[step].is_one)
+      files[places[step].file].motion(places[step].statement, selected[step]);
   }
   for (File& file : files) file.finish();
 }
@@ -465,11 +496,12 @@ Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options) {
   read_motions(read);
   for (std::string& note : notes_on_system(controller)) program.notes.push_back(std::move(note));
   for (const auto& [load, set] : controller.loads)
-    program.notes.push_back(
-        fmt::format("{} ({}{}): the controller alone knows this load, it is not compared with the cell's", load,
-                    set.first, set.count > 1 ? fmt::format(" and {} more", set.count - 1) : ""));
-  sites.finish(program,
-               [&](const Site& site, ProgramTarget& target) { return read[site.file].describe(site, target); });
+    program.notes.push_back(fmt::format(
+        "{} ({}{}): the controller alone knows this load, it is not compared with the cell's", load,
+        set.first, set.count > 1 ? fmt::format(" and {} more", set.count - 1) : ""));
+  sites.finish(program, [&](const Site& site, ProgramTarget& target) {
+    return read[site.file].describe(site, target);
+  });
   return program;
 }
 

@@ -6,9 +6,9 @@
 
 namespace trammel::cam {
 
-/// Reads FANUC TP programs (.ls). Positions are those of /POS, poses or joints, with the user frame and tool that they
-/// say. The values of UFRAME[n] and UTOOL[n] come from `UFRAME[n]=PR[m]` with a constant PR[m], or from the user. The
-/// world frame is taken as the robot's base.
+/// Reads FANUC TP programs (.ls). Positions are those of /POS, poses or joints, with the user frame
+/// and tool that they say. The values of UFRAME[n] and UTOOL[n] come from `UFRAME[n]=PR[m]` with a
+/// constant PR[m], or from the user. The world frame is taken as the robot's base.
 [[nodiscard]] Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options);
 
 }  // namespace trammel::cam

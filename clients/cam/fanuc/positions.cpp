@@ -26,8 +26,8 @@ void read_groups(const Pieces& pieces, std::size_t begin, std::size_t end, Posit
       if (word == "CONFIG") now.config = std::string(pieces[at + 2].text);
     }
   }
-  if (position.groups.contains(1) && position.groups[1].values.empty() && position.groups.size() > 1 &&
-      position.groups[1].frame.empty())
+  if (position.groups.contains(1) && position.groups[1].values.empty() &&
+      position.groups.size() > 1 && position.groups[1].frame.empty())
     position.groups.erase(1);
 }
 
@@ -37,7 +37,9 @@ std::vector<Position> positions_of(const std::string& text, const Part& part) {
   const Pieces pieces = pieces_of(text, part.begin, part.end, part.line, {"", "'\""});
   std::vector<Position> positions;
   for (std::size_t at = 0; at + 3 < pieces.size(); ++at) {
-    if (!pieces[at].is("P") || !pieces[at + 1].is("[") || pieces[at + 2].kind != Piece::Kind::kNumber) continue;
+    if (!pieces[at].is("P") || !pieces[at + 1].is("[") ||
+        pieces[at + 2].kind != Piece::Kind::kNumber)
+      continue;
     Position position;
     position.begin = pieces[at].begin;
     position.line = pieces[at].line;
@@ -55,9 +57,11 @@ std::vector<Position> positions_of(const std::string& text, const Part& part) {
 void note_external(int group, const Group& values, ProgramTarget& target) {
   for (int k = 1; k <= 6; ++k) {
     const auto extended = values.values.find(fmt::format("E{}", k));
-    if (group == 1 && extended != values.values.end()) target.external[k - 1] = number(extended->second);
+    if (group == 1 && extended != values.values.end())
+      target.external[k - 1] = number(extended->second);
     const auto joint = values.values.find(fmt::format("J{}", k));
-    if (group > 1 && joint != values.values.end()) target.external[6 * (group - 1) + k - 1] = number(joint->second);
+    if (group > 1 && joint != values.values.end())
+      target.external[6 * (group - 1) + k - 1] = number(joint->second);
   }
 }
 

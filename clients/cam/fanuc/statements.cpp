@@ -18,10 +18,11 @@ constexpr std::string_view kKnown =
     "MESSAGE UALM RSR PAYLOAD UFRAME_NUM UTOOL_NUM Arc ARC Weave WEAVE Track TRACK Touch TOUCH "
     "Search SEARCH SPOT BACKUP COL SKIP OFFSET TOOL_OFFSET MONITOR ERROR_PROG RESUME_PROG LOCK "
     "UNLOCK SOFTFLOAT MP TORQ_LIMIT STOP_TRACKING VISION TIMER VOFFSET LINE SYNC JOINT_MAX_SPEED "
-    "LINEAR_MAX_SPEED FORCE SENSOR DIAG POINT_LOGIC LINECOUNT TOOL_OFFSET_CONDITION CLEAR TC_ONLINE "
-    "RESET PULSE RETURN ";
+    "LINEAR_MAX_SPEED FORCE SENSOR DIAG POINT_LOGIC LINECOUNT TOOL_OFFSET_CONDITION CLEAR "
+    "TC_ONLINE RESET PULSE RETURN ";
 
-/// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean nothing.
+/// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean
+/// nothing.
 Pieces without_comments(const Pieces& pieces) {
   Pieces kept;
   const auto skip_to = [&](std::size_t at, std::string_view end) {
@@ -55,7 +56,8 @@ void add_statements(const Pieces& pieces, std::vector<Pieces>& statements) {
     all.back().push_back(piece);
   }
   for (Pieces& one : all) {
-    while (!one.empty() && (one[0].kind == Piece::Kind::kNumber || one[0].is(":"))) one.erase(one.begin());
+    while (!one.empty() && (one[0].kind == Piece::Kind::kNumber || one[0].is(":")))
+      one.erase(one.begin());
     if (!one.empty()) statements.push_back(std::move(one));
   }
 }
@@ -91,8 +93,10 @@ Part part_of(const std::string& text, const std::string& head) {
 std::string name_of_program(const SourceFile& source) {
   const std::string& text = source.text;
   const std::size_t head = text.find("/PROG");
-  const std::size_t end = head == std::string::npos ? 0 : std::min(text.find('\n', head), text.size());
-  const Pieces pieces = head == std::string::npos ? Pieces{} : pieces_of(text, head, end, 1, {"", ""});
+  const std::size_t end =
+      head == std::string::npos ? 0 : std::min(text.find('\n', head), text.size());
+  const Pieces pieces =
+      head == std::string::npos ? Pieces{} : pieces_of(text, head, end, 1, {"", ""});
   if (pieces.size() > 2) return upper(std::string(pieces[2].text));
   const std::string& file = source.name;
   const std::size_t folder = file.rfind('/') + 1;
@@ -107,11 +111,13 @@ std::vector<Pieces> statements_of(const std::string& text, const Part& part) {
     const std::size_t end = std::min(text.find('\n', at), part.end - 1) + 1;
     const std::size_t last = text.find_last_not_of(" \t\r\n", end - 1);
     at = end;
-    if (end < part.end && (last == std::string::npos || last < begin || text[last] != ';')) continue;
+    if (end < part.end && (last == std::string::npos || last < begin || text[last] != ';'))
+      continue;
     const std::size_t first = text.find_first_not_of(" \t\r\n0123456789:", begin);
     // Remarks: `!hole`, `--eg:hole`, and what is commented out, `//L P[1] ...`.
     if (first < end && std::string_view("!-/").find(text[first]) == std::string_view::npos)
-      add_statements(without_comments(pieces_of(text, begin, end, first_line, {"", ""})), statements);
+      add_statements(without_comments(pieces_of(text, begin, end, first_line, {"", ""})),
+                     statements);
     begin = end;
     first_line = line + 1;
   }
@@ -130,10 +136,13 @@ double number(const Piece& piece) {
 bool is_group(const Piece& piece) { return piece.text.size() == 3 && piece.text.starts_with("GP"); }
 
 std::optional<double> constant_at(const Pieces& statement, std::size_t at) {
-  const bool in_brackets = at + 3 == statement.size() && statement[at].is("(") && statement[at + 2].is(")");
+  const bool in_brackets =
+      at + 3 == statement.size() && statement[at].is("(") && statement[at + 2].is(")");
   const std::size_t value = in_brackets ? at + 1 : at;
   if (!in_brackets && at + 1 != statement.size()) return std::nullopt;
-  return statement[value].kind == Piece::Kind::kNumber ? std::optional<double>(number(statement[value])) : std::nullopt;
+  return statement[value].kind == Piece::Kind::kNumber
+             ? std::optional<double>(number(statement[value]))
+             : std::nullopt;
 }
 
 std::size_t done_perhaps(const Pieces& statement) {
@@ -161,7 +170,8 @@ Step step_of(const Pieces& statement) {
   if (statement.empty()) return {};
   const Piece& first = statement[0];
   if (first.is("LBL")) return {Kind::kLabel, indexed_number(statement, 0)};
-  // `JMP LBL[1]`, `IF R[1]=1,JMP LBL[2]`, `L P[1] 100mm/sec FINE Skip,LBL[3]`, `WAIT DI[1]=ON TIMEOUT,LBL[4]`
+  // `JMP LBL[1]`, `IF R[1]=1,JMP LBL[2]`, `L P[1] 100mm/sec FINE Skip,LBL[3]`, `WAIT DI[1]=ON
+  // TIMEOUT,LBL[4]`
   for (std::size_t at = 1; at < statement.size(); ++at) {
     if (!statement[at].is("LBL")) continue;
     const bool always = at == 1 && first.is("JMP");

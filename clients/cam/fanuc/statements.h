@@ -23,8 +23,8 @@ struct Part {
 [[nodiscard]] Part part_of(const std::string& text, const std::string& head);
 /// `/PROG  WELD1`, in capitals; of a file without it its own name.
 [[nodiscard]] std::string name_of_program(const SourceFile& source);
-/// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers. A quote in one of them, or in a
-/// remark, is no matter of the next.
+/// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers. A quote in one of
+/// them, or in a remark, is no matter of the next.
 [[nodiscard]] std::vector<Pieces> statements_of(const std::string& text, const Part& part);
 
 [[nodiscard]] bool is_number(const std::string& text);
@@ -41,7 +41,8 @@ struct Part {
 [[nodiscard]] Step step_of(const Pieces& statement);
 /// `CALL SUB(1)`, `IF R[1]=1,CALL SUB`; empty: it calls nothing.
 [[nodiscard]] std::string called_by(const Pieces& statement);
-/// `GRIPPER OPEN`: a macro is called by its name, of any words. Empty: it is an instruction that is known.
+/// `GRIPPER OPEN`: a macro is called by its name, of any words. Empty: it is an instruction that is
+/// known.
 [[nodiscard]] std::string macro_in(const Pieces& statement);
 
 }  // namespace trammel::cam::fanuc

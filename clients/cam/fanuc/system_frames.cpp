@@ -31,11 +31,13 @@ void add(const Element& element, const std::string& file, Frames& frames) {
     numbers.push_back(*number);
   }
   const Pose X = pose_of(Coordinates::kAnglesXyz, numbers);
-  const auto [known, fresh] = frames.try_emplace(element.name, SystemFrame{X, file, element.line, ""});
+  const auto [known, fresh] =
+      frames.try_emplace(element.name, SystemFrame{X, file, element.line, ""});
   SystemFrame& first = known->second;
   if (!fresh && first.why_not.empty() && !same_place(first.X, X))
-    first.why_not = fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", element.name, pose_text(first.X),
-                                first.file, first.line, pose_text(X), file, element.line);
+    first.why_not =
+        fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", element.name,
+                    pose_text(first.X), first.file, first.line, pose_text(X), file, element.line);
 }
 
 /// `[*SYSTEM*]$MNUFRAME  Storage: ...`: how its elements are called; empty: another variable.
@@ -75,16 +77,20 @@ class File {
     }
     if (variable_.empty()) return;
     // `[1,2] =`
-    if (line.size() > 5 && line[0].is("[") && line[1].kind == Piece::Kind::kNumber && line[2].is(",")) {
+    if (line.size() > 5 && line[0].is("[") && line[1].kind == Piece::Kind::kNumber &&
+        line[2].is(",")) {
       close();
-      if (line[1].is("1")) element_ = {fmt::format("{}[{}]", variable_, line[3].text), line[0].line, {}};
+      if (line[1].is("1"))
+        element_ = {fmt::format("{}[{}]", variable_, line[3].text), line[0].line, {}};
       return;
     }
     if (element_.name.empty()) return;
     for (std::size_t at = 0; at + 2 < line.size(); ++at) {
       for (std::size_t k = 0; k < kNumbers; ++k) {
-        const bool said = line[at].is(kNames[k]) && line[at + 1].is(":") && line[at + 2].kind == Piece::Kind::kNumber;
-        const auto number = said && !element_.numbers[k] ? read_number(line[at + 2].text) : std::nullopt;
+        const bool said = line[at].is(kNames[k]) && line[at + 1].is(":") &&
+                          line[at + 2].kind == Piece::Kind::kNumber;
+        const auto number =
+            said && !element_.numbers[k] ? read_number(line[at + 2].text) : std::nullopt;
         if (number) element_.numbers[k] = number->value;
       }
     }

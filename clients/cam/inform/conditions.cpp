@@ -26,7 +26,8 @@ std::vector<double> numbers_in(const std::vector<Piece>& line) {
   return numbers;
 }
 
-/// Reads one file line by line. Of a tool its pose comes first, then its centre of gravity (mm), then its mass (kg).
+/// Reads one file line by line. Of a tool its pose comes first, then its centre of gravity (mm),
+/// then its mass (kg).
 class File {
  public:
   File(const SourceFile& file, Conditions& all) : file_(file), all_(all) {}
@@ -36,18 +37,21 @@ class File {
     int number = 1;
     for (std::size_t at = 0; at < text.size(); ++number) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
-      take(std::string_view(text).substr(at, end - at), pieces_of(text, at, end, number, {}), number);
+      take(std::string_view(text).substr(at, end - at), pieces_of(text, at, end, number, {}),
+           number);
       at = end + 1;
     }
     close();
   }
 
  private:
-  /// `//TOOL 0`, `//UFRAME 1`, `////BUSER 900.0,0,0,0,0,0`, `0.000,0.000,300.000,0.0000,0.0000,0.0000`
+  /// `//TOOL 0`, `//UFRAME 1`, `////BUSER 900.0,0,0,0,0,0`,
+  /// `0.000,0.000,300.000,0.0000,0.0000,0.0000`
   void take(std::string_view line, const std::vector<Piece>& pieces, int number) {
     if (line.starts_with("//") && !line.starts_with("///")) {
       close();
-      for (const auto& [word, called] : {std::pair("//TOOL ", "TOOL"), std::pair("//UFRAME ", "USER")}) {
+      for (const auto& [word, called] :
+           {std::pair("//TOOL ", "TOOL"), std::pair("//UFRAME ", "USER")}) {
         if (line.starts_with(word) && !pieces.empty() && pieces.back().kind == Piece::Kind::kNumber)
           name_ = fmt::format("{}[{}]", called, pieces.back().text);
       }
@@ -58,7 +62,8 @@ class File {
     constexpr std::string_view kOfUser = "////BUSER";
     if (!is_tool_ && line.starts_with(kOfUser)) {
       const std::vector<Piece> behind(
-          std::find_if(pieces.begin(), pieces.end(), [](const Piece& p) { return p.kind == Piece::Kind::kNumber; }),
+          std::find_if(pieces.begin(), pieces.end(),
+                       [](const Piece& p) { return p.kind == Piece::Kind::kNumber; }),
           pieces.end());
       take_numbers(numbers_in(behind), number);
     } else if (is_tool_ && !line.starts_with("/")) {
@@ -83,8 +88,9 @@ class File {
     const auto [known, is_new] = all_.try_emplace(name, one);
     Condition& first = known->second;
     if (!is_new && first.why_not.empty() && !same_place(first.X, one.X))
-      first.why_not = fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", name, pose_text(first.X),
-                                  first.file, first.line, pose_text(one.X), one.file, one.line);
+      first.why_not = fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", name,
+                                  pose_text(first.X), first.file, first.line, pose_text(one.X),
+                                  one.file, one.line);
   }
 
   const SourceFile& file_;

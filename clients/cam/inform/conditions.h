@@ -18,8 +18,8 @@ struct Condition {
   std::string why_not;  ///< why its value is not known; empty: it is
 };
 
-/// What Yaskawa's TOOL.CND and UFRAME.CND say, by the names `TOOL[0]`, `USER[1]`. One that two files have otherwise is
-/// not known; one without its six numbers is not there.
+/// What Yaskawa's TOOL.CND and UFRAME.CND say, by the names `TOOL[0]`, `USER[1]`. One that two
+/// files have otherwise is not known; one without its six numbers is not there.
 [[nodiscard]] std::map<std::string, Condition> conditions(const std::vector<SourceFile>& files);
 
 }  // namespace trammel::cam::inform

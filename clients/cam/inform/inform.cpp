@@ -35,7 +35,8 @@ struct Statement {
 /// What moves the robot beside where motions say.
 struct Displaced {
   std::string shifted;  ///< where a SFTON stands that holds; empty: none does
-  std::string sensed;   ///< what a sensor or a soft axis does, as `COMARCON (drill.jbi line 7)`; empty: nothing
+  std::string sensed;   ///< what a sensor or a soft axis does, as `COMARCON (drill.jbi line 7)`;
+                        ///< empty: nothing
   bool operator==(const Displaced&) const = default;
 };
 
@@ -55,7 +56,8 @@ struct Controller {
 
 class Job {
  public:
-  Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options, Controller& controller)
+  Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options,
+      Controller& controller)
       : index_(index),
         program_(program),
         sites_(sites),
@@ -73,7 +75,8 @@ class Job {
       if (line.starts_with("//INST")) instructions = true;
       if (line.starts_with("/JOB")) jobs_at_ = number;
       if (instructions && is_end(line)) jobs_at_ = 0;
-      if (line.starts_with("NOP") && instructions && program_.mark_places[index_].at == text_.size())
+      if (line.starts_with("NOP") && instructions &&
+          program_.mark_places[index_].at == text_.size())
         program_.mark_places[index_].at = std::min(end + 1, text_.size());
       if (line.starts_with("//NAME ")) name_ = value_behind(line);
       if (line.starts_with("///GROUP1 ")) group_ = value_behind(line);
@@ -88,28 +91,34 @@ class Job {
 
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// `MFRAME UF#(1) C00000 C00001 C00002`, `SETTOOL TL#(1) P010`: frames and tools that jobs set, with where.
+  /// `MFRAME UF#(1) C00000 C00001 C00002`, `SETTOOL TL#(1) P010`: frames and tools that jobs set,
+  /// with where.
   void note_settings(std::map<std::string, std::string>& set) const {
     for (const Statement& statement : statements_) {
       const std::vector<Piece> pieces = pieces_at(statement);
       note_frame_of_call(statement, pieces, set);
       if (pieces.size() < 4 || (!pieces[0].is("MFRAME") && !pieces[0].is("SETTOOL"))) continue;
-      const bool numbered = pieces.size() > 5 && pieces[2].is("#") && pieces[4].kind == Piece::Kind::kNumber;
+      const bool numbered =
+          pieces.size() > 5 && pieces[2].is("#") && pieces[4].kind == Piece::Kind::kNumber;
       const std::string what = fmt::format("{}[{}]", pieces[0].is("MFRAME") ? "USER" : "TOOL",
                                            numbered ? pieces[4].text : std::string_view("*"));
-      set.emplace(what,
-                  fmt::format("{} is set at run time ({} line {})", what, program_.files[index_].name, statement.line));
+      set.emplace(what, fmt::format("{} is set at run time ({} line {})", what,
+                                    program_.files[index_].name, statement.line));
     }
   }
   /// `CALL JOB:DRILL UF#(2)`: a relative job goes by another user frame than the one in its head.
   void note_frame_of_call(const Statement& statement, const std::vector<Piece>& pieces,
                           std::map<std::string, std::string>& set) const {
-    if (pieces.size() < 4 || (!pieces[0].is("CALL") && !pieces[0].is("JUMP")) || !pieces[1].is("JOB")) return;
-    const bool frame = std::any_of(pieces.begin(), pieces.end(), [](const Piece& piece) { return piece.is("UF"); });
+    if (pieces.size() < 4 || (!pieces[0].is("CALL") && !pieces[0].is("JUMP")) ||
+        !pieces[1].is("JOB"))
+      return;
+    const bool frame = std::any_of(pieces.begin(), pieces.end(),
+                                   [](const Piece& piece) { return piece.is("UF"); });
     if (frame)
       set.emplace(frame_of_call(word_from(pieces[3].begin)),
                   fmt::format("{} {} gives the job another user frame ({} line {})", pieces[0].text,
-                              shown(word_from(pieces[3].begin)), program_.files[index_].name, statement.line));
+                              shown(word_from(pieces[3].begin)), program_.files[index_].name,
+                              statement.line));
   }
   static std::string frame_of_call(const std::string& job) { return "JOB:" + job; }
 
@@ -121,15 +130,17 @@ class Job {
   [[nodiscard]] std::vector<Step> steps_of(const Statement& statement) const {
     using Kind = Step::Kind;
     static const std::map<std::string, Kind> kWords = {
-        {"IFTHEN", Kind::kIf},        {"IFTHENEXP", Kind::kIf}, {"ELSEIF", Kind::kCase},   {"ELSEIFEXP", Kind::kCase},
-        {"ELSE", Kind::kElse},        {"ENDIF", Kind::kEnd},    {"WHILE", Kind::kWhile},   {"WHILEEXP", Kind::kWhile},
-        {"ENDWHILE", Kind::kEnd},     {"FOR", Kind::kWhile},    {"NEXT", Kind::kEnd},      {"SWITCH", Kind::kSwitch},
-        {"CASE", Kind::kCase},        {"DEFAULT", Kind::kElse}, {"ENDSWITCH", Kind::kEnd}, {"BREAK", Kind::kExit},
-        {"CONTINUE", Kind::kContinue}};
+        {"IFTHEN", Kind::kIf},      {"IFTHENEXP", Kind::kIf},     {"ELSEIF", Kind::kCase},
+        {"ELSEIFEXP", Kind::kCase}, {"ELSE", Kind::kElse},        {"ENDIF", Kind::kEnd},
+        {"WHILE", Kind::kWhile},    {"WHILEEXP", Kind::kWhile},   {"ENDWHILE", Kind::kEnd},
+        {"FOR", Kind::kWhile},      {"NEXT", Kind::kEnd},         {"SWITCH", Kind::kSwitch},
+        {"CASE", Kind::kCase},      {"DEFAULT", Kind::kElse},     {"ENDSWITCH", Kind::kEnd},
+        {"BREAK", Kind::kExit},     {"CONTINUE", Kind::kContinue}};
     const std::vector<Piece> pieces = pieces_at(statement);
     if (pieces.empty()) return {{}};
     if (pieces[0].is("*")) return {{Kind::kLabel, word_from(pieces[0].begin)}};
-    const bool maybe = std::any_of(pieces.begin() + 1, pieces.end(), [](const Piece& piece) { return piece.is("IF"); });
+    const bool maybe = std::any_of(pieces.begin() + 1, pieces.end(),
+                                   [](const Piece& piece) { return piece.is("IF"); });
     if (pieces[0].is("RET") || pieces[0].is("END")) return {{maybe ? Kind::kPlain : Kind::kReturn}};
     if (pieces[0].is("JUMP") && pieces.size() > 1 && pieces[1].is("*"))
       return {{maybe ? Kind::kJumpMaybe : Kind::kJump, word_from(pieces[1].begin)}};
@@ -144,12 +155,13 @@ class Job {
 
   /// `SFTON`, `SFTOF`; `COMARCON`, `COMARCOF` of the seam's sensor, and their like.
   void shift(const Statement& statement, Displaced& displaced) const {
-    static const std::map<std::string_view, bool> kSensors = {{"COMARCON", true}, {"COMARCOF", false},
-                                                              {"FLOATON", true},  {"FLOATOF", false},
-                                                              {"PMTON", true},    {"PMTOF", false}};
+    static const std::map<std::string_view, bool> kSensors = {
+        {"COMARCON", true}, {"COMARCOF", false}, {"FLOATON", true},
+        {"FLOATOF", false}, {"PMTON", true},     {"PMTOF", false}};
     const std::vector<Piece> pieces = pieces_at(statement);
     if (pieces.empty()) return;
-    const std::string place = fmt::format("{} line {}", program_.files[index_].name, statement.line);
+    const std::string place =
+        fmt::format("{} line {}", program_.files[index_].name, statement.line);
     if (pieces[0].is("SFTON")) displaced.shifted = place;
     if (pieces[0].is("SFTOF")) displaced.shifted.clear();
     if (const auto sensor = kSensors.find(pieces[0].text); sensor != kSensors.end())
@@ -159,7 +171,8 @@ class Job {
   void list_unused() {
     for (const auto& [name, position] : positions_) {
       if (!used_.contains(name) && name[0] == 'C')
-        program_.left.push_back({name, index_, position.line, "", "no motion in this job goes to it"});
+        program_.left.push_back(
+            {name, index_, position.line, "", "no motion in this job goes to it"});
     }
   }
 
@@ -167,19 +180,23 @@ class Job {
     const Position& position = positions_.at(site.name);
     target.line = position.line;
     if (position.again_at != 0)
-      return fmt::format("it stands there twice (line {}, line {})", position.line, position.again_at);
+      return fmt::format("it stands there twice (line {}, line {})", position.line,
+                         position.again_at);
     const bool in_pulses = position.kind == "PULSE";
     if (in_pulses && options_.keep_joints) return "joint targets are kept (--keep-joints)";
     if (in_pulses && options_.pulses_per_deg.empty())
-      return "it is in pulses, and only the controller knows how many make a degree: --pulses-per-deg tells it";
-    if (position.numbers.size() < 6) return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
+      return "it is in pulses, and only the controller knows how many make a degree: "
+             "--pulses-per-deg tells it";
+    if (position.numbers.size() < 6)
+      return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
     target.coordinates = in_pulses ? Coordinates::kJointPulses : Coordinates::kAnglesXyz;
     if (in_pulses) target.pulses_per_deg = options_.pulses_per_deg;
     for (std::size_t k = 0; k < 6; ++k) {
       const auto written = read_number(position.numbers[k].text);
       if (!written) return "it holds what is no number";
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
+      target.rewrites.push_back(
+          {{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
     }
     if (!in_pulses) target.configuration = configuration_of(position.conf);
     return take_external(site, target);
@@ -198,10 +215,12 @@ class Job {
     return std::string(line.substr(at + 1, end - at));
   }
 
-  /// `C00000`, and the external axes of the same place: `BC00000` that carry the robot, `EC00000` that carry the part.
+  /// `C00000`, and the external axes of the same place: `BC00000` that carry the robot, `EC00000`
+  /// that carry the part.
   static bool names_position(std::string_view text) {
     const std::size_t letter = !text.empty() && (text[0] == 'B' || text[0] == 'E') ? 1 : 0;
-    return text.size() > letter + 1 && text[letter] == 'C' && text[letter + 1] >= '0' && text[letter + 1] <= '9';
+    return text.size() > letter + 1 && text[letter] == 'C' && text[letter + 1] >= '0' &&
+           text[letter + 1] <= '9';
   }
 
   void header(std::string_view line, std::size_t begin, std::size_t end, int number) {
@@ -223,7 +242,8 @@ class Job {
     for (const Piece& piece : pieces_of(text_, begin + equals + 1, end, number, {})) {
       if (piece.kind == Piece::Kind::kNumber) position.numbers.push_back(piece);
     }
-    const auto [known, fresh] = positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
+    const auto [known, fresh] =
+        positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
     if (!fresh) known->second.again_at = number;
   }
 
@@ -231,20 +251,22 @@ class Job {
   static bool is_external(const Piece& piece) {
     return piece.kind == Piece::Kind::kWord && piece.text.size() > 2 &&
            (piece.text[0] == 'B' || piece.text[0] == 'E') &&
-           (piece.text[1] == 'C' || piece.text[1] == 'P' || piece.text[1] == 'X') && piece.text[2] >= '0' &&
-           piece.text[2] <= '9';
+           (piece.text[1] == 'C' || piece.text[1] == 'P' || piece.text[1] == 'X') &&
+           piece.text[2] >= '0' && piece.text[2] <= '9';
   }
 
-  /// Where the axes stand that carry the robot or the part, as the motions to a position say. They are in pulses: it
-  /// can only be told whether they move.
+  /// Where the axes stand that carry the robot or the part, as the motions to a position say. They
+  /// are in pulses: it can only be told whether they move.
   std::string take_external(const Site& site, ProgramTarget& target) const {
     std::optional<std::map<int, double>> all;
     for (const SiteUse& use : site.uses) {
       std::map<int, double> now;
       const auto names = external_of_.find(use.move);
-      for (const std::string& name : names == external_of_.end() ? std::vector<std::string>{} : names->second) {
+      for (const std::string& name :
+           names == external_of_.end() ? std::vector<std::string>{} : names->second) {
         const auto known = positions_.find(name);
-        if (known == positions_.end()) return fmt::format("{} is a variable, which any job may set", shown(name));
+        if (known == positions_.end())
+          return fmt::format("{} is a variable, which any job may set", shown(name));
         const bool base = name[0] == 'B';
         for (std::size_t k = 0; k < known->second.numbers.size() && k < 6; ++k) {
           now[(base ? kFirstBaseAxis : kFirstStationAxis) + static_cast<int>(k)] =
@@ -260,7 +282,8 @@ class Job {
 
   std::size_t tool_of(const Position& position) {
     ProgramTool tool;
-    tool.name = fmt::format("TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
+    tool.name = fmt::format(
+        "TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
     const bool by_row = take_row(tool.name, options_, tool);
     if (const inform::Condition* condition = controller_.take(tool.name); condition != nullptr) {
       tool.why_not = by_row ? against(*condition, tool.row, *tool.X_FT) : condition->why_not;
@@ -269,7 +292,8 @@ class Job {
       tool.line = condition->line;
       if (!by_row && tool.why_not.empty()) tool.X_FT = condition->X;
     }
-    if (std::string set = why_set(tool.name, "TOOL[*]"); !set.empty()) tool.why_not = std::move(set);
+    if (std::string set = why_set(tool.name, "TOOL[*]"); !set.empty())
+      tool.why_not = std::move(set);
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       if (program_.tools[k].name == tool.name) return k;
     }
@@ -300,16 +324,19 @@ class Job {
     const inform::Condition* condition = controller_.take(frame.name);
     if (condition == nullptr) {
       if (!by_row)
-        frame.why_not = fmt::format("{} is not in the files handed over: --frames tells its value", shown(frame.name));
+        frame.why_not = fmt::format("{} is not in the files handed over: --frames tells its value",
+                                    shown(frame.name));
       return;
     }
     frame.why_not = by_row ? against(*condition, frame.row, frame.X_BO) : condition->why_not;
     if (!by_row) frame.X_BO = condition->X;
     frame.in_base = true;
   }
-  static std::string against(const inform::Condition& condition, const std::string& row, const Pose& X) {
+  static std::string against(const inform::Condition& condition, const std::string& row,
+                             const Pose& X) {
     if (!condition.why_not.empty()) return condition.why_not;
-    return against_row(row, X, condition.X, fmt::format("{} line {}", condition.file, condition.line));
+    return against_row(row, X, condition.X,
+                       fmt::format("{} line {}", condition.file, condition.line));
   }
 
   /// Why a frame or tool is not what it was; empty: no job sets it.
@@ -337,7 +364,8 @@ class Job {
     static const std::set<std::string> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
     if (pieces.size() < 2) return;
     if (!kMotions.contains(word)) return unknown(statement, pieces);
-    const bool goes_on = !program_.moves.empty() && program_.moves.back().file == index_ && last_motion_ == word;
+    const bool goes_on =
+        !program_.moves.empty() && program_.moves.back().file == index_ && last_motion_ == word;
     program_.moves.push_back({index_, number, {}, word == "MOVC"});
     program_.moves.back().arc_goes_on = word == "MOVC" && goes_on;
     program_.moves.back().speed_mm_s = speed_of(pieces);
@@ -353,26 +381,31 @@ class Job {
         return leave(fmt::format("a sensor may end the motion ({})", piece.text));
     }
     if (group_.starts_with("RB") && group_.substr(0, group_.find(',')) != "RB1")
-      return leave(fmt::format("the job moves {}, another robot", shown(group_.substr(0, group_.find(',')))));
+      return leave(fmt::format("the job moves {}, another robot",
+                               shown(group_.substr(0, group_.find(',')))));
     if (word == "IMOV") return leave("it is relative to where the robot is");
-    if (!displaced.shifted.empty()) return leave(fmt::format("SFTON displaces it ({})", displaced.shifted));
-    if (!displaced.sensed.empty()) return leave(fmt::format("a sensor or a soft axis moves it: {}", displaced.sensed));
+    if (!displaced.shifted.empty())
+      return leave(fmt::format("SFTON displaces it ({})", displaced.shifted));
+    if (!displaced.sensed.empty())
+      return leave(fmt::format("a sensor or a soft axis moves it: {}", displaced.sensed));
     const auto position = positions_.find(name);
     if (position == positions_.end()) return leave("it is a variable, which any job may set");
     if (name[0] != 'C') return leave("it moves external axes alone");
     for (std::size_t at = 2; at < pieces.size(); ++at) {
-      if (is_external(pieces[at])) external_of_[program_.moves.size() - 1].emplace_back(pieces[at].text);
+      if (is_external(pieces[at]))
+        external_of_[program_.moves.size() - 1].emplace_back(pieces[at].text);
     }
     used_.insert(name);
     sites_.add(index_, position->second.begin, name,
-               {tool_of(position->second), frame_of(position->second), word, index_, number, program_.moves.size() - 1,
-                word != "MOVJ"});
+               {tool_of(position->second), frame_of(position->second), word, index_, number,
+                program_.moves.size() - 1, word != "MOVJ"});
   }
 
  private:
   /// `SMOVL C00000 ...`, `SYMOVL C00000 ...`: of a part that moves, or more.
   void unknown(const Statement& statement, const std::vector<Piece>& pieces) {
-    static const std::set<std::string> kStill = {"REFP", "MFRAME", "SETTOOL", "CALL", "JUMP", "PSTART"};
+    static const std::set<std::string> kStill = {"REFP", "MFRAME", "SETTOOL",
+                                                 "CALL", "JUMP",   "PSTART"};
     const std::string word = word_from(pieces[0].begin);
     if (kStill.contains(word)) return;
     for (const Piece& piece : pieces) {
@@ -381,8 +414,9 @@ class Job {
       used_.insert(name);
       program_.moves.push_back({index_, statement.line, {}, false});
       program_.moves.back().left_some = true;
-      program_.left.push_back({name, index_, statement.line, word,
-                               fmt::format("{} is not known here: it may move the robot there", shown(word))});
+      program_.left.push_back(
+          {name, index_, statement.line, word,
+           fmt::format("{} is not known here: it may move the robot there", shown(word))});
     }
   }
 
@@ -457,14 +491,16 @@ void read_motions(std::vector<Job>& jobs) {
   const std::vector<Displaced> shifted = states_before(
       flow_of(steps), Displaced{},
       [&](std::size_t s, Displaced& displaced) {
-        if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, displaced);
+        if (places[s].statement != nullptr)
+          jobs[places[s].job].shift(*places[s].statement, displaced);
       },
       [](Displaced& one, const Displaced& other, const std::string&) {
         if (one.shifted.empty()) one.shifted = other.shifted;
         if (one.sensed.empty()) one.sensed = other.sensed;
       });
   for (std::size_t s = 0; s < steps.size(); ++s) {
-    if (places[s].statement != nullptr) jobs[places[s].job].motion(*places[s].statement, shifted[s]);
+    if (places[s].statement != nullptr)
+      jobs[places[s].job].motion(*places[s].statement, shifted[s]);
   }
   for (Job& job : jobs) job.list_unused();
 }
@@ -484,8 +520,9 @@ Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
   read_motions(jobs);
   for (const auto& [file, names] : controller.taken)
     program.notes.push_back(fmt::format("{}: taken from {}", fmt::join(names, ", "), file));
-  sites.finish(program,
-               [&](const Site& site, ProgramTarget& target) { return jobs[site.file].describe(site, target); });
+  sites.finish(program, [&](const Site& site, ProgramTarget& target) {
+    return jobs[site.file].describe(site, target);
+  });
   return program;
 }
 

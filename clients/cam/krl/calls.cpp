@@ -8,15 +8,18 @@ namespace trammel::cam::krl {
 Step step_of(const std::vector<Token>& tokens) {
   using Kind = Step::Kind;
   static const std::map<std::string, Kind> kWords = {
-      {"IF", Kind::kIf},         {"ELSE", Kind::kElse},     {"ENDIF", Kind::kEnd},     {"SWITCH", Kind::kSwitch},
-      {"CASE", Kind::kCase},     {"DEFAULT", Kind::kElse},  {"ENDSWITCH", Kind::kEnd}, {"LOOP", Kind::kRepeat},
-      {"ENDLOOP", Kind::kEnd},   {"WHILE", Kind::kWhile},   {"ENDWHILE", Kind::kEnd},  {"FOR", Kind::kWhile},
-      {"ENDFOR", Kind::kEnd},    {"REPEAT", Kind::kRepeat}, {"UNTIL", Kind::kEnd},     {"EXIT", Kind::kExit},
-      {"RETURN", Kind::kReturn}, {"RESUME", Kind::kReturn}};
+      {"IF", Kind::kIf},         {"ELSE", Kind::kElse},     {"ENDIF", Kind::kEnd},
+      {"SWITCH", Kind::kSwitch}, {"CASE", Kind::kCase},     {"DEFAULT", Kind::kElse},
+      {"ENDSWITCH", Kind::kEnd}, {"LOOP", Kind::kRepeat},   {"ENDLOOP", Kind::kEnd},
+      {"WHILE", Kind::kWhile},   {"ENDWHILE", Kind::kEnd},  {"FOR", Kind::kWhile},
+      {"ENDFOR", Kind::kEnd},    {"REPEAT", Kind::kRepeat}, {"UNTIL", Kind::kEnd},
+      {"EXIT", Kind::kExit},     {"RETURN", Kind::kReturn}, {"RESUME", Kind::kReturn}};
   if (tokens.empty()) return {};
   if (tokens.size() == 2 && tokens[1].text == ":") return {Kind::kLabel, tokens[0].text};
   if (tokens.size() > 1 && tokens[0].text == "GOTO") return {Kind::kJump, tokens[1].text};
-  if (tokens.size() > 1 && (tokens[1].text == "=" || tokens[1].text == "[" || tokens[1].text == ".")) return {};
+  if (tokens.size() > 1 &&
+      (tokens[1].text == "=" || tokens[1].text == "[" || tokens[1].text == "."))
+    return {};
   const auto word = kWords.find(tokens[0].text);
   return word == kWords.end() ? Step{} : Step{word->second};
 }
@@ -25,7 +28,8 @@ namespace {
 
 class HandedOver {
  public:
-  HandedOver(const std::vector<std::vector<Line>>& lines, const std::vector<Routine>& routines, Variables& names)
+  HandedOver(const std::vector<std::vector<Line>>& lines, const std::vector<Routine>& routines,
+             Variables& names)
       : lines_(lines), routines_(routines), names_(names) {}
 
   void note() {
@@ -45,10 +49,11 @@ class HandedOver {
   void note(std::size_t f, std::size_t k, std::size_t at) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     const std::string& name = tokens[at].text;
-    const auto routine =
-        std::find_if(routines_.begin(), routines_.end(), [&](const Routine& one) { return one.name == name; });
+    const auto routine = std::find_if(routines_.begin(), routines_.end(),
+                                      [&](const Routine& one) { return one.name == name; });
     // Functions of the controller in expressions take values; so do BAS( ) and `IF (`.
-    const bool is_statement = at == 0 && name != "BAS" && step_of(tokens).kind == Step::Kind::kPlain;
+    const bool is_statement =
+        at == 0 && name != "BAS" && step_of(tokens).kind == Step::Kind::kPlain;
     if (routine == routines_.end() && !is_statement) return;
     if (routine == routines_.end()) elsewhere_.insert(name);
     std::size_t argument = 0;
@@ -61,7 +66,8 @@ class HandedOver {
       if (tokens[t].text == ",") ++argument;
       if (tokens[t].text != "(" && tokens[t].text != ",") continue;
       const bool by_value = routine != routines_.end() && takes_value(*routine, argument);
-      if (!by_value && tokens[t + 1].kind == TokenKind::kWord) names_.note_handed_over(f, k, t + 1, tokens[at].text);
+      if (!by_value && tokens[t + 1].kind == TokenKind::kWord)
+        names_.note_handed_over(f, k, t + 1, tokens[at].text);
     }
   }
   /// Whether the parameter of that number is `:IN`.

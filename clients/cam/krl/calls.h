@@ -20,9 +20,10 @@ struct Routine {
 /// What a line does to the order. Calls are not in it.
 [[nodiscard]] Step step_of(const std::vector<Token>& tokens);
 
-/// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set it. Returns the
-/// routines that are called and not in the files.
+/// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set
+/// it. Returns the routines that are called and not in the files.
 [[nodiscard]] std::set<std::string> note_handed_over(const std::vector<std::vector<Line>>& lines,
-                                                     const std::vector<Routine>& routines, Variables& names);
+                                                     const std::vector<Routine>& routines,
+                                                     Variables& names);
 
 }  // namespace trammel::cam::krl

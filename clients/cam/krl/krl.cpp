@@ -45,7 +45,8 @@ bool is_by_axes(const std::string& word) { return word.find("PTP") != std::strin
 
 /// `PTP $AXIS_ACT` goes to where the axes are: it has no target.
 bool stands_still(const std::vector<Token>& tokens) {
-  const bool alone = tokens.size() == 2 || (tokens.size() > 2 && tokens[2].kind == TokenKind::kWord);
+  const bool alone =
+      tokens.size() == 2 || (tokens.size() > 2 && tokens[2].kind == TokenKind::kWord);
   return alone && tokens[1].text == "$AXIS_ACT";
 }
 
@@ -56,7 +57,8 @@ class Reader {
     program_.files = std::move(files);
     program_.frames.push_back({"$BASE", Pose::Identity(), "no $BASE is set before it"});
     program_.frames.push_back({"$NULLFRAME", Pose::Identity(), ""});
-    program_.tools.push_back({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "no $TOOL is set before it"});
+    program_.tools.push_back(
+        {"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "no $TOOL is set before it"});
   }
 
   Program read() {
@@ -75,8 +77,9 @@ class Reader {
       if (!ran_.contains(r)) run(r, {}, 0);
     }
     for (std::size_t f = 0; f < lines_.size(); ++f) targets_.note_readings(f);
-    sites_.finish(program_,
-                  [this](const Site& site, ProgramTarget& target) { return targets_.describe(site, target); });
+    sites_.finish(program_, [this](const Site& site, ProgramTarget& target) {
+      return targets_.describe(site, target);
+    });
     find_order();
     targets_.list_unused();
     note_elsewhere();
@@ -93,7 +96,8 @@ class Reader {
     MarkPlace mark{program_.files[f].text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "; "};
     const std::vector<Line>& lines = lines_[f];
     if (is_controllers_bas(f)) return program_.mark_places.push_back(mark);
-    std::size_t spline = lines.size();  // the head of the block that the line is in; their number: none
+    std::size_t spline =
+        lines.size();  // the head of the block that the line is in; their number: none
     bool any = false;
     for (std::size_t k = 0; k < lines.size(); ++k) {
       tools_.note_tool_name(lines[k]);
@@ -104,15 +108,18 @@ class Reader {
       if (spline < lines.size()) spline_heads_[{f, k}] = spline;
       if (word == "SPLINE" || word == "PTP_SPLINE") spline = k;
       if (tokens.size() > first + 1 &&
-          (tokens[first].text == "DEF" || tokens[first].text == "DEFFCT" || tokens[first].text == "DEFDAT")) {
-        const std::size_t name = first + (tokens[first].text == "DEFFCT" && tokens.size() > first + 2 ? 2 : 1);
+          (tokens[first].text == "DEF" || tokens[first].text == "DEFFCT" ||
+           tokens[first].text == "DEFDAT")) {
+        const std::size_t name =
+            first + (tokens[first].text == "DEFFCT" && tokens.size() > first + 2 ? 2 : 1);
         if (!any) mark.at = k + 1 < lines.size() ? lines[k + 1].begin : mark.at;
         any = true;
         if (tokens[first].text == "DEFDAT") continue;
         names_.note_parameters(f, k, name + 1);
         routines_.push_back({tokens[name].text, f, k + 1, lines.size()});
         open = static_cast<int>(routines_.size()) - 1;
-      } else if (!tokens.empty() && (tokens[0].text == "END" || tokens[0].text == "ENDFCT") && open >= 0) {
+      } else if (!tokens.empty() && (tokens[0].text == "END" || tokens[0].text == "ENDFCT") &&
+                 open >= 0) {
         routines_[static_cast<std::size_t>(open)].last = k;
         open = -1;
       } else {
@@ -126,7 +133,8 @@ class Reader {
 
   /// `PTP {E1 90}`, `ASYPTP {E1 90}`: an external axis moves, and no target says it.
   void note_moved_axes(const std::vector<Token>& tokens) {
-    if (tokens.empty() || !(is_motion(tokens[0].text) || is_relative(tokens[0].text) || tokens[0].text == "ASYPTP"))
+    if (tokens.empty() ||
+        !(is_motion(tokens[0].text) || is_relative(tokens[0].text) || tokens[0].text == "ASYPTP"))
       return;
     std::size_t end = 0;
     const std::vector<Value> target = krl::operands_at(tokens, 1, &end);
@@ -135,7 +143,8 @@ class Reader {
     const bool relative = is_relative(tokens[0].text);
     for (int axis = 0; axis < 6 && (!whole || relative); ++axis) {
       const Value* to = target[0].field(fmt::format("E{}", axis + 1));
-      const bool stands = relative && to != nullptr && to->kind == Value::Kind::kNumber && to->number == 0;
+      const bool stands =
+          relative && to != nullptr && to->kind == Value::Kind::kNumber && to->number == 0;
       if (to != nullptr && !stands) program_.moved_axes.insert(axis);
     }
   }
@@ -146,23 +155,25 @@ class Reader {
     if (upper(name.substr(name.find_last_of("/\\") + 1)) != "BAS.SRC") return false;
     return std::any_of(lines_[f].begin(), lines_[f].end(), [](const Line& line) {
       const std::size_t first = !line.tokens.empty() && line.tokens[0].text == "GLOBAL" ? 1 : 0;
-      return line.tokens.size() > first + 1 && line.tokens[first].text == "DEF" && line.tokens[first + 1].text == "BAS";
+      return line.tokens.size() > first + 1 && line.tokens[first].text == "DEF" &&
+             line.tokens[first + 1].text == "BAS";
     });
   }
 
   /// Routines that the files lack may do more than they seem to.
   void note_elsewhere() {
     static const std::set<std::string> kOfTheController = {
-        "PULSE", "COPEN", "CCLOSE", "CREAD", "CWRITE", "SWRITE", "SREAD", "P00", "CLEAR", "DELETE_BACKWARD_BUFFER"};
+        "PULSE",  "COPEN", "CCLOSE", "CREAD", "CWRITE",
+        "SWRITE", "SREAD", "P00",    "CLEAR", "DELETE_BACKWARD_BUFFER"};
     for (const std::string& name : kOfTheController) elsewhere_.erase(name);
     if (elsewhere_.empty() || !setting_.by_hand()) return;
     constexpr std::size_t kMost = 5;
     const std::vector<std::string> all(elsewhere_.begin(), elsewhere_.end());
     const std::size_t shown_here = std::min(all.size(), kMost);
-    program_.notes.push_back(
-        fmt::format("{}{}: not in the files handed over, taken to leave $TOOL, $BASE and $LOAD as they are",
-                    fmt::join(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(shown_here), ", "),
-                    all.size() > kMost ? fmt::format(" and {} more", all.size() - kMost) : ""));
+    program_.notes.push_back(fmt::format(
+        "{}{}: not in the files handed over, taken to leave $TOOL, $BASE and $LOAD as they are",
+        fmt::join(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(shown_here), ", "),
+        all.size() > kMost ? fmt::format(" and {} more", all.size() - kMost) : ""));
   }
 
   // What `$machine.dat` says of the robot.
@@ -185,7 +196,9 @@ class Reader {
         const std::size_t at = done_later(line.tokens);
         const auto routine = at == 0 ? by_name_.end() : by_name_.find(line.tokens[at].text);
         resumes_ |= !line.tokens.empty() && line.tokens[0].text == "RESUME";
-        const auto known = [&] { return std::find(interrupts_.begin(), interrupts_.end(), routine->second); };
+        const auto known = [&] {
+          return std::find(interrupts_.begin(), interrupts_.end(), routine->second);
+        };
         if (routine == by_name_.end() || known() != interrupts_.end()) continue;
         called.insert(routine->first);
         interrupts_.push_back(routine->second);
@@ -207,7 +220,9 @@ class Reader {
         const State back = end_of(interrupts_[i], state, depth + 1);
         inside_interrupt_ = false;
         const State was = state;
-        setting_.join(state, back, fmt::format("the interrupt routine {}", shown(routines_[interrupts_[i]].name)));
+        setting_.join(
+            state, back,
+            fmt::format("the interrupt routine {}", shown(routines_[interrupts_[i]].name)));
         more |= !(state == was);
       }
     }
@@ -229,8 +244,12 @@ class Reader {
     }
     return states_before(
         order->second, begin,
-        [&](std::size_t step, State& state) { set(routine.file, routine.first + step, state, depth); },
-        [&](State& state, const State& other, const std::string& by) { setting_.join(state, other, by); },
+        [&](std::size_t step, State& state) {
+          set(routine.file, routine.first + step, state, depth);
+        },
+        [&](State& state, const State& other, const std::string& by) {
+          setting_.join(state, other, by);
+        },
         [&](State& state) { come_in(state, depth); });
   }
 
@@ -311,7 +330,8 @@ class Reader {
     if (stands_still(tokens)) return;
     const std::size_t move = move_at(f, k);
     program_.moves[move].is_arc = word == "CIRC" || word == "SCIRC";
-    if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
+    if (is_relative(word))
+      return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
     if (const auto head = spline_heads_.find({f, k}); head != spline_heads_.end())
       setting_.apply_with(f, head->second, state);
     setting_.apply_with(f, k, state);
@@ -327,28 +347,33 @@ class Reader {
       if (next >= tokens.size() || tokens[next].text != ",") break;
       ++next;
     }
-    if (count == 2 && next < tokens.size() && tokens[next].text == "CA") by_angle_.insert({f, lines_[f][k].number});
+    if (count == 2 && next < tokens.size() && tokens[next].text == "CA")
+      by_angle_.insert({f, lines_[f][k].number});
   }
 
-  /// `CIRC XP1,XP2,CA 360`: the circle through the points is corrected, and the arc ends elsewhere on it.
+  /// `CIRC XP1,XP2,CA 360`: the circle through the points is corrected, and the arc ends elsewhere
+  /// on it.
   void note_angles() {
     if (by_angle_.empty()) return;
     const auto& [f, line] = *by_angle_.begin();
-    const std::string more = by_angle_.size() > 1 ? fmt::format(" and {} more", by_angle_.size() - 1) : "";
-    program_.notes.push_back(fmt::format(
-        "an arc ends by its angle CA and not at its end point ({} line {}{}): the circle through its points "
-        "is corrected, and what lies beyond them follows it",
-        program_.files[f].name, line, more));
+    const std::string more =
+        by_angle_.size() > 1 ? fmt::format(" and {} more", by_angle_.size() - 1) : "";
+    program_.notes.push_back(
+        fmt::format("an arc ends by its angle CA and not at its end point ({} line {}{}): the "
+                    "circle through its points is corrected, and what lies beyond them follows it",
+                    program_.files[f].name, line, more));
   }
 
   std::string text_of(std::size_t f, const std::vector<Token>& tokens, std::size_t from) const {
     if (from >= tokens.size()) return "";
-    return program_.files[f].text.substr(tokens[from].begin, tokens.back().end - tokens[from].begin);
+    return program_.files[f].text.substr(tokens[from].begin,
+                                         tokens.back().end - tokens[from].begin);
   }
 
-  void use(std::size_t f, std::size_t k, const std::vector<Value>& operands, const State& state, std::size_t move) {
-    const std::string name =
-        program_.files[f].text.substr(operands.front().begin, operands.back().end - operands.front().begin);
+  void use(std::size_t f, std::size_t k, const std::vector<Value>& operands, const State& state,
+           std::size_t move) {
+    const std::string name = program_.files[f].text.substr(
+        operands.front().begin, operands.back().end - operands.front().begin);
     if (!state.fixed_tool.empty()) return leave(f, k, name, state.fixed_tool);
     if (!state.sensed.empty()) return leave(f, k, name, state.sensed);
     if (!state.soft.empty()) return leave(f, k, name, state.soft);
@@ -364,9 +389,11 @@ class Reader {
       note_axes(operands[0], move);
       return sites_.add(f, operands[0].begin, name, use);
     }
-    if (operands[0].kind != Value::Kind::kName) return leave(f, k, name, "an expression decides it");
+    if (operands[0].kind != Value::Kind::kName)
+      return leave(f, k, name, "an expression decides it");
     const std::string& wanted = operands[0].name;
-    if (wanted.starts_with("$")) return leave(f, k, name, fmt::format("{} decides it", shown(wanted)));
+    if (wanted.starts_with("$"))
+      return leave(f, k, name, fmt::format("{} decides it", shown(wanted)));
     if (wanted.find("[*]") == std::string::npos) {
       const Told<const Assigned*> one = names_.value_of(wanted, f);
       if (one && (*one)->operands.size() == 1) note_axes((*one)->operands[0], move);
@@ -378,16 +405,19 @@ class Reader {
       if (!key.second.starts_with(beginning) || key.second == wanted) continue;
       any = true;
       const Assigned* at = variable.values.empty() ? nullptr : &variable.values[0];
-      use_named(f, k, key.second, at == nullptr ? key.second : names_.spelled(key.second, at->file, at->line), use);
+      use_named(f, k, key.second,
+                at == nullptr ? key.second : names_.spelled(key.second, at->file, at->line), use);
     }
     if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
   }
 
   void note_axes(const Value& value, std::size_t move) {
-    if (const Told<std::vector<double>> axes = krl::Variables::numbers_of(value, kAxes)) axes_[move] = *axes;
+    if (const Told<std::vector<double>> axes = krl::Variables::numbers_of(value, kAxes))
+      axes_[move] = *axes;
   }
 
-  void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name, const SiteUse& use) {
+  void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name,
+                 const SiteUse& use) {
     const Told<const Assigned*> assigned = names_.value_of(wanted, f);
     if (!assigned) return leave(f, k, name, assigned.error());
     const Assigned& at = **assigned;
@@ -406,31 +436,37 @@ class Reader {
       steps.push_back({Step::Kind::kRoutine, std::to_string(&routine - routines_.data())});
       for (std::size_t k = routine.first; k < routine.last; ++k) {
         const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
-        for (const std::size_t called : called_by(tokens)) steps.push_back({Step::Kind::kCall, std::to_string(called)});
+        for (const std::size_t called : called_by(tokens))
+          steps.push_back({Step::Kind::kCall, std::to_string(called)});
         const auto move = moves_.find({routine.file, k});
         // A line that is left leaves the posture as it was.
-        if (move != moves_.end() && (is_by_axes(tokens[0].text) || !program_.moves[move->second].targets.empty()))
+        if (move != moves_.end() &&
+            (is_by_axes(tokens[0].text) || !program_.moves[move->second].targets.empty()))
           moves.emplace(steps.size(), std::pair(routine.file, k));
         steps.push_back(krl::step_of(tokens));
       }
       steps.push_back({Step::Kind::kEnd});
     }
-    const auto before = motions_before(flow_of(steps), [&](std::size_t step) -> std::optional<std::size_t> {
-      const auto move = moves.find(step);
-      return move == moves.end() ? std::nullopt : std::optional<std::size_t>(moves_.at(move->second));
-    });
+    const auto before =
+        motions_before(flow_of(steps), [&](std::size_t step) -> std::optional<std::size_t> {
+          const auto move = moves.find(step);
+          return move == moves.end() ? std::nullopt
+                                     : std::optional<std::size_t>(moves_.at(move->second));
+        });
     for (const auto& [step, place] : moves) follow(place.first, place.second, before[step]);
     for (const auto& [move, axes] : axes_) program_.moves[move].axes = axes;
   }
 
-  /// Where the program begins, or an interrupt ends what it came in, what a target does not say is taken to be nearest
-  /// to zero.
+  /// Where the program begins, or an interrupt ends what it came in, what a target does not say is
+  /// taken to be nearest to zero.
   void follow(std::size_t f, std::size_t k, const std::set<std::size_t>& before) {
     ProgramMove& move = program_.moves[moves_.at({f, k})];
     const bool by_axes = is_by_axes(lines_[f][k].tokens[0].text);
-    const bool says = std::any_of(move.targets.begin(), move.targets.end(),
-                                  [&](std::size_t t) { return program_.targets[t].configuration.said(); });
-    if (resumes_ || before.contains(kNoMotion) || (by_axes && (says || move.targets.empty()))) return;
+    const bool says = std::any_of(move.targets.begin(), move.targets.end(), [&](std::size_t t) {
+      return program_.targets[t].configuration.said();
+    });
+    if (resumes_ || before.contains(kNoMotion) || (by_axes && (says || move.targets.empty())))
+      return;
     move.choice = JointChoice::kOnALine;
     move.before = before;
   }
@@ -445,7 +481,8 @@ class Reader {
   krl::Tools tools_{lines_, names_, options_, program_};
   krl::Setting setting_{lines_, names_, tools_, program_};
   krl::Targets targets_{lines_, names_, options_, program_};
-  std::map<std::pair<std::size_t, std::size_t>, std::size_t> spline_heads_;  ///< of the lines in a spline block
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t>
+      spline_heads_;                            ///< of the lines in a spline block
   std::set<std::string> elsewhere_;             ///< routines that are called and not in the files
   std::map<std::string, std::size_t> by_name_;  ///< routines
   std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine

@@ -22,7 +22,8 @@ std::size_t number_end(std::string_view text, std::size_t at) {
   if (at < text.size() && text[at] == '.') ++at;
   while (digit(at)) ++at;
   if (at < text.size() && (text[at] == 'E' || text[at] == 'e')) {
-    const std::size_t sign = at + 1 < text.size() && (text[at + 1] == '+' || text[at + 1] == '-') ? 2 : 1;
+    const std::size_t sign =
+        at + 1 < text.size() && (text[at + 1] == '+' || text[at + 1] == '-') ? 2 : 1;
     if (digit(at + sign)) {
       at += sign;
       while (digit(at)) ++at;
@@ -37,7 +38,8 @@ Token token_at(std::string_view text, std::size_t at, std::size_t end) {
   const char c = text[at];
   if (is_letter(c)) {
     token.kind = TokenKind::kWord;
-    while (token.end < end && (is_letter(text[token.end]) || is_digit(text[token.end]))) ++token.end;
+    while (token.end < end && (is_letter(text[token.end]) || is_digit(text[token.end])))
+      ++token.end;
   } else if (is_digit(c) || (c == '.' && at + 1 < end && is_digit(text[at + 1]))) {
     token.kind = TokenKind::kNumber;
     token.end = number_end(text, at);
@@ -64,9 +66,12 @@ class Reader {
   Reader(const std::vector<Token>& tokens, std::size_t at) : tokens_(tokens), at_(at) {}
 
   [[nodiscard]] bool is(std::string_view sign) const {
-    return at_ < tokens_.size() && tokens_[at_].kind == TokenKind::kSign && tokens_[at_].text == sign;
+    return at_ < tokens_.size() && tokens_[at_].kind == TokenKind::kSign &&
+           tokens_[at_].text == sign;
   }
-  [[nodiscard]] bool is(TokenKind kind) const { return at_ < tokens_.size() && tokens_[at_].kind == kind; }
+  [[nodiscard]] bool is(TokenKind kind) const {
+    return at_ < tokens_.size() && tokens_[at_].kind == kind;
+  }
   [[nodiscard]] std::size_t at() const { return at_; }
   bool take(std::string_view sign) {
     if (!is(sign)) return false;
@@ -118,7 +123,8 @@ class Reader {
         continue;
       }
       ++at_;
-      const bool constant = is(TokenKind::kNumber) && at_ + 1 < tokens_.size() && tokens_[at_ + 1].text == "]";
+      const bool constant =
+          is(TokenKind::kNumber) && at_ + 1 < tokens_.size() && tokens_[at_ + 1].text == "]";
       made.name += constant ? "[" + tokens_[at_].text + "]" : is("]") ? "[]" : "[*]";
       while (at_ < tokens_.size() && !is("]")) ++at_;
       take("]");
@@ -164,7 +170,9 @@ class Reader {
 
 const Value* Value::field(std::string_view wanted) const {
   const auto found = std::find(field_names.begin(), field_names.end(), wanted);
-  return found == field_names.end() ? nullptr : &field_values[static_cast<std::size_t>(found - field_names.begin())];
+  return found == field_names.end()
+             ? nullptr
+             : &field_values[static_cast<std::size_t>(found - field_names.begin())];
 }
 
 std::vector<Line> lines_of(std::string_view text) {
@@ -194,7 +202,8 @@ std::vector<Line> lines_of(std::string_view text) {
   return lines;
 }
 
-std::vector<Value> operands_at(const std::vector<Token>& tokens, std::size_t at, std::size_t* next) {
+std::vector<Value> operands_at(const std::vector<Token>& tokens, std::size_t at,
+                               std::size_t* next) {
   std::vector<Value> operands;
   Reader reader(tokens, at);
   do {

@@ -35,14 +35,16 @@ struct Value {
   Kind kind = Kind::kOther;
   std::size_t begin = 0, end = 0;
   double number = 0;
-  std::string name;                      ///< in upper case, with its index: `XP[3]`; an index that is no number is `*`
+  std::string name;  ///< in upper case, with its index: `XP[3]`; an index that is no number is `*`
   std::vector<std::string> field_names;  ///< of an aggregate
   std::vector<Value> field_values;       ///< as field_names
 
   [[nodiscard]] const Value* field(std::string_view name) const;
 };
 
-/// The operands of `a:b:c` from a token on; `next` is set behind them. Empty where it is no such expression.
-[[nodiscard]] std::vector<Value> operands_at(const std::vector<Token>& tokens, std::size_t at, std::size_t* next);
+/// The operands of `a:b:c` from a token on; `next` is set behind them. Empty where it is no such
+/// expression.
+[[nodiscard]] std::vector<Value> operands_at(const std::vector<Token>& tokens, std::size_t at,
+                                             std::size_t* next);
 
 }  // namespace trammel::cam::krl

@@ -33,12 +33,14 @@ void Setting::set(std::size_t f, std::size_t k, State& state) {
   } else if (word == "$BASE" && assigns) {
     state.frame = tools_.base_set(operands_at(tokens, 2, &end), f);
   } else if (word == "$LOAD" && tokens.size() > 1) {
-    state.load = assigns ? tools_.load_set(operands_at(tokens, 2, &end), f, k)
-                         : tools_.add_load({"$LOAD", std::nullopt, "",
-                                            fmt::format("a part of $LOAD is set ({})", names_.place(f, k))});
+    state.load =
+        assigns ? tools_.load_set(operands_at(tokens, 2, &end), f, k)
+                : tools_.add_load({"$LOAD", std::nullopt, "",
+                                   fmt::format("a part of $LOAD is set ({})", names_.place(f, k))});
   } else if ((word == "$TOOL" || word == "$BASE") && tokens.size() > 1) {
     const std::string why = fmt::format("a part of {} is set ({})", word, names_.place(f, k));
-    if (word == "$TOOL") state.tool = tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
+    if (word == "$TOOL")
+      state.tool = tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
     if (word == "$BASE") state.frame = tools_.add_frame({"$BASE", Pose::Identity(), why});
   } else if (word == "$IPO_MODE" && assigns) {
     state.fixed_tool = why_fixed(tokens, 2);
@@ -57,7 +59,8 @@ void Setting::set(std::size_t f, std::size_t k, State& state) {
 
 /// Where ways come together, what they set differently is not known.
 void Setting::join(State& state, const State& other, const std::string& by) {
-  const std::string why = by.empty() ? "a branch or a loop of the program decides it" : by + " may change it";
+  const std::string why =
+      by.empty() ? "a branch or a loop of the program decides it" : by + " may change it";
   if (state.tool != other.tool && program_.tools[state.tool].why_not.empty())
     state.tool = tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
   if (state.frame != other.frame && program_.frames[state.frame].why_not.empty())
@@ -71,7 +74,8 @@ void Setting::join(State& state, const State& other, const std::string& by) {
   state.speed = std::max(state.speed, other.speed);
 }
 
-/// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a spline, alone.
+/// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a
+/// spline, alone.
 void Setting::apply_with(std::size_t f, std::size_t k, State& state) {
   const std::vector<Token>& tokens = lines_[f][k].tokens;
   std::size_t at = 0;
@@ -88,11 +92,13 @@ void Setting::apply_with(std::size_t f, std::size_t k, State& state) {
 /// FDAT of an inline form: `{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,...}`
 void Setting::apply_fdat(const std::string& name, std::size_t f, State& state) {
   const Told<const Assigned*> assigned = names_.value_of(name, f);
-  const Value* tool =
-      assigned && (*assigned)->operands.size() == 1 ? (*assigned)->operands[0].field("TOOL_NO") : nullptr;
+  const Value* tool = assigned && (*assigned)->operands.size() == 1
+                          ? (*assigned)->operands[0].field("TOOL_NO")
+                          : nullptr;
   const Value* base = tool == nullptr ? nullptr : (*assigned)->operands[0].field("BASE_NO");
   if (tool == nullptr || base == nullptr) {
-    const std::string why = assigned ? fmt::format("{} has no tool or base", shown(name)) : assigned.error();
+    const std::string why =
+        assigned ? fmt::format("{} has no tool or base", shown(name)) : assigned.error();
     state.tool = tools_.add_tool({name, "", 0, std::nullopt, std::nullopt, 0, why});
     state.frame = tools_.add_frame({name, Pose::Identity(), why});
     return;
@@ -107,22 +113,27 @@ void Setting::apply_fdat(const std::string& name, std::size_t f, State& state) {
 }
 
 /// `ret=RSI_ON(#RELATIVE)`, `RSI_OFF()`; `ST_ON1( )` of older ones.
-void Setting::set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const {
-  static const std::set<std::string> kBegins = {"RSI_ON", "ST_ON", "ST_ON1"}, kEnds = {"RSI_OFF", "ST_OFF", "ST_OFF1"};
+void Setting::set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k,
+                         State& state) const {
+  static const std::set<std::string> kBegins = {"RSI_ON", "ST_ON", "ST_ON1"},
+                                     kEnds = {"RSI_OFF", "ST_OFF", "ST_OFF1"};
   for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
     if (tokens[at + 1].text != "(" || declares(tokens)) continue;
     if (kBegins.contains(tokens[at].text))
-      state.sensed = fmt::format("a sensor corrects the path ({}, {})", tokens[at].text, names_.place(f, k));
+      state.sensed =
+          fmt::format("a sensor corrects the path ({}, {})", tokens[at].text, names_.place(f, k));
     if (kEnds.contains(tokens[at].text)) state.sensed.clear();
   }
 }
 
-/// `SET_TORQUE_LIMITS(3, lims)`, `RESET_TORQUE_LIMITS(3)`; `$CURR_RED[3,1]=20` (percent) and `$TORQUE_AXIS=4` (a bit an
-/// axis) of older ones: axes with less torque give way.
-void Setting::set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const {
+/// `SET_TORQUE_LIMITS(3, lims)`, `RESET_TORQUE_LIMITS(3)`; `$CURR_RED[3,1]=20` (percent) and
+/// `$TORQUE_AXIS=4` (a bit an axis) of older ones: axes with less torque give way.
+void Setting::set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k,
+                       State& state) const {
   constexpr double kFullCurrent = 100;
   const auto begins = [&](const std::string& what) {
-    state.soft = fmt::format("a force may move the axes, whose torques are limited ({}, {})", what, names_.place(f, k));
+    state.soft = fmt::format("a force may move the axes, whose torques are limited ({}, {})", what,
+                             names_.place(f, k));
   };
   for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
     if (tokens[at + 1].text != "(" || declares(tokens)) continue;
@@ -131,7 +142,8 @@ void Setting::set_soft(const std::vector<Token>& tokens, std::size_t f, std::siz
   }
   const std::string& word = tokens[0].text;
   if (word != "$CURR_RED" && word != "$TORQUE_AXIS") return;
-  const auto equals = std::find_if(tokens.begin(), tokens.end(), [](const Token& token) { return token.text == "="; });
+  const auto equals = std::find_if(tokens.begin(), tokens.end(),
+                                   [](const Token& token) { return token.text == "="; });
   if (equals == tokens.end() || equals + 1 == tokens.end()) return;
   const bool alone = equals + 2 == tokens.end() && (equals + 1)->kind == TokenKind::kNumber;
   const auto number = alone ? read_number((equals + 1)->text) : std::nullopt;
@@ -152,7 +164,8 @@ double Setting::speed_at(const std::vector<Token>& tokens, std::size_t at) {
   if (is(1, "=") && is(2, "SVEL_CP") && is(3, "(")) number = at + 4;
   if (is(1, "=") && is(2, "{")) {
     number = at + 3;
-    while (number < tokens.size() && tokens[number].text != "CP" && tokens[number].text != "}") ++number;
+    while (number < tokens.size() && tokens[number].text != "CP" && tokens[number].text != "}")
+      ++number;
     ++number;
   }
   return number == 0 ? kSpeedUnknown : speed_of(tokens, number);
@@ -165,18 +178,23 @@ double Setting::speed_of(const std::vector<Token>& tokens, std::size_t at) {
 }
 
 /// `BAS(#TOOL,1)`, `BAS(#BASE,2)`
-void Setting::set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) {
+void Setting::set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k,
+                         State& state) {
   const bool constant = tokens[5].kind == TokenKind::kNumber;
   const int number = constant ? std::atoi(tokens[5].text.c_str()) : 0;
-  const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), names_.place(f, k));
+  const std::string why =
+      fmt::format("{} chooses it ({})", shown(tokens[5].text), names_.place(f, k));
   if (tokens[3].text == "TOOL" || tokens[3].text == "EX_TOOL") {
     state.load = 0;
-    state.tool = constant ? tools_.tool_numbered(number, f)
-                          : tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+    state.tool =
+        constant
+            ? tools_.tool_numbered(number, f)
+            : tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
   } else if (tokens[3].text == "CP_PARAMS" || tokens[3].text == "VEL_CP") {
     state.speed = speed_of(tokens, 5);
   } else if (tokens[3].text == "INITMOV") {
-    const std::string may = fmt::format("BAS(#INITMOV) sets it to its default ({})", names_.place(f, k));
+    const std::string may =
+        fmt::format("BAS(#INITMOV) sets it to its default ({})", names_.place(f, k));
     state.speed = kSpeedUnknown;
     state.load = 0;
     state.tool = tools_.add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + may});
@@ -184,14 +202,15 @@ void Setting::set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::s
   } else if (tokens[3].text == "EX_BASE") {
     state.frame = tools_.add_frame({"$BASE", Pose::Identity(), carried_at(f, k)});
   } else if (tokens[3].text == "BASE") {
-    state.frame =
-        constant ? tools_.base_numbered(number, f) : tools_.add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    state.frame = constant ? tools_.base_numbered(number, f)
+                           : tools_.add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
   }
 }
 
 /// `#BASE` or `#TCP`, from a token on.
 std::string Setting::why_fixed(const std::vector<Token>& tokens, std::size_t at) {
-  const std::string word = at + 1 < tokens.size() && tokens[at].text == "#" ? tokens[at + 1].text : "";
+  const std::string word =
+      at + 1 < tokens.size() && tokens[at].text == "#" ? tokens[at + 1].text : "";
   return word == "BASE" ? "" : word == "TCP" ? kToolStands : "$IPO_MODE is not constant";
 }
 
@@ -205,7 +224,8 @@ void Setting::set_with(std::size_t f, std::size_t k, std::size_t at, bool assign
   static const std::set<std::string> kOfFdat = {"STOOL2", "STOOL", "SBASE", "SIPO_MODE", "SLOAD"};
   const std::string& name = tokens[at].text;
   const bool calls = at + 4 < tokens.size() && tokens[at + 3].text == "(";
-  const bool by_fdat = calls && kOfFdat.contains(tokens[at + 2].text) && tokens[at + 4].kind == TokenKind::kWord;
+  const bool by_fdat =
+      calls && kOfFdat.contains(tokens[at + 2].text) && tokens[at + 4].kind == TokenKind::kWord;
   State one = state;
   if (by_fdat) apply_fdat(tokens[at + 4].text, f, one);
   std::size_t end = 0;

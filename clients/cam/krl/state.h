@@ -26,21 +26,24 @@ struct State {
 
 class Setting {
  public:
-  Setting(const std::vector<std::vector<Line>>& lines, const Variables& names, Tools& tools, Program& program)
+  Setting(const std::vector<std::vector<Line>>& lines, const Variables& names, Tools& tools,
+          Program& program)
       : lines_(lines), names_(names), tools_(tools), program_(program) {}
 
   /// What a line sets by itself.
   void set(std::size_t f, std::size_t k, State& state);
   /// Where ways come together, what they set differently is not known.
   void join(State& state, const State& other, const std::string& by);
-  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a spline, alone.
+  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a
+  /// spline, alone.
   void apply_with(std::size_t f, std::size_t k, State& state);
   /// Whether lines set tool or base for more than one motion.
   [[nodiscard]] bool by_hand() const { return sets_by_hand_; }
 
  private:
   void apply_fdat(const std::string& name, std::size_t f, State& state);
-  void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
+  void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k,
+                  State& state) const;
   void set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
   static double speed_at(const std::vector<Token>& tokens, std::size_t at);
   static double speed_of(const std::vector<Token>& tokens, std::size_t at);

@@ -12,7 +12,8 @@ namespace {
 
 class Stated {
  public:
-  Stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options, Variables& names, Program& program)
+  Stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options, Variables& names,
+         Program& program)
       : lines_(lines), options_(options), names_(names), program_(program) {}
 
   void read() {
@@ -37,13 +38,14 @@ class Stated {
 
   void find_base() {
     if (!on_rail_.empty()) {
-      program_.notes.push_back(
-          fmt::format("an external axis carries the robot ({}): $ROBROOT moves and is not used", on_rail_));
+      program_.notes.push_back(fmt::format(
+          "an external axis carries the robot ({}): $ROBROOT moves and is not used", on_rail_));
       return;
     }
     at_each("$ROBROOT", [&](const Assigned& at, const Value&) {
       const Told<Pose> X_WB = names_.frame_of(at.operands, at.file);
-      if (X_WB) program_.bases.push_back({*X_WB, "$ROBROOT", program_.files[at.file].name, line_at(at)});
+      if (X_WB)
+        program_.bases.push_back({*X_WB, "$ROBROOT", program_.files[at.file].name, line_at(at)});
     });
     if (const auto row = options_.frames.find(kRobotBase); row != options_.frames.end())
       names_.set_robroot(row->second);
@@ -55,11 +57,13 @@ class Stated {
     const auto add = [&](ArmNumber of, const char* name, const auto& value_of) {
       at_each(name, [&](const Assigned& at, const Value& value) {
         if (const std::optional<double> number = value_of(at, value))
-          program_.numbers.push_back({of, *number, name, program_.files[at.file].name, line_at(at)});
+          program_.numbers.push_back(
+              {of, *number, name, program_.files[at.file].name, line_at(at)});
       });
     };
     const auto count = [](const Assigned&, const Value& value) -> std::optional<double> {
-      return value.kind == Value::Kind::kNumber ? std::optional<double>(value.number) : std::nullopt;
+      return value.kind == Value::Kind::kNumber ? std::optional<double>(value.number)
+                                                : std::nullopt;
     };
     const auto length = [](const Assigned&, const Value& value) -> std::optional<double> {
       // Arms of other kinds have zeros there.
@@ -83,13 +87,16 @@ class Stated {
   void note_robot(std::size_t f, std::size_t k) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     const auto has = [&](const char* word) {
-      return std::any_of(tokens.begin(), tokens.end(), [&](const Token& token) { return token.text == word; });
+      return std::any_of(tokens.begin(), tokens.end(),
+                         [&](const Token& token) { return token.text == word; });
     };
     if (has("$EX_KIN") && has("ERSYS")) on_rail_ = names_.place(f, k);
-    if (tokens.size() < 3 || tokens[0].text != "$TRAFONAME" || tokens.back().kind != TokenKind::kText) return;
+    if (tokens.size() < 3 || tokens[0].text != "$TRAFONAME" ||
+        tokens.back().kind != TokenKind::kText)
+      return;
     const std::string& text = tokens.back().text;
-    program_.types.push_back(
-        {text.substr(1, text.size() - 2), "$TRAFONAME", program_.files[f].name, lines_[f][k].number});
+    program_.types.push_back({text.substr(1, text.size() - 2), "$TRAFONAME", program_.files[f].name,
+                              lines_[f][k].number});
   }
 
   [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }
@@ -103,8 +110,8 @@ class Stated {
 
 }  // namespace
 
-void read_stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options, Variables& names,
-                 Program& program) {
+void read_stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options,
+                 Variables& names, Program& program) {
   Stated(lines, options, names, program).read();
 }
 

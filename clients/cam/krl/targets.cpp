@@ -22,7 +22,8 @@ const NumberStyle kThreeDecimals = [] {
 std::string Targets::describe(const Site& site, ProgramTarget& target) const {
   const Assigned& place = places_.at({site.file, site.begin});
   target.line = lines_[place.file][place.line].number;
-  if (const auto read = read_.find({site.file, site.begin}); read != read_.end()) return read->second;
+  if (const auto read = read_.find({site.file, site.begin}); read != read_.end())
+    return read->second;
   const Value& first = place.operands[0];
   if (place.operands.size() == 1 && first.kind == Value::Kind::kAggregate) {
     if (first.field("A1") != nullptr) return describe_axes(first, target);
@@ -59,12 +60,15 @@ std::string Targets::describe_axes(const Value& value, ProgramTarget& target) co
   return "";
 }
 
-void Targets::rewrite(const Value& value, const std::array<const char*, 6>& fields, ProgramTarget& target) const {
+void Targets::rewrite(const Value& value, const std::array<const char*, 6>& fields,
+                      ProgramTarget& target) const {
   const std::string& text = program_.files[target.file].text;
   for (std::size_t k = 0; k < fields.size(); ++k) {
     const Value& number = *value.field(fields[k]);
-    const auto written = read_number(std::string_view(text).substr(number.begin, number.end - number.begin));
-    target.rewrites.push_back({{number.begin, number.end}, {}, {{k, written ? written->style : kThreeDecimals}}});
+    const auto written =
+        read_number(std::string_view(text).substr(number.begin, number.end - number.begin));
+    target.rewrites.push_back(
+        {{number.begin, number.end}, {}, {{k, written ? written->style : kThreeDecimals}}});
   }
 }
 
@@ -96,7 +100,8 @@ void Targets::fold(const Assigned& place, const Value* last, ProgramTarget& targ
 void Targets::note_rest(const Value& value, ProgramTarget& target) {
   const auto number = [&](const char* name) -> std::optional<double> {
     const Value* field = value.field(name);
-    const bool known = field != nullptr && (field->kind == Value::Kind::kNumber || field->kind == Value::Kind::kBits);
+    const bool known = field != nullptr &&
+                       (field->kind == Value::Kind::kNumber || field->kind == Value::Kind::kBits);
     return known ? std::optional<double>(field->number) : std::nullopt;
   };
   for (int k = 0; k < 6; ++k) {
@@ -132,7 +137,8 @@ void Targets::note_readings(std::size_t f) {
   for (std::size_t k = 0; k < lines_[f].size(); ++k) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     for (std::size_t at = 0; at < tokens.size(); ++at) {
-      if (tokens[at].kind == TokenKind::kWord && words_of_targets_.contains(tokens[at].text)) note_reading(f, k, at);
+      if (tokens[at].kind == TokenKind::kWord && words_of_targets_.contains(tokens[at].text))
+        note_reading(f, k, at);
     }
   }
 }
@@ -154,26 +160,30 @@ void Targets::note_reading(std::size_t f, std::size_t k, std::size_t at) {
     add_reading(f, k, at, number, *other->second);
   } else if (root.ends_with("[*]")) {
     const std::string beginning = root.substr(0, root.size() - 2);
-    for (auto any = targets_.lower_bound(beginning); any != targets_.end() && any->first.starts_with(beginning); ++any)
+    for (auto any = targets_.lower_bound(beginning);
+         any != targets_.end() && any->first.starts_with(beginning); ++any)
       add_reading(f, k, at, number, *any->second);
   }
 }
 
-void Targets::add_reading(std::size_t f, std::size_t k, std::size_t at, bool number, const Assigned& source) {
+void Targets::add_reading(std::size_t f, std::size_t k, std::size_t at, bool number,
+                          const Assigned& source) {
   if (source.operands.empty() || (source.file == f && source.line == k)) return;
   const auto where = std::pair(source.file, source.operands[0].begin);
   if (!places_.contains(where)) return;
   const std::vector<Token>& tokens = lines_[f][k].tokens;
   const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
   const std::string& text = program_.files[f].text;
-  static const std::set<std::string> kConditions = {"IF", "WHILE", "UNTIL", "SWITCH", "CASE", "FOR", "WAIT"};
+  static const std::set<std::string> kConditions = {"IF",   "WHILE", "UNTIL", "SWITCH",
+                                                    "CASE", "FOR",   "WAIT"};
   std::string by;
   for (std::size_t k2 = 1; k2 < at && !moves && !kConditions.contains(tokens[0].text); ++k2) {
     if (tokens[k2].text != "=" || tokens[k2 - 1].kind != TokenKind::kWord) continue;
     by = text.substr(tokens[k2 - 1].begin, tokens[k2 - 1].end - tokens[k2 - 1].begin);
   }
   if (number && !moves) {
-    read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", names_.place(f, k)));
+    read_.emplace(where,
+                  fmt::format("its numbers are read elsewhere too ({})", names_.place(f, k)));
     return;
   }
   const Line& line = lines_[f][k];
@@ -191,15 +201,18 @@ void Targets::list_unused() {
   for (const auto& one : names_.all()) {
     const auto& [key, variable] = one;
     const std::string& name = key.second;
-    const bool is_position = variable.values.size() == 1 && variable.values[0].operands.size() == 1 &&
+    const bool is_position = variable.values.size() == 1 &&
+                             variable.values[0].operands.size() == 1 &&
                              variable.values[0].operands[0].field("X") != nullptr &&
                              variable.values[0].operands[0].field("S") != nullptr;
     if (!is_position) continue;
     const Assigned& at = variable.values[0];
-    const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
-                                    [&](const LeftAlone& left) { return upper(left.name) == name; });
+    const bool listed =
+        std::any_of(program_.left.begin(), program_.left.end(),
+                    [&](const LeftAlone& left) { return upper(left.name) == name; });
     if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
-    program_.left.push_back({names_.spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
+    program_.left.push_back({names_.spelled(name, at.file, at.line), at.file,
+                             lines_[at.file][at.line].number, "",
                              "no motion in these files goes to it"});
   }
 }

@@ -14,8 +14,8 @@ namespace trammel::cam::krl {
 
 class Targets {
  public:
-  Targets(const std::vector<std::vector<Line>>& lines, const Variables& names, const ReadOptions& options,
-          Program& program)
+  Targets(const std::vector<std::vector<Line>>& lines, const Variables& names,
+          const ReadOptions& options, Program& program)
       : lines_(lines), names_(names), options_(options), program_(program) {}
 
   /// A motion goes to what stands there.
@@ -28,19 +28,22 @@ class Targets {
 
  private:
   [[nodiscard]] std::string describe_axes(const Value& value, ProgramTarget& target) const;
-  void rewrite(const Value& value, const std::array<const char*, 6>& fields, ProgramTarget& target) const;
+  void rewrite(const Value& value, const std::array<const char*, 6>& fields,
+               ProgramTarget& target) const;
   void fold(const Assigned& place, const Value* last, ProgramTarget& target) const;
   static void note_rest(const Value& value, ProgramTarget& target);
   void note_reading(std::size_t f, std::size_t k, std::size_t at);
-  void add_reading(std::size_t f, std::size_t k, std::size_t at, bool number, const Assigned& source);
+  void add_reading(std::size_t f, std::size_t k, std::size_t at, bool number,
+                   const Assigned& source);
 
   const std::vector<std::vector<Line>>& lines_;
   const Variables& names_;
   const ReadOptions& options_;
   Program& program_;
-  std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;   ///< by file and first byte
-  std::map<std::pair<std::size_t, std::size_t>, std::string> read_;  ///< why the numbers at a place must stay
-  std::map<std::string, const Assigned*> targets_;                   ///< by name, of all files
+  std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;  ///< by file and first byte
+  std::map<std::pair<std::size_t, std::size_t>, std::string>
+      read_;                                        ///< why the numbers at a place must stay
+  std::map<std::string, const Assigned*> targets_;  ///< by name, of all files
   std::set<std::string> words_of_targets_;
 };
 

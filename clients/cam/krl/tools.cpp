@@ -13,7 +13,8 @@ namespace trammel::cam::krl {
 void Tools::note_tool_name(const Line& line) {
   if (!line.comment.starts_with("FOLD")) return;
   const std::size_t at = line.comment.find("Tool[");
-  const std::size_t close = line.comment.find("]:", at == std::string_view::npos ? line.comment.size() : at);
+  const std::size_t close =
+      line.comment.find("]:", at == std::string_view::npos ? line.comment.size() : at);
   if (at == std::string_view::npos || close == std::string_view::npos) return;
   const std::size_t end = line.comment.find_first_of(" ;,\t\r", close + 2);
   const std::string number(line.comment.substr(at + 5, close - at - 5));
@@ -33,7 +34,8 @@ std::size_t Tools::tool_numbered(int number, std::size_t f) {
   const bool by_row = take_row(data, options_, tool);
   const Told<const Assigned*> value = names_.value_of(data, f);
   if (value && by_row)
-    tool.why_not = against_row(data, *tool.X_FT, names_.frame_of((*value)->operands, (*value)->file), **value);
+    tool.why_not =
+        against_row(data, *tool.X_FT, names_.frame_of((*value)->operands, (*value)->file), **value);
   else if (value)
     fill(**value, tool);
   else if (names_.is_set(data, f))
@@ -51,7 +53,8 @@ std::size_t Tools::tool_numbered(int number, std::size_t f) {
 std::size_t Tools::base_numbered(int number, std::size_t f) {
   if (number == 0) return 1;
   const std::string data = fmt::format("BASE_DATA[{}]", number);
-  if (const std::string why = carried(number, f); !why.empty()) return add_frame({data, Pose::Identity(), why});
+  if (const std::string why = carried(number, f); !why.empty())
+    return add_frame({data, Pose::Identity(), why});
   Value name;
   name.kind = Value::Kind::kName;
   name.name = data;
@@ -60,7 +63,8 @@ std::size_t Tools::base_numbered(int number, std::size_t f) {
 
 /// `$TOOL = ...`
 std::size_t Tools::tool_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
-  const std::string data = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "";
+  const std::string data =
+      operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "";
   if (data == "$NULLFRAME") return tool_numbered(0, f);
   if (data.starts_with("TOOL_DATA[") && data.find('*') == std::string::npos)
     return tool_numbered(std::atoi(data.c_str() + 10), f);
@@ -74,8 +78,10 @@ std::size_t Tools::tool_set(const std::vector<Value>& operands, std::size_t f, s
 /// `$BASE = ...`
 std::size_t Tools::base_set(const std::vector<Value>& operands, std::size_t f) {
   ProgramFrame frame;
-  frame.name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
-  const bool numbered = frame.name.starts_with("BASE_DATA[") && frame.name.find('*') == std::string::npos;
+  frame.name =
+      operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
+  const bool numbered =
+      frame.name.starts_with("BASE_DATA[") && frame.name.find('*') == std::string::npos;
   Told<Pose> X_WO = names_.frame_of(operands, f);
   if (numbered && take_row(frame.name, options_, frame)) {
     // Rows are seen from the robot's base.
@@ -107,7 +113,8 @@ std::size_t Tools::load_set(const std::vector<Value>& operands, std::size_t f, s
   if (operands.size() == 1 && operands[0].kind == Value::Kind::kName) {
     load.name = operands[0].name;
     if (names_.find(root_of(load.name), f) == nullptr) {
-      load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
+      load.note = fmt::format("load {} is not in the files: it is not compared with the cell's",
+                              shown(load.name));
       return add_load(std::move(load));
     }
     const Told<const Assigned*> assigned = names_.value_of(load.name, f);
@@ -116,7 +123,8 @@ std::size_t Tools::load_set(const std::vector<Value>& operands, std::size_t f, s
   }
   if (load.why_not.empty()) load.load = load_of(value->operands);
   if (load.load) load.note = note_on_default(load.load, *value);
-  if (load.why_not.empty() && !load.load) load.why_not = fmt::format("$LOAD is not constant ({})", names_.place(f, k));
+  if (load.why_not.empty() && !load.load)
+    load.why_not = fmt::format("$LOAD is not constant ({})", names_.place(f, k));
   return add_load(std::move(load));
 }
 
@@ -137,7 +145,8 @@ std::size_t Tools::tool_carrying(std::size_t tool, std::size_t index) {
 /// Why a row of --frames cannot hold beside the value of the files; empty: it can.
 std::string Tools::against_row(const std::string& row, const Pose& X, const Told<Pose>& by_files,
                                const Assigned& at) const {
-  return by_files ? cam::against_row(row, X, *by_files, names_.place(at.file, at.line)) : by_files.error();
+  return by_files ? cam::against_row(row, X, *by_files, names_.place(at.file, at.line))
+                  : by_files.error();
 }
 
 void Tools::fill(const Assigned& assigned, ProgramTool& tool) const {
@@ -170,28 +179,36 @@ std::optional<StatedLoad> Tools::load_of(const std::vector<Value>& operands) {
 }
 
 /// `{M -1}` says that nobody has told the load.
-std::string Tools::note_on_default(const std::optional<StatedLoad>& load, const Assigned& at) const {
+std::string Tools::note_on_default(const std::optional<StatedLoad>& load,
+                                   const Assigned& at) const {
   if (!load || load->mass >= 0) return "";
   return fmt::format(
-      "a load of {:g} kg ({}): the controller takes its default load, which is not compared with the "
-      "cell's",
+      "a load of {:g} kg ({}): the controller takes its default load, which is not compared with "
+      "the cell's",
       load->mass, names_.place(at.file, at.line));
 }
 
-/// Why a base moves: `MACH_DEF_INDEX[2]=3` hangs it on a unit of the controller; empty: it does not.
+/// Why a base moves: `MACH_DEF_INDEX[2]=3` hangs it on a unit of the controller; empty: it does
+/// not.
 std::string Tools::carried(int number, std::size_t f) const {
   const Variable* unit = names_.find(fmt::format("MACH_DEF_INDEX[{}]", number), f);
   if (unit == nullptr || unit->values.empty() || unit->values[0].operands.size() != 1) return "";
   const Assigned& at = unit->values[0];
-  if (at.operands[0].kind == Value::Kind::kNumber && (at.operands[0].number <= 0 || carries_nothing(at, f))) return "";
-  return fmt::format("external kinematics carry base {} (MACH_DEF_INDEX, {})", number, names_.place(at.file, at.line));
+  if (at.operands[0].kind == Value::Kind::kNumber &&
+      (at.operands[0].number <= 0 || carries_nothing(at, f)))
+    return "";
+  return fmt::format("external kinematics carry base {} (MACH_DEF_INDEX, {})", number,
+                     names_.place(at.file, at.line));
 }
 
 /// `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}`: there is no such unit.
 bool Tools::carries_nothing(const Assigned& index, std::size_t f) const {
-  const Told<const Assigned*> unit = names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index.operands[0].number), f);
-  const Value* type = unit && (*unit)->operands.size() == 1 ? (*unit)->operands[0].field("MECH_TYPE") : nullptr;
-  return type != nullptr && upper(program_.files[(*unit)->file].text.substr(type->begin, 5)) == "#NONE";
+  const Told<const Assigned*> unit =
+      names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index.operands[0].number), f);
+  const Value* type =
+      unit && (*unit)->operands.size() == 1 ? (*unit)->operands[0].field("MECH_TYPE") : nullptr;
+  return type != nullptr &&
+         upper(program_.files[(*unit)->file].text.substr(type->begin, 5)) == "#NONE";
 }
 
 }  // namespace trammel::cam::krl

@@ -21,8 +21,8 @@ struct Load {
 
 class Tools {
  public:
-  Tools(const std::vector<std::vector<Line>>& lines, const Variables& names, const ReadOptions& options,
-        Program& program)
+  Tools(const std::vector<std::vector<Line>>& lines, const Variables& names,
+        const ReadOptions& options, Program& program)
       : lines_(lines), names_(names), options_(options), program_(program) {}
 
   /// `;FOLD PTP P1 ... Tool[1]:spindle Base[2]:panel;...`
@@ -44,11 +44,12 @@ class Tools {
   [[nodiscard]] const std::string& why_not(std::size_t load) const { return loads_[load].why_not; }
 
  private:
-  [[nodiscard]] std::string against_row(const std::string& row, const Pose& X, const Told<Pose>& by_files,
-                                        const Assigned& at) const;
+  [[nodiscard]] std::string against_row(const std::string& row, const Pose& X,
+                                        const Told<Pose>& by_files, const Assigned& at) const;
   void fill(const Assigned& assigned, ProgramTool& tool) const;
   static std::optional<StatedLoad> load_of(const std::vector<Value>& operands);
-  [[nodiscard]] std::string note_on_default(const std::optional<StatedLoad>& load, const Assigned& at) const;
+  [[nodiscard]] std::string note_on_default(const std::optional<StatedLoad>& load,
+                                            const Assigned& at) const;
   [[nodiscard]] std::string carried(int number, std::size_t f) const;
   [[nodiscard]] bool carries_nothing(const Assigned& index, std::size_t f) const;
 

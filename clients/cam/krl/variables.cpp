@@ -15,11 +15,13 @@ namespace {
 constexpr int kDeepest = 20;  // calls within calls, names that stand for names
 
 bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Value& one, const Value& other) {
-    return one.kind == other.kind && one.kind != Value::Kind::kOther && one.number == other.number &&
-           one.name == other.name && one.field_names == other.field_names &&
-           is_equal(one.field_values, other.field_values);
-  });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Value& one, const Value& other) {
+                      return one.kind == other.kind && one.kind != Value::Kind::kOther &&
+                             one.number == other.number && one.name == other.name &&
+                             one.field_names == other.field_names &&
+                             is_equal(one.field_values, other.field_values);
+                    });
 }
 
 }  // namespace
@@ -29,11 +31,13 @@ std::string stem_of(const std::string& name) { return upper(name.substr(0, name.
 /// `XP[3].X` -> `XP[3]`
 std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
 
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
-/// stands; 0: the line is neither.
+/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`:
+/// where what is done stands; 0: the line is neither.
 std::size_t done_later(const std::vector<Token>& tokens) {
   const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
-  if (tokens.size() < first + 2 || (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER")) return 0;
+  if (tokens.size() < first + 2 ||
+      (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER"))
+    return 0;
   for (std::size_t at = first + 1; at + 1 < tokens.size(); ++at) {
     if (tokens[at].text == "DO") return at + 1;
   }
@@ -41,7 +45,8 @@ std::size_t done_later(const std::vector<Token>& tokens) {
 }
 
 bool is_motion(const std::string& word) {
-  static const std::set<std::string> kMotions = {"PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL"};
+  static const std::set<std::string> kMotions = {"PTP",  "LIN",   "CIRC", "SPTP",
+                                                 "SLIN", "SCIRC", "SPL"};
   return kMotions.contains(word);
 }
 
@@ -55,7 +60,8 @@ bool declares(const std::vector<Token>& tokens) {
   return kWords.contains(tokens[first].text);
 }
 
-Variables::Variables(const std::vector<SourceFile>& files, const std::vector<std::vector<Line>>& lines)
+Variables::Variables(const std::vector<SourceFile>& files,
+                     const std::vector<std::vector<Line>>& lines)
     : files_(files), lines_(lines) {}
 
 void Variables::note_value(std::size_t f, std::size_t k) {
@@ -66,8 +72,9 @@ void Variables::note_value(std::size_t f, std::size_t k) {
 void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
   const bool later = at > 0;
   const std::vector<Token>& tokens = lines_[f][k].tokens;
-  static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
-                                               "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
+  static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS",
+                                               "FDAT", "LDAT",  "PDAT",  "LOAD", "INT",
+                                               "REAL", "BOOL",  "CHAR"};
   bool declared = false;
   while (at < tokens.size() &&
          (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
@@ -79,7 +86,8 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
     ++at;
     declared_[tokens[at].text].insert(stem_of(files_[f].name));
   }
-  if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
+  if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text))
+    return;
   std::size_t next = at;
   const std::vector<Value> name = operands_at(tokens, at, &next);
   if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
@@ -89,7 +97,8 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
   const std::string root = root_of(name[0].name);
   const auto key = std::pair(stem_of(files_[f].name), root);
   Variable& variable = variables_[key];
-  if (later || root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
+  if (later || root != name[0].name || root.find("[*]") != std::string::npos ||
+      end < tokens.size()) {
     variable.changed = set_at(root, f, k);
     return;
   }
@@ -100,7 +109,9 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
 void Variables::note_parameters(std::size_t f, std::size_t k, std::size_t at) {
   const std::vector<Token>& tokens = lines_[f][k].tokens;
   for (; at + 1 < tokens.size(); ++at) {
-    if ((tokens[at].text != "(" && tokens[at].text != ",") || tokens[at + 1].kind != TokenKind::kWord) continue;
+    if ((tokens[at].text != "(" && tokens[at].text != ",") ||
+        tokens[at + 1].kind != TokenKind::kWord)
+      continue;
     const std::string& name = tokens[at + 1].text;
     declared_[name].insert(stem_of(files_[f].name));
     variables_[{stem_of(files_[f].name), name}].changed =
@@ -108,7 +119,8 @@ void Variables::note_parameters(std::size_t f, std::size_t k, std::size_t at) {
   }
 }
 
-void Variables::note_handed_over(std::size_t f, std::size_t k, std::size_t at, const std::string& to) {
+void Variables::note_handed_over(std::size_t f, std::size_t k, std::size_t at,
+                                 const std::string& to) {
   const std::vector<Token>& tokens = lines_[f][k].tokens;
   std::size_t end = at;
   const std::vector<Value> name = operands_at(tokens, at, &end);
@@ -117,7 +129,8 @@ void Variables::note_handed_over(std::size_t f, std::size_t k, std::size_t at, c
   const std::string root = root_of(name[0].name);
   std::string& changed = variables_[{stem_of(files_[f].name), root}].changed;
   if (changed.empty())
-    changed = fmt::format("{} may be set by {} ({})", shown(spelled(root, f, k)), shown(to), place(f, k));
+    changed =
+        fmt::format("{} may be set by {} ({})", shown(spelled(root, f, k)), shown(to), place(f, k));
 }
 
 void Variables::join_globals() {
@@ -177,7 +190,8 @@ const Variable* Variables::find(const std::string& name, std::size_t f) const {
 
 const Variable* Variables::any_changed(const std::string& name, std::size_t f) const {
   const std::size_t index = name.find('[');
-  const Variable* any = index == std::string::npos ? nullptr : find(name.substr(0, index) + "[*]", f);
+  const Variable* any =
+      index == std::string::npos ? nullptr : find(name.substr(0, index) + "[*]", f);
   return any == nullptr || any->changed.empty() ? nullptr : any;
 }
 
@@ -189,9 +203,11 @@ Told<const Assigned*> Variables::value_of(const std::string& name, std::size_t f
   // One element of an array is changed where any may be.
   if (const Variable* any = any_changed(name, f)) return because(any->changed);
   const Variable* variable = find(root_of(name), f);
-  if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
+  if (variable == nullptr)
+    return because(fmt::format("{} is not in the files handed over", shown(name)));
   if (!variable->changed.empty()) return because(variable->changed);
-  if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
+  if (variable->values.empty())
+    return because(fmt::format("{} has no value in the files", shown(name)));
   return &variable->values[0];
 }
 
@@ -221,12 +237,14 @@ Told<Pose> Variables::frame_of(const Value& value, std::size_t f, int depth) con
   return frame_of((*assigned)->operands, (*assigned)->file, depth + 1);
 }
 
-Told<std::vector<double>> Variables::numbers_of(const Value& value, const std::array<const char*, 6>& fields) {
+Told<std::vector<double>> Variables::numbers_of(const Value& value,
+                                                const std::array<const char*, 6>& fields) {
   std::vector<double> numbers;
   for (const char* name : fields) {
     const Value* field = value.field(name);
     if (field == nullptr) return because(fmt::format("it does not say {}", name));
-    if (field->kind != Value::Kind::kNumber) return because(fmt::format("{} is not a constant number", name));
+    if (field->kind != Value::Kind::kNumber)
+      return because(fmt::format("{} is not a constant number", name));
     numbers.push_back(field->number);
   }
   return numbers;

@@ -40,8 +40,8 @@ struct Variable {
 [[nodiscard]] std::string stem_of(const std::string& name);
 /// `XP[3].X` -> `XP[3]`
 [[nodiscard]] std::string root_of(const std::string& name);
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
-/// stands; 0: the line is neither.
+/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`:
+/// where what is done stands; 0: the line is neither.
 [[nodiscard]] std::size_t done_later(const std::vector<Token>& tokens);
 [[nodiscard]] bool is_motion(const std::string& word);
 /// `LIN_REL`
@@ -71,14 +71,17 @@ class Variables {
   [[nodiscard]] bool is_set(const std::string& name, std::size_t f) const;
   /// The only value of a name.
   [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;
-  [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const;
+  [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f,
+                                    int depth = 0) const;
   /// What `$ROBROOT` stands for: the robot's base, seen from `$WORLD`.
   void set_robroot(const Pose& X_WB) { X_WB_ = X_WB; }
   [[nodiscard]] const Pose& robroot() const { return X_WB_; }
-  [[nodiscard]] static Told<std::vector<double>> numbers_of(const Value& value,
-                                                            const std::array<const char*, 6>& fields);
+  [[nodiscard]] static Told<std::vector<double>> numbers_of(
+      const Value& value, const std::array<const char*, 6>& fields);
   /// By file and name.
-  [[nodiscard]] const std::map<std::pair<std::string, std::string>, Variable>& all() const { return variables_; }
+  [[nodiscard]] const std::map<std::pair<std::string, std::string>, Variable>& all() const {
+    return variables_;
+  }
 
  private:
   void note_value(std::size_t f, std::size_t k, std::size_t at);

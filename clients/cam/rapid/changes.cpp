@@ -16,7 +16,8 @@ using Kind = Expression::Kind;
 
 /// Instructions that leave the data which they are given as they are.
 bool only_reads(const std::string& name) {
-  static const std::set<std::string> kMotions = {"move", "trig", "arc", "spot", "disp", "pain", "capl", "capc"};
+  static const std::set<std::string> kMotions = {"move", "trig", "arc",  "spot",
+                                                 "disp", "pain", "capl", "capc"};
   if (is_still(name)) return true;
   for (const std::string& beginning : kMotions) {
     if (name.starts_with(beginning)) return true;
@@ -26,10 +27,14 @@ bool only_reads(const std::string& name) {
 
 constexpr const char* kFindsLoads = "loadid";
 
-/// Which argument of an instruction is the tool that it measures: `MToolTCPCalib jos1,jos2,jos3,jos4,tGun,max,mean;`.
+/// Which argument of an instruction is the tool that it measures: `MToolTCPCalib
+/// jos1,jos2,jos3,jos4,tGun,max,mean;`.
 std::size_t tool_found_by(const std::string& instruction) {
-  static const std::map<std::string, std::size_t> kFound = {
-      {"mtooltcpcalib", 4}, {"stooltcpcalib", 4}, {"mtoolrotcalib", 2}, {"stoolrotcalib", 3}, {kFindsLoads, 2}};
+  static const std::map<std::string, std::size_t> kFound = {{"mtooltcpcalib", 4},
+                                                            {"stooltcpcalib", 4},
+                                                            {"mtoolrotcalib", 2},
+                                                            {"stoolrotcalib", 3},
+                                                            {kFindsLoads, 2}};
   const auto found = kFound.find(instruction);
   return found == kFound.end() ? std::string::npos : found->second;
 }
@@ -59,11 +64,13 @@ std::string Interpreter::changed(const Declaration* declaration) const {
   return it == changed_.end() ? "" : it->second;
 }
 
-void Interpreter::note_change(const Expression& target, const Scope& scope, const std::string& why) {
+void Interpreter::note_change(const Expression& target, const Scope& scope,
+                              const std::string& why) {
   const Expression* root = name_in(target);
   if (root == nullptr) return;
   const auto found = find(root->name, scope);
-  if (found && found->declaration->storage != Storage::kConst) changed_.emplace(found->declaration, why);
+  if (found && found->declaration->storage != Storage::kConst)
+    changed_.emplace(found->declaration, why);
 }
 
 void Interpreter::note_changes() {
@@ -71,8 +78,9 @@ void Interpreter::note_changes() {
     for (const Assignment& assignment : modules_[m].assignments) {
       const Expression* root = name_in(assignment.target);
       if (root == nullptr) continue;
-      const std::string why = fmt::format("{} is set at run time ({})", text_of(*root, {m, assignment.routine}),
-                                          place_of(m, assignment.line));
+      const std::string why =
+          fmt::format("{} is set at run time ({})", text_of(*root, {m, assignment.routine}),
+                      place_of(m, assignment.line));
       if (auto part = constant_part(assignment, m)) {
         set_in_order_.emplace(part->of, why);
         parts_.emplace(&assignment, std::move(*part));
@@ -86,7 +94,8 @@ void Interpreter::note_changes() {
   do {
     before = changed_.size();
     for (std::size_t m = 0; m < modules_.size(); ++m) {
-      for (const Instruction& instruction : modules_[m].instructions) note_changes_by(m, instruction);
+      for (const Instruction& instruction : modules_[m].instructions)
+        note_changes_by(m, instruction);
     }
     note_changes_by_tasks();
   } while (changed_.size() > before);
@@ -103,14 +112,16 @@ void Interpreter::note_changes_by_tasks() {
   for (std::size_t m = 0; m < modules_.size(); ++m) {
     for (const Declaration& declared : modules_[m].declarations) {
       if (!is_shared(declared)) continue;
-      if (const auto elsewhere = set_elsewhere_.find(declared.name); elsewhere != set_elsewhere_.end())
+      if (const auto elsewhere = set_elsewhere_.find(declared.name);
+          elsewhere != set_elsewhere_.end())
         changed_.emplace(&declared, elsewhere->second);
       if (tasks_[m].empty()) continue;
       Shared& shared = by_name[declared.name];
       shared.tasks.insert(tasks_[m]);
       shared.declared.push_back(&declared);
       for (const auto* changes : {&changed_, &set_in_order_}) {
-        if (const auto change = changes->find(&declared); change != changes->end()) shared.why = change->second;
+        if (const auto change = changes->find(&declared); change != changes->end())
+          shared.why = change->second;
       }
     }
   }
@@ -121,7 +132,8 @@ void Interpreter::note_changes_by_tasks() {
 }
 
 bool Interpreter::is_shared(const Declaration& declared) {
-  return declared.storage == Storage::kPers && declared.routine < 0 && !declared.local && !declared.of_task;
+  return declared.storage == Storage::kPers && declared.routine < 0 && !declared.local &&
+         !declared.of_task;
 }
 
 std::map<std::string, std::string> Interpreter::set_for_all_tasks() const {
@@ -139,7 +151,8 @@ std::string Interpreter::load_found(const Declaration* tool) const {
   return found == load_found_.end() ? "" : found->second;
 }
 
-/// `SetDataVal "p10",pNew;`: the name is a text, so that any data of the type may be meant. `SetAllDataVal` sets all.
+/// `SetDataVal "p10",pNew;`: the name is a text, so that any data of the type may be meant.
+/// `SetAllDataVal` sets all.
 void Interpreter::note_changes_by_name(std::size_t module, const Instruction& instruction) {
   std::vector<const Expression*> positional;
   for (const Expression& argument : instruction.arguments) {
@@ -147,32 +160,39 @@ void Interpreter::note_changes_by_name(std::size_t module, const Instruction& in
   }
   if (positional.size() < 2) return;
   const Scope& scope = *own_scope(module, instruction.routine);
-  const std::string why = fmt::format("{} may set it ({})", instruction.spelled, place_of(module, instruction.line));
+  const std::string why =
+      fmt::format("{} may set it ({})", instruction.spelled, place_of(module, instruction.line));
   const std::string text = positional[0]->kind == Kind::kText ? text_of(*positional[0], scope) : "";
   if (instruction.name == "setdataval" && text.size() > 2) {
     const auto found = find(lower(text.substr(1, text.size() - 2)), scope);
-    if (found && found->declaration->storage != Storage::kConst) changed_.emplace(found->declaration, why);
+    if (found && found->declaration->storage != Storage::kConst)
+      changed_.emplace(found->declaration, why);
     return;
   }
   const std::string type = type_of(*positional[1], scope);
   for (const Module& any : modules_) {
     for (const Declaration& declared : any.declarations) {
-      const bool may_be_set = declared.storage == Storage::kPers || declared.storage == Storage::kVar;
+      const bool may_be_set =
+          declared.storage == Storage::kPers || declared.storage == Storage::kVar;
       if (may_be_set && (type.empty() || declared.type == type)) changed_.emplace(&declared, why);
     }
   }
 }
 
-std::optional<Interpreter::Part> Interpreter::constant_part(const Assignment& assignment, std::size_t module) const {
+std::optional<Interpreter::Part> Interpreter::constant_part(const Assignment& assignment,
+                                                            std::size_t module) const {
   const Expression* root = name_in(assignment.target);
-  const auto found = root == nullptr ? std::nullopt : find(root->name, {module, assignment.routine});
+  const auto found =
+      root == nullptr ? std::nullopt : find(root->name, {module, assignment.routine});
   if (!found || found->module != module || !is_literal(assignment.value)) return std::nullopt;
   const Declaration& declared = *found->declaration;
   const bool is_setting = declared.type == "tooldata" || declared.type == "wobjdata";
   // A function comes in within expressions, whose order is not followed.
-  if (assignment.routine >= 0 && modules_[module].routines[static_cast<std::size_t>(assignment.routine)].is_function)
+  if (assignment.routine >= 0 &&
+      modules_[module].routines[static_cast<std::size_t>(assignment.routine)].is_function)
     return std::nullopt;
-  if (!is_setting || declared.is_array || (declared.storage != Storage::kPers && declared.storage != Storage::kVar))
+  if (!is_setting || declared.is_array ||
+      (declared.storage != Storage::kPers && declared.storage != Storage::kVar))
     return std::nullopt;
   auto fields = fields_of(assignment.target, declared.type, module);
   if (!fields) return std::nullopt;
@@ -184,7 +204,8 @@ void Interpreter::set(const Assignment& assignment, Settings& settings) const {
   auto& of = settings[part.of];
   const std::vector<std::size_t>& fields = part.fields;
   std::erase_if(of, [&](const auto& set) {
-    return set.first.size() >= fields.size() && std::equal(fields.begin(), fields.end(), set.first.begin());
+    return set.first.size() >= fields.size() &&
+           std::equal(fields.begin(), fields.end(), set.first.begin());
   });
   of[fields] = &assignment;
 }
@@ -195,7 +216,8 @@ Told<const Expression*> Interpreter::as_set(const Declaration& declared) const {
   if (now_ == nullptr) return because(where);
   const auto settings = now_->find(&declared);
   if (settings == now_->end()) {
-    if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
+    if (!declared.value)
+      return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
     return &*declared.value;
   }
   const auto known = as_set_.find({&declared, settings->second});
@@ -212,7 +234,8 @@ Told<const Expression*> Interpreter::as_set(const Declaration& declared) const {
     *part = assignment->value;
     made->line = line;
   }
-  return as_set_.emplace(std::pair(&declared, settings->second), std::move(made)).first->second.get();
+  return as_set_.emplace(std::pair(&declared, settings->second), std::move(made))
+      .first->second.get();
 }
 
 void Interpreter::note_changes_by(std::size_t module, const Instruction& instruction) {
@@ -227,11 +250,12 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
     if (root == nullptr) continue;
     const auto change = [&] {
       note_change(argument, scope,
-                  fmt::format("{} may be changed by {} ({})", text_of(*root, scope), shown(instruction.spelled),
-                              place_of(module, instruction.line)));
+                  fmt::format("{} may be changed by {} ({})", text_of(*root, scope),
+                              shown(instruction.spelled), place_of(module, instruction.line)));
     };
     if (routine) {
-      const Routine& called = modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
+      const Routine& called =
+          modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
       const std::string& parameter = !argument.label.empty()         ? argument.label.text()
                                      : at < called.parameters.size() ? called.parameters[at]
                                                                      : root->name.text();
@@ -240,10 +264,12 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
       if (changed_.contains(found->second)) change();
       continue;
     }
-    const bool is_found_point = instruction.name.starts_with("search") && at == 1 && argument.label.empty();
+    const bool is_found_point =
+        instruction.name.starts_with("search") && at == 1 && argument.label.empty();
     if (instruction.name.starts_with("search") && !is_found_point) continue;
     const std::string type = type_of(argument, scope);
-    // Tools and work objects are handed to all kinds of instructions; they are changed by assignment, and by few.
+    // Tools and work objects are handed to all kinds of instructions; they are changed by
+    // assignment, and by few.
     const bool is_found = argument.label.empty() && at == tool_found_by(instruction.name);
     if (is_found && instruction.name == kFindsLoads) {
       if (const auto found = find(root->name, scope))

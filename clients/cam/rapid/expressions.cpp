@@ -23,7 +23,8 @@ bool Expressions::is_reserved() const {
 }
 
 bool Expressions::is_operator(const std::string& text) {
-  return text == "and" || text == "or" || text == "not" || text == "xor" || text == "div" || text == "mod";
+  return text == "and" || text == "or" || text == "not" || text == "xor" || text == "div" ||
+         text == "mod";
 }
 
 Expression Expressions::expression(int depth) {
@@ -66,7 +67,8 @@ Expression Expressions::term(int depth) {
   return left;
 }
 
-Expression Expressions::binary(Expression left, Expression (Expressions::*operand)(int), int depth) {
+Expression Expressions::binary(Expression left, Expression (Expressions::*operand)(int),
+                               int depth) {
   Expression both;
   both.kind = Kind::kBinary;
   both.begin = left.begin;
@@ -90,7 +92,8 @@ Expression Expressions::factor(int depth) {
   ++at_;
   Expression inner = factor(depth + 1);
   signed_one.end = inner.end;
-  if (inner.kind == Kind::kNumber && read_number(text_.substr(signed_one.begin, inner.end - signed_one.begin))) {
+  if (inner.kind == Kind::kNumber &&
+      read_number(text_.substr(signed_one.begin, inner.end - signed_one.begin))) {
     inner.value = signed_one.sign == '-' ? -inner.value : inner.value;
     inner.begin = signed_one.begin;
     return inner;
@@ -127,7 +130,9 @@ void Expressions::aggregate(Expression& made, int depth) {
 /// `-1.5,` or `1.5]` as the next part: most of a long program.
 bool Expressions::plain_number(Expression& made) {
   const std::size_t sign = is_sign("-") || is_sign("+") ? 1 : 0;
-  if (token(sign).kind != TokenKind::kNumber || (!is_sign(",", sign + 1) && !is_sign("]", sign + 1))) return false;
+  if (token(sign).kind != TokenKind::kNumber ||
+      (!is_sign(",", sign + 1) && !is_sign("]", sign + 1)))
+    return false;
   const auto number = read_number(text_.substr(token().begin, token(sign).end - token().begin));
   if (!number) return false;
   if (made.parts.empty()) made.parts.reserve(4);

@@ -29,7 +29,8 @@ class Expressions {
   /// A sign of two bytes is `:=`; no other begins so.
   [[nodiscard]] bool is_sign(std::string_view sign, std::size_t ahead = 0) const {
     const Token& t = token(ahead);
-    return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() && text_[t.begin] == sign[0];
+    return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() &&
+           text_[t.begin] == sign[0];
   }
   [[nodiscard]] std::string word(std::size_t ahead = 0) const {
     return token(ahead).kind == TokenKind::kWord ? lower(bytes(ahead)) : std::string();
@@ -45,7 +46,8 @@ class Expressions {
     return text;
   }
   [[nodiscard]] std::uint32_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
-  /// A word that begins or ends something wherever it stands: a statement that lacks its end goes no further.
+  /// A word that begins or ends something wherever it stands: a statement that lacks its end goes
+  /// no further.
   [[nodiscard]] bool is_reserved() const;
   [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
   static bool is_operator(const std::string& text);

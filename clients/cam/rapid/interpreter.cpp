@@ -24,20 +24,41 @@ struct BuiltIn {
 };
 const std::map<std::string, std::vector<BuiltIn>>& built_in() {
   static const std::map<std::string, std::vector<BuiltIn>> kTypes = {
-      {"robtarget", {{"trans", "pos"}, {"rot", "orient"}, {"robconf", "confdata"}, {"extax", "extjoint"}}},
+      {"robtarget",
+       {{"trans", "pos"}, {"rot", "orient"}, {"robconf", "confdata"}, {"extax", "extjoint"}}},
       {"jointtarget", {{"robax", "robjoint"}, {"extax", "extjoint"}}},
       {"pos", {{"x", "num"}, {"y", "num"}, {"z", "num"}}},
       {"orient", {{"q1", "num"}, {"q2", "num"}, {"q3", "num"}, {"q4", "num"}}},
       {"confdata", {{"cf1", "num"}, {"cf4", "num"}, {"cf6", "num"}, {"cfx", "num"}}},
       {"robjoint",
-       {{"rax_1", "num"}, {"rax_2", "num"}, {"rax_3", "num"}, {"rax_4", "num"}, {"rax_5", "num"}, {"rax_6", "num"}}},
+       {{"rax_1", "num"},
+        {"rax_2", "num"},
+        {"rax_3", "num"},
+        {"rax_4", "num"},
+        {"rax_5", "num"},
+        {"rax_6", "num"}}},
       {"extjoint",
-       {{"eax_a", "num"}, {"eax_b", "num"}, {"eax_c", "num"}, {"eax_d", "num"}, {"eax_e", "num"}, {"eax_f", "num"}}},
+       {{"eax_a", "num"},
+        {"eax_b", "num"},
+        {"eax_c", "num"},
+        {"eax_d", "num"},
+        {"eax_e", "num"},
+        {"eax_f", "num"}}},
       {"pose", {{"trans", "pos"}, {"rot", "orient"}}},
       {"tooldata", {{"robhold", "bool"}, {"tframe", "pose"}, {"tload", "loaddata"}}},
-      {"loaddata", {{"mass", "num"}, {"cog", "pos"}, {"aom", "orient"}, {"ix", "num"}, {"iy", "num"}, {"iz", "num"}}},
+      {"loaddata",
+       {{"mass", "num"},
+        {"cog", "pos"},
+        {"aom", "orient"},
+        {"ix", "num"},
+        {"iy", "num"},
+        {"iz", "num"}}},
       {"wobjdata",
-       {{"robhold", "bool"}, {"ufprog", "bool"}, {"ufmec", "string"}, {"uframe", "pose"}, {"oframe", "pose"}}},
+       {{"robhold", "bool"},
+        {"ufprog", "bool"},
+        {"ufmec", "string"},
+        {"uframe", "pose"},
+        {"oframe", "pose"}}},
   };
   return kTypes;
 }
@@ -46,39 +67,47 @@ const std::map<std::string, std::vector<BuiltIn>>& built_in() {
 std::string task_of(const std::string& file) {
   const std::size_t at = file.find("TASK");
   const std::size_t end = at == std::string::npos ? at : file.find('/', at);
-  return end == std::string::npos || (at > 0 && file[at - 1] != '/') ? "" : file.substr(at, end - at);
+  return end == std::string::npos || (at > 0 && file[at - 1] != '/') ? ""
+                                                                     : file.substr(at, end - at);
 }
 
 }  // namespace
 
 const Expression* name_in(const Expression& expression) {
   const Expression* root = &expression;
-  while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty()) root = &root->parts[0];
+  while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty())
+    root = &root->parts[0];
   return root->kind == Kind::kName ? root : nullptr;
 }
 
 bool is_still(const std::string& instruction) {
   static const std::set<std::string> kReaders = {
-      "set",          "reset",        "setdo",      "setgo",       "setao",    "pulsedo",    "waittime",
-      "waituntil",    "waitdi",       "waitdo",     "tpwrite",     "tperase",  "write",      "errwrite",
-      "stop",         "gripload",     "pdispset",   "pdispon",     "eoffsset", "eoffson",    "actunit",
-      "confl",        "confj",        "singarea",   "accset",      "velset",   "softact",    "waitrob",
-      "speedrefresh", "stopmove",     "startmove",  "return",      "triggio",  "triggequip", "triggint",
-      "mechunitload", "waitsynctask", "syncmoveon", "syncmoveoff", "exit",     "raise",      "connect",
-      "isignaldi",    "deactunit",    "corron",     "worldacclim", "invertdo", "tpshow",     "uishow"};
+      "set",          "reset",      "setdo",       "setgo",       "setao",        "pulsedo",
+      "waittime",     "waituntil",  "waitdi",      "waitdo",      "tpwrite",      "tperase",
+      "write",        "errwrite",   "stop",        "gripload",    "pdispset",     "pdispon",
+      "eoffsset",     "eoffson",    "actunit",     "confl",       "confj",        "singarea",
+      "accset",       "velset",     "softact",     "waitrob",     "speedrefresh", "stopmove",
+      "startmove",    "return",     "triggio",     "triggequip",  "triggint",     "mechunitload",
+      "waitsynctask", "syncmoveon", "syncmoveoff", "exit",        "raise",        "connect",
+      "isignaldi",    "deactunit",  "corron",      "worldacclim", "invertdo",     "tpshow",
+      "uishow"};
   return kReaders.contains(instruction);
 }
 
 Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules,
                          std::map<std::string, std::string> set_elsewhere)
-    : files_(files), modules_(modules), by_name_(modules.size()), set_elsewhere_(std::move(set_elsewhere)) {
+    : files_(files),
+      modules_(modules),
+      by_name_(modules.size()),
+      set_elsewhere_(std::move(set_elsewhere)) {
   for (const SourceFile& file : files_) tasks_.push_back(task_of(file.name));
   for (std::size_t m = 0; m < modules_.size(); ++m) {
     static_cast<void>(own_scope(m, -1));
     for (std::size_t r = 0; r < modules_[m].routines.size(); ++r)
       routines_[modules_[m].routines[r].name].emplace_back(m, static_cast<int>(r));
     for (const Declaration& declared : modules_[m].declarations) {
-      const auto [known, fresh] = by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
+      const auto [known, fresh] =
+          by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
       if (!fresh && declared.storage != Storage::kLoop) note_twice(m, *known->second, declared);
       if (declared.routine < 0 && !declared.local) global_[declared.name].push_back({&declared, m});
     }
@@ -86,11 +115,12 @@ Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector
   note_changes();
 }
 
-/// A file of several modules, or one that no controller takes: which of them a name means is not followed.
+/// A file of several modules, or one that no controller takes: which of them a name means is not
+/// followed.
 void Interpreter::note_twice(std::size_t module, const Declaration& one, const Declaration& other) {
-  const std::string why =
-      fmt::format("{} is declared twice ({} line {}, line {})",
-                  shown(other.spelled.empty() ? other.name : other.spelled), files_[module].name, one.line, other.line);
+  const std::string why = fmt::format("{} is declared twice ({} line {}, line {})",
+                                      shown(other.spelled.empty() ? other.name : other.spelled),
+                                      files_[module].name, one.line, other.line);
   for (const Declaration* declared : {&one, &other}) changed_.emplace(declared, why);
 }
 
@@ -100,8 +130,10 @@ std::string Interpreter::place_of(std::size_t module, int line) const {
 
 std::string Interpreter::text_of(const Expression& expression, const Scope& scope) const {
   const std::string& text = files_[scope.module].text;
-  const std::string_view bytes = std::string_view(text).substr(expression.begin, expression.end - expression.begin);
-  if (bytes.find_first_of(" \t\r\n\f!\"") == std::string_view::npos && bytes.find('\0') == std::string_view::npos)
+  const std::string_view bytes =
+      std::string_view(text).substr(expression.begin, expression.end - expression.begin);
+  if (bytes.find_first_of(" \t\r\n\f!\"") == std::string_view::npos &&
+      bytes.find('\0') == std::string_view::npos)
     return std::string(bytes);
   std::string shown;
   for (const Token& token : tokens_of(bytes)) {
@@ -110,20 +142,24 @@ std::string Interpreter::text_of(const Expression& expression, const Scope& scop
   return shown;
 }
 
-std::optional<Interpreter::Found> Interpreter::find(const std::string& name, const Scope& scope) const {
+std::optional<Interpreter::Found> Interpreter::find(const std::string& name,
+                                                    const Scope& scope) const {
   const auto& own = by_name_[scope.module];
   if (scope.routine >= 0) {
-    if (const auto it = own.find({scope.routine, name}); it != own.end()) return Found{it->second, scope.module};
+    if (const auto it = own.find({scope.routine, name}); it != own.end())
+      return Found{it->second, scope.module};
   }
   if (const auto it = own.find({-1, name}); it != own.end()) return Found{it->second, scope.module};
   return find_global(name, scope.module);
 }
 
-std::optional<Interpreter::Found> Interpreter::find_global(const std::string& name, std::size_t module) const {
+std::optional<Interpreter::Found> Interpreter::find_global(const std::string& name,
+                                                           std::size_t module) const {
   const auto known = global_.find(name);
   if (known == global_.end()) return std::nullopt;
-  const auto own = std::find_if(known->second.begin(), known->second.end(),
-                                [&](const Found& found) { return tasks_[found.module] == tasks_[module]; });
+  const auto own =
+      std::find_if(known->second.begin(), known->second.end(),
+                   [&](const Found& found) { return tasks_[found.module] == tasks_[module]; });
   return own == known->second.end() ? known->second.front() : *own;
 }
 
@@ -145,20 +181,24 @@ std::optional<std::pair<std::size_t, int>> Interpreter::find_routine(const std::
 
 const Scope* Interpreter::own_scope(std::size_t module, int routine) {
   const Scope*& scope = own_[{module, routine}];
-  if (scope == nullptr) scope = scopes_.emplace_back(std::make_unique<Scope>(Scope{module, routine})).get();
+  if (scope == nullptr)
+    scope = scopes_.emplace_back(std::make_unique<Scope>(Scope{module, routine})).get();
   return scope;
 }
 
 const std::vector<const Scope*>& Interpreter::scopes_of(std::size_t module, int routine) {
-  const auto [entry, is_new] = ways_in_.emplace(std::pair(module, routine), std::vector<const Scope*>{});
+  const auto [entry, is_new] =
+      ways_in_.emplace(std::pair(module, routine), std::vector<const Scope*>{});
   std::vector<const Scope*>& ways = entry->second;
   if (!is_new && !ways.empty()) return ways;
   const Scope* own = own_scope(module, routine);
   bool has_parameters = false;
   for (const Declaration& declared : modules_[module].declarations) {
-    has_parameters |= declared.routine == routine && routine >= 0 && declared.storage == Storage::kParameter;
+    has_parameters |=
+        declared.routine == routine && routine >= 0 && declared.storage == Storage::kParameter;
   }
-  // While the ways into a routine are looked for, a routine that calls itself sees none but its own.
+  // While the ways into a routine are looked for, a routine that calls itself sees none but its
+  // own.
   ways.push_back(own);
   if (!has_parameters) return ways;
   const std::string& name = modules_[module].routines[static_cast<std::size_t>(routine)].name;
@@ -168,7 +208,9 @@ const std::vector<const Scope*>& Interpreter::scopes_of(std::size_t module, int 
       if (call.name != name || find_routine(name, m) != std::pair(module, routine)) continue;
       for (const Scope* caller : std::vector<const Scope*>(scopes_of(m, call.routine))) {
         if (found.size() >= kMostWaysIn || (m == module && call.routine == routine)) break;
-        found.push_back(scopes_.emplace_back(std::make_unique<Scope>(Scope{module, routine, &call, caller})).get());
+        found.push_back(
+            scopes_.emplace_back(std::make_unique<Scope>(Scope{module, routine, &call, caller}))
+                .get());
       }
     }
   }
@@ -177,13 +219,15 @@ const std::vector<const Scope*>& Interpreter::scopes_of(std::size_t module, int 
   return result;
 }
 
-std::optional<std::vector<std::size_t>> Interpreter::fields_of(const Expression& target, const std::string& type,
+std::optional<std::vector<std::size_t>> Interpreter::fields_of(const Expression& target,
+                                                               const std::string& type,
                                                                std::size_t module) const {
   if (target.kind == Kind::kName) return std::vector<std::size_t>{};
   if (target.kind != Kind::kField) return std::nullopt;
   std::optional<std::vector<std::size_t>> fields = fields_of(target.parts[0], type, module);
   std::string inner = type;
-  for (std::size_t k = 0; fields && k < fields->size(); ++k) inner = built_in().at(inner)[(*fields)[k]].type;
+  for (std::size_t k = 0; fields && k < fields->size(); ++k)
+    inner = built_in().at(inner)[(*fields)[k]].type;
   const auto known = fields ? field(inner, target.name, module) : std::nullopt;
   if (!known || !built_in().contains(inner)) return std::nullopt;
   fields->push_back(known->index);
@@ -191,22 +235,26 @@ std::optional<std::vector<std::size_t>> Interpreter::fields_of(const Expression&
 }
 
 Told<const Expression*> Interpreter::bound(const Declaration& parameter, const Scope& scope) const {
-  const std::string of = modules_[scope.module].routines[static_cast<std::size_t>(scope.routine)].name;
-  if (scope.call == nullptr) return because(fmt::format("{} is handed over by whoever calls {}", parameter.name, of));
+  const std::string of =
+      modules_[scope.module].routines[static_cast<std::size_t>(scope.routine)].name;
+  if (scope.call == nullptr)
+    return because(fmt::format("{} is handed over by whoever calls {}", parameter.name, of));
   if (const std::string why = changed(&parameter); !why.empty()) return because(why);
-  const auto& order = modules_[scope.module].routines[static_cast<std::size_t>(scope.routine)].parameters;
+  const auto& order =
+      modules_[scope.module].routines[static_cast<std::size_t>(scope.routine)].parameters;
   std::size_t position = 0;
   for (const Expression& argument : scope.call->arguments) {
-    const bool is_it = argument.label.empty() ? position < order.size() && order[position] == parameter.name
-                                              : argument.label == parameter.name;
+    const bool is_it = argument.label.empty()
+                           ? position < order.size() && order[position] == parameter.name
+                           : argument.label == parameter.name;
     if (is_it) return &argument;
     if (argument.label.empty()) ++position;
   }
   return because(fmt::format("{} is not handed over to {}", parameter.name, of));
 }
 
-Told<std::pair<const Expression*, const Scope*>> Interpreter::handed_over(const Expression& expression,
-                                                                          const Scope& scope) const {
+Told<std::pair<const Expression*, const Scope*>> Interpreter::handed_over(
+    const Expression& expression, const Scope& scope) const {
   const Expression* now = &expression;
   const Scope* where = &scope;
   for (int depth = 0; now->kind == Kind::kName && depth < kDeepest; ++depth) {
@@ -220,7 +268,8 @@ Told<std::pair<const Expression*, const Scope*>> Interpreter::handed_over(const 
   return std::pair(now, where);
 }
 
-std::optional<Interpreter::Field> Interpreter::field(const std::string& type, const std::string& name,
+std::optional<Interpreter::Field> Interpreter::field(const std::string& type,
+                                                     const std::string& name,
                                                      std::size_t module) const {
   if (const auto known = built_in().find(type); known != built_in().end()) {
     for (std::size_t k = 0; k < known->second.size(); ++k) {
@@ -242,7 +291,8 @@ std::optional<Interpreter::Field> Interpreter::field(const std::string& type, co
   return std::nullopt;
 }
 
-std::string Interpreter::type_of(const Expression& expression, const Scope& scope, int depth) const {
+std::string Interpreter::type_of(const Expression& expression, const Scope& scope,
+                                 int depth) const {
   if (depth > kDeepest) return "";
   switch (expression.kind) {
     case Kind::kName: {
@@ -250,7 +300,8 @@ std::string Interpreter::type_of(const Expression& expression, const Scope& scop
       return found ? found->declaration->type : "";
     }
     case Kind::kField: {
-      const auto known = field(type_of(expression.parts[0], scope, depth + 1), expression.name, scope.module);
+      const auto known =
+          field(type_of(expression.parts[0], scope, depth + 1), expression.name, scope.module);
       return known ? known->type : "";
     }
     case Kind::kElement:
@@ -258,7 +309,8 @@ std::string Interpreter::type_of(const Expression& expression, const Scope& scop
     case Kind::kCall:
       return expression.name == "offs" || expression.name == "reltool" ? "robtarget" : "";
     case Kind::kAggregate:
-      if (expression.parts.size() == 4 && expression.parts[0].kind != Kind::kNumber) return "robtarget";
+      if (expression.parts.size() == 4 && expression.parts[0].kind != Kind::kNumber)
+        return "robtarget";
       return expression.parts.size() == 2 ? "jointtarget" : "";
     case Kind::kNumber:
       return "num";
@@ -267,12 +319,15 @@ std::string Interpreter::type_of(const Expression& expression, const Scope& scop
   }
 }
 
-Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const Scope& scope, int depth) const {
+Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const Scope& scope,
+                                             int depth) const {
   if (depth > kDeepest) return because("it stands for itself");
   switch (expression.kind) {
     case Kind::kName: {
       const auto found = find(expression.name, scope);
-      if (!found) return because(fmt::format("{} is not in the files handed over", shown(text_of(expression, scope))));
+      if (!found)
+        return because(
+            fmt::format("{} is not in the files handed over", shown(text_of(expression, scope))));
       const Declaration& declared = *found->declaration;
       if (declared.storage == Storage::kLoop)
         return because(fmt::format("a loop counts {}", shown(text_of(expression, scope))));
@@ -293,7 +348,8 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
         if (!now) return because(now.error());
         return std::vector<Data>{{*now, where, declared.type, &declared}};
       }
-      if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
+      if (!declared.value)
+        return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
       return std::vector<Data>{{&*declared.value, where, declared.type, &declared}};
     }
     case Kind::kField:
@@ -307,13 +363,16 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
   }
 }
 
-Told<std::vector<Data>> Interpreter::field_of(const Expression& expression, const Scope& scope, int depth) const {
+Told<std::vector<Data>> Interpreter::field_of(const Expression& expression, const Scope& scope,
+                                              int depth) const {
   const Told<std::vector<Data>> of = data_of(expression.parts[0], scope, depth + 1);
   if (!of) return of;
   std::vector<Data> all;
   for (const Data& data : *of) {
     const auto known = field(data.type, expression.name, data.scope->module);
-    if (!known) return because(fmt::format("{} of a {} is not known", shown(expression.name.text()), shown(data.type)));
+    if (!known)
+      return because(
+          fmt::format("{} of a {} is not known", shown(expression.name.text()), shown(data.type)));
     const Expression* node = data.node;
     if (node->kind != Kind::kAggregate) {
       const Told<std::vector<Data>> inner = data_of(*node, *data.scope, depth + 1);
@@ -321,13 +380,15 @@ Told<std::vector<Data>> Interpreter::field_of(const Expression& expression, cons
         return because(fmt::format("{} is not constant", shown(text_of(*node, *data.scope))));
       node = (*inner)[0].node;
     }
-    if (known->index >= node->parts.size()) return because(fmt::format("a {} is incomplete", shown(data.type)));
+    if (known->index >= node->parts.size())
+      return because(fmt::format("a {} is incomplete", shown(data.type)));
     all.push_back({&node->parts[known->index], data.scope, known->type, data.declared});
   }
   return all;
 }
 
-Told<std::vector<Data>> Interpreter::element_of(const Expression& expression, const Scope& scope, int depth) const {
+Told<std::vector<Data>> Interpreter::element_of(const Expression& expression, const Scope& scope,
+                                                int depth) const {
   const Told<std::vector<Data>> of = data_of(expression.parts[0], scope, depth + 1);
   if (!of) return of;
   std::vector<Data> all = *of;

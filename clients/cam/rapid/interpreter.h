@@ -53,16 +53,18 @@ struct JointValue {
   int decimals = 0;
 };
 
-/// What assignments have made of tools and work objects, by the part of them, `tframe.trans` as the numbers of its
-/// fields; nullptr: on some ways another one.
-using Settings = std::map<const Declaration*, std::map<std::vector<std::size_t>, const Assignment*>>;
+/// What assignments have made of tools and work objects, by the part of them, `tframe.trans` as the
+/// numbers of its fields; nullptr: on some ways another one.
+using Settings =
+    std::map<const Declaration*, std::map<std::vector<std::size_t>, const Assignment*>>;
 
 constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not there
 
 /// The name whose value an expression is a part of; nullptr: of none.
 [[nodiscard]] const Expression* name_in(const Expression& expression);
 
-/// Instructions of the controller that neither move the robot nor change the data which they are given.
+/// Instructions of the controller that neither move the robot nor change the data which they are
+/// given.
 [[nodiscard]] bool is_still(const std::string& instruction);
 
 class Interpreter {
@@ -75,7 +77,8 @@ class Interpreter {
     const Declaration* declaration = nullptr;
     std::size_t module = 0;
   };
-  /// The declaration of a name: of the routine, of the module, or of any other module that does not keep it to itself.
+  /// The declaration of a name: of the routine, of the module, or of any other module that does not
+  /// keep it to itself.
   [[nodiscard]] std::optional<Found> find(const std::string& name, const Scope& scope) const;
   /// The routine of that name which is called from a module: its module and number.
   [[nodiscard]] std::optional<std::pair<std::size_t, int>> find_routine(const std::string& name,
@@ -85,30 +88,39 @@ class Interpreter {
 
   /// Why a declared value may be another one at run time; empty: it is never changed.
   [[nodiscard]] std::string changed(const Declaration* declaration) const;
-  /// The persistents that these modules set and that other tasks may have too, in lower case, with where.
+  /// The persistents that these modules set and that other tasks may have too, in lower case, with
+  /// where.
   [[nodiscard]] std::map<std::string, std::string> set_for_all_tasks() const;
   /// Where a tool's load is found at run time (LoadId); empty: nowhere.
   [[nodiscard]] std::string load_found(const Declaration* tool) const;
 
   /// Whether an assignment gives a tool or work object a constant, which holds until the next one.
-  [[nodiscard]] bool sets(const Assignment& assignment) const { return parts_.contains(&assignment); }
+  [[nodiscard]] bool sets(const Assignment& assignment) const {
+    return parts_.contains(&assignment);
+  }
   void set(const Assignment& assignment, Settings& settings) const;
   /// What holds for the expressions that are asked for next.
   void assume(const Settings& settings) { now_ = &settings; }
 
   /// What an expression stands for: its literal. Several where an index is not constant.
-  [[nodiscard]] Told<std::vector<Data>> data_of(const Expression& expression, const Scope& scope, int depth = 0) const;
-  [[nodiscard]] Told<double> number_of(const Expression& expression, const Scope& scope, int depth = 0) const;
-  [[nodiscard]] Told<TargetValue> target_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  [[nodiscard]] Told<std::vector<Data>> data_of(const Expression& expression, const Scope& scope,
+                                                int depth = 0) const;
+  [[nodiscard]] Told<double> number_of(const Expression& expression, const Scope& scope,
+                                       int depth = 0) const;
+  [[nodiscard]] Told<TargetValue> target_of(const Expression& expression, const Scope& scope,
+                                            int depth = 0) const;
   [[nodiscard]] Told<JointValue> joints_of(const Expression& expression, const Scope& scope) const;
-  /// `count` numbers of an aggregate or of what stands for one; `decimals`: raised to the most that are written.
-  [[nodiscard]] Told<std::vector<double>> numbers_of(const Expression& expression, std::size_t count,
-                                                     const Scope& scope, int* decimals, int depth = 0) const;
+  /// `count` numbers of an aggregate or of what stands for one; `decimals`: raised to the most that
+  /// are written.
+  [[nodiscard]] Told<std::vector<double>> numbers_of(const Expression& expression,
+                                                     std::size_t count, const Scope& scope,
+                                                     int* decimals, int depth = 0) const;
   /// The type of what the expression stands for; empty: not known.
-  [[nodiscard]] std::string type_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  [[nodiscard]] std::string type_of(const Expression& expression, const Scope& scope,
+                                    int depth = 0) const;
   /// The argument that a parameter stands for; `expression` itself where it is none.
-  [[nodiscard]] Told<std::pair<const Expression*, const Scope*>> handed_over(const Expression& expression,
-                                                                             const Scope& scope) const;
+  [[nodiscard]] Told<std::pair<const Expression*, const Scope*>> handed_over(
+      const Expression& expression, const Scope& scope) const;
 
   [[nodiscard]] std::string text_of(const Expression& expression, const Scope& scope) const;
   [[nodiscard]] std::string place_of(std::size_t module, int line) const;
@@ -127,22 +139,30 @@ class Interpreter {
     const Declaration* of = nullptr;
     std::vector<std::size_t> fields;
   };
-  [[nodiscard]] std::optional<Part> constant_part(const Assignment& assignment, std::size_t module) const;
-  [[nodiscard]] std::optional<std::vector<std::size_t>> fields_of(const Expression& target, const std::string& type,
+  [[nodiscard]] std::optional<Part> constant_part(const Assignment& assignment,
+                                                  std::size_t module) const;
+  [[nodiscard]] std::optional<std::vector<std::size_t>> fields_of(const Expression& target,
+                                                                  const std::string& type,
                                                                   std::size_t module) const;
   [[nodiscard]] Told<const Expression*> as_set(const Declaration& declared) const;
   void note_changes_by(std::size_t module, const Instruction& instruction);
   [[nodiscard]] const Scope* own_scope(std::size_t module, int routine);
-  [[nodiscard]] Told<const Expression*> bound(const Declaration& parameter, const Scope& scope) const;
-  [[nodiscard]] Told<std::vector<Data>> field_of(const Expression& expression, const Scope& scope, int depth) const;
-  [[nodiscard]] Told<std::vector<Data>> element_of(const Expression& expression, const Scope& scope, int depth) const;
-  [[nodiscard]] Told<TargetValue> offset_of(const Expression& call, const Scope& scope, int depth) const;
-  [[nodiscard]] Told<double> operation(const Expression& expression, const Scope& scope, int depth) const;
+  [[nodiscard]] Told<const Expression*> bound(const Declaration& parameter,
+                                              const Scope& scope) const;
+  [[nodiscard]] Told<std::vector<Data>> field_of(const Expression& expression, const Scope& scope,
+                                                 int depth) const;
+  [[nodiscard]] Told<std::vector<Data>> element_of(const Expression& expression, const Scope& scope,
+                                                   int depth) const;
+  [[nodiscard]] Told<TargetValue> offset_of(const Expression& call, const Scope& scope,
+                                            int depth) const;
+  [[nodiscard]] Told<double> operation(const Expression& expression, const Scope& scope,
+                                       int depth) const;
   struct Field {
     std::size_t index = 0;
     std::string type;
   };
-  [[nodiscard]] std::optional<Field> field(const std::string& type, const std::string& name, std::size_t module) const;
+  [[nodiscard]] std::optional<Field> field(const std::string& type, const std::string& name,
+                                           std::size_t module) const;
 
   const std::vector<SourceFile>& files_;
   const std::vector<Module>& modules_;
@@ -151,12 +171,16 @@ class Interpreter {
   std::map<std::string, std::vector<Found>> global_;  ///< by name, in the order of the modules
   std::map<std::string, std::string> set_elsewhere_;
   std::map<const Declaration*, std::string> load_found_;
-  std::unordered_map<std::string, std::vector<std::pair<std::size_t, int>>> routines_;  ///< by name, in their order
+  std::unordered_map<std::string, std::vector<std::pair<std::size_t, int>>>
+      routines_;  ///< by name, in their order
   std::map<const Declaration*, std::string> changed_;
-  std::map<const Declaration*, std::string> set_in_order_;  ///< where, of those that constants alone are assigned to
+  std::map<const Declaration*, std::string>
+      set_in_order_;  ///< where, of those that constants alone are assigned to
   std::map<const Assignment*, Part> parts_;
   const Settings* now_ = nullptr;
-  mutable std::map<std::pair<const Declaration*, Settings::mapped_type>, std::unique_ptr<Expression>> as_set_;
+  mutable std::map<std::pair<const Declaration*, Settings::mapped_type>,
+                   std::unique_ptr<Expression>>
+      as_set_;
   std::vector<std::unique_ptr<Scope>> scopes_;
   std::map<std::pair<std::size_t, int>, std::vector<const Scope*>> ways_in_;
   std::map<std::pair<std::size_t, int>, const Scope*> own_;

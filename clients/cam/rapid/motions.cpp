@@ -41,13 +41,15 @@ bool is_speed(const Expression& aggregate) {
 }
 
 /// mm/s, of the tool: what `v100`, which a controller predefines, or a constant speeddata says.
-std::optional<double> speed_by(const Interpreter& meaning, const Expression& argument, const Scope& scope) {
+std::optional<double> speed_by(const Interpreter& meaning, const Expression& argument,
+                               const Scope& scope) {
   const auto handed = meaning.handed_over(argument, scope);
   if (!handed) return std::nullopt;
   const auto& [expression, where] = *handed;
   if (expression->kind == Kind::kName && !meaning.find(expression->name, *where)) {
     const std::string& name = expression->name;
-    if (!name.starts_with('v') || name.find_first_not_of("0123456789", 1) != std::string::npos) return std::nullopt;
+    if (!name.starts_with('v') || name.find_first_not_of("0123456789", 1) != std::string::npos)
+      return std::nullopt;
     const auto number = read_number(std::string_view(name).substr(1));
     return number ? std::optional<double>(number->value) : std::nullopt;
   }
@@ -83,7 +85,8 @@ bool has_label(const Instruction& instruction, std::string_view label) {
 }
 
 const Expression* tool_argument(const Interpreter& meaning, const Instruction& motion,
-                                const std::vector<const Expression*>& positional, const Scope& scope) {
+                                const std::vector<const Expression*>& positional,
+                                const Scope& scope) {
   for (const Expression* argument : positional) {
     const auto handed = meaning.handed_over(*argument, scope);
     if (!handed) {
@@ -94,20 +97,22 @@ const Expression* tool_argument(const Interpreter& meaning, const Instruction& m
     if (argument->kind == Kind::kName && argument->name == "tool0") return argument;
   }
   // `MoveLDO p10,v100,fine,tool1,do1,1`: the tool stands behind the zone.
-  const bool more_behind = motion.name.ends_with("do") || motion.name.ends_with("ao") || motion.name.ends_with("go") ||
-                           motion.name.ends_with("sync");
+  const bool more_behind = motion.name.ends_with("do") || motion.name.ends_with("ao") ||
+                           motion.name.ends_with("go") || motion.name.ends_with("sync");
   if (positional.size() < 3 || (more_behind && !motion.name.starts_with("move"))) return nullptr;
   const std::size_t at = !more_behind ? positional.size() - 1 : is_arc(motion.name) ? 4 : 3;
   return at < positional.size() && positional[at]->kind == Kind::kName ? positional[at] : nullptr;
 }
 
-std::optional<double> speed_of(Interpreter& meaning, std::size_t module, const Instruction& motion) {
+std::optional<double> speed_of(Interpreter& meaning, std::size_t module,
+                               const Instruction& motion) {
   std::optional<double> speed;
   if (!is_linear(motion.name)) return speed;
   for (const Scope* scope : meaning.scopes_of(module, motion.routine)) {
     for (const Expression& argument : motion.arguments) {
       if (!argument.label.empty()) continue;
-      if (const auto one = speed_by(meaning, argument, *scope)) speed = std::max(speed.value_or(0), *one);
+      if (const auto one = speed_by(meaning, argument, *scope))
+        speed = std::max(speed.value_or(0), *one);
     }
     for (const Expression& argument : motion.arguments) {
       if (argument.label != "v") continue;

@@ -11,8 +11,8 @@
 /// The instructions of RAPID that move the tool, and what stands in them.
 namespace trammel::cam::rapid {
 
-/// Instructions of the controller that move the tool to the targets which they are given. What is merely called alike,
-/// `MoveLOffset`, is a procedure of somebody's.
+/// Instructions of the controller that move the tool to the targets which they are given. What is
+/// merely called alike, `MoveLOffset`, is a procedure of somebody's.
 [[nodiscard]] bool is_motion(const std::string& name);
 [[nodiscard]] bool is_search(const std::string& name);
 /// Whether the tool goes to the target on a line or an arc.
@@ -22,8 +22,10 @@ namespace trammel::cam::rapid {
 [[nodiscard]] bool has_label(const Instruction& instruction, std::string_view label);
 /// The argument that is a tool: one that is declared as such, or the last.
 [[nodiscard]] const Expression* tool_argument(const Interpreter& meaning, const Instruction& motion,
-                                              const std::vector<const Expression*>& positional, const Scope& scope);
+                                              const std::vector<const Expression*>& positional,
+                                              const Scope& scope);
 /// mm/s, of the tool: the fastest that the callers of a motion hand over; `\V:=60` decides it.
-[[nodiscard]] std::optional<double> speed_of(Interpreter& meaning, std::size_t module, const Instruction& motion);
+[[nodiscard]] std::optional<double> speed_of(Interpreter& meaning, std::size_t module,
+                                             const Instruction& motion);
 
 }  // namespace trammel::cam::rapid

@@ -21,7 +21,8 @@ constexpr const char* kAnyRoutine = "any";
 
 class Order {
  public:
-  Order(const std::vector<SourceFile>& files, const std::vector<Module>& modules, const Interpreter& meaning)
+  Order(const std::vector<SourceFile>& files, const std::vector<Module>& modules,
+        const Interpreter& meaning)
       : files_(files), modules_(modules), meaning_(meaning) {}
 
   std::pair<std::vector<Step>, std::vector<Place>> steps() const {
@@ -62,13 +63,16 @@ class Order {
   }
 
  private:
-  /// What a call may mean whose routine is named at run time: a routine that nothing calls by its name.
+  /// What a call may mean whose routine is named at run time: a routine that nothing calls by its
+  /// name.
   std::vector<Step> late_routines() const {
-    std::set<std::pair<std::size_t, int>> by_name;  // and those that call so: one that calls itself has no beginning
+    std::set<std::pair<std::size_t, int>>
+        by_name;  // and those that call so: one that calls itself has no beginning
     bool any = false;
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (const Instruction& instruction : modules_[m].instructions) {
-        if (const auto routine = meaning_.find_routine(instruction.name, m)) by_name.insert(*routine);
+        if (const auto routine = meaning_.find_routine(instruction.name, m))
+          by_name.insert(*routine);
         if (!is_late(instruction) || meaning_.find_routine(named_late(m, instruction), m)) continue;
         by_name.emplace(m, instruction.routine);
         any = true;
@@ -79,7 +83,9 @@ class Order {
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (std::size_t r = 0; r < modules_[m].routines.size(); ++r) {
         const Routine& routine = modules_[m].routines[r];
-        if (routine.is_function || routine.name == "main" || by_name.contains({m, static_cast<int>(r)})) continue;
+        if (routine.is_function || routine.name == "main" ||
+            by_name.contains({m, static_cast<int>(r)}))
+          continue;
         steps.push_back({Step::Kind::kCase});
         steps.push_back({Step::Kind::kCall, fmt::format("{}:{}", m, r)});
       }
@@ -90,7 +96,8 @@ class Order {
   }
 
   static bool is_late(const Instruction& instruction) {
-    return (instruction.name == kLateCall || instruction.name == "callbyvar") && !instruction.arguments.empty();
+    return (instruction.name == kLateCall || instruction.name == "callbyvar") &&
+           !instruction.arguments.empty();
   }
 
   /// The name that a late call spells out; empty: it is not known.
@@ -106,12 +113,14 @@ class Order {
     static const std::set<std::string> kGoesBack = {"retry", "trynext", "startmoveretry"};
     if (is_motion(instruction.name)) return {};
     if (kGoesBack.contains(instruction.name)) return {Step::Kind::kGoBack};
-    if (instruction.name == "gripload" || instruction.name == "pdispoff") return {Step::Kind::kPlain, "", true};
+    if (instruction.name == "gripload" || instruction.name == "pdispoff")
+      return {Step::Kind::kPlain, "", true};
     if (kReturns.contains(instruction.name)) return {Step::Kind::kReturn};
     if (instruction.name == "goto" && !instruction.arguments.empty())
       return {Step::Kind::kJump, instruction.arguments[0].name};
     const bool late = is_late(instruction);
-    const auto routine = meaning_.find_routine(late ? named_late(module, instruction) : instruction.name, module);
+    const auto routine =
+        meaning_.find_routine(late ? named_late(module, instruction) : instruction.name, module);
     if (late && !routine) return {Step::Kind::kCall, kAnyRoutine};
     if (!routine) return {};
     return {Step::Kind::kCall, fmt::format("{}:{}", routine->first, routine->second)};

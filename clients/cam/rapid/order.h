@@ -18,8 +18,8 @@ struct Place {
 };
 
 /// The statements of all modules in a row, and what stands at each.
-[[nodiscard]] std::pair<std::vector<Step>, std::vector<Place>> steps_of(const std::vector<SourceFile>& files,
-                                                                        const std::vector<Module>& modules,
-                                                                        const Interpreter& meaning);
+[[nodiscard]] std::pair<std::vector<Step>, std::vector<Place>> steps_of(
+    const std::vector<SourceFile>& files, const std::vector<Module>& modules,
+    const Interpreter& meaning);
 
 }  // namespace trammel::cam::rapid

@@ -67,14 +67,15 @@ class Parser : private Expressions {
   }
 
   void statement() {
-    static const std::set<std::string> kSingle = {"else",  "endif", "endfor",  "endwhile",  "endtest",
-                                                  "error", "undo",  "default", "endmodule", "backward"};
+    static const std::set<std::string> kSingle = {"else",      "endif",   "endfor", "endwhile",
+                                                  "endtest",   "error",   "undo",   "default",
+                                                  "endmodule", "backward"};
     const std::string first = word();
     if (first.empty()) return skip_odd_statement();
     if (first == "module") return module_head();
     if (first == "record") return record();
-    if (first == "proc" || first == "func" || first == "trap" || first == "local" || first == "task" ||
-        first == "const" || first == "pers" || first == "var") {
+    if (first == "proc" || first == "func" || first == "trap" || first == "local" ||
+        first == "task" || first == "const" || first == "pers" || first == "var") {
       return declaration();
     }
     if (first == "endproc" || first == "endfunc" || first == "endtrap") {
@@ -97,7 +98,9 @@ class Parser : private Expressions {
       open_block(first);
       turn(Step::Kind::kSwitch);
       const std::size_t begin = at_;
-      while (!at_end() && word() != "case" && word() != "default" && word() != "endtest" && !is_sign(";")) ++at_;
+      while (!at_end() && word() != "case" && word() != "default" && word() != "endtest" &&
+             !is_sign(";"))
+        ++at_;
       note_condition(begin);
     } else if (first == "case") {
       turn(Step::Kind::kCase);
@@ -138,13 +141,14 @@ class Parser : private Expressions {
   }
   /// From the token `begin` to where the reading is.
   void note_condition(std::size_t begin) {
-    module_.conditions.push_back({tokens_[begin].begin, token().begin, routine_, tokens_[begin].line});
+    module_.conditions.push_back(
+        {tokens_[begin].begin, token().begin, routine_, tokens_[begin].line});
   }
 
   /// `%"name"% p10;`. Heads of module files, `%%%`, and rubbish mean nothing.
   void skip_odd_statement() {
-    const bool of_head = is_sign("%", 1) ||
-                         (at_ > 0 && tokens_[at_ - 1].kind == TokenKind::kSign && text_[tokens_[at_ - 1].begin] == '%');
+    const bool of_head = is_sign("%", 1) || (at_ > 0 && tokens_[at_ - 1].kind == TokenKind::kSign &&
+                                             text_[tokens_[at_ - 1].begin] == '%');
     if (!is_sign(kLateCall) || of_head || routine_ < 0) {
       ++at_;
       return;
@@ -202,9 +206,12 @@ class Parser : private Expressions {
       declared.of_task = take_word() == "task";
     }
     const std::string kind = take_word();
-    if (kind == "proc" || kind == "func" || kind == "trap") return routine_head(kind, declared.local);
+    if (kind == "proc" || kind == "func" || kind == "trap")
+      return routine_head(kind, declared.local);
     if (kind != "const" && kind != "pers" && kind != "var") return skip_statement();
-    declared.storage = kind == "const" ? Storage::kConst : kind == "pers" ? Storage::kPers : Storage::kVar;
+    declared.storage = kind == "const"  ? Storage::kConst
+                       : kind == "pers" ? Storage::kPers
+                                        : Storage::kVar;
     declared.type = take_word();
     declared.spelled = std::string(bytes());
     declared.name = take_word();
@@ -252,8 +259,8 @@ class Parser : private Expressions {
       declared.line = token().line;
       declared.begin = token().begin;
       const bool optional = take("\\");
-      for (std::string mode = word(); mode == "inout" || mode == "var" || mode == "pers" || mode == "switch";
-           mode = word()) {
+      for (std::string mode = word();
+           mode == "inout" || mode == "var" || mode == "pers" || mode == "switch"; mode = word()) {
         if (mode == "switch") break;
         declared.may_be_changed = true;
         ++at_;
@@ -274,7 +281,8 @@ class Parser : private Expressions {
     take(")");
   }
 
-  /// `IF c THEN`, or `IF c instruction;`: then the instruction is found by its name behind the condition.
+  /// `IF c THEN`, or `IF c instruction;`: then the instruction is found by its name behind the
+  /// condition.
   void condition() {
     ++at_;
     const std::size_t begin = at_;
@@ -302,12 +310,14 @@ class Parser : private Expressions {
     take(";");
   }
   [[nodiscard]] bool is_closing(std::size_t index) const {
-    const std::string_view sign = text_.substr(tokens_[index].begin, tokens_[index].end - tokens_[index].begin);
+    const std::string_view sign =
+        text_.substr(tokens_[index].begin, tokens_[index].end - tokens_[index].begin);
     return sign == ")" || sign == "]" || sign == "}";
   }
   [[nodiscard]] std::string word_at(std::size_t index) const {
     const Token& t = tokens_[index];
-    return t.kind == TokenKind::kWord ? lower(text_.substr(t.begin, t.end - t.begin)) : std::string();
+    return t.kind == TokenKind::kWord ? lower(text_.substr(t.begin, t.end - t.begin))
+                                      : std::string();
   }
 
   /// `FOR i FROM a TO b DO`: i is a number that the loop decides.
@@ -340,8 +350,9 @@ class Parser : private Expressions {
       Expression value = expression();
       // A value that is not understood changes its target all the same.
       if (!is_sign(";")) value = {};
-      module_.assignments.push_back({std::move(target), std::move(value), routine_, line, value_begin, 0,
-                                     module_.instructions.size(), module_.turns.size()});
+      module_.assignments.push_back({std::move(target), std::move(value), routine_, line,
+                                     value_begin, 0, module_.instructions.size(),
+                                     module_.turns.size()});
       skip_statement();
       module_.assignments.back().end = last_end();
       return;

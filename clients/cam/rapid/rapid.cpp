@@ -56,7 +56,8 @@ class Reader {
         const Data data{&*declared.value, &own(m), declared.type, &declared};
         if (declared.type == "tooldata") found.tools.push_back(tools_->declared_tool(data));
         const std::string where = fmt::format("{} line {}", program_.files[m].name, declared.line);
-        if (declared.type == "wobjdata") found.frames.push_back({tools_->declared_frame(data), where});
+        if (declared.type == "wobjdata")
+          found.frames.push_back({tools_->declared_frame(data), where});
         const auto load = declared.type == "loaddata" ? tools_->load_of(data) : std::nullopt;
         if (load) found.loads.push_back({declared.spelled, *load, where});
       }
@@ -97,7 +98,8 @@ class Reader {
 
   // Motions.
 
-  void leave(std::size_t module, const Instruction& motion, const std::string& name, const std::string& why) {
+  void leave(std::size_t module, const Instruction& motion, const std::string& name,
+             const std::string& why) {
     for (std::size_t k = program_.moves.size(); k-- > 0;) {
       if (program_.moves[k].file != module || program_.moves[k].line != motion.line) continue;
       program_.moves[k].left_some = true;
@@ -115,11 +117,15 @@ class Reader {
     const Flow flow = flow_of(steps, true);
     const std::vector<State> states = states_before(
         flow, State{}, [&](std::size_t s, State& state) { setting_->set(places[s], state); },
-        [&](State& state, const State& other, const std::string& by) { setting_->join(state, other, by); });
+        [&](State& state, const State& other, const std::string& by) {
+          setting_->join(state, other, by);
+        });
     for (std::size_t s = 0; s < steps.size(); ++s) {
       const Instruction* motion = places[s].instruction;
       const std::size_t module = places[s].module;
-      if (motion == nullptr || !is_motion(motion->name) || meaning_->find_routine(motion->name, module)) continue;
+      if (motion == nullptr || !is_motion(motion->name) ||
+          meaning_->find_routine(motion->name, module))
+        continue;
       move_of.emplace(s, program_.moves.size());
       program_.moves.push_back({module, motion->line, {}, is_arc(motion->name)});
       state_ = states[s];
@@ -147,9 +153,10 @@ class Reader {
     }
     if (undecided_confs_) return;
     undecided_confs_ = true;
-    program_.notes.push_back(
-        fmt::format("{} ({}): on some ways to it {}\\Off holds, on others not; it is taken to go to its configuration",
-                    motion.spelled, meaning_->place_of(module, motion.line), on_a_line ? "ConfL" : "ConfJ"));
+    program_.notes.push_back(fmt::format(
+        "{} ({}): on some ways to it {}\\Off holds, on others not; it is taken to go to its "
+        "configuration",
+        motion.spelled, meaning_->place_of(module, motion.line), on_a_line ? "ConfL" : "ConfJ"));
   }
 
   void read_motion(std::size_t module, const Instruction& motion) {
@@ -165,9 +172,12 @@ class Reader {
     for (const Expression* argument : positional) readings_->note_names(*argument);
     program_.moves.back().speed_mm_s = speed_of(*meaning_, module, motion);
     const auto leave_it = [&](const std::string& why) {
-      leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
+      leave(module, motion,
+            meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]),
+            why);
     };
-    if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
+    if (is_search(motion.name))
+      return leave(module, motion, "", "a sensor decides where the motion ends");
     if (has_label(motion, "corr")) return leave_it("a sensor corrects the path (\\Corr)");
     if (has_label(motion, "track")) return leave_it("a sensor corrects the path (\\Track)");
     for (const std::size_t way : state_.given_way) {
@@ -176,7 +186,8 @@ class Reader {
     if (state_.displaced != 0) return leave_it(setting_->displacement(state_.displaced));
     if (!setting_->open_displacement().empty()) return leave_it(setting_->open_displacement());
     for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
-      const Expression* with = tool != nullptr ? tool : tool_argument(*meaning_, motion, positional, *scope);
+      const Expression* with =
+          tool != nullptr ? tool : tool_argument(*meaning_, motion, positional, *scope);
       if (with == nullptr) {
         leave_it("it has no tool");
         continue;
@@ -191,16 +202,17 @@ class Reader {
     }
   }
 
-  void use(std::size_t module, const Instruction& motion, const Expression& argument, bool joints, std::size_t tool,
-           std::size_t frame, const Scope& scope) {
+  void use(std::size_t module, const Instruction& motion, const Expression& argument, bool joints,
+           std::size_t tool, std::size_t frame, const Scope& scope) {
     const auto handed = meaning_->handed_over(argument, scope);
     if (!handed) return leave(module, motion, meaning_->text_of(argument, scope), handed.error());
     const auto& [expression, where] = *handed;
-    const bool written_here = expression->kind == Kind::kAggregate || expression->kind == Kind::kCall;
+    const bool written_here =
+        expression->kind == Kind::kAggregate || expression->kind == Kind::kCall;
     const Told<std::vector<Data>> all =
-        written_here
-            ? Told<std::vector<Data>>(std::vector<Data>{{expression, where, joints ? "jointtarget" : "robtarget"}})
-            : meaning_->data_of(*expression, *where);
+        written_here ? Told<std::vector<Data>>(std::vector<Data>{
+                           {expression, where, joints ? "jointtarget" : "robtarget"}})
+                     : meaning_->data_of(*expression, *where);
     if (!all) return leave(module, motion, meaning_->text_of(argument, scope), all.error());
     for (const Data& data : *all) {
       const std::size_t of = data.scope->module;
@@ -210,7 +222,8 @@ class Reader {
         site.joints = joints;
         site.in_motion = written_here;
         site.statement = statement_of(data, where, motion, expression, &argument);
-        site.name = all->size() > 1 ? meaning_->text_of(argument, scope) : meaning_->text_of(*expression, *where);
+        site.name = all->size() > 1 ? meaning_->text_of(argument, scope)
+                                    : meaning_->text_of(*expression, *where);
       }
       site.uses.push_back({tool, frame, &motion, module, program_.moves.size() - 1, data,
                            setting_->displacement(state_.external_displaced)});
@@ -222,7 +235,8 @@ class Reader {
     if (data.declared != nullptr) return data.declared->begin;
     if (expression == argument) return motion.begin;
     for (const Scope* scope = where; scope != nullptr; scope = scope->caller) {
-      if (scope->call != nullptr && scope->call->begin <= data.node->begin && data.node->end <= scope->call->end)
+      if (scope->call != nullptr && scope->call->begin <= data.node->begin &&
+          data.node->end <= scope->call->end)
         return scope->call->begin;
     }
     return data.node->begin;
@@ -233,13 +247,14 @@ class Reader {
     std::vector<std::string> places;
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (const Instruction& instruction : modules_[m].instructions) {
-        if (instruction.name == "softact") places.push_back(meaning_->place_of(m, instruction.line));
+        if (instruction.name == "softact")
+          places.push_back(meaning_->place_of(m, instruction.line));
       }
     }
     if (places.empty()) return;
     program_.notes.push_back(fmt::format(
-        "SoftAct ({}{}): a soft axis gives way by what the model does not know; its targets are corrected as "
-        "those of a stiff one",
+        "SoftAct ({}{}): a soft axis gives way by what the model does not know; its targets are "
+        "corrected as those of a stiff one",
         places.front(), places.size() > 1 ? fmt::format(" and {} more", places.size() - 1) : ""));
   }
 
@@ -286,7 +301,8 @@ class Reader {
     const Use& first = site.uses.front();
     program_.left.push_back(
         {site.name, site.module, first.data.node->line, first.motion->spelled,
-         fmt::format("it is used in different ways: {}; --split makes a target of each", fmt::join(ways, ", "))});
+         fmt::format("it is used in different ways: {}; --split makes a target of each",
+                     fmt::join(ways, ", "))});
   }
 
   /// The argument of each motion becomes a target of its own.
@@ -300,16 +316,20 @@ class Reader {
           argument = &candidate;
       }
       if (argument == nullptr || argument->kind == Kind::kElement) {
-        leave(use->module, *use->motion, site.name, "it is used with another tool or frame too, and cannot be split");
+        leave(use->module, *use->motion, site.name,
+              "it is used with another tool or frame too, and cannot be split");
         continue;
       }
       Data data = use->data;
       Data place{argument, &own(use->module), data.type, nullptr};
-      add_target({use->module, use->motion->begin, site.name, {}, site.joints, true}, {use}, data, &place);
+      add_target({use->module, use->motion->begin, site.name, {}, site.joints, true}, {use}, data,
+                 &place);
     }
   }
 
-  const Scope& own(std::size_t module) { return own_.emplace(module, Scope{module, -1}).first->second; }
+  const Scope& own(std::size_t module) {
+    return own_.emplace(module, Scope{module, -1}).first->second;
+  }
 
   /// Writes the target at `place`, or where `data` stands.
   void add_target(const Site& site, const std::vector<const Use*>& uses, const Data& data,
@@ -324,12 +344,13 @@ class Reader {
     target.frame = first.frame;
     target.linear = is_linear(first.motion->name);
     for (const Use* use : uses) {
-      if (std::find(target.used_at.begin(), target.used_at.end(), use->motion->line) == target.used_at.end())
+      if (std::find(target.used_at.begin(), target.used_at.end(), use->motion->line) ==
+          target.used_at.end())
         target.used_at.push_back(use->motion->line);
     }
     if (site.joints) note_axes(data, uses);
-    const Told<void> read =
-        site.joints ? targets_->read_joints(data, target) : targets_->read_target(data, uses, place, target);
+    const Told<void> read = site.joints ? targets_->read_joints(data, target)
+                                        : targets_->read_target(data, uses, place, target);
     std::string why = read ? "" : read.error();
     if (why.empty()) why = program_.tools[target.tool].why_not;
     if (why.empty()) why = program_.frames[target.frame].why_not;
@@ -341,7 +362,8 @@ class Reader {
       for (const Use* use : uses) program_.moves[use->move].left_some = true;
       return;
     }
-    for (const Use* use : uses) program_.moves[use->move].targets.push_back(program_.targets.size());
+    for (const Use* use : uses)
+      program_.moves[use->move].targets.push_back(program_.targets.size());
     if (target.folded) targets_->note_original(site, place != nullptr ? *place : data, target);
     program_.targets.push_back(std::move(target));
   }

@@ -8,13 +8,14 @@
 
 namespace trammel::cam {
 
-/// Reads ABB RAPID modules (.mod .prg .sys) of one program. Targets are where motions go: declared, in arrays and
-/// records, written in the motion, `Offs` and `RelTool` of them with constant numbers, also through parameters of
-/// procedures. What a variable, a loop, a sensor or another module decides is left, with the reason. W of the
-/// controller is taken as the robot's base.
+/// Reads ABB RAPID modules (.mod .prg .sys) of one program. Targets are where motions go: declared,
+/// in arrays and records, written in the motion, `Offs` and `RelTool` of them with constant
+/// numbers, also through parameters of procedures. What a variable, a loop, a sensor or another
+/// module decides is left, with the reason. W of the controller is taken as the robot's base.
 [[nodiscard]] Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options);
 
-/// What modules declare, whether motions use it or not: tools, work objects and loads that are constant or persistent.
+/// What modules declare, whether motions use it or not: tools, work objects and loads that are
+/// constant or persistent.
 struct RapidData {
   struct Frame {
     ProgramFrame frame;  ///< seen from the controller's world

@@ -41,17 +41,19 @@ void Readings::list_unused() {
       if (used || named_.contains(declared.name)) continue;
       const auto unknown = unknown_.find(&declared);
       if (unknown == unknown_.end())
-        program_.left.push_back({declared.spelled, m, declared.line, "", "no motion in these files goes to it"});
-      else
         program_.left.push_back(
-            {declared.spelled, m, declared.line, unknown->second->spelled,
-             fmt::format("{} is not known here: it may move the robot there", shown(unknown->second->spelled))});
+            {declared.spelled, m, declared.line, "", "no motion in these files goes to it"});
+      else
+        program_.left.push_back({declared.spelled, m, declared.line, unknown->second->spelled,
+                                 fmt::format("{} is not known here: it may move the robot there",
+                                             shown(unknown->second->spelled))});
     }
   }
 }
 
 /// Why the bytes at a place must stay as they are; empty: they need not.
-std::string Readings::why_kept(const std::pair<std::size_t, std::size_t>& place, const Declaration* declared) const {
+std::string Readings::why_kept(const std::pair<std::size_t, std::size_t>& place,
+                               const Declaration* declared) const {
   const auto behind = references_.upper_bound(place);
   if (behind != references_.begin()) {
     const auto& [begin, reference] = *std::prev(behind);
@@ -63,7 +65,8 @@ std::string Readings::why_kept(const std::pair<std::size_t, std::size_t>& place,
 
 /// `PDispOn\ExeP:=pFound,pRef,tGun`: how many of the first arguments are such.
 std::size_t Readings::old_points(const std::string& name) {
-  static const std::map<std::string, std::size_t> kOldPoints = {{"pdispon", 1}, {"defdframe", 3}, {"defaccframe", 1}};
+  static const std::map<std::string, std::size_t> kOldPoints = {
+      {"pdispon", 1}, {"defdframe", 3}, {"defaccframe", 1}};
   const auto known = kOldPoints.find(name);
   return known == kOldPoints.end() ? 0 : known->second;
 }
@@ -74,14 +77,15 @@ void Readings::note_references() {
     const std::size_t before = measured.size();
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (const Instruction& instruction : modules_[m].instructions)
-        note_references(instruction.name, instruction.spelled, instruction.arguments, {m, instruction.routine},
-                        measured);
+        note_references(instruction.name, instruction.spelled, instruction.arguments,
+                        {m, instruction.routine}, measured);
       for (const Assignment& assignment : modules_[m].assignments) {
         const Scope at{m, assignment.routine};
         note_references(assignment.value, at, measured);
         const auto to = meaning_.find(root_of(assignment.target)->name, at);
         if (to && measured.contains(to->declaration))
-          note_reference(assignment.value, at, root_text(assignment.target, m), assignment.line, measured);
+          note_reference(assignment.value, at, root_text(assignment.target, m), assignment.line,
+                         measured);
       }
     }
     grows = measured.size() > before;
@@ -99,21 +103,23 @@ void Readings::note_references(const std::string& name, const std::string& spell
   }
 }
 
-void Readings::note_references(const Expression& expression, const Scope& at, std::set<const Declaration*>& measured) {
+void Readings::note_references(const Expression& expression, const Scope& at,
+                               std::set<const Declaration*>& measured) {
   const std::string name = expression.kind == Kind::kCall ? expression.name.text() : "";
   note_references(name, name, expression.parts, at, measured);
 }
 
-void Readings::note_reference(const Expression& point, const Scope& at, const std::string& by, int line,
-                              std::set<const Declaration*>& measured) {
+void Readings::note_reference(const Expression& point, const Scope& at, const std::string& by,
+                              int line, std::set<const Declaration*>& measured) {
   const auto named = meaning_.find(root_of(point)->name, at);
   if (named) measured.insert(named->declaration);
   for (const Scope* scope : meaning_.scopes_of(at.module, at.routine)) {
     const Told<std::vector<Data>> all = meaning_.data_of(point, *scope);
     for (const Data& data : all ? *all : std::vector<Data>{}) {
-      references_.try_emplace({data.scope->module, data.node->begin},
-                              Reference{data.node->end, fmt::format("a displacement is measured from it ({}, {})",
-                                                                    shown(by), meaning_.place_of(at.module, line))});
+      references_.try_emplace(
+          {data.scope->module, data.node->begin},
+          Reference{data.node->end, fmt::format("a displacement is measured from it ({}, {})",
+                                                shown(by), meaning_.place_of(at.module, line))});
     }
   }
 }
@@ -128,13 +134,15 @@ void Readings::note_readings(std::size_t m) {
     note_readings(m, {condition.begin, condition.end}, condition.routine, condition.line, "");
   for (const Instruction& instruction : module.instructions) {
     const bool motion = is_motion(instruction.name) && !meaning_.find_routine(instruction.name, m);
-    const bool calls = std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
-                                   [](const Expression& argument) { return argument.kind == Kind::kCall; });
+    const bool calls =
+        std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
+                    [](const Expression& argument) { return argument.kind == Kind::kCall; });
     if (motion && !calls) continue;
     calls_routine_ = !motion && meaning_.find_routine(instruction.name, m).has_value();
     if (!motion && !calls_routine_) note_unknown(m, instruction);
     moves_ = motion;
-    note_readings(m, {instruction.begin, instruction.end}, instruction.routine, instruction.line, "");
+    note_readings(m, {instruction.begin, instruction.end}, instruction.routine, instruction.line,
+                  "");
     calls_routine_ = moves_ = false;
   }
 }
@@ -142,7 +150,8 @@ void Readings::note_readings(std::size_t m) {
 /// The whole that a field or an element is a part of; another expression itself.
 const Expression* Readings::root_of(const Expression& target) {
   const Expression* root = &target;
-  while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty()) root = &root->parts[0];
+  while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty())
+    root = &root->parts[0];
   return root;
 }
 
@@ -150,12 +159,15 @@ std::string Readings::root_text(const Expression& target, std::size_t m) {
   return meaning_.text_of(*root_of(target), own(m));
 }
 
-void Readings::note_readings(std::size_t m, const Span& span, int routine, int line, const std::string& by) {
+void Readings::note_readings(std::size_t m, const Span& span, int routine, int line,
+                             const std::string& by) {
   if (span.end <= span.begin) return;
-  const std::string_view text = std::string_view(program_.files[m].text).substr(span.begin, span.end - span.begin);
+  const std::string_view text =
+      std::string_view(program_.files[m].text).substr(span.begin, span.end - span.begin);
   const std::vector<Token> tokens = tokens_of(text);
   const auto word = [&](std::size_t k) {
-    return k < tokens.size() ? text.substr(tokens[k].begin, tokens[k].end - tokens[k].begin) : std::string_view();
+    return k < tokens.size() ? text.substr(tokens[k].begin, tokens[k].end - tokens[k].begin)
+                             : std::string_view();
   };
   for (std::size_t k = 0; k < tokens.size(); ++k) {
     if (tokens[k].kind != TokenKind::kWord || word(k + 1) == "(") continue;
@@ -165,12 +177,14 @@ void Readings::note_readings(std::size_t m, const Span& span, int routine, int l
       while (behind < tokens.size() && word(behind) != "}") ++behind;
       ++behind;
     }
-    const int dots = (word(behind) == "." ? 1 : 0) + (word(behind) == "." && word(behind + 2) == "." ? 1 : 0);
+    const int dots =
+        (word(behind) == "." ? 1 : 0) + (word(behind) == "." && word(behind + 2) == "." ? 1 : 0);
     note_reading({m, routine}, std::string(word(k)), dots, line, by);
   }
 }
 
-void Readings::note_reading(const Scope& at, const std::string& spelled, int dots, int line, const std::string& by) {
+void Readings::note_reading(const Scope& at, const std::string& spelled, int dots, int line,
+                            const std::string& by) {
   Expression name;
   name.kind = Kind::kName;
   name.name = lower(spelled);
@@ -183,13 +197,14 @@ void Readings::note_reading(const Scope& at, const std::string& spelled, int dot
     const Told<std::vector<Data>> all = meaning_.data_of(name, *scope);
     if (!all) continue;
     for (const Data& data : *all) {
-      if (data.declared != nullptr && data.declared->value) add_reading(data, at, spelled, dots, line, by);
+      if (data.declared != nullptr && data.declared->value)
+        add_reading(data, at, spelled, dots, line, by);
     }
   }
 }
 
-void Readings::add_reading(const Data& data, const Scope& at, const std::string& spelled, int dots, int line,
-                           const std::string& by) {
+void Readings::add_reading(const Data& data, const Scope& at, const std::string& spelled, int dots,
+                           int line, const std::string& by) {
   const Expression& value = *data.declared->value;
   const std::size_t file = data.scope->module;
   const auto place = places_.lower_bound({file, value.begin});
@@ -197,23 +212,26 @@ void Readings::add_reading(const Data& data, const Scope& at, const std::string&
   const bool is_target = data.declared->type == "robtarget" || data.declared->type == "jointtarget";
   const bool numbers = dots > (is_target ? 0 : 1);
   if (numbers && !moves_) {
-    read_.emplace(data.declared,
-                  fmt::format("its numbers are read elsewhere too ({})", meaning_.place_of(at.module, line)));
+    read_.emplace(data.declared, fmt::format("its numbers are read elsewhere too ({})",
+                                             meaning_.place_of(at.module, line)));
     return;
   }
   if (calls_routine_) return;  // what becomes of it is told there
-  program_.readings.push_back({file, {value.begin, value.end}, spelled, at.module, line, by, moves_});
+  program_.readings.push_back(
+      {file, {value.begin, value.end}, spelled, at.module, line, by, moves_});
 }
 
 /// `FCPressL p10,v50,...`, and procedures of modules that are not there, may be motions.
 void Readings::note_unknown(std::size_t m, const Instruction& instruction) {
-  static const std::set<std::string> kTakeTargets = {"wzhomejointdef", "wzlimjointdef", "mtooltcpcalib",
-                                                     "mtoolrotcalib",  "stooltcpcalib", "stoolrotcalib"};
+  static const std::set<std::string> kTakeTargets = {"wzhomejointdef", "wzlimjointdef",
+                                                     "mtooltcpcalib",  "mtoolrotcalib",
+                                                     "stooltcpcalib",  "stoolrotcalib"};
   if (is_still(instruction.name) || kTakeTargets.contains(instruction.name)) return;
   for (const Expression& argument : instruction.arguments) {
     for (const Scope* scope : meaning_.scopes_of(m, instruction.routine)) {
       const Told<std::vector<Data>> all = meaning_.data_of(*root_of(argument), *scope);
-      for (const Data& data : all ? *all : std::vector<Data>{}) unknown_.emplace(data.declared, &instruction);
+      for (const Data& data : all ? *all : std::vector<Data>{})
+        unknown_.emplace(data.declared, &instruction);
     }
   }
 }

@@ -35,7 +35,8 @@ void Setting::note_displacements() {
       if (displaces(instruction)) open[instruction.routine] = displacement(m, instruction);
       if (instruction.name == "pdispoff") open.erase(instruction.routine);
     }
-    for (const auto& [routine, why] : open) open_displacement_ = why + ", and is not switched off where it stands";
+    for (const auto& [routine, why] : open)
+      open_displacement_ = why + ", and is not switched off where it stands";
   }
 }
 
@@ -53,13 +54,16 @@ void Setting::set(const Place& place, State& state) {
   for (std::size_t k = 0; k < give_ways().size(); ++k) {
     const GiveWay& way = give_ways()[k];
     if (instruction.name.starts_with(way.ends)) state.given_way[k] = 0;
-    if (instruction.name != way.begins || (*way.label != '\0' && !has_label(instruction, way.label))) continue;
-    state.given_way[k] =
-        known_displacement(fmt::format("{} ({})", way.why, meaning_.place_of(place.module, instruction.line)));
+    if (instruction.name != way.begins ||
+        (*way.label != '\0' && !has_label(instruction, way.label)))
+      continue;
+    state.given_way[k] = known_displacement(
+        fmt::format("{} ({})", way.why, meaning_.place_of(place.module, instruction.line)));
   }
   if (instruction.name == "confl") state.lines = confs_of(instruction);
   if (instruction.name == "confj") state.axes = confs_of(instruction);
-  if (displaces(instruction)) state.displaced = known_displacement(displacement(place.module, instruction));
+  if (displaces(instruction))
+    state.displaced = known_displacement(displacement(place.module, instruction));
   if (displaces_external(instruction))
     state.external_displaced = known_displacement(displacement(place.module, instruction));
 }
@@ -70,13 +74,15 @@ void Setting::join(State& state, const State& other, const std::string& by) {
   for (std::size_t k = 0; k < state.given_way.size(); ++k)
     state.given_way[k] = std::max(state.given_way[k], other.given_way[k]);
   if (state.settings != other.settings)
-    state.settings = known_settings(on_both_ways(*settings_[state.settings], *settings_[other.settings]));
+    state.settings =
+        known_settings(on_both_ways(*settings_[state.settings], *settings_[other.settings]));
   if (state.lines != other.lines) state.lines = Confs::kUndecided;
   if (state.axes != other.axes) state.axes = Confs::kUndecided;
   if (state.load == other.load) return;
   state.load = tools_.undecided_load(
-      state.load, by.empty() ? "GripLoad: a branch, a loop or a caller decides what the robot carries"
-                             : fmt::format("GripLoad: {} may change what the robot carries", by));
+      state.load, by.empty()
+                      ? "GripLoad: a branch, a loop or a caller decides what the robot carries"
+                      : fmt::format("GripLoad: {} may change what the robot carries", by));
 }
 
 bool Setting::displaces(const Instruction& instruction) {
@@ -89,12 +95,14 @@ bool Setting::displaces_external(const Instruction& instruction) {
 
 std::string Setting::displacement(std::size_t module, const Instruction& instruction) const {
   const char* what = displaces_external(instruction) ? "its external axes" : "it";
-  return fmt::format("{} displaces {} ({})", instruction.spelled, what, meaning_.place_of(module, instruction.line));
+  return fmt::format("{} displaces {} ({})", instruction.spelled, what,
+                     meaning_.place_of(module, instruction.line));
 }
 
 std::size_t Setting::known_displacement(const std::string& why) {
   const auto known = std::find(displacements_.begin(), displacements_.end(), why);
-  if (known != displacements_.end()) return static_cast<std::size_t>(known - displacements_.begin());
+  if (known != displacements_.end())
+    return static_cast<std::size_t>(known - displacements_.begin());
   displacements_.push_back(why);
   return displacements_.size() - 1;
 }
@@ -114,7 +122,8 @@ Settings Setting::on_both_ways(const Settings& one, const Settings& other) {
       const auto there = beside.find(of);
       for (const auto& [fields, assignment] : parts) {
         const auto same = there == beside.end() ? parts.end() : there->second.find(fields);
-        const bool agrees = there != beside.end() && same != there->second.end() && same->second == assignment;
+        const bool agrees =
+            there != beside.end() && same != there->second.end() && same->second == assignment;
         both[of][fields] = agrees ? assignment : nullptr;
       }
     }

@@ -18,11 +18,12 @@ enum class Confs { kOn, kOff, kUndecided };
 
 /// What holds where a motion begins.
 struct State {
-  std::size_t load = 0;                         ///< as Tools numbers them; 0: the tool's own
-  std::size_t displaced = 0;                    ///< as Setting has the reason; 0: none
-  std::size_t external_displaced = 0;           ///< the same
-  std::array<std::size_t, 4> given_way{};       ///< the same, where the arm does not go where motions say
-  std::size_t settings = 0;                     ///< as Setting numbers them
+  std::size_t load = 0;                ///< as Tools numbers them; 0: the tool's own
+  std::size_t displaced = 0;           ///< as Setting has the reason; 0: none
+  std::size_t external_displaced = 0;  ///< the same
+  std::array<std::size_t, 4>
+      given_way{};           ///< the same, where the arm does not go where motions say
+  std::size_t settings = 0;  ///< as Setting numbers them
   Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
   bool operator==(const State&) const = default;
 };
@@ -38,7 +39,9 @@ class Setting {
   void join(State& state, const State& other, const std::string& by);
   /// Why all motions may be displaced; empty: they are not.
   [[nodiscard]] const std::string& open_displacement() const { return open_displacement_; }
-  [[nodiscard]] const std::string& displacement(std::size_t number) const { return displacements_[number]; }
+  [[nodiscard]] const std::string& displacement(std::size_t number) const {
+    return displacements_[number];
+  }
   [[nodiscard]] const Settings& settings(std::size_t number) const { return *settings_[number]; }
 
  private:

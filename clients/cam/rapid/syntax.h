@@ -10,8 +10,8 @@
 #include "clients/cam/flow.h"
 #include "clients/cam/rapid/tokens.h"
 
-/// What a RAPID module says, as far as targets need it. The whole language is not read: a statement that is not
-/// understood is passed over.
+/// What a RAPID module says, as far as targets need it. The whole language is not read: a statement
+/// that is not understood is passed over.
 namespace trammel::cam::rapid {
 
 /// A text that takes a pointer where it is empty: most parts of a long program are numbers.
@@ -59,10 +59,11 @@ struct Expression {
   char sign = 0;  ///< of a unary or binary operation
   int line = 0;
   std::uint32_t begin = 0, end = 0;
-  double value = 0;               ///< of a number
-  Name name;                      ///< of a name, a call, a field; the word of a truth value
-  Name label;                     ///< of an argument `\Rx:=...`: `rx`
-  std::vector<Expression> parts;  ///< elements, arguments, operands; of a field or element: what it is of, first
+  double value = 0;  ///< of a number
+  Name name;         ///< of a name, a call, a field; the word of a truth value
+  Name label;        ///< of an argument `\Rx:=...`: `rx`
+  std::vector<Expression>
+      parts;  ///< elements, arguments, operands; of a field or element: what it is of, first
 };
 
 enum class Storage { kConst, kPers, kVar, kParameter, kLoop };
@@ -103,7 +104,8 @@ struct Turn {
   std::size_t before = 0;  ///< which instruction of the module
 };
 
-/// The name of an instruction whose routine is named at run time, by its first argument: `%"load"% p10;`.
+/// The name of an instruction whose routine is named at run time, by its first argument: `%"load"%
+/// p10;`.
 constexpr const char* kLateCall = "%";
 
 /// `MoveL p10,v100,fine,tool1\WObj:=wobj1;`, or a call of a procedure.

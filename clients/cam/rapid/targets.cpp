@@ -28,8 +28,8 @@ Told<void> Targets::read_joints(const Data& data, ProgramTarget& target) {
   return {};
 }
 
-Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>& uses, const Data* place,
-                                ProgramTarget& target) const {
+Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>& uses,
+                                const Data* place, ProgramTarget& target) const {
   const Told<TargetValue> value = meaning_.target_of(*data.node, *data.scope);
   if (!value) return because(value.error());
   // The same bytes reached through different callers must mean the same.
@@ -60,7 +60,8 @@ void Targets::note_original(const Site& site, const Data& place, ProgramTarget& 
   target.comment_at = line_begin(text, site.statement);
   const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
   std::string original = meaning_.text_of(*place.node, *place.scope);
-  target.comment = text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
+  target.comment =
+      text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
 }
 
 void Targets::note_external(const std::array<double, 6>& external, ProgramTarget& target) {
@@ -74,7 +75,8 @@ void Targets::note_external(const std::array<double, 6>& external, ProgramTarget
 Configuration Targets::configuration_of(const std::array<double, 4>& conf) {
   Configuration configuration;
   const double branch = conf[3];
-  if (branch >= 0 && branch <= 7 && branch == std::floor(branch)) configuration.conf = static_cast<int>(branch);
+  if (branch >= 0 && branch <= 7 && branch == std::floor(branch))
+    configuration.conf = static_cast<int>(branch);
   configuration.near.resize(6);
   constexpr std::array<std::size_t, 3> kJoints = {0, 3, 5};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -84,19 +86,21 @@ Configuration Targets::configuration_of(const std::array<double, 4>& conf) {
 }
 
 /// `count` numbers from `first` on are written where the expression stands.
-void Targets::rewrite(const Expression& expression, const Scope& scope, std::size_t first, std::size_t count,
-                      int decimals, ProgramTarget& target) const {
+void Targets::rewrite(const Expression& expression, const Scope& scope, std::size_t first,
+                      std::size_t count, int decimals, ProgramTarget& target) const {
   const std::string& text = program_.files[scope.module].text;
   if (expression.kind == Kind::kAggregate && expression.parts.size() == count) {
     for (std::size_t k = 0; k < count; ++k) {
       const Expression& part = expression.parts[k];
-      const auto written = part.kind == Kind::kNumber
-                               ? read_number(std::string_view(text).substr(part.begin, part.end - part.begin))
-                               : std::nullopt;
+      const auto written =
+          part.kind == Kind::kNumber
+              ? read_number(std::string_view(text).substr(part.begin, part.end - part.begin))
+              : std::nullopt;
       NumberStyle style;
       style.decimals = decimals;
       if (!written) target.folded = true;
-      target.rewrites.push_back({{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
+      target.rewrites.push_back(
+          {{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
     }
     return;
   }
@@ -117,7 +121,8 @@ void Targets::add_numbers(std::size_t first, std::size_t count, int decimals, Re
   }
 }
 
-void Targets::rewrite_whole(const Expression& expression, const TargetValue& value, ProgramTarget& target) {
+void Targets::rewrite_whole(const Expression& expression, const TargetValue& value,
+                            ProgramTarget& target) {
   target.folded = true;
   Rewrite whole{{expression.begin, expression.end}, {"[["}, {}};
   add_numbers(0, 3, value.decimals, whole);
@@ -126,7 +131,8 @@ void Targets::rewrite_whole(const Expression& expression, const TargetValue& val
   std::vector<std::string> external;
   for (const double axis : value.external)
     external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
-  whole.texts.back() += fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
+  whole.texts.back() +=
+      fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
   target.rewrites.push_back(std::move(whole));
 }
 

@@ -18,7 +18,8 @@ struct Use {
   std::size_t module = 0;
   std::size_t move = 0;  ///< of Program::moves
   Data data;
-  std::string external_displaced = {};  ///< why external axes are not where the target has them; empty: they are
+  std::string external_displaced =
+      {};  ///< why external axes are not where the target has them; empty: they are
 };
 
 /// Bytes that hold a target, and what uses them.
@@ -38,18 +39,19 @@ class Targets {
       : meaning_(meaning), options_(options), program_(program) {}
 
   Told<void> read_joints(const Data& data, ProgramTarget& target);
-  [[nodiscard]] Told<void> read_target(const Data& data, const std::vector<const Use*>& uses, const Data* place,
-                                       ProgramTarget& target) const;
+  [[nodiscard]] Told<void> read_target(const Data& data, const std::vector<const Use*>& uses,
+                                       const Data* place, ProgramTarget& target) const;
   /// The line above the statement that keeps what was folded.
   void note_original(const Site& site, const Data& place, ProgramTarget& target) const;
 
  private:
   static void note_external(const std::array<double, 6>& external, ProgramTarget& target);
   static Configuration configuration_of(const std::array<double, 4>& conf);
-  void rewrite(const Expression& expression, const Scope& scope, std::size_t first, std::size_t count, int decimals,
-               ProgramTarget& target) const;
+  void rewrite(const Expression& expression, const Scope& scope, std::size_t first,
+               std::size_t count, int decimals, ProgramTarget& target) const;
   static void add_numbers(std::size_t first, std::size_t count, int decimals, Rewrite& whole);
-  static void rewrite_whole(const Expression& expression, const TargetValue& value, ProgramTarget& target);
+  static void rewrite_whole(const Expression& expression, const TargetValue& value,
+                            ProgramTarget& target);
 
   const Interpreter& meaning_;
   const ReadOptions& options_;

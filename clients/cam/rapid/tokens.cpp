@@ -9,7 +9,8 @@ namespace trammel::cam::rapid {
 namespace {
 
 bool is_letter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || static_cast<unsigned char>(c) >= 0x80;
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' ||
+         static_cast<unsigned char>(c) >= 0x80;
 }
 
 class Scanner {
@@ -20,7 +21,8 @@ class Scanner {
 
   Token next() {
     skip_blanks();
-    Token token{TokenKind::kEnd, static_cast<std::uint32_t>(at_), static_cast<std::uint32_t>(at_), line_};
+    Token token{TokenKind::kEnd, static_cast<std::uint32_t>(at_), static_cast<std::uint32_t>(at_),
+                line_};
     if (at_ >= text_.size()) return token;
     const char c = text_[at_];
     if (is_letter(c)) {
@@ -41,14 +43,17 @@ class Scanner {
   }
 
  private:
-  [[nodiscard]] char peek(std::size_t ahead) const { return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0'; }
+  [[nodiscard]] char peek(std::size_t ahead) const {
+    return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0';
+  }
 
   void skip_blanks() {
     for (; at_ < text_.size(); ++at_) {
       const char c = text_[at_];
       if (c == '!') at_ = std::min(text_.find('\n', at_), text_.size() - 1);
       if (at_ < text_.size() && text_[at_] == '\n') ++line_;
-      if (c != ' ' && c != '\t' && c != '\r' && c != '\n' && c != '!' && c != '\f' && c != '\0') return;
+      if (c != ' ' && c != '\t' && c != '\r' && c != '\n' && c != '!' && c != '\f' && c != '\0')
+        return;
     }
   }
 

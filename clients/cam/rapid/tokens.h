@@ -17,8 +17,8 @@ struct Token {
   int line = 1;
 };
 
-/// The tokens of a module, the last one kEnd. Words may hold letters of any encoding. A text that is no RAPID has
-/// tokens too.
+/// The tokens of a module, the last one kEnd. Words may hold letters of any encoding. A text that
+/// is no RAPID has tokens too.
 [[nodiscard]] std::vector<Token> tokens_of(std::string_view text);
 
 }  // namespace trammel::cam::rapid

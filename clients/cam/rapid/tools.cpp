@@ -17,14 +17,18 @@ namespace {
 
 using Kind = Expression::Kind;
 
-Data part(const Data& of, std::size_t index) { return {&of.node->parts[index], of.scope, of.type, of.declared}; }
+Data part(const Data& of, std::size_t index) {
+  return {&of.node->parts[index], of.scope, of.type, of.declared};
+}
 
 bool is_same(const std::optional<StatedLoad>& a, const std::optional<StatedLoad>& b) {
   return a.has_value() == b.has_value() && (!a || (a->mass == b->mass && a->p_F == b->p_F));
 }
 
-/// What the flange bears: a gripped load, whose centre is given in the tool, and the tool's own where it is stated.
-StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own, const std::optional<Pose>& X_FT) {
+/// What the flange bears: a gripped load, whose centre is given in the tool, and the tool's own
+/// where it is stated.
+StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own,
+                    const std::optional<Pose>& X_FT) {
   StatedLoad all = gripped;
   all.has_centre = X_FT.has_value();
   if (X_FT) all.p_F = *X_FT * gripped.p_F;
@@ -42,7 +46,8 @@ Tools::Tools(Interpreter& meaning, const ReadOptions& options, Program& program)
 }
 
 bool Tools::Load::operator==(const Load& other) const {
-  return name == other.name && why_not == other.why_not && total == other.total && is_same(load, other.load);
+  return name == other.name && why_not == other.why_not && total == other.total &&
+         is_same(load, other.load);
 }
 
 ProgramTool Tools::declared_tool(const Data& data) const {
@@ -74,8 +79,9 @@ std::size_t Tools::undecided_load(std::size_t load, const std::string& why) {
 std::size_t Tools::known_tool(ProgramTool tool) {
   for (std::size_t k = 0; k < program_.tools.size(); ++k) {
     const ProgramTool& known = program_.tools[k];
-    if (lower(known.name) == lower(tool.name) && known.file == tool.file && known.line == tool.line &&
-        known.carries == tool.carries && known.X_FT.has_value() == tool.X_FT.has_value() &&
+    if (lower(known.name) == lower(tool.name) && known.file == tool.file &&
+        known.line == tool.line && known.carries == tool.carries &&
+        known.X_FT.has_value() == tool.X_FT.has_value() &&
         (!tool.X_FT || known.X_FT->isApprox(*tool.X_FT, 1e-12)))
       return k;
   }
@@ -89,7 +95,8 @@ Told<Data> Tools::aggregate(const Data& of, std::size_t parts) const {
   for (int depth = 0; now.node->kind != Kind::kAggregate && depth < 10; ++depth) {
     const Told<std::vector<Data>> inner = meaning_.data_of(*now.node, *now.scope);
     if (!inner) return because(inner.error());
-    if (inner->size() != 1 || inner->front().node == now.node) return because("it is not written out");
+    if (inner->size() != 1 || inner->front().node == now.node)
+      return because("it is not written out");
     now = inner->front();
   }
   if (now.node->kind != Kind::kAggregate || now.node->parts.size() != parts)
@@ -101,9 +108,11 @@ Told<Pose> Tools::pose(const Data& of, int* rotation_decimals) const {
   const Told<Data> both = aggregate(of, 2);
   if (!both) return because(both.error());
   int ignored = 0;
-  const Told<std::vector<double>> p = meaning_.numbers_of(both->node->parts[0], 3, *both->scope, &ignored);
+  const Told<std::vector<double>> p =
+      meaning_.numbers_of(both->node->parts[0], 3, *both->scope, &ignored);
   if (!p) return because(p.error());
-  const Told<std::vector<double>> q = meaning_.numbers_of(both->node->parts[1], 4, *both->scope, rotation_decimals);
+  const Told<std::vector<double>> q =
+      meaning_.numbers_of(both->node->parts[1], 4, *both->scope, rotation_decimals);
   if (!q) return because(q.error());
   std::vector<double> numbers = *p;
   numbers.insert(numbers.end(), q->begin(), q->end());
@@ -115,15 +124,18 @@ Told<Pose> Tools::pose(const Data& of, int* rotation_decimals) const {
 Told<bool> Tools::truth(const Data& of) const {
   if (of.node->kind == Kind::kTruth) return of.node->name == "true";
   const Told<std::vector<Data>> data = meaning_.data_of(*of.node, *of.scope);
-  if (!data || data->size() != 1 || data->front().node->kind != Kind::kTruth) return because("it is not constant");
+  if (!data || data->size() != 1 || data->front().node->kind != Kind::kTruth)
+    return because("it is not constant");
   return data->front().node->name == "true";
 }
 
-/// What an argument that names a tool or a work object stands for; an error where it is not in the files.
+/// What an argument that names a tool or a work object stands for; an error where it is not in the
+/// files.
 Told<Data> Tools::named(const Expression& argument, const Scope& scope) const {
   const Told<std::vector<Data>> data = meaning_.data_of(argument, scope);
   if (!data) return because(data.error());
-  if (data->size() != 1) return because(fmt::format("an index chooses {}", shown(meaning_.text_of(argument, scope))));
+  if (data->size() != 1)
+    return because(fmt::format("an index chooses {}", shown(meaning_.text_of(argument, scope))));
   return data->front();
 }
 
@@ -171,8 +183,7 @@ void Tools::read_tool(const Data& data, ProgramTool& tool) const {
   if (const std::string found = meaning_.load_found(data.declared); !found.empty()) {
     tool.load.reset();
     tool.load_note = fmt::format(
-        "the load of tool {} is found at run time (LoadId, {}): it is not compared with the "
-        "cell's",
+        "the load of tool {} is found at run time (LoadId, {}): it is not compared with the cell's",
         shown(tool.name), found);
   }
 }
@@ -182,7 +193,8 @@ std::optional<StatedLoad> Tools::load_of(const Data& data) const {
   if (!load) return std::nullopt;
   int ignored = 0;
   const Told<double> mass = meaning_.number_of(load->node->parts[0], *load->scope);
-  const Told<std::vector<double>> cog = meaning_.numbers_of(load->node->parts[1], 3, *load->scope, &ignored);
+  const Told<std::vector<double>> cog =
+      meaning_.numbers_of(load->node->parts[1], 3, *load->scope, &ignored);
   if (!mass || !cog) return std::nullopt;
   return StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
 }
@@ -203,7 +215,8 @@ std::size_t Tools::frame_of(const Expression* argument, const Scope& scope) {
     if (expression->name == "wobj0") return 0;
     if (!take_row(frame.name, options_, frame))
       frame.why_not =
-          fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
+          fmt::format("work object {} is not in the files handed over: --frames tells its value",
+                      shown(frame.name));
     return add_once(program_, std::move(frame));
   }
   const Told<Data> data = named(*expression, *where);
@@ -260,13 +273,15 @@ Tools::Load Tools::load_called(const Expression& argument, const Scope& scope) c
     if (expression->name == "load0")
       load.load = StatedLoad{};
     else
-      load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
+      load.note = fmt::format("load {} is not in the files: it is not compared with the cell's",
+                              shown(load.name));
     return load;
   }
   const Told<Data> data = named(*expression, *where);
   if (data) load.load = load_of(*data);
   if (!load.load)
-    load.why_not = fmt::format("load {}: {}", shown(load.name), data ? "it is not constant" : data.error());
+    load.why_not =
+        fmt::format("load {}: {}", shown(load.name), data ? "it is not constant" : data.error());
   return load;
 }
 
@@ -283,8 +298,10 @@ std::size_t Tools::load_set(std::size_t module, const Instruction& instruction) 
   return known_load(std::move(load));
 }
 
-/// The tool with what it carries: `\TLoad` says all of it, else GripLoad what comes to the tool's own.
-std::size_t Tools::tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion, const Scope& scope) {
+/// The tool with what it carries: `\TLoad` says all of it, else GripLoad what comes to the tool's
+/// own.
+std::size_t Tools::tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion,
+                                 const Scope& scope) {
   std::size_t index = gripped;
   for (const Expression& argument : motion.arguments) {
     if (argument.label != "tload") continue;

@@ -26,8 +26,10 @@ class Tools {
   std::size_t load_set(std::size_t module, const Instruction& instruction);
   /// A load of which only this is known; a load that is not known already stays.
   std::size_t undecided_load(std::size_t load, const std::string& why);
-  /// The tool with what it carries: `\TLoad` says all of it, else `gripped` what comes to the tool's own.
-  std::size_t tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion, const Scope& scope);
+  /// The tool with what it carries: `\TLoad` says all of it, else `gripped` what comes to the
+  /// tool's own.
+  std::size_t tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion,
+                            const Scope& scope);
 
   /// As a module declares it, whether motions use it or not.
   [[nodiscard]] ProgramTool declared_tool(const Data& data) const;
@@ -48,7 +50,8 @@ class Tools {
   [[nodiscard]] Told<Data> aggregate(const Data& of, std::size_t parts) const;
   [[nodiscard]] Told<Pose> pose(const Data& of, int* rotation_decimals) const;
   [[nodiscard]] Told<bool> truth(const Data& of) const;
-  /// What an argument that names a tool or a work object stands for; an error where it is not in the files.
+  /// What an argument that names a tool or a work object stands for; an error where it is not in
+  /// the files.
   [[nodiscard]] Told<Data> named(const Expression& argument, const Scope& scope) const;
   void read_tool(const Data& data, ProgramTool& tool) const;
   void read_frame(const Data& parts, ProgramFrame& frame) const;
@@ -59,7 +62,8 @@ class Tools {
   const ReadOptions& options_;
   Program& program_;
   std::vector<Load> loads_ = std::vector<Load>(1);
-  std::map<const Expression*, std::size_t> tool_at_, frame_at_;  ///< of Program::tools and frames, by what says them
+  std::map<const Expression*, std::size_t> tool_at_,
+      frame_at_;  ///< of Program::tools and frames, by what says them
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
 };
 

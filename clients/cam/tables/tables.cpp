@@ -29,8 +29,8 @@ struct Columns {
 
 Field trimmed(const std::string& text, std::size_t begin, std::size_t end) {
   while (begin < end && (text[begin] == ' ' || text[begin] == '\t' || text[begin] == '"')) ++begin;
-  while (end > begin &&
-         (text[end - 1] == ' ' || text[end - 1] == '\t' || text[end - 1] == '\r' || text[end - 1] == '"'))
+  while (end > begin && (text[end - 1] == ' ' || text[end - 1] == '\t' || text[end - 1] == '\r' ||
+                         text[end - 1] == '"'))
     --end;
   return {begin, end, std::string_view(text).substr(begin, end - begin)};
 }
@@ -90,17 +90,21 @@ std::optional<Columns> named_columns(const Row& header) {
     }
     return at.size() == names.size() ? at : std::vector<std::size_t>();
   };
-  if (auto at = all({"x", "y", "z", "qw", "qx", "qy", "qz"}); !at.empty()) return Columns{Coordinates::kQuaternion, at};
-  if (auto at = all({"x", "y", "z", "a", "b", "c"}); !at.empty()) return Columns{Coordinates::kAnglesZyx, at};
-  if (auto at = all({"x", "y", "z", "rx", "ry", "rz"}); !at.empty()) return Columns{Coordinates::kAnglesXyz, at};
-  if (auto at = all({"x", "y", "z", "w", "p", "r"}); !at.empty()) return Columns{Coordinates::kAnglesXyz, at};
+  if (auto at = all({"x", "y", "z", "qw", "qx", "qy", "qz"}); !at.empty())
+    return Columns{Coordinates::kQuaternion, at};
+  if (auto at = all({"x", "y", "z", "a", "b", "c"}); !at.empty())
+    return Columns{Coordinates::kAnglesZyx, at};
+  if (auto at = all({"x", "y", "z", "rx", "ry", "rz"}); !at.empty())
+    return Columns{Coordinates::kAnglesXyz, at};
+  if (auto at = all({"x", "y", "z", "w", "p", "r"}); !at.empty())
+    return Columns{Coordinates::kAnglesXyz, at};
   return std::nullopt;
 }
 
 class Tables {
  public:
-  Tables(std::vector<SourceFile> files, const std::string& dialect, const std::string& frame, Columns bare,
-         const ReadOptions& options)
+  Tables(std::vector<SourceFile> files, const std::string& dialect, const std::string& frame,
+         Columns bare, const ReadOptions& options)
       : bare_(std::move(bare)) {
     program_.dialect = dialect;
     program_.files = std::move(files);
@@ -159,11 +163,15 @@ class Tables {
 }  // namespace
 
 Program read_camrob(std::vector<SourceFile> files, const ReadOptions& options) {
-  return Tables(std::move(files), "camrob", "CAMROB", {Coordinates::kAnglesZyx, {1, 2, 3, 4, 5, 6}}, options).read();
+  return Tables(std::move(files), "camrob", "CAMROB", {Coordinates::kAnglesZyx, {1, 2, 3, 4, 5, 6}},
+                options)
+      .read();
 }
 
 Program read_robodk(std::vector<SourceFile> files, const ReadOptions& options) {
-  return Tables(std::move(files), "robodk", "ROBODK", {Coordinates::kAnglesXyz, {0, 1, 2, 3, 4, 5}}, options).read();
+  return Tables(std::move(files), "robodk", "ROBODK", {Coordinates::kAnglesXyz, {0, 1, 2, 3, 4, 5}},
+                options)
+      .read();
 }
 
 }  // namespace trammel::cam

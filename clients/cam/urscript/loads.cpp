@@ -29,16 +29,18 @@ std::optional<Vector3> centre_at(const std::vector<Piece>& pieces, std::size_t a
 std::size_t Loads::add(Load load) {
   for (std::size_t k = 1; k < all_.size(); ++k) {
     const Load& known = all_[k];
-    const bool same = known.load.has_value() == load.load.has_value() &&
-                      (!load.load || (known.load->mass == load.load->mass && known.load->p_F == load.load->p_F &&
-                                      known.load->has_centre == load.load->has_centre));
+    const bool same =
+        known.load.has_value() == load.load.has_value() &&
+        (!load.load || (known.load->mass == load.load->mass && known.load->p_F == load.load->p_F &&
+                        known.load->has_centre == load.load->has_centre));
     if (same && known.why_not == load.why_not) return k;
   }
   all_.push_back(std::move(load));
   return all_.size() - 1;
 }
 
-std::size_t Loads::set(const std::vector<Piece>& pieces, std::size_t at, std::size_t before, const std::string& file) {
+std::size_t Loads::set(const std::vector<Piece>& pieces, std::size_t at, std::size_t before,
+                       const std::string& file) {
   const std::string where = fmt::format("{} ({} line {})", pieces[at].text, file, pieces[at].line);
   Load load{where, std::nullopt, ""};
   StatedLoad stated;
@@ -56,7 +58,8 @@ std::size_t Loads::set(const std::vector<Piece>& pieces, std::size_t at, std::si
     if (constant) stated.mass = read_number(pieces[next].text).value_or(WrittenNumber{}).value;
     next += 2;
   }
-  if (constant && !pieces[at].is("set_payload_mass") && next < pieces.size() && pieces[next - 1].text != ")") {
+  if (constant && !pieces[at].is("set_payload_mass") && next < pieces.size() &&
+      pieces[next - 1].text != ")") {
     const auto centre = centre_at(pieces, next);
     constant = centre.has_value();
     if (centre) stated.p_F = *centre;

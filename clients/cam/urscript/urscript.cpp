@@ -63,7 +63,8 @@ struct State {
 /// The axes are commanded, and the tool may take any way.
 bool is_of_axes(const Piece& piece) { return piece.is("movej") || piece.is("optimovej"); }
 bool is_motion(const Piece& piece) {
-  return is_of_axes(piece) || piece.is("movel") || piece.is("movep") || piece.is("movec") || piece.is("optimovel");
+  return is_of_axes(piece) || piece.is("movel") || piece.is("movep") || piece.is("movec") ||
+         piece.is("optimovel");
 }
 
 /// Moves the arm to where no pose says.
@@ -81,7 +82,8 @@ class Script {
         sites_(sites),
         options_(options),
         text_(program.files[index].text),
-        pieces_(pieces_of(text_, text_.starts_with("\xEF\xBB\xBF") ? 3 : 0, text_.size(), 1, {"#", "\"'"})) {}
+        pieces_(pieces_of(text_, text_.starts_with("\xEF\xBB\xBF") ? 3 : 0, text_.size(), 1,
+                          {"#", "\"'"})) {}
 
   void read() {
     program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
@@ -105,7 +107,8 @@ class Script {
         motion(at);
       }
       if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
-        leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
+        leave(pieces_[at], std::string(pieces_[at].text),
+              "it follows what is computed at run time");
     }
     values_of_.assume(nullptr);
     note_order(flow);
@@ -134,10 +137,15 @@ class Script {
   /// The words that decide the order, and the functions that move the robot or set something.
   void find_steps() {
     using Kind = Step::Kind;
-    static const std::map<std::string_view, Kind> kWords = {
-        {"if", Kind::kIf},      {"elif", Kind::kCase},  {"else", Kind::kElse},         {"while", Kind::kWhile},
-        {"end", Kind::kEnd},    {"break", Kind::kExit}, {"continue", Kind::kContinue}, {"return", Kind::kReturn},
-        {"halt", Kind::kReturn}};
+    static const std::map<std::string_view, Kind> kWords = {{"if", Kind::kIf},
+                                                            {"elif", Kind::kCase},
+                                                            {"else", Kind::kElse},
+                                                            {"while", Kind::kWhile},
+                                                            {"end", Kind::kEnd},
+                                                            {"break", Kind::kExit},
+                                                            {"continue", Kind::kContinue},
+                                                            {"return", Kind::kReturn},
+                                                            {"halt", Kind::kReturn}};
     std::set<std::string> functions;
     for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
       if (pieces_[at].is("def")) functions.emplace(pieces_[at + 1].text);
@@ -157,8 +165,9 @@ class Script {
       if (defines(pieces_[at]) && at + 1 < pieces_.size()) {
         const std::string name(pieces_[at + 1].text);
         // A thread runs beside all others.
-        add(pieces_[at].is("def") ? Step{Kind::kRoutine, name}
-                                  : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
+        add(pieces_[at].is("def")
+                ? Step{Kind::kRoutine, name}
+                : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
             at);
         ++at;  // not a call of it
       } else if (const auto word = kWords.find(pieces_[at].text); word != kWords.end()) {
@@ -178,19 +187,22 @@ class Script {
       if (piece.kind != Piece::Kind::kWord) continue;
       if (defines(piece) || piece.is("if") || piece.is("while")) open.push_back(&piece);
       if (!piece.is("end")) continue;
-      if (open.empty()) return program_.cuts.push_back({index_, piece.line, "an end without its beginning"});
+      if (open.empty())
+        return program_.cuts.push_back({index_, piece.line, "an end without its beginning"});
       open.pop_back();
     }
     if (!open.empty())
-      program_.cuts.push_back({index_, open.back()->line, fmt::format("{} has no end", open.back()->text)});
+      program_.cuts.push_back(
+          {index_, open.back()->line, fmt::format("{} has no end", open.back()->text)});
   }
 
   /// The controller takes the joints nearest to those before.
   void note_order(const Flow& flow) {
     const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
       if (const auto move = move_of_.find(s); move != move_of_.end()) return move->second;
-      return sets_[s] == nullptr && is_followed(pieces_[step_at_[s]]) ? std::optional<std::size_t>(kNoMotion)
-                                                                      : std::nullopt;
+      return sets_[s] == nullptr && is_followed(pieces_[step_at_[s]])
+                 ? std::optional<std::size_t>(kNoMotion)
+                 : std::nullopt;
     });
     for (const auto& [step, move] : move_of_) program_.moves[move].before = before[step];
   }
@@ -208,8 +220,8 @@ class Script {
       if (superposed()[k].ends.contains(pieces_[at].text)) state.superposed[k] = 0;
     }
     if (pieces_[at].is("set_tcp")) state.tool = tool_set(at);
-    if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") || pieces_[at].is("set_payload_mass") ||
-        pieces_[at].is("set_payload_cog"))
+    if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") ||
+        pieces_[at].is("set_payload_mass") || pieces_[at].is("set_payload_cog"))
       state.load = loads_.set(pieces_, at, state.load, program_.files[index_].name);
   }
 
@@ -221,8 +233,8 @@ class Script {
       if (there == other.settings.end() || there->second != number) number = kUndecided;
     }
     for (const auto& [name, number] : other.settings) state.settings.try_emplace(name, kUndecided);
-    const std::string why =
-        by.empty() ? "a branch or a loop of the script decides it" : fmt::format("{} may change it", by);
+    const std::string why = by.empty() ? "a branch or a loop of the script decides it"
+                                       : fmt::format("{} may change it", by);
     if (state.tool != other.tool && program_.tools[state.tool].why_not.empty()) {
       ProgramTool tool;
       tool.name = "tcp";
@@ -237,8 +249,11 @@ class Script {
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       const ProgramTool& known = program_.tools[k];
       const bool same_pose = known.X_FT && tool.X_FT && known.X_FT->isApprox(*tool.X_FT, 1e-12);
-      const bool both_unknown = !known.X_FT && !tool.X_FT && known.why_not == tool.why_not && !tool.why_not.empty();
-      if ((same_pose || both_unknown) && known.carries == tool.carries && known.why_not == tool.why_not) return k;
+      const bool both_unknown =
+          !known.X_FT && !tool.X_FT && known.why_not == tool.why_not && !tool.why_not.empty();
+      if ((same_pose || both_unknown) && known.carries == tool.carries &&
+          known.why_not == tool.why_not)
+        return k;
     }
     program_.tools.push_back(std::move(tool));
     return program_.tools.size() - 1;
@@ -267,8 +282,8 @@ class Script {
   }
   void note_reading(std::size_t at, const Value& value) {
     if (!values_.contains(value.begin) || value.numbers.empty()) return;
-    const bool set_here =
-        at + 1 < pieces_.size() && pieces_[at + 1].is("=") && !pieces_[std::min(at + 2, pieces_.size() - 1)].is("=");
+    const bool set_here = at + 1 < pieces_.size() && pieces_[at + 1].is("=") &&
+                          !pieces_[std::min(at + 2, pieces_.size() - 1)].is("=");
     const bool gone_to = at > 1 && pieces_[at - 1].is("(") && is_motion(pieces_[at - 2]);
     if (set_here || gone_to) return;
     std::size_t first = at;
@@ -310,9 +325,9 @@ class Script {
     if (up_B.norm() > 0)
       program_.ups.push_back({up_B.normalized(), "set_gravity", file, pieces_[at].line});
     else
-      program_.notes.push_back(
-          fmt::format("set_gravity ({} line {}) is not constant: it is not compared with the cell's gravity", file,
-                      pieces_[at].line));
+      program_.notes.push_back(fmt::format(
+          "set_gravity ({} line {}) is not constant: it is not compared with the cell's gravity",
+          file, pieces_[at].line));
   }
 
   std::size_t tool_set(std::size_t at) {
@@ -347,12 +362,15 @@ class Script {
       Value value = values_of_.value_at(next);
       // The joints of a pose are those of the pose.
       std::string why;
-      if (value.kind == Value::Kind::kCall && value.name == "get_inverse_kin" && !value.arguments.empty())
+      if (value.kind == Value::Kind::kCall && value.name == "get_inverse_kin" &&
+          !value.arguments.empty())
         why = take_inverse(value, move);
-      else if (!values_of_.ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
+      else if (!values_of_.ends_here(next, pieces_[at].line) && next < pieces_.size() &&
+               !pieces_[next].is(","))
         value.kind = Value::Kind::kOther;
       for (std::size_t s = 0; s < superposed_.size(); ++s) {
-        if (superposed_[s] != 0) why = fmt::format("{} (line {})", superposed()[s].why, superposed_[s]);
+        if (superposed_[s] != 0)
+          why = fmt::format("{} (line {})", superposed()[s].why, superposed_[s]);
       }
       if (why.empty())
         use(at, value);
@@ -363,19 +381,22 @@ class Script {
     note_speed(at, next);
   }
 
-  /// `get_inverse_kin(p, qnear=q)`: what stands for its pose, and the joints that the motion is to be near to. Returns
-  /// why it is not known; empty: it is.
+  /// `get_inverse_kin(p, qnear=q)`: what stands for its pose, and the joints that the motion is to
+  /// be near to. Returns why it is not known; empty: it is.
   std::string take_inverse(Value& value, ProgramMove& move) const {
     const std::vector<Value> arguments = std::move(value.arguments);
     value = arguments[0];
     for (std::size_t k = 1; k < arguments.size(); ++k) {
       const Value& argument = arguments[k];
-      if (argument.label == "tcp" || (argument.label.empty() && k == 4)) return "get_inverse_kin is given another tool";
+      if (argument.label == "tcp" || (argument.label.empty() && k == 4))
+        return "get_inverse_kin is given another tool";
       if (argument.label != "qnear" && (!argument.label.empty() || k > 1)) continue;
-      if (argument.kind == Value::Kind::kCall && argument.name == "get_actual_joint_positions") continue;
+      if (argument.kind == Value::Kind::kCall && argument.name == "get_actual_joint_positions")
+        continue;
       const Told<Value> near = values_of_.resolved(argument);
       if (!near) return near.error();
-      if (near->kind != Value::Kind::kJoints) return "the joints that it is to be near to are not constant";
+      if (near->kind != Value::Kind::kJoints)
+        return "the joints that it is to be near to are not constant";
       if (move.choice == JointChoice::kNearest) move.near = numbers_in(*near);
     }
     return "";
@@ -385,9 +406,12 @@ class Script {
   void note_speed(std::size_t at, std::size_t next) {
     if (is_of_axes(pieces_[at])) return;
     const std::size_t first = next;
-    for (; next + 2 < pieces_.size() && pieces_[next].line == pieces_[at].line && !pieces_[next].is(")"); ++next) {
+    for (; next + 2 < pieces_.size() && pieces_[next].line == pieces_[at].line &&
+           !pieces_[next].is(")");
+         ++next) {
       const bool named = pieces_[next].is("v") && pieces_[next + 1].is("=");
-      const bool second = next == first && pieces_[next].kind == Piece::Kind::kNumber && pieces_[next + 1].is(",");
+      const bool second =
+          next == first && pieces_[next].kind == Piece::Kind::kNumber && pieces_[next + 1].is(",");
       if (!named && !second) continue;
       if (pieces_[next + 2].kind != Piece::Kind::kNumber) continue;
       if (const auto speed = read_number(pieces_[next + 2].text))
@@ -403,16 +427,18 @@ class Script {
                           (now->kind == Value::Kind::kCall && is_function_of_poses(now->name));
     if (!readable) {
       return leave(pieces_[at], name,
-                   now->kind == Value::Kind::kCall ? fmt::format("the function {} decides it", shown(now->name))
-                                                   : std::string("an expression decides it"));
+                   now->kind == Value::Kind::kCall
+                       ? fmt::format("the function {} decides it", shown(now->name))
+                       : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
-    if (now->kind == Value::Kind::kCall) poses_.insert_or_assign(now->begin, values_of_.pose_of_value(value, 0));
+    if (now->kind == Value::Kind::kCall)
+      poses_.insert_or_assign(now->begin, values_of_.pose_of_value(value, 0));
     if (now->kind == Value::Kind::kJoints)
       program_.moves.back().axes = in_degrees(Coordinates::kJointRadians, numbers_in(*now));
     sites_.add(index_, now->begin, name,
-               {tool_, 0, std::string(pieces_[at].text), index_, pieces_[at].line, program_.moves.size() - 1,
-                !is_of_axes(pieces_[at])});
+               {tool_, 0, std::string(pieces_[at].text), index_, pieces_[at].line,
+                program_.moves.size() - 1, !is_of_axes(pieces_[at])});
   }
 
   static std::string rewrite_numbers(const Value& value, ProgramTarget& target) {
@@ -420,7 +446,8 @@ class Script {
       const auto written = read_number(value.numbers[k].text);
       if (!written) return "it holds what is no number";
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{value.numbers[k].begin, value.numbers[k].end}, {}, {{k, written->style}}});
+      target.rewrites.push_back(
+          {{value.numbers[k].begin, value.numbers[k].end}, {}, {{k, written->style}}});
     }
     return "";
   }
@@ -440,7 +467,8 @@ class Script {
     for (char& c : original) {
       if (c == '\n' || c == '\r') c = ' ';
     }
-    target.comment = text_.substr(target.comment_at, indent - target.comment_at) + "# trammel: was " + original;
+    target.comment =
+        text_.substr(target.comment_at, indent - target.comment_at) + "# trammel: was " + original;
     target.rewrites.push_back(std::move(whole));
   }
 
@@ -473,9 +501,11 @@ Program read_urscript(std::vector<SourceFile> files, const ReadOptions& options)
   Sites sites;
   std::vector<Script> scripts;
   scripts.reserve(program.files.size());
-  for (std::size_t f = 0; f < program.files.size(); ++f) scripts.emplace_back(f, program, sites, options).read();
-  sites.finish(program,
-               [&](const Site& site, ProgramTarget& target) { return scripts[site.file].describe(site, target); });
+  for (std::size_t f = 0; f < program.files.size(); ++f)
+    scripts.emplace_back(f, program, sites, options).read();
+  sites.finish(program, [&](const Site& site, ProgramTarget& target) {
+    return scripts[site.file].describe(site, target);
+  });
   return program;
 }
 

@@ -20,15 +20,19 @@ bool is_function_of_poses(const std::string& name) {
   return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
 }
 
-bool defines(const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); }
+bool defines(const Piece& piece) {
+  return piece.is("def") || piece.is("thread") || piece.is("sec");
+}
 
 std::vector<double> numbers_in(const Value& value) {
   std::vector<double> numbers;
-  for (const Piece& piece : value.numbers) numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
+  for (const Piece& piece : value.numbers)
+    numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
   return numbers;
 }
 
-Values::Values(const std::vector<Piece>& pieces, std::string file) : pieces_(pieces), file_(std::move(file)) {
+Values::Values(const std::vector<Piece>& pieces, std::string file)
+    : pieces_(pieces), file_(std::move(file)) {
   for (std::size_t at = 0; at < pieces_.size(); ++at) {
     note_block(at);
     note_assignment(at);
@@ -46,26 +50,30 @@ void Values::note_block(std::size_t at) {
 
 /// The piece of the `def` or `thread` that is open; one behind all of them: none is.
 std::size_t Values::function_here() const {
-  const auto own =
-      std::find_if(open_.rbegin(), open_.rend(), [&](std::size_t block) { return defines(pieces_[block]); });
+  const auto own = std::find_if(open_.rbegin(), open_.rend(),
+                                [&](std::size_t block) { return defines(pieces_[block]); });
   return own == open_.rend() ? pieces_.size() : *own;
 }
 
 /// `global p1 = p[...]`; what is set in part is decided at run time.
 void Values::note_assignment(std::size_t at) {
   if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
-  const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line || pieces_[at - 1].is("global") ||
-                     pieces_[at - 1].is("local");
+  const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line ||
+                     pieces_[at - 1].is("global") || pieces_[at - 1].is("local");
   if (!first) return;
   const std::string name(pieces_[at].text);
   std::size_t equals = at + 1;
   if (pieces_[equals].is("[")) {
-    while (equals < pieces_.size() && !pieces_[equals].is("=") && pieces_[equals].line == pieces_[at].line) ++equals;
+    while (equals < pieces_.size() && !pieces_[equals].is("=") &&
+           pieces_[equals].line == pieces_[at].line)
+      ++equals;
   }
-  if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("=")) return;
+  if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("="))
+    return;
   Variable& variable = variables_[name];
   const bool again = variable.value.end > 0, in_part = equals != at + 1;
-  const std::string why = fmt::format("{} is set at run time ({} line {})", shown(name), file_, pieces_[at].line);
+  const std::string why =
+      fmt::format("{} is set at run time ({} line {})", shown(name), file_, pieces_[at].line);
   std::size_t next = equals + 1;
   const Value value = value_at(next);
   if (in_part) variable.changed = why;
@@ -92,14 +100,15 @@ void Values::note_parameters(std::size_t at) {
   }
 }
 
-/// A variable that constants alone are assigned to has each of them until the next, if all its assignments mean one
-/// variable: none is local, and they stand in one function or it is global.
+/// A variable that constants alone are assigned to has each of them until the next, if all its
+/// assignments mean one variable: none is local, and they stand in one function or it is global.
 void Values::find_order(Variable& variable) {
   if (variable.in_order.size() < 2) return variable.in_order.clear();
   const bool is_one = !variable.is_local && (variable.is_global || variable.functions.size() < 2);
-  const bool constant = std::all_of(variable.in_order.begin(), variable.in_order.end(), [](const Value& value) {
-    return value.kind == Value::Kind::kPose || value.kind == Value::Kind::kJoints;
-  });
+  const bool constant =
+      std::all_of(variable.in_order.begin(), variable.in_order.end(), [](const Value& value) {
+        return value.kind == Value::Kind::kPose || value.kind == Value::Kind::kJoints;
+      });
   if (variable.changed.empty() && is_one && constant) return;
   if (variable.changed.empty()) variable.changed = variable.set_again;
   variable.in_order.clear();
@@ -117,7 +126,8 @@ Value Values::value_at(std::size_t& at, int depth) const {
     bool is_number_due = true;
     for (; at < pieces_.size() && !pieces_[at].is("]"); ++at) {
       const bool is_number = pieces_[at].kind == Piece::Kind::kNumber;
-      if (is_number != is_number_due || (!is_number && !pieces_[at].is(","))) value.kind = Value::Kind::kOther;
+      if (is_number != is_number_due || (!is_number && !pieces_[at].is(",")))
+        value.kind = Value::Kind::kOther;
       if (is_number) value.numbers.push_back(pieces_[at]);
       is_number_due = !is_number_due;
     }
@@ -152,14 +162,16 @@ Value Values::value_at(std::size_t& at, int depth) const {
 }
 
 bool Values::ends_here(std::size_t at, int line) const {
-  return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") || pieces_[at].is(")");
+  return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") ||
+         pieces_[at].is(")");
 }
 
 Told<Value> Values::resolved(const Value& value, bool stored) const {
   Value now = value;
   for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
     const auto variable = variables_.find(now.name);
-    if (variable == variables_.end()) return because(fmt::format("{} is not in the script", shown(now.name)));
+    if (variable == variables_.end())
+      return because(fmt::format("{} is not in the script", shown(now.name)));
     if (!variable->second.changed.empty()) return because(variable->second.changed);
     if (variable->second.in_order.empty()) {
       now = variable->second.value;
@@ -177,7 +189,8 @@ Told<Pose> Values::pose_of_value(const Value& value, int depth, bool stored) con
   const Told<Value> now = resolved(value, stored);
   const bool inner = stored || value.kind == Value::Kind::kName;
   if (!now) return because(now.error());
-  if (now->kind == Value::Kind::kPose) return pose_of(Coordinates::kRotationVector, numbers_in(*now));
+  if (now->kind == Value::Kind::kPose)
+    return pose_of(Coordinates::kRotationVector, numbers_in(*now));
   if (now->kind != Value::Kind::kCall) return because("it is not constant");
   const std::size_t due = now->name == "pose_inv" ? 1 : 2;
   if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)

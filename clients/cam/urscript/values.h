@@ -34,7 +34,8 @@ struct Value {
 struct Variable {
   Value value;
   std::string changed;
-  /// Constants that it is set to one after the other, each until the next; empty: `value` is its only one.
+  /// Constants that it is set to one after the other, each until the next; empty: `value` is its
+  /// only one.
   std::vector<Value> in_order = {};
   bool is_global = false, is_local = false;  ///< as any of its assignments says
   std::set<std::size_t> functions = {};      ///< that set it, by the piece of their `def`
@@ -60,7 +61,8 @@ struct Assignment {
 
 class Values {
  public:
-  /// Of the pieces of a script, which is called `file` in reasons. Finds what its variables are set to.
+  /// Of the pieces of a script, which is called `file` in reasons. Finds what its variables are set
+  /// to.
   Values(const std::vector<Piece>& pieces, std::string file);
 
   /// The value from a piece on; `at` is set behind it.
@@ -73,8 +75,12 @@ class Values {
   void assume(const Settings* settings) { now_ = settings; }
   [[nodiscard]] const std::map<std::string, Variable>& variables() const { return variables_; }
   /// Assignments to variables that are set in order, by the piece behind them.
-  [[nodiscard]] const std::multimap<std::size_t, Assignment>& assignments() const { return assignments_; }
-  [[nodiscard]] bool is_set_in_order(const std::string& name) const { return variables_.at(name).in_order.size() > 1; }
+  [[nodiscard]] const std::multimap<std::size_t, Assignment>& assignments() const {
+    return assignments_;
+  }
+  [[nodiscard]] bool is_set_in_order(const std::string& name) const {
+    return variables_.at(name).in_order.size() > 1;
+  }
 
  private:
   void note_block(std::size_t at);

@@ -27,7 +27,8 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr std::size_t kPosesTogether = 1000;  // poses that a model predicts between two updates of the progress
+constexpr std::size_t kPosesTogether =
+    1000;  // poses that a model predicts between two updates of the progress
 
 /// What predict and correct have in common.
 struct ApplyArguments {
@@ -61,7 +62,8 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   list = std::move(checked);
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
-    if (const Status known = model.check_trained_with(pose.context.tool, pose.context.payload); !known) {
+    if (const Status known = model.check_trained_with(pose.context.tool, pose.context.payload);
+        !known) {
       return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
@@ -79,7 +81,9 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
     const std::size_t to = std::min(from + kPosesTogether, poses.size());
-    const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
+    const auto place = [&](std::size_t i) {
+      return poses.begin() + static_cast<std::ptrdiff_t>(i);
+    };
     for (const ErrorPrediction& prediction : model.predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
     }
@@ -94,8 +98,8 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   std::vector<client::CommandedJoints> poses;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context.tool || pose.context.payload != context.payload) {
-      return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
-                     context.tool, context.payload)
+      return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool,
+                     pose.context.payload, context.tool, context.payload)
           .in(list.where)
           .at_row(pose.row)
           .of("tool_id")
@@ -106,9 +110,10 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   }
   const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
-  auto answer =
-      TRY(session->predict_error_at(context, poses, [&](double share) { progress.show("predicting", share); }));
-  return Predictions{answer.model.id, std::move(answer.items), {}, {}, std::move(answer.model.notes)};
+  auto answer = TRY(session->predict_error_at(
+      context, poses, [&](double share) { progress.show("predicting", share); }));
+  return Predictions{
+      answer.model.id, std::move(answer.items), {}, {}, std::move(answer.model.notes)};
 }
 
 /// What --covariance and --orientation ask for.
@@ -126,12 +131,13 @@ Status add_uncertainties(Predictions& predictions, const ApplyArguments& argumen
 Status predict(const ApplyArguments& arguments) {
   JointList list = TRY(read_joint_file(arguments.input));
   fill_in(list, arguments);
-  Predictions predictions =
-      TRY(arguments.service.service ? predict_by_service(list, arguments) : predict_here(list, arguments));
+  Predictions predictions = TRY(arguments.service.service ? predict_by_service(list, arguments)
+                                                          : predict_here(list, arguments));
   warn_of_notes(predictions.notes);
   TRY(add_uncertainties(predictions, arguments));
-  return write_together({{"--output", arguments.output, predictions_csv(list, predictions)},
-                         {"--json", arguments.json, json_text(predictions_json(list, predictions))}});
+  return write_together(
+      {{"--output", arguments.output, predictions_csv(list, predictions)},
+       {"--json", arguments.json, json_text(predictions_json(list, predictions))}});
 }
 
 Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& arguments) {
@@ -140,14 +146,17 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   const std::string tool = TRY(resolve_tool(model.cell(), arguments.tool));
   const std::string payload = TRY(resolve_payload(model.cell(), arguments.payload));
   TRY(model.check_trained_with(tool, payload));
-  Corrections corrections{model.provenance().id, joint_types(model.cell().robot), {}, notes_of(model)};
+  Corrections corrections{
+      model.provenance().id, joint_types(model.cell().robot), {}, notes_of(model)};
   corrections.items.resize(file.rows.size());
   ProgressLine progress;
   in_parallel(
       file.rows.size(),
       [&](std::size_t i) {
-        const Target target = from_wire(to_wire(file.rows[i].target, corrections.joint_types), model.cell().robot);
-        corrections.items[i] = to_wire(model.correct(target, tool, payload), corrections.joint_types);
+        const Target target =
+            from_wire(to_wire(file.rows[i].target, corrections.joint_types), model.cell().robot);
+        corrections.items[i] =
+            to_wire(model.correct(target, tool, payload), corrections.joint_types);
       },
       [&](double share) { progress.show("correcting", share); });
   return corrections;
@@ -159,12 +168,14 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
   const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
-  auto answer =
-      TRY(session->correct_targets(context, targets, [&](double share) { progress.show("correcting", share); }));
-  const bool all_unreachable = std::all_of(answer.items.begin(), answer.items.end(),
-                                           [](const auto& item) { return item.status == "unreachable"; });
+  auto answer = TRY(session->correct_targets(
+      context, targets, [&](double share) { progress.show("correcting", share); }));
+  const bool all_unreachable =
+      std::all_of(answer.items.begin(), answer.items.end(),
+                  [](const auto& item) { return item.status == "unreachable"; });
   if (all_unreachable && may_be_metres(file)) return tl::make_unexpected(looks_like_metres(file));
-  return Corrections{answer.model.id, file.joint_types, std::move(answer.items), std::move(answer.model.notes)};
+  return Corrections{answer.model.id, file.joint_types, std::move(answer.items),
+                     std::move(answer.model.notes)};
 }
 
 /// What correct is asked for, a program or a table of targets.
@@ -173,29 +184,31 @@ struct CorrectArguments : ApplyArguments {
   std::string receipt, report, format, frames, task;
   std::vector<std::string> idle_axes;
   std::vector<double> pulses_per_deg;
-  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
-       keep_joints = false;
+  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false,
+       split = false, keep_joints = false;
   double tolerance_mm = 0;
 
   [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs,      model,        tool,         payload,   format,      output,        receipt, report,
-            json,        frames,       allow_failed, strict,    keep_digits, undo,          again,   split,
-            keep_joints, tolerance_mm, service,      idle_axes, task,        pulses_per_deg};
+    return {inputs,      model,     tool,  payload,       format,       output,
+            receipt,     report,    json,  frames,        allow_failed, strict,
+            keep_digits, undo,      again, split,         keep_joints,  tolerance_mm,
+            service,     idle_axes, task,  pulses_per_deg};
   }
 };
 
 /// What is said of programs alone.
 Status check_table_usage(const CorrectArguments& arguments) {
-  const std::pair<bool, const char*> of_programs[] = {{!arguments.report.empty(), "--report"},
-                                                      {!arguments.frames.empty(), "--frames"},
-                                                      {!arguments.idle_axes.empty(), "--idle-axis"},
-                                                      {!arguments.task.empty(), "--task"},
-                                                      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"},
-                                                      {arguments.split, "--split"},
-                                                      {arguments.keep_digits, "--keep-digits"},
-                                                      {arguments.keep_joints, "--keep-joints"},
-                                                      {arguments.undo, "--undo"},
-                                                      {arguments.again, "--again"}};
+  const std::pair<bool, const char*> of_programs[] = {
+      {!arguments.report.empty(), "--report"},
+      {!arguments.frames.empty(), "--frames"},
+      {!arguments.idle_axes.empty(), "--idle-axis"},
+      {!arguments.task.empty(), "--task"},
+      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"},
+      {arguments.split, "--split"},
+      {arguments.keep_digits, "--keep-digits"},
+      {arguments.keep_joints, "--keep-joints"},
+      {arguments.undo, "--undo"},
+      {arguments.again, "--again"}};
   for (const auto& [said, option] : of_programs) {
     if (said)
       return failure(ErrorCode::kUsage, "a table of targets, and {} is of programs", option)
@@ -207,7 +220,9 @@ Status check_table_usage(const CorrectArguments& arguments) {
 
 Status check_usage(const CorrectArguments& arguments) {
   if (!arguments.undo && arguments.model.empty())
-    return failure(ErrorCode::kUsage, "--model is required").of("--model").next("it may be left out with --undo only");
+    return failure(ErrorCode::kUsage, "--model is required")
+        .of("--model")
+        .next("it may be left out with --undo only");
   if (is_program(arguments.inputs, arguments.format)) return {};
   const std::string ending = std::filesystem::path(arguments.inputs[0]).extension().string();
   if (arguments.format.empty() && (ending == ".xlsx" || ending == ".xls" || ending == ".ods")) {
@@ -229,17 +244,20 @@ std::optional<ToleranceVerdict> verdict_of(const Corrections& corrections, doubl
   if (tolerance_mm <= 0) return std::nullopt;
   std::vector<ExpectedError> errors;
   for (const client::CorrectedTarget& item : corrections.items)
-    errors.push_back({item.error_before_mm, item.error_after_mm, item.sigma_mm, item.status != "out_of_domain"});
+    errors.push_back(
+        {item.error_before_mm, item.error_after_mm, item.sigma_mm, item.status != "out_of_domain"});
   return tolerance_verdict(errors, tolerance_mm);
 }
 
 Result<Extent> correct(CorrectArguments arguments) {
   TRY(check_usage(arguments));
-  if (is_program(arguments.inputs, arguments.format)) return correct_program(arguments.of_program());
+  if (is_program(arguments.inputs, arguments.format))
+    return correct_program(arguments.of_program());
   arguments.input = arguments.inputs[0];
   const TargetFile file = TRY(read_targets_csv(arguments.input));
   const Corrections corrections =
-      TRY(arguments.service.service ? correct_by_service(file, arguments) : correct_here(file, arguments));
+      TRY(arguments.service.service ? correct_by_service(file, arguments)
+                                    : correct_here(file, arguments));
   warn_of_notes(corrections.notes);
   const std::string left_alone = left_alone_text(file, corrections);
   const auto verdict = verdict_of(corrections, arguments.tolerance_mm);
@@ -255,15 +273,16 @@ Result<Extent> correct(CorrectArguments arguments) {
                                              {"--json", arguments.json, json_text(json)}});
       !written)
     return tl::make_unexpected(written.error());
-  fmt::print(
-      stderr, "{}",
-      shown_lines(corrections_summary(corrections) + left_alone + (verdict ? verdict_text(*verdict) + "\n" : "")));
+  fmt::print(stderr, "{}",
+             shown_lines(corrections_summary(corrections) + left_alone +
+                         (verdict ? verdict_text(*verdict) + "\n" : "")));
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
 CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
-  CLI::Option* model = command.add_option("--model", arguments.model,
-                                          "Model file; with --service a cell id (its model in force) or CELL@VERSION");
+  CLI::Option* model = command.add_option(
+      "--model", arguments.model,
+      "Model file; with --service a cell id (its model in force) or CELL@VERSION");
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
   add_service_options(command, arguments.service);
@@ -272,35 +291,37 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 
 /// How a program is read.
 void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
-                         std::vector<std::string>& idle_axes, std::string& task, std::vector<double>& pulses_per_deg) {
+                         std::vector<std::string>& idle_axes, std::string& task,
+                         std::vector<double>& pulses_per_deg) {
   const std::string group = "Programs";
   command
       .add_option("--format", format,
-                  fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
+                  fmt::format("What the input is, where its ending does not say so: csv, {}",
+                              cam::dialect_names()))
       ->group(group);
   command
-      .add_option(
-          "--frames", frames,
-          "Values of tools and frames that the program leaves to the controller (CSV: "
-          "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...; robot_base: where the robot stands in "
-          "the controller's world), or a controller's own list: SYSFRAME.VA (FANUC), TOOL.CND, UFRAME.CND (Yaskawa)")
+      .add_option("--frames", frames,
+                  "Values of tools and frames that the program leaves to the controller (CSV: "
+                  "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...; robot_base: "
+                  "where the robot stands in the controller's world), or a controller's own list: "
+                  "SYSFRAME.VA (FANUC), TOOL.CND, UFRAME.CND (Yaskawa)")
       ->group(group);
   command
       .add_option("--idle-axis", idle_axes,
-                  "External axis that carries neither robot nor part, such as a servo gun, by the name that messages "
-                  "give it: 'group 2, axis 1'; may be given several times")
+                  "External axis that carries neither robot nor part, such as a servo gun, by the "
+                  "name that messages give it: 'group 2, axis 1'; may be given several times")
       ->allow_extra_args(false)
       ->group(group);
   command
       .add_option("--task", task,
-                  "Of the backup of an ABB controller that moves several robots: the task whose modules are taken, and "
-                  "whose robot (TASK2)")
+                  "Of the backup of an ABB controller that moves several robots: the task whose "
+                  "modules are taken, and whose robot (TASK2)")
       ->group(group);
   command
-      .add_option(
-          "--pulses-per-deg", pulses_per_deg,
-          "Of a Yaskawa job whose positions are in pulses: how many make a degree of each axis, six numbers with "
-          "commas between; negative where the axis counts against the robot file's sense")
+      .add_option("--pulses-per-deg", pulses_per_deg,
+                  "Of a Yaskawa job whose positions are in pulses: how many make a degree of each "
+                  "axis, six numbers with commas between; negative where the axis counts against "
+                  "the robot file's sense")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->group(group);
@@ -314,27 +335,32 @@ struct PredictArguments : ApplyArguments {
   std::vector<double> pulses_per_deg;
 
   [[nodiscard]] PredictProgramArguments of_program() const {
-    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes, task, pulses_per_deg};
+    return {inputs, model,  tool,    payload,   format, output,
+            json,   frames, service, idle_axes, task,   pulses_per_deg};
   }
 };
 
 Status check_usage(const PredictArguments& arguments) {
   const bool program = !arguments.inputs.empty();
   if (program == !arguments.input.empty()) {
-    return failure(ErrorCode::kUsage, "{}", program ? "a program and --joints at once" : "nothing to predict")
+    return failure(ErrorCode::kUsage, "{}",
+                   program ? "a program and --joints at once" : "nothing to predict")
         .of("--joints")
         .next("name a program, or joints by --joints");
   }
-  const std::pair<bool, const char*> of_programs[] = {{!arguments.format.empty(), "--format"},
-                                                      {!arguments.frames.empty(), "--frames"},
-                                                      {!arguments.idle_axes.empty(), "--idle-axis"},
-                                                      {!arguments.task.empty(), "--task"},
-                                                      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"}};
+  const std::pair<bool, const char*> of_programs[] = {
+      {!arguments.format.empty(), "--format"},
+      {!arguments.frames.empty(), "--frames"},
+      {!arguments.idle_axes.empty(), "--idle-axis"},
+      {!arguments.task.empty(), "--task"},
+      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"}};
   for (const auto& [said, option] : of_programs) {
-    if (said && !program) return failure(ErrorCode::kUsage, "{} is of programs, not of joints", option).of(option);
+    if (said && !program)
+      return failure(ErrorCode::kUsage, "{} is of programs, not of joints", option).of(option);
   }
   if (program && (arguments.covariance || arguments.orientation)) {
-    return failure(ErrorCode::kUsage, "--covariance and --orientation are of joints, not of programs")
+    return failure(ErrorCode::kUsage,
+                   "--covariance and --orientation are of joints, not of programs")
         .of(arguments.covariance ? "--covariance" : "--orientation");
   }
   return {};
@@ -342,21 +368,25 @@ Status check_usage(const PredictArguments& arguments) {
 
 void add_predict(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<PredictArguments>();
-  CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
+  CLI::App* command =
+      app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
   command->add_option("program", arguments->inputs,
-                      "A robot program as it is, corrected or not: its files, its folder, or '-' for standard input");
-  command->add_option("--joints", arguments->input, "Or commanded joints (CSV: joints in deg, rails in mm)");
+                      "A robot program as it is, corrected or not: its files, its folder, or '-' "
+                      "for standard input");
+  command->add_option("--joints", arguments->input,
+                      "Or commanded joints (CSV: joints in deg, rails in mm)");
   command
       ->add_option("-o,--output", arguments->output,
-                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm); of a "
-                   "program a line for each of its targets")
+                   "Predicted errors, standard deviations and poses to write, in the robot's base "
+                   "(CSV: mm); of a program a line for each of its targets")
       ->required();
   command->add_flag("--covariance", arguments->covariance,
                     "Append the covariances of the coordinates of one measurement (cxy_mm2 ...)");
   command->add_flag("--orientation", arguments->orientation,
-                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
-  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task,
-                      arguments->pulses_per_deg);
+                    "Append the standard deviations of one measured orientation about the base's "
+                    "axes (srx_deg ...)");
+  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes,
+                      arguments->task, arguments->pulses_per_deg);
   add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
@@ -370,22 +400,29 @@ void add_predict(CLI::App& app, Action& chosen) {
 
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
-  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes, arguments.task,
-                      arguments.pulses_per_deg);
-  command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
+  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes,
+                      arguments.task, arguments.pulses_per_deg);
+  command
+      .add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")
+      ->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,
-                "Write numbers with the decimals that they have, even where rounding takes more than a tenth of what "
-                "is known")
+                "Write numbers with the decimals that they have, even where rounding takes more "
+                "than a tenth of what is known")
       ->group(group);
   command
-      .add_flag("--split", arguments.split, "Make a target of each use where one is used with several tools or frames")
+      .add_flag("--split", arguments.split,
+                "Make a target of each use where one is used with several tools or frames")
       ->group(group);
-  command.add_flag("--keep-joints", arguments.keep_joints, "Leave targets that are given as joints")->group(group);
-  CLI::Option* undo = command
-                          .add_flag("--undo", arguments.undo,
-                                    "Write the program as it was before, from what is kept beside the corrected one")
-                          ->group(group);
+  command
+      .add_flag("--keep-joints", arguments.keep_joints, "Leave targets that are given as joints")
+      ->group(group);
+  CLI::Option* undo =
+      command
+          .add_flag(
+              "--undo", arguments.undo,
+              "Write the program as it was before, from what is kept beside the corrected one")
+          ->group(group);
   command
       .add_flag("--again", arguments.again,
                 "Correct a corrected program anew, from what is kept beside it of the time before")
@@ -395,34 +432,36 @@ void add_program_options(CLI::App& command, CorrectArguments& arguments) {
 
 void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
-  CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
+  CLI::App* command = app.add_subcommand(
+      "correct", "Find what to command so that the tool lands where it is wanted");
   command
       ->add_option(
           "input", arguments->inputs,
-          "A robot program: its files, its folder, or '-' for standard input; or targets in the robot's base "
-          "(.csv: positions in mm, joints in deg, rails in mm). Programmed off line: a position that was taught by "
-          "jogging the robot to it holds the robot's error already, and gets worse by all of it; so does one in a "
-          "frame that was touched with the robot")
+          "A robot program: its files, its folder, or '-' for standard input; or targets in the "
+          "robot's base (.csv: positions in mm, joints in deg, rails in mm). Programmed off line: "
+          "a position that was taught by jogging the robot to it holds the robot's error already, "
+          "and gets worse by all of it; so does one in a frame that was touched with the robot")
       ->required();
   command
-      ->add_option(
-          "-o,--output", arguments->output,
-          "The corrected program: a file, or a folder for several; what each file was before is kept beside it as "
-          "FILE.original. Of a table the corrected targets (CSV: mm, deg), behind the columns of the input; an input "
-          "column that is named as an output column comes as input_NAME")
+      ->add_option("-o,--output", arguments->output,
+                   "The corrected program: a file, or a folder for several; what each file was "
+                   "before is kept beside it as FILE.original. Of a table the corrected targets "
+                   "(CSV: mm, deg), behind the columns of the input; an input column that is named "
+                   "as an output column comes as input_NAME")
       ->required();
-  CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
-                                                "Exit with 0, not 1, where targets are left as they were");
+  CLI::Option* allow_failed =
+      command->add_flag("--allow-failed", arguments->allow_failed,
+                        "Exit with 0, not 1, where targets are left as they were");
   command
-      ->add_flag(
-          "--strict", arguments->strict,
-          "Write nothing and exit with 3 where any target would be left as it was or, with --tolerance, is not inside "
-          "it with 95 % or is out of domain")
+      ->add_flag("--strict", arguments->strict,
+                 "Write nothing and exit with 3 where any target would be left as it was or, with "
+                 "--tolerance, is not inside it with 95 % or is out of domain")
       ->excludes(allow_failed);
   command->add_option("--receipt", arguments->receipt, "What became of each target, as CSV");
   command
-      ->add_option("--tolerance", arguments->tolerance_mm,
-                   "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
+      ->add_option(
+          "--tolerance", arguments->tolerance_mm,
+          "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
       ->check(above_zero());
   add_apply_options(*command, *arguments);
   add_program_options(*command, *arguments);

@@ -22,7 +22,8 @@ struct AuditArguments {
 Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArguments& arguments) {
   std::vector<std::pair<std::string, AuditTrail>> all;
   if (!arguments.store.empty()) {
-    auto trail = TRY(read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last}));
+    auto trail =
+        TRY(read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last}));
     all.emplace_back(spoken_place(arguments.store), std::move(trail));
     return all;
   }
@@ -40,9 +41,11 @@ Status check_rows(const AuditTrail& trail) {
   if (trail.broken) return tl::make_unexpected(*trail.broken);
   const AuditRow* before = nullptr;
   for (const AuditRow& row : trail.rows) {
-    const bool follows = before == nullptr || row.number != before->number + 1 || row.hash_before == before->hash;
+    const bool follows =
+        before == nullptr || row.number != before->number + 1 || row.hash_before == before->hash;
     if (row.hash != hash_of(row) || !follows) {
-      return failure(ErrorCode::kInternal, "audit row {}: its content is not what was written", row.number)
+      return failure(ErrorCode::kInternal, "audit row {}: its content is not what was written",
+                     row.number)
           .at_row(row.number);
     }
     before = &row;
@@ -59,7 +62,8 @@ Status audit(const AuditArguments& arguments) {
     text += audit_text(trail, where);
     json.push_back(audit_json(trail));
     json.back()["where"] = where;
-    if (const Status good = check_rows(trail); !good && !broken) broken = Failure(good.error()).in(where).value();
+    if (const Status good = check_rows(trail); !good && !broken)
+      broken = Failure(good.error()).in(where).value();
   }
   tell(text, {arguments.json});
   TRY(write_json(arguments.json, {{"trails", json}}));
@@ -71,9 +75,11 @@ Status audit(const AuditArguments& arguments) {
 void add_audit_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<AuditArguments>();
   CLI::App* command = app.add_subcommand(
-      "audit", "Show who changed what and when, and verify that nothing of it was changed afterwards");
-  command->add_option("--store", arguments->store,
-                      "The file of a store, or its URL, instead of asking a service; also while one runs");
+      "audit",
+      "Show who changed what and when, and verify that nothing of it was changed afterwards");
+  command->add_option(
+      "--store", arguments->store,
+      "The file of a store, or its URL, instead of asking a service; also while one runs");
   command->add_option("--cell", arguments->cell, "Only what was changed of this cell");
   command->add_option("--since", arguments->since, "Only what was changed since then, Unix time, s")
       ->check(CLI::NonNegativeNumber);

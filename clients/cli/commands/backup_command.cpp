@@ -25,7 +25,8 @@ struct BackupArguments {
   std::string backup, robot, cell, unit, task, compare, output, frames, json;
 };
 
-/// The entry of a folder with this name, whatever its case: backups are copied by all kinds of systems.
+/// The entry of a folder with this name, whatever its case: backups are copied by all kinds of
+/// systems.
 std::string inside(const std::string& folder, const std::string& name) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
@@ -40,7 +41,10 @@ Result<std::vector<cam::SourceFile>> modules_of(const BackupArguments& arguments
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     if (arguments.task.empty()) return std::vector<cam::SourceFile>{};
-    return refused("no task {} in the backup", shown(arguments.task)).in(folder).of("--task").with_text(arguments.task);
+    return refused("no task {} in the backup", shown(arguments.task))
+        .in(folder)
+        .of("--task")
+        .with_text(arguments.task);
   }
   bool any = false;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder, error))
@@ -57,7 +61,8 @@ std::string frames_csv(const cam::ControllerCell& controller) {
     const Vector3 p = X.translation() * to_mm(1);
     const Eigen::Quaterniond q(X.linear());
     text += csv_field(name);
-    for (const double value : {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()}) text += "," + csv_number(value);
+    for (const double value : {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()})
+      text += "," + csv_number(value);
     text += ",yes\n";
   };
   add(cam::kRobotBase, controller.X_WB);
@@ -65,8 +70,10 @@ std::string frames_csv(const cam::ControllerCell& controller) {
   return text;
 }
 
-ordered_json as_json(const cam::ControllerCell& controller, const std::vector<std::string>& differing) {
-  ordered_json tools = ordered_json::array(), frames = ordered_json::array(), loads = ordered_json::array();
+ordered_json as_json(const cam::ControllerCell& controller,
+                     const std::vector<std::string>& differing) {
+  ordered_json tools = ordered_json::array(), frames = ordered_json::array(),
+               loads = ordered_json::array();
   for (const auto& [name, tool] : controller.tools) tools.push_back(name);
   for (const auto& [name, X_BO] : controller.frames) frames.push_back(name);
   for (const auto& [name, load] : controller.loads) loads.push_back(name);
@@ -82,26 +89,29 @@ ordered_json as_json(const cam::ControllerCell& controller, const std::vector<st
 
 std::string in_words(const cam::ControllerCell& controller, const BackupArguments& arguments,
                      const std::vector<std::string>& differing) {
-  std::string text =
-      fmt::format("{} ({}): {} tools, {} work objects, {} loads; the controller's own calibration is {}\n",
-                  controller.unit, controller.robot_type, controller.tools.size(), controller.frames.size(),
-                  controller.loads.size(), controller.controller_compensates ? "in use" : "not in use");
+  std::string text = fmt::format(
+      "{} ({}): {} tools, {} work objects, {} loads; the controller's own calibration is {}\n",
+      controller.unit, controller.robot_type, controller.tools.size(), controller.frames.size(),
+      controller.loads.size(), controller.controller_compensates ? "in use" : "not in use");
   for (const std::string& note : controller.notes) text += "note: " + note + "\n";
   if (arguments.compare.empty()) return text;
   for (const std::string& one : differing) text += "differs: " + one + "\n";
   return text + (differing.empty() ? fmt::format("{} has all of it\n", arguments.compare) : "");
 }
 
-/// The robot file as it is to stand in the cell file: relative to it, unless the cell goes to standard output.
+/// The robot file as it is to stand in the cell file: relative to it, unless the cell goes to
+/// standard output.
 std::string robot_in(const BackupArguments& arguments) {
   std::error_code error;
   const fs::path robot = fs::absolute(arguments.robot, error);
   if (arguments.output.empty() || arguments.output == "-") return robot.string();
-  const fs::path relative = fs::relative(robot, fs::absolute(arguments.output, error).parent_path(), error);
+  const fs::path relative =
+      fs::relative(robot, fs::absolute(arguments.output, error).parent_path(), error);
   return relative.empty() ? robot.string() : relative.string();
 }
 
-/// Another maker's backup, by the names of files that only his controllers have; nullptr: none is known.
+/// Another maker's backup, by the names of files that only his controllers have; nullptr: none is
+/// known.
 struct Maker {
   const char* name;
   std::vector<const char*> endings;  ///< of paths, in lower case
@@ -111,24 +121,25 @@ const Maker* maker_of(const std::string& folder) {
   static const std::vector<Maker> kMakers = {
       {"KUKA",
        {"$machine.dat", "$config.dat", ".src"},
-       "correct takes the folder as it is; write the cell by hand: $machine.dat names the robot, $config.dat has its "
-       "tools (TOOL_DATA) and loads (LOAD_DATA)"},
+       "correct takes the folder as it is; write the cell by hand: $machine.dat names the robot, "
+       "$config.dat has its tools (TOOL_DATA) and loads (LOAD_DATA)"},
       {"FANUC",
        {".ls", ".tp", ".va", ".sv", "orderfil.dat"},
-       "correct takes its .ls files; write the cell by hand: sysframe.va has the tools ($MNUTOOL) and frames "
-       "($MNUFRAME) as UTOOL[n] and UFRAME[n] of --frames"},
+       "correct takes its .ls files; write the cell by hand: sysframe.va has the tools ($MNUTOOL) "
+       "and frames ($MNUFRAME) as UTOOL[n] and UFRAME[n] of --frames"},
       {"Yaskawa",
        {".jbi", ".prm", ".cnd"},
-       "correct takes its .JBI files; write the cell by hand: TOOL.CND has the tools, UFRAME.CND the frames, as "
-       "TOOL[n] "
-       "and USER[n] of --frames"}};
+       "correct takes its .JBI files; write the cell by hand: TOOL.CND has the tools, UFRAME.CND "
+       "the frames, as TOOL[n] and USER[n] of --frames"}};
   std::error_code error;
   std::vector<std::string> paths;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error))
     paths.push_back(lower(it->path().filename().string()));
   for (const Maker& maker : kMakers) {
     for (const char* ending : maker.endings) {
-      if (std::any_of(paths.begin(), paths.end(), [&](const std::string& path) { return path.ends_with(ending); }))
+      if (std::any_of(paths.begin(), paths.end(),
+                      [&](const std::string& path) { return path.ends_with(ending); }))
         return &maker;
     }
   }
@@ -193,7 +204,8 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
   if (!arguments.frames.empty()) {
     TRY(write_output(arguments.frames, frames_csv(*controller)));
   }
-  tell(in_words(*controller, arguments, differing), {arguments.output, arguments.frames, arguments.json});
+  tell(in_words(*controller, arguments, differing),
+       {arguments.output, arguments.frames, arguments.json});
   TRY(write_json(arguments.json, as_json(*controller, differing)));
   return differing.empty() ? Extent::kAll : Extent::kPart;
 }
@@ -202,22 +214,31 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
 
 void add_backup_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<BackupArguments>();
-  CLI::App* command =
-      app.add_subcommand("import-backup", "Make a cell of an ABB controller's backup, or tell where a cell differs");
-  command->add_option("backup", arguments->backup, "Folder of the backup, with SYSPAR/MOC.cfg and RAPID")->required();
+  CLI::App* command = app.add_subcommand(
+      "import-backup", "Make a cell of an ABB controller's backup, or tell where a cell differs");
+  command
+      ->add_option("backup", arguments->backup,
+                   "Folder of the backup, with SYSPAR/MOC.cfg and RAPID")
+      ->required();
   command->add_option("-o,--output", arguments->output,
-                      "Cell file to write (YAML): base frame, tools, loads, axis ranges, whether the controller's own "
-                      "calibration is in use");
+                      "Cell file to write (YAML): base frame, tools, loads, axis ranges, whether "
+                      "the controller's own calibration is in use");
   command->add_option("--name", arguments->cell, "Cell id, for --output");
-  command->add_option("--robot", arguments->robot, "Robot file (YAML) that the cell file names, for --output");
-  command->add_option("--compare", arguments->compare,
-                      "Cell file (YAML) to compare with; what differs is told, and the exit code is 1");
-  command->add_option("--unit", arguments->unit, "Robot of the backup, where it has several (ROB_1, ...)");
-  command->add_option("--task", arguments->task, "Task whose modules are read (TASK1, ...); all where none is given");
+  command->add_option("--robot", arguments->robot,
+                      "Robot file (YAML) that the cell file names, for --output");
+  command->add_option(
+      "--compare", arguments->compare,
+      "Cell file (YAML) to compare with; what differs is told, and the exit code is 1");
+  command->add_option("--unit", arguments->unit,
+                      "Robot of the backup, where it has several (ROB_1, ...)");
+  command->add_option("--task", arguments->task,
+                      "Task whose modules are read (TASK1, ...); all where none is given");
   command->add_option("--frames", arguments->frames,
-                      "Work objects, seen from the robot's base, to write for --frames of correct and predict (CSV)");
+                      "Work objects, seen from the robot's base, to write for --frames of correct "
+                      "and predict (CSV)");
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return import_backup(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return import_backup(*arguments); }; });
 }
 
 }  // namespace trammel::cli

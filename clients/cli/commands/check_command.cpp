@@ -36,9 +36,12 @@ struct CheckArguments {
   ServiceOptions service;
 };
 
-Result<std::int64_t> ask(client::Session& session, const std::string& cell, const CheckArguments& arguments) {
-  const double tolerance = arguments.tolerance_mm.value_or(std::numeric_limits<double>::quiet_NaN());
-  if (!std::filesystem::exists(arguments.batch)) return session.check_health(cell, arguments.batch, "", tolerance);
+Result<std::int64_t> ask(client::Session& session, const std::string& cell,
+                         const CheckArguments& arguments) {
+  const double tolerance =
+      arguments.tolerance_mm.value_or(std::numeric_limits<double>::quiet_NaN());
+  if (!std::filesystem::exists(arguments.batch))
+    return session.check_health(cell, arguments.batch, "", tolerance);
   return read_text_file(arguments.batch).and_then([&](const std::string& csv) {
     return session.check_health(cell, "", csv, tolerance);
   });
@@ -54,18 +57,23 @@ Result<nlohmann::ordered_json> check_of(const std::string& text, const std::stri
   return json;
 }
 
-Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell, std::int64_t job) {
+Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell,
+                                        std::int64_t job) {
   const auto found = TRY(session.diagnosis(cell, job, false));
   return check_of(found.findings_json, fmt::format("what job {} found", job));
 }
 
-/// What the measurements are called: a file without its folder and ending, or the id that the service has them by.
-std::string batch_name(const std::string& batch) { return std::filesystem::path(batch).stem().string(); }
+/// What the measurements are called: a file without its folder and ending, or the id that the
+/// service has them by.
+std::string batch_name(const std::string& batch) {
+  return std::filesystem::path(batch).stem().string();
+}
 
 /// `next check: 2026-03-01; ...`; empty where nothing is said of it.
 std::string due_text(const nlohmann::ordered_json& check) {
   const auto text_of = [&](const char* key) {
-    return check.contains(key) && check[key].is_string() ? check[key].get<std::string>() : std::string();
+    return check.contains(key) && check[key].is_string() ? check[key].get<std::string>()
+                                                         : std::string();
   };
   const std::string due = text_of("due"), because = text_of("due_because");
   if (due.empty() && because.empty()) return "";
@@ -73,7 +81,8 @@ std::string due_text(const nlohmann::ordered_json& check) {
 }
 
 std::string check_text(const nlohmann::ordered_json& check) {
-  return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(), check.at("why").get<std::string>()) +
+  return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(),
+                     check.at("why").get<std::string>()) +
          due_text(check);
 }
 
@@ -81,18 +90,22 @@ std::string check_text(const nlohmann::ordered_json& check) {
 void warn_of_notes_in(const nlohmann::ordered_json& check) {
   if (!check.contains("notes") || !check["notes"].is_array()) return;
   for (const auto& note : check["notes"]) {
-    const bool whole = note.is_object() && note.contains("severity") && note["severity"].is_string() &&
-                       note.contains("text") && note["text"].is_string();
+    const bool whole = note.is_object() && note.contains("severity") &&
+                       note["severity"].is_string() && note.contains("text") &&
+                       note["text"].is_string();
     if (!whole) continue;
     const auto severity = note["severity"].get<std::string>();
     if (severity == to_text(Note::Severity::kInfo)) continue;
-    std::fputs(shown_lines(fmt::format("{}: {}\n", severity, note["text"].get<std::string>())).c_str(), stderr);
+    std::fputs(
+        shown_lines(fmt::format("{}: {}\n", severity, note["text"].get<std::string>())).c_str(),
+        stderr);
   }
 }
 
 /// kPart where --strict asks for a healthy robot and this one is not shown to be.
 Extent extent_of(const nlohmann::ordered_json& check, const CheckArguments& arguments) {
-  if (!arguments.strict || check.at("verdict") == std::string(to_string(HealthVerdict::kHealthy))) return Extent::kAll;
+  if (!arguments.strict || check.at("verdict") == std::string(to_string(HealthVerdict::kHealthy)))
+    return Extent::kAll;
   std::fputs(shown_lines("not shown to be healthy: " + check_text(check)).c_str(), stderr);
   return Extent::kPart;
 }
@@ -104,13 +117,16 @@ Status check_outputs(const CheckArguments& arguments) {
   return outputs.check({{"--model", arguments.model}, {"--batch", arguments.batch}});
 }
 
-Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of, const CheckArguments& arguments) {
+Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of,
+                    const CheckArguments& arguments) {
   if (arguments.report.empty()) return {};
-  return write_output(arguments.report, with_pages_beside(health_page(found.dump(), of), arguments.report));
+  return write_output(arguments.report,
+                      with_pages_beside(health_page(found.dump(), of), arguments.report));
 }
 
 /// What earlier checks said.
-Status tell_health(client::Session& session, const std::string& cell, const CheckArguments& arguments) {
+Status tell_health(client::Session& session, const std::string& cell,
+                   const CheckArguments& arguments) {
   const auto cells = TRY(health_at(session, cell, 0));
   std::string text;
   for (const auto& one : cells) text += cell_health_text(one);
@@ -119,8 +135,10 @@ Status tell_health(client::Session& session, const std::string& cell, const Chec
 }
 
 Result<Extent> check_at_service(const CheckArguments& arguments) {
-  if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
-  if (!arguments.earlier.empty()) return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
+  if (arguments.new_tool)
+    return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
+  if (!arguments.earlier.empty())
+    return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
   const ModelReference model = TRY(parse_model_reference(arguments.model));
   if (model.version != 0) {
     return failure(ErrorCode::kUsage, "a service checks against the model in force")
@@ -136,10 +154,12 @@ Result<Extent> check_at_service(const CheckArguments& arguments) {
   const client::JobStatus end = TRY([&] {
     ProgressLine progress;
     return session->wait_for_job(job, std::chrono::hours(1), [&](const client::JobStatus& status) {
-      progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
+      progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
+                    status.share);
     });
   }());
-  if (end.stage == "failed") return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job");
+  if (end.stage == "failed")
+    return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job");
   const auto json = TRY(found_by(*session, model.cell, job));
   warn_of_notes_in(json);
   tell(check_text(json), {arguments.json, arguments.report});
@@ -153,7 +173,8 @@ Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& fil
   std::vector<DriftSeen> all;
   for (const std::string& file : files) {
     const std::string text = TRY(read_text_file(file));
-    if (const auto json = check_of(text, file); !json) return Failure(json.error()).as(ErrorCode::kRefused).in(file);
+    if (const auto json = check_of(text, file); !json)
+      return Failure(json.error()).as(ErrorCode::kRefused).in(file);
     if (auto drift = drift_of(text)) all.push_back(std::move(*drift));
   }
   return all;
@@ -186,26 +207,32 @@ Result<Extent> check(const CheckArguments& arguments) {
 
 void add_check_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CheckArguments>();
-  CLI::App* command = app.add_subcommand("check", "Say by a few poses whether the robot still is as its model has it");
-  command->add_option("--model", arguments->model, "Model file; with --service a cell's id: its model in force")
+  CLI::App* command = app.add_subcommand(
+      "check", "Say by a few poses whether the robot still is as its model has it");
+  command
+      ->add_option("--model", arguments->model,
+                   "Model file; with --service a cell's id: its model in force")
       ->required();
   command->add_option(
       "--batch", arguments->batch,
-      "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check plans them; "
-      "with --service also the id of a batch that the service has, or left out: what checks have said so far, "
-      "and when the next one is due");
-  command->add_option(
-      "--earlier", arguments->earlier,
-      "What an earlier check of this robot wrote with --json, once for each: the next one is due by all of "
-      "them; a service has its own");
+      "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check "
+      "plans them; with --service also the id of a batch that the service has, or left out: what "
+      "checks have said so far, and when the next one is due");
+  command->add_option("--earlier", arguments->earlier,
+                      "What an earlier check of this robot wrote with --json, once for each: the "
+                      "next one is due by all of them; a service has its own");
   command
       ->add_option("--tolerance", arguments->tolerance_mm,
-                   "What the cell must hold, mm, instead of the cell file's tolerance_mm (0.1 where it says none)")
+                   "What the cell must hold, mm, instead of the cell file's tolerance_mm (0.1 "
+                   "where it says none)")
       ->check(above_zero());
   command->add_flag("--new-tool", arguments->new_tool,
-                    "The tool was changed or mounted anew: where it sits is found with the base, and is no change");
-  command->add_flag("--strict", arguments->strict, "Exit with 1, not 0, where the robot is not shown to be healthy");
-  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+                    "The tool was changed or mounted anew: where it sits is found with the base, "
+                    "and is no change");
+  command->add_flag("--strict", arguments->strict,
+                    "Exit with 1, not 0, where the robot is not shown to be healthy");
+  command
+      ->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
       ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);

@@ -11,8 +11,8 @@ namespace CLI {
 class App;
 }
 
-/// The commands, a file a group. Each add function adds its commands to `app`; the action of the one that the command
-/// line names is put into `chosen`.
+/// The commands, a file a group. Each add function adds its commands to `app`; the action of the
+/// one that the command line names is put into `chosen`.
 namespace trammel::cli {
 
 /// How much of its task a command did. For kPart it has printed what is missing on standard error.
@@ -23,7 +23,8 @@ class Action {
  public:
   Action() = default;
   template <typename Work>
-  requires(!std::same_as<Work, Action>) Action(Work work)  // NOLINT(google-explicit-constructor): a lambda is one
+  requires(!std::same_as<Work, Action>)
+      Action(Work work)  // NOLINT(google-explicit-constructor): a lambda is one
       : work_([work = std::move(work)]() -> Result<Extent> {
           if constexpr (std::same_as<std::invoke_result_t<const Work&>, Status>) {
             return work().map([] { return Extent::kAll; });
@@ -62,6 +63,7 @@ void add_study_command(CLI::App& app, Action& chosen);
 void add_audit_command(CLI::App& app, Action& chosen);
 void add_replay_command(CLI::App& app, Action& chosen);
 void add_history_command(CLI::App& app, Action& chosen);
-void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
+void add_service_commands(CLI::App& app,
+                          Action& chosen);  // submit, retrain, status, watch, models, ...
 
 }  // namespace trammel::cli

@@ -51,10 +51,12 @@ struct Compared {
   std::string where;  ///< which poses, for people
   ModelDifference difference;
   std::optional<Judged> judged;
-  std::size_t learned = 0;  ///< poses of the batch that one of the models was trained on: they do not judge
+  std::size_t learned =
+      0;  ///< poses of the batch that one of the models was trained on: they do not judge
 };
 
-/// Poses of the cell that both models know: a Latin hypercube, with a tool and a payload of the newer model.
+/// Poses of the cell that both models know: a Latin hypercube, with a tool and a payload of the
+/// newer model.
 Result<std::vector<PoseContext>> drawn_poses(const CompensatedModel& model) {
   PlanOptions options;
   options.count = kDrawnPoses;
@@ -68,7 +70,8 @@ Result<std::vector<PoseContext>> drawn_poses(const CompensatedModel& model) {
   return poses;
 }
 
-Status judge(const CompensatedModel& before, const CompensatedModel& now, const CheckedBatch& batch, Compared& all) {
+Status judge(const CompensatedModel& before, const CompensatedModel& now, const CheckedBatch& batch,
+             Compared& all) {
   const LearnedFrom by_before(before, batch.hash()), by_now(now, batch.hash());
   const auto is_learned = [&](const Measurement& m) { return by_before(m) || by_now(m); };
   MeasurementBatch in_old = TRY(in_world_of(before, positions_of(batch.rows()))).batch;
@@ -76,12 +79,14 @@ Status judge(const CompensatedModel& before, const CompensatedModel& now, const 
   all.learned = std::erase_if(in_old.measurements, is_learned);
   std::erase_if(in_new.measurements, is_learned);
   if (in_old.measurements.empty()) return {};
-  all.judged = Judged{before.evaluate(in_old), now.evaluate(in_new),
-                      paired_gain(before.errors_B(in_old).compensated, now.errors_B(in_new).compensated)};
+  all.judged =
+      Judged{before.evaluate(in_old), now.evaluate(in_new),
+             paired_gain(before.errors_B(in_old).compensated, now.errors_B(in_new).compensated)};
   return {};
 }
 
-Result<Compared> compared(const CompensatedModel& before, const CompensatedModel& now, const CompareArguments& asked) {
+Result<Compared> compared(const CompensatedModel& before, const CompensatedModel& now,
+                          const CompareArguments& asked) {
   TRY(check_fits_cell(before, now.cell(), "model " + before.provenance().id));
   Compared all;
   std::optional<CheckedBatch> batch;
@@ -91,7 +96,8 @@ Result<Compared> compared(const CompensatedModel& before, const CompensatedModel
   } else {
     batch.emplace(TRY(read_checked_batches({asked.batch}, now.cell())));
     TRY(require_positions(batch->rows(), "compare --batch"));
-    for (const Measurement& m : positions_of(batch->rows()).measurements) all.poses.push_back(m.context);
+    for (const Measurement& m : positions_of(batch->rows()).measurements)
+      all.poses.push_back(m.context);
     all.where = fmt::format("{} poses of {}", all.poses.size(), batch->id());
   }
   for (const PoseContext& pose : all.poses) {
@@ -122,25 +128,30 @@ std::vector<std::size_t> most_moved(const ModelDifference& difference) {
   return order;
 }
 
-std::string text_of(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+std::string text_of(const Compared& all, const CompensatedModel& before,
+                    const CompensatedModel& now) {
   const ModelDifference& found = all.difference;
   std::string text = fmt::format(
       "model {} predicts otherwise than model {} by {:.4f} mm rms, {:.4f} mm at most, at {};\n"
       "touching base and tool frames would leave {:.4f} mm of it\n",
       now.provenance().id, before.provenance().id, to_mm(rms_of(found)),
-      to_mm(found.moved_B[most_moved(found).front()].norm()), all.where, to_mm(found.budget.beyond_frames.error_rms));
+      to_mm(found.moved_B[most_moved(found).front()].norm()), all.where,
+      to_mm(found.budget.beyond_frames.error_rms));
   for (const std::string& line : difference_in_words(found)) text += line + "\n";
   if (all.learned > 0)
-    text += fmt::format("note: {} of the {} poses do not judge the models, because one was trained on them\n",
-                        all.learned, all.poses.size());
+    text += fmt::format(
+        "note: {} of the {} poses do not judge the models, because one was trained on them\n",
+        all.learned, all.poses.size());
   if (all.judged) text += fmt::format("on these poses: {}\n", to_string(all.judged->gain));
   return text;
 }
 
-std::string tables_of(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+std::string tables_of(const Compared& all, const CompensatedModel& before,
+                      const CompensatedModel& now) {
   if (!all.judged) return "";
-  return fmt::format("model {}:\n{}model {}:\n{}", before.provenance().id, evaluation_table(all.judged->before),
-                     now.provenance().id, evaluation_table(all.judged->now));
+  return fmt::format("model {}:\n{}model {}:\n{}", before.provenance().id,
+                     evaluation_table(all.judged->before), now.provenance().id,
+                     evaluation_table(all.judged->now));
 }
 
 ordered_json model_of(const CompensatedModel& model) {
@@ -161,12 +172,15 @@ ordered_json poses_json(const Compared& all, const std::vector<JointType>& types
       joints[joint_column(static_cast<int>(j), types[j])] =
           joint_to_column(all.poses[i].q(static_cast<Eigen::Index>(j)), types[j]);
     const Vector3 moved = to_mm(1) * all.difference.moved_B[i];
-    poses.push_back({{"pose", i + 1}, {"joints", std::move(joints)}, {"moved_mm", {moved.x(), moved.y(), moved.z()}}});
+    poses.push_back({{"pose", i + 1},
+                     {"joints", std::move(joints)},
+                     {"moved_mm", {moved.x(), moved.y(), moved.z()}}});
   }
   return poses;
 }
 
-ordered_json comparison_json(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+ordered_json comparison_json(const Compared& all, const CompensatedModel& before,
+                             const CompensatedModel& now) {
   const ModelDifference& found = all.difference;
   ordered_json parameters = ordered_json::array();
   for (const ParameterDifference& one : found.parameters)
@@ -212,7 +226,8 @@ Status compare(const CompareArguments& arguments) {
   tell(text + tables_of(all, before, now), {arguments.report, arguments.json});
   if (!arguments.report.empty())
     outputs.put("--report",
-                with_pages_beside(comparison_page({before, now, all.difference, all.where, text}), arguments.report));
+                with_pages_beside(comparison_page({before, now, all.difference, all.where, text}),
+                                  arguments.report));
   if (!arguments.json.empty()) outputs.put("--json", json_text(comparison_json(all, before, now)));
   return outputs.write();
 }
@@ -221,13 +236,16 @@ Status compare(const CompareArguments& arguments) {
 
 void add_compare_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CompareArguments>();
-  CLI::App* command = app.add_subcommand(
-      "compare", "Compare two models of one robot: what changed in which parameter, and by how much at which poses");
+  CLI::App* command = app.add_subcommand("compare",
+                                         "Compare two models of one robot: what changed in which "
+                                         "parameter, and by how much at which poses");
   command->add_option("A", arguments->before, "Model file")->required();
   command->add_option("B", arguments->now, "Model file to hold against it")->required();
-  command->add_option("--batch", arguments->batch,
-                      "Measurements to judge both by (CSV: joints in deg, rails in mm; positions in mm)");
-  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network");
+  command->add_option(
+      "--batch", arguments->batch,
+      "Measurements to judge both by (CSV: joints in deg, rails in mm; positions in mm)");
+  command->add_option("--report", arguments->report,
+                      "Page to write (HTML); opens without a network");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return compare(*arguments); }; });
 }

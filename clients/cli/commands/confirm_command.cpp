@@ -44,19 +44,21 @@ std::string comparison_text(const RobotComparison& found) {
   for (const std::string& one : found.could_be) text += fmt::format("  {}\n", one);
   if (found.verdict == RobotComparison::Verdict::kDiffers)
     text +=
-        "Until the file is right, every corrected pose lands off by the difference, since the controller solves it "
-        "with its own arm.\n";
+        "Until the file is right, every corrected pose lands off by the difference, since the "
+        "controller solves it with its own arm.\n";
   return text;
 }
 
-/// A cell file says what the last comparison said. One that does not count takes nothing away that an earlier one
-/// confirmed, unless it shows that the file is wrong.
-Status note_in_cell(const ConfirmArguments& arguments, const Cell& cell, const RobotComparison& found) {
+/// A cell file says what the last comparison said. One that does not count takes nothing away that
+/// an earlier one confirmed, unless it shows that the file is wrong.
+Status note_in_cell(const ConfirmArguments& arguments, const Cell& cell,
+                    const RobotComparison& found) {
   if (found.verdict == RobotComparison::Verdict::kCannotTell) return {};
   std::optional<RobotConfirmation> confirmation;
   if (found.verdict == RobotComparison::Verdict::kConfirmed) {
-    confirmation = RobotConfirmation{sha256_hex(cell.robot_yaml), found.poses, to_mm(found.position_max),
-                                     to_deg(found.rotation_max), shown_day(unix_now())};
+    confirmation =
+        RobotConfirmation{sha256_hex(cell.robot_yaml), found.poses, to_mm(found.position_max),
+                          to_deg(found.rotation_max), shown_day(unix_now())};
   }
   const std::string text = TRY(with_confirmation(cell, confirmation));
   if (text == cell.cell_yaml) return {};
@@ -82,14 +84,17 @@ Result<Extent> confirm(const ConfirmArguments& arguments) {
 
 void add_confirm_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ConfirmArguments>();
-  CLI::App* command = app.add_subcommand(
-      "confirm-robot",
-      "Compare the robot file with poses that the controller shows, and note in the cell file that it was");
-  command->add_option("--cell", arguments->cell, "Cell file; a line `robot_confirmed` is written into it")->required();
+  CLI::App* command = app.add_subcommand("confirm-robot",
+                                         "Compare the robot file with poses that the controller "
+                                         "shows, and note in the cell file that it was");
+  command
+      ->add_option("--cell", arguments->cell,
+                   "Cell file; a line `robot_confirmed` is written into it")
+      ->required();
   command
       ->add_option("--poses", arguments->poses,
-                   "Some six poses of the flange (tool 0) in the robot's base, as the controller shows them: joints, "
-                   "mm, its own angles (CSV)")
+                   "Some six poses of the flange (tool 0) in the robot's base, as the controller "
+                   "shows them: joints, mm, its own angles (CSV)")
       ->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return confirm(*arguments); }; });

@@ -41,7 +41,8 @@ std::string today() {
 
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
-             const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {
+             const std::vector<client::TargetMm>& targets)
+             -> Result<client::Answer<client::CorrectedTarget>> {
     const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
     client::Answer<client::CorrectedTarget> answer{info_of(model), {}};
     answer.items.resize(targets.size());
@@ -49,8 +50,9 @@ cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progr
     in_parallel(
         targets.size(),
         [&](std::size_t i) {
-          answer.items[i] =
-              to_wire(model.correct(from_wire(targets[i], model.cell().robot), known.tool, known.payload), types);
+          answer.items[i] = to_wire(
+              model.correct(from_wire(targets[i], model.cell().robot), known.tool, known.payload),
+              types);
         },
         [&](double share) { progress.show("correcting", share); });
     return answer;
@@ -68,37 +70,43 @@ struct Corrected {
   std::vector<Note> notes;  ///< of the model
 };
 
-Result<Corrected> with_papers(Result<cam::CorrectedProgram> program, const CompensatedModel& model) {
+Result<Corrected> with_papers(Result<cam::CorrectedProgram> program,
+                              const CompensatedModel& model) {
   if (!program) return tl::make_unexpected(program.error());
-  return Corrected{std::move(*program), papers_of(model.cell()).value_or(CellPapers()), notes_of(model)};
+  return Corrected{std::move(*program), papers_of(model.cell()).value_or(CellPapers()),
+                   notes_of(model)};
 }
 
-Result<Corrected> correct_here(const cam::Program& program, const CorrectProgramArguments& arguments) {
+Result<Corrected> correct_here(const cam::Program& program,
+                               const CorrectProgramArguments& arguments) {
   const CompensatedModel model = TRY(load_model(arguments.model));
   ProgressLine progress;
-  return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model), ask_model(model, progress),
-                                          options_of(arguments)),
+  return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model),
+                                          ask_model(model, progress), options_of(arguments)),
                      model);
 }
 
 /// Tools and robot come from the model that answers.
-Result<Corrected> correct_by_service(const cam::Program& program, const CorrectProgramArguments& arguments) {
+Result<Corrected> correct_by_service(const cam::Program& program,
+                                     const CorrectProgramArguments& arguments) {
   return with_served_model<Corrected>(
       arguments.model, arguments.service,
-      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model, const SawModel& saw) {
+      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model,
+          const SawModel& saw) {
         ProgressLine progress;
         const cam::AskCorrections ask = [&](const std::string& tool, const std::string& payload,
                                             const std::vector<client::TargetMm>& targets) {
           client::CallContext context = of;
           context.tool = tool;
           context.payload = payload;
-          auto answer =
-              session.correct_targets(context, targets, [&](double share) { progress.show("correcting", share); });
+          auto answer = session.correct_targets(
+              context, targets, [&](double share) { progress.show("correcting", share); });
           if (answer) saw(answer->model);
           return answer;
         };
-        return with_papers(
-            cam::correct_program(program, model.cell().robot, tools_of(model), ask, options_of(arguments)), model);
+        return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model), ask,
+                                                options_of(arguments)),
+                           model);
       });
 }
 
@@ -111,7 +119,8 @@ Texts texts_of(const ProgramFiles& before, const std::vector<cam::SourceFile>& a
   Texts texts;
   for (std::size_t k = 0; k < after.size(); ++k) {
     texts.push_back({paths[k], after[k].text});
-    if (keep_before[k] && paths[k] != "-") texts.push_back({cam::original_path(paths[k]), before.files[k].text});
+    if (keep_before[k] && paths[k] != "-")
+      texts.push_back({cam::original_path(paths[k]), before.files[k].text});
   }
   return texts;
 }
@@ -161,7 +170,8 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
   return Extent::kAll;
 }
 
-std::optional<ToleranceVerdict> verdict_of(const cam::CorrectedProgram& corrected, double tolerance_mm) {
+std::optional<ToleranceVerdict> verdict_of(const cam::CorrectedProgram& corrected,
+                                           double tolerance_mm) {
   if (tolerance_mm <= 0) return std::nullopt;
   return tolerance_verdict(expected_errors(corrected), tolerance_mm);
 }
@@ -174,11 +184,13 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
     texts.push_back({arguments.report, with_pages_beside(page, arguments.report)});
   }
   if (!arguments.receipt.empty()) texts.push_back({arguments.receipt, receipt_csv(corrected)});
-  if (!arguments.json.empty()) texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
+  if (!arguments.json.empty())
+    texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
-  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes};
+  cam::ReadOptions reading{
+      arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes};
   reading.pulses_per_deg = arguments.pulses_per_deg;
   return understood_program(files, std::move(reading), arguments.frames);
 }
@@ -186,7 +198,8 @@ Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArgumen
 }  // namespace
 
 Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
-  Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format, arguments.task);
+  Result<ProgramFiles> files =
+      read_program_files(arguments.inputs, arguments.format, arguments.task);
   if (!files) return tl::make_unexpected(files.error());
   if (arguments.undo) return undo(*files, arguments);
   if (arguments.again) files = originals_of(*files, true);
@@ -194,8 +207,8 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   const auto paths = TRY(output_paths(*files, arguments.output));
   TRY(check_receipts_are_apart(*files, paths, arguments));
   const cam::Program program = TRY(read(*files, arguments));
-  const Corrected done =
-      TRY(arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments));
+  const Corrected done = TRY(arguments.service.service ? correct_by_service(program, arguments)
+                                                       : correct_here(program, arguments));
   const cam::CorrectedProgram& corrected = done.program;
   const std::string left = left_alone_text(corrected);
   const auto verdict = verdict_of(corrected, arguments.tolerance_mm);

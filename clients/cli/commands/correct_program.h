@@ -13,8 +13,8 @@ namespace trammel::cli {
 struct CorrectProgramArguments {
   std::vector<std::string> inputs;
   std::string model, tool, payload, format, output, receipt, report, json, frames;
-  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
-       keep_joints = false;
+  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false,
+       split = false, keep_joints = false;
   double tolerance_mm = 0;  ///< 0: none
   ServiceOptions service;
   std::vector<std::string> idle_axes = {};

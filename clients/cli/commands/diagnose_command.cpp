@@ -59,13 +59,15 @@ const std::string& extended_cell(const DiagnoseArguments& arguments) {
 
 std::string extension_written(const Extension& extension, const DiagnoseArguments& arguments) {
   const std::string& path = extended_cell(arguments);
-  std::string said = fmt::format("{}: error_sources: [{}]\n", path, fmt::join(extension.lasting, ", "));
+  std::string said =
+      fmt::format("{}: error_sources: [{}]\n", path, fmt::join(extension.lasting, ", "));
   if (extension.lasting.size() < extension.sources.size()) {
     said += "  (what began at a pose of this batch is in the model, not in the cell file)\n";
   }
   if (const Result<Cell> readable = read_cell(path); !readable) {
-    said += fmt::format("  (it names its robot relative to itself, and is no cell file where it is: {})\n",
-                        sentence(readable.error()));
+    said += fmt::format(
+        "  (it names its robot relative to itself, and is no cell file where it is: {})\n",
+        sentence(readable.error()));
   }
   if (!arguments.model.empty()) {
     said += fmt::format("model {} in {}\n", extension.after.provenance().id, arguments.model);
@@ -74,8 +76,9 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
 }
 
 /// Extends the model by the causes found. Writes it only where a service would put it in force.
-Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
-                      const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
+Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                      const Diagnosis& diagnosis, const DiagnoseArguments& arguments,
+                      ordered_json& json, Outputs& outputs) {
   Result<Applied> found = run_extension(cell, batch, diagnosis, arguments.seed);
   if (!found || !found->extension) return found;
   const Extension& extension = *found->extension;
@@ -94,8 +97,9 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
 
 /// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
 Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
-  return read_checked_batches(arguments.batches, cell,
-                              arguments.apply ? held_out_to_extend(arguments.seed) : drawn(0, arguments.seed));
+  return read_checked_batches(
+      arguments.batches, cell,
+      arguments.apply ? held_out_to_extend(arguments.seed) : drawn(0, arguments.seed));
 }
 
 /// Says what was applied, or why nothing was.
@@ -109,7 +113,8 @@ Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) 
 }
 
 Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
-  if (arguments.batches.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
+  if (arguments.batches.empty())
+    return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
@@ -164,30 +169,36 @@ Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outp
 void add_diagnose_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<DiagnoseArguments>();
   CLI::App* command = app.add_subcommand(
-      "diagnose", "Tell which physical cause the model lacks, how sure that is, and what to measure next");
-  command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
+      "diagnose",
+      "Tell which physical cause the model lacks, how sure that is, and what to measure next");
+  command
+      ->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")
+      ->required();
   command
       ->add_option("--batch", arguments->batches,
-                   "Measurements (CSV: joints in deg, rails in mm; positions in mm), on files again for each measuring "
-                   "session; with "
-                   "--service also the id of a batch that the service has; left out there: its newest batch")
+                   "Measurements (CSV: joints in deg, rails in mm; positions in mm), on files "
+                   "again for each measuring session; with --service also the id of a batch that "
+                   "the service has; left out there: its newest batch")
       ->allow_extra_args(false);
-  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+  command
+      ->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
       ->type_name("FILE");
   command
       ->add_option("--next-poses", arguments->next_poses,
-                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot. "
-                   "Where there are "
-                   "none nothing is written, the reason goes to standard error, and the exit code is 0")
+                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what "
+                   "this batch cannot. Where there are none nothing is written, the reason goes to "
+                   "standard error, and the exit code is 0")
       ->type_name("FILE");
   command->add_flag("--strict", arguments->strict,
                     "Exit with 1, not 0, where the model lacks something that is not applied");
   add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
-  CLI::Option* apply_flag = command->add_flag("--apply", arguments->apply,
-                                              "Add what was found to the cell's error sources and train. Cell file and "
-                                              "model are written, with --service put in "
-                                              "force, only where poses held out gain by it beyond chance");
-  command->add_option("--model", arguments->model, "With --apply, on files: extended model file to write")
+  CLI::Option* apply_flag = command->add_flag(
+      "--apply", arguments->apply,
+      "Add what was found to the cell's error sources and train. Cell file and model are written, "
+      "with --service put in force, only where poses held out gain by it beyond chance");
+  command
+      ->add_option("--model", arguments->model,
+                   "With --apply, on files: extended model file to write")
       ->needs(apply_flag);
   command
       ->add_option("--cell-out", arguments->cell_out,
@@ -198,7 +209,9 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
-      return diagnose_at_service(*arguments).map([](bool all) { return all ? Extent::kAll : Extent::kPart; });
+      return diagnose_at_service(*arguments).map([](bool all) {
+        return all ? Extent::kAll : Extent::kPart;
+      });
     };
   });
 }

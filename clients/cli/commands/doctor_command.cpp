@@ -48,7 +48,9 @@ struct Found {
   std::string what, next;
 };
 
-const char* name_of(State state) { return state == State::kGood ? "good" : state == State::kNote ? "note" : "bad"; }
+const char* name_of(State state) {
+  return state == State::kGood ? "good" : state == State::kNote ? "note" : "bad";
+}
 
 /// A UDP socket that is closed with its scope.
 class Udp {
@@ -65,14 +67,17 @@ class Udp {
     place_.sin_family = AF_INET;
     place_.sin_port = htons(port);
     if (::inet_pton(AF_INET, host.c_str(), &place_.sin_addr) != 1) return EINVAL;
-    return ::bind(socket_, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) == 0 ? 0 : errno;
+    return ::bind(socket_, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) == 0 ? 0
+                                                                                           : errno;
   }
   /// Whether a datagram to itself comes back.
   [[nodiscard]] bool hears_itself() {
     socklen_t size = sizeof place_;
     if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&place_), &size) != 0) return false;
     const char out = 'x';
-    if (::sendto(socket_, &out, 1, 0, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) != 1) return false;
+    if (::sendto(socket_, &out, 1, 0, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) !=
+        1)
+      return false;
     pollfd readable{socket_, POLLIN, 0};
     char in = 0;
     return ::poll(&readable, 1, 1000) == 1 && ::recv(socket_, &in, 1, 0) == 1;
@@ -86,11 +91,13 @@ class Udp {
 Found network(const std::string& host) {
   const auto own = own_address_towards(host);
   if (!own) return {"network", State::kBad, own.error().message, own.error().next};
-  if (*own != host) return {"network", State::kGood, fmt::format("{} is reached from {}", host, *own), ""};
+  if (*own != host)
+    return {"network", State::kGood, fmt::format("{} is reached from {}", host, *own), ""};
   Udp udp;
   const int why = udp.bind(host, 0);
   if (why != 0) {
-    return {"network", State::kBad, fmt::format("{} cannot be used: {}", shown(host), std::strerror(why)),
+    return {"network", State::kBad,
+            fmt::format("{} cannot be used: {}", shown(host), std::strerror(why)),
             "name an address of this host by --host; is the interface up? ip address"};
   }
   if (!udp.hears_itself())
@@ -118,21 +125,24 @@ Found port(const std::string& host, std::uint16_t number) {
     return {check, State::kNote, "free: no server listens here",
             "start one: trammeld --config SERVER.yaml; or name its port by --port"};
   return {check, State::kBad, fmt::format("taken by another program: {}", std::strerror(why)),
-          fmt::format("who is it? ss -ulnp 'sport = :{}'; give the server another port (key port)", number)};
+          fmt::format("who is it? ss -ulnp 'sport = :{}'; give the server another port (key port)",
+                      number)};
 }
 
 Found version_of(const client::ServerStatus& server) {
   const std::string check = "server " + shown(server.server_id);
   if (!server.trouble.empty())
-    return {check, State::kBad, shown(server.trouble), "trammel status tells more; its log says since when"};
+    return {check, State::kBad, shown(server.trouble),
+            "trammel status tells more; its log says since when"};
   if (server.version != TRAMMEL_VERSION) {
-    return {check, State::kNote,
-            fmt::format("version {}, this command line is {}", shown(server.version), TRAMMEL_VERSION),
-            "bring both to one version"};
+    return {
+        check, State::kNote,
+        fmt::format("version {}, this command line is {}", shown(server.version), TRAMMEL_VERSION),
+        "bring both to one version"};
   }
   return {check, State::kGood,
-          fmt::format("version {} as this command line, {} cells, up {:.0f} s", shown(server.version),
-                      server.cells.size(), server.uptime_s),
+          fmt::format("version {} as this command line, {} cells, up {:.0f} s",
+                      shown(server.version), server.cells.size(), server.uptime_s),
           ""};
 }
 
@@ -141,18 +151,22 @@ bool is_of_this_host(const HostPort& place) {
   return std::find(own.begin(), own.end(), place.address) != own.end();
 }
 
-void look_at_servers(const ServiceOptions& options, const std::vector<HostPort>& places, std::vector<Found>& found) {
+void look_at_servers(const ServiceOptions& options, const std::vector<HostPort>& places,
+                     std::vector<Found>& found) {
   const bool any = std::any_of(places.begin(), places.end(), [](const HostPort& place) {
     return !is_of_this_host(place) || held_by_server(place.address, place.port);
   });
   if (!any && options.discovery_servers.empty()) return;  // the ports say so
   const auto session = open_session(options);
   const auto servers =
-      session ? (*session)->servers() : Result<std::vector<client::ServerStatus>>(tl::make_unexpected(session.error()));
+      session ? (*session)->servers()
+              : Result<std::vector<client::ServerStatus>>(tl::make_unexpected(session.error()));
   if (!servers) {
     const std::string hung =
-        "its port is held, and it does not answer: is it of another --domain, or hung? read its log";
-    found.push_back({"servers", State::kBad, servers.error().message, any ? hung : servers.error().next});
+        "its port is held, and it does not answer: is it of another --domain, or hung? read its "
+        "log";
+    found.push_back(
+        {"servers", State::kBad, servers.error().message, any ? hung : servers.error().next});
     return;
   }
   for (const client::ServerStatus& server : *servers) found.push_back(version_of(server));
@@ -166,19 +180,22 @@ Found certificates(const std::string& folder, const std::vector<HostPort>& place
     return {"certificates", State::kNote, "none are used, and traffic leaves this host",
             "is the service without security? else name your folder by --security"};
   const auto subject = client::check_security(folder);
-  if (!subject) return {"certificates", State::kBad, sentence(subject.error()), subject.error().next};
+  if (!subject)
+    return {"certificates", State::kBad, sentence(subject.error()), subject.error().next};
   return {"certificates", State::kGood, "of " + shown(*subject), ""};
 }
 
 Found clock() {
-  const auto now =
-      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const auto now = std::chrono::duration_cast<std::chrono::seconds>(
+                       std::chrono::system_clock::now().time_since_epoch())
+                       .count();
   if (now < kEarliest)
     return {"clock", State::kBad, "it is years behind: models and audit trail would be dated wrong",
             "set it: timedatectl set-time, or set-ntp true"};
   timex about{};
   if (::adjtimex(&about) == TIME_ERROR)
-    return {"clock", State::kNote, "not synchronised: times of tracker and controller may not fit each other",
+    return {"clock", State::kNote,
+            "not synchronised: times of tracker and controller may not fit each other",
             "synchronise it: timedatectl set-ntp true"};
   return {"clock", State::kGood, "synchronised", ""};
 }
@@ -190,8 +207,10 @@ Found leftovers(const std::vector<fs::path>& folders) {
     for (const fs::path& part : leftover_parts(folder)) left.push_back(shown(part.string()));
   }
   std::sort(left.begin(), left.end());
-  if (left.empty()) return {"leftovers", State::kGood, "no half-written files of processes that are gone", ""};
-  return {"leftovers", State::kNote, fmt::format("half-written by processes that are gone: {}", fmt::join(left, ", ")),
+  if (left.empty())
+    return {"leftovers", State::kGood, "no half-written files of processes that are gone", ""};
+  return {"leftovers", State::kNote,
+          fmt::format("half-written by processes that are gone: {}", fmt::join(left, ", ")),
           fmt::format("delete them: rm {}", fmt::join(left, " "))};
 }
 
@@ -204,8 +223,8 @@ void look_at_record(const std::string& url, std::vector<Found>& found) {
                      "an acknowledged change survives " + record.survives, record.worry});
   }
   if (const std::string missing = missing_watchdog(); !missing.empty())
-    found.push_back(
-        {"watchdog", State::kNote, missing.substr(0, missing.find("; ")), missing.substr(missing.find("; ") + 2)});
+    found.push_back({"watchdog", State::kNote, missing.substr(0, missing.find("; ")),
+                     missing.substr(missing.find("; ") + 2)});
 }
 
 void look_at_store(const std::string& path, std::vector<Found>& found) {
@@ -213,20 +232,25 @@ void look_at_store(const std::string& path, std::vector<Found>& found) {
   const bool in_use = !usable && usable.error().code == ErrorCode::kConflict;
   if (!usable && !in_use) {
     found.push_back({"store", State::kBad, sentence(usable.error()),
-                     usable.error().next.empty() ? "name the key store of the server file; its folder must exist"
-                                                 : usable.error().next});
+                     usable.error().next.empty()
+                         ? "name the key store of the server file; its folder must exist"
+                         : usable.error().next});
     return;
   }
   found.push_back({"store", State::kGood, in_use ? "in use by a server" : "could be opened", ""});
   if (is_postgres_url(path)) return look_at_record(path, found);  // its disk is another host's
   struct statvfs disk {};
-  const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
+  const fs::path folder =
+      fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
   if (::statvfs(folder.c_str(), &disk) != 0) return;
-  const double free_mb = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
+  const double free_mb =
+      static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
   const bool little = free_mb < kRoomNeededMb;
-  found.push_back(
-      {"disk", little ? State::kBad : State::kGood, fmt::format("{:.0f} MB free for the store", free_mb),
-       little ? fmt::format("make room in {}: {:.0f} MB at least", shown(folder.string()), kRoomNeededMb) : ""});
+  found.push_back({"disk", little ? State::kBad : State::kGood,
+                   fmt::format("{:.0f} MB free for the store", free_mb),
+                   little ? fmt::format("make room in {}: {:.0f} MB at least",
+                                        shown(folder.string()), kRoomNeededMb)
+                          : ""});
 }
 
 /// The text in lines beside `left`, which is as wide as they are indented.
@@ -263,16 +287,21 @@ Result<Extent> examine(const DoctorArguments& arguments) {
   std::vector<fs::path> folders = {"."};
   if (!arguments.store.empty()) {
     look_at_store(arguments.store, found);
-    if (fs::path(arguments.store).has_parent_path()) folders.push_back(fs::path(arguments.store).parent_path());
+    if (fs::path(arguments.store).has_parent_path())
+      folders.push_back(fs::path(arguments.store).parent_path());
   }
   found.push_back(leftovers(folders));
   found.push_back(certificates(service.security, places));
   tell(as_text(found), {arguments.json});
   nlohmann::ordered_json checks = nlohmann::ordered_json::array();
   for (const Found& one : found)
-    checks.push_back({{"check", one.check}, {"state", name_of(one.state)}, {"what", one.what}, {"next", one.next}});
+    checks.push_back({{"check", one.check},
+                      {"state", name_of(one.state)},
+                      {"what", one.what},
+                      {"next", one.next}});
   TRY(write_json(arguments.json, {{"version", TRAMMEL_VERSION}, {"checks", std::move(checks)}}));
-  const bool bad = std::any_of(found.begin(), found.end(), [](const Found& one) { return one.state == State::kBad; });
+  const bool bad = std::any_of(found.begin(), found.end(),
+                               [](const Found& one) { return one.state == State::kBad; });
   return bad ? Extent::kPart : Extent::kAll;
 }
 
@@ -282,9 +311,11 @@ void add_doctor_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<DoctorArguments>();
   arguments->service.timeout_s = 2;
   CLI::App* command = app.add_subcommand(
-      "doctor", "Look at this machine for what keeps a service from working, and say what to do about it");
+      "doctor",
+      "Look at this machine for what keeps a service from working, and say what to do about it");
   command
-      ->add_option("--store", arguments->store, "A server's store (its key store), a file or a URL, to look at it, too")
+      ->add_option("--store", arguments->store,
+                   "A server's store (its key store), a file or a URL, to look at it, too")
       ->type_name("STORE");
   add_json_option(*command, arguments->json);
   add_options_of_service_command(*command, arguments->service);

@@ -50,14 +50,15 @@ Result<ordered_json> fleet_of_service(const FleetArguments& arguments) {
 
 Status fleet(const FleetArguments& arguments) {
   if (arguments.models.empty() == !arguments.service.service) {
-    return failure(ErrorCode::kUsage, "either --model, once for each robot, or --service").of("--model");
+    return failure(ErrorCode::kUsage, "either --model, once for each robot, or --service")
+        .of("--model");
   }
   Outputs outputs;
   outputs.add("--report", arguments.report);
   outputs.add("--json", arguments.json);
   TRY(outputs.check({}));
-  const ordered_json json =
-      TRY(arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models));
+  const ordered_json json = TRY(arguments.service.service ? fleet_of_service(arguments)
+                                                          : fleet_of_files(arguments.models));
   if (!arguments.report.empty()) {
     const std::string page = with_pages_beside(fleet_page(json, unix_now()), arguments.report);
     TRY(write_output(arguments.report, page));
@@ -74,10 +75,12 @@ Status fleet(const FleetArguments& arguments) {
 
 void add_fleet_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<FleetArguments>();
-  CLI::App* command =
-      app.add_subcommand("fleet", "List cells, their health, and what is unusual about each among robots of its type");
-  command->add_option("--model", arguments->models, "Model file of a robot, once for each; or --service");
-  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+  CLI::App* command = app.add_subcommand(
+      "fleet", "List cells, their health, and what is unusual about each among robots of its type");
+  command->add_option("--model", arguments->models,
+                      "Model file of a robot, once for each; or --service");
+  command
+      ->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
       ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);

@@ -45,7 +45,8 @@ Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
     const CompensatedModel model = TRY(load_model(path));
     if (history.cell.empty()) history.cell = model.cell().name;
     if (model.cell().name != history.cell) {
-      return refused("the model is of cell {}, the ones before it are of {}", model.cell().name, history.cell)
+      return refused("the model is of cell {}, the ones before it are of {}", model.cell().name,
+                     history.cell)
           .in(path)
           .of("cell")
           .next("give models of one cell");
@@ -58,9 +59,10 @@ Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
 
 /// With its parameters, where the service still has the file.
 VersionOnRecord version_of(client::Session& session, const client::ModelInfo& info) {
-  VersionOnRecord one{
-      info.version, info.id, info.batch_id, info.trained_at_unix_s, info.training_poses, metres(info.validation_rms_mm),
-      info.in_force};
+  VersionOnRecord one{info.version,        info.id,
+                      info.batch_id,       info.trained_at_unix_s,
+                      info.training_poses, metres(info.validation_rms_mm),
+                      info.in_force};
   const Result<std::string> text = session.export_model(info.cell, info.version);
   const auto model = text.and_then([&](const std::string& t) { return deserialize(t, info.id); });
   if (model) put_on_record(*model, one);
@@ -71,9 +73,9 @@ Status add_trainings(client::Session& session, CellHistory& history) {
   const auto jobs = TRY(session.jobs(history.cell));
   for (const client::DatedJob& job : jobs) {
     if (job.kind != "train" || !job.finished_unix_s) continue;
-    history.trainings.push_back({*job.finished_unix_s, fmt::format("{}", fmt::join(job.batches, "+")),
-                                 job.status.verdict, job.status.why, metres(job.status.before_mm),
-                                 metres(job.status.after_mm)});
+    history.trainings.push_back(
+        {*job.finished_unix_s, fmt::format("{}", fmt::join(job.batches, "+")), job.status.verdict,
+         job.status.why, metres(job.status.before_mm), metres(job.status.after_mm)});
   }
   return {};
 }
@@ -82,7 +84,8 @@ Status add_events(client::Session& session, std::size_t last, CellHistory& histo
   const auto texts = TRY(session.audit(history.cell, 0, last));
   for (const client::AuditText& text : texts) {
     const auto trail = TRY(audit_of_json(text.json));
-    for (const AuditRow& row : trail.rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+    for (const AuditRow& row : trail.rows)
+      history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
   }
   return {};
 }
@@ -91,10 +94,12 @@ Result<CellHistory> history_of_service(const HistoryArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const auto session = TRY(open_session(arguments.service));
   auto models = TRY(session->models(cell));
-  std::sort(models.begin(), models.end(), [](const auto& a, const auto& b) { return a.version < b.version; });
+  std::sort(models.begin(), models.end(),
+            [](const auto& a, const auto& b) { return a.version < b.version; });
   const std::size_t skipped = models.size() - std::min(models.size(), arguments.last);
   CellHistory history{cell};
-  for (std::size_t i = skipped; i < models.size(); ++i) history.versions.push_back(version_of(*session, models[i]));
+  for (std::size_t i = skipped; i < models.size(); ++i)
+    history.versions.push_back(version_of(*session, models[i]));
   TRY(add_trainings(*session, history));
   TRY(add_events(*session, 10 * arguments.last, history));
   return history;
@@ -102,19 +107,22 @@ Result<CellHistory> history_of_service(const HistoryArguments& arguments) {
 
 Status history(const HistoryArguments& arguments) {
   if (arguments.models.empty() == arguments.cell.empty())
-    return failure(ErrorCode::kUsage, "either --cell, of a service, or --model, once for each version").of("--cell");
+    return failure(ErrorCode::kUsage,
+                   "either --cell, of a service, or --model, once for each version")
+        .of("--cell");
   Outputs outputs;
   outputs.add("--output", arguments.output);
   outputs.add("--json", arguments.json);
   std::vector<NamedFile> inputs;
   for (const std::string& path : arguments.models) inputs.push_back({"--model", path});
   TRY(outputs.check(inputs));
-  const CellHistory found = TRY(arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments));
+  const CellHistory found =
+      TRY(arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments));
   outputs.put("--output", with_pages_beside(history_page(found), arguments.output));
   outputs.put("--json", json_text(history_json(found)));
   TRY(outputs.write());
-  tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found.cell,
-                   found.versions.size(), moved_parameters(found).size()),
+  tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n",
+                   found.cell, found.versions.size(), moved_parameters(found).size()),
        {arguments.output, arguments.json});
   return {};
 }
@@ -124,10 +132,14 @@ Status history(const HistoryArguments& arguments) {
 void add_history_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<HistoryArguments>();
   CLI::App* command = app.add_subcommand(
-      "history", "Show what a cell has been through: its parameters over the versions, errors, events");
-  command->add_option("--cell", arguments->cell, "The cell, by its name or its file; asks a service");
-  command->add_option("--model", arguments->models, "Model file of a version, once for each, the oldest first");
-  command->add_option("--last", arguments->last, "How many versions of a service, the newest")->capture_default_str();
+      "history",
+      "Show what a cell has been through: its parameters over the versions, errors, events");
+  command->add_option("--cell", arguments->cell,
+                      "The cell, by its name or its file; asks a service");
+  command->add_option("--model", arguments->models,
+                      "Model file of a version, once for each, the oldest first");
+  command->add_option("--last", arguments->last, "How many versions of a service, the newest")
+      ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
   add_json_option(*command, arguments->json);
   add_options_of_service_command(*command, arguments->service);

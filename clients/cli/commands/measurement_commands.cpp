@@ -29,9 +29,10 @@ const std::map<std::string, LengthUnit> kUnits = {
 const std::map<std::string, Coordinates> kCoordinates = {{"cartesian", Coordinates::kCartesian},
                                                          {"cylindrical", Coordinates::kCylindrical},
                                                          {"spherical", Coordinates::kSpherical}};
-const std::map<std::string, BehindCoordinates> kBehind = {{"uncertainties", BehindCoordinates::kUncertainties},
-                                                          {"fixed-xyz", BehindCoordinates::kFixedXyz},
-                                                          {"euler-zyx", BehindCoordinates::kEulerZyx}};
+const std::map<std::string, BehindCoordinates> kBehind = {
+    {"uncertainties", BehindCoordinates::kUncertainties},
+    {"fixed-xyz", BehindCoordinates::kFixedXyz},
+    {"euler-zyx", BehindCoordinates::kEulerZyx}};
 
 /// What an option says; nothing when it was not given.
 template <typename T>
@@ -55,14 +56,17 @@ struct Converted {
 
 Result<Converted> read_converted(const ConvertArguments& arguments) {
   if (!arguments.robodk.empty()) {
-    return read_robodk_csv(arguments.robodk).map([](MeasurementBatch batch) { return Converted{std::move(batch), 0}; });
+    return read_robodk_csv(arguments.robodk).map([](MeasurementBatch batch) {
+      return Converted{std::move(batch), 0};
+    });
   }
   if (!arguments.table.empty()) {
     return read_batch_table(arguments.table, arguments.columns).map([](MeasurementBatch batch) {
       return Converted{std::move(batch), 0};
     });
   }
-  const PointFileOptions options{said(kUnits, arguments.unit), said(kCoordinates, arguments.coordinates),
+  const PointFileOptions options{said(kUnits, arguments.unit),
+                                 said(kCoordinates, arguments.coordinates),
                                  said(kBehind, arguments.behind), arguments.coverage};
   const PointList points = TRY(read_points(arguments.points, options));
   const JointList joints = TRY(read_joint_file(arguments.joints));
@@ -74,7 +78,9 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
 
 Status convert(const ConvertArguments& arguments) {
   if (!arguments.points.empty() && arguments.joints.empty()) {
-    return failure(ErrorCode::kUsage, "--points needs --joints").of("--joints").next("name the plan that was measured");
+    return failure(ErrorCode::kUsage, "--points needs --joints")
+        .of("--joints")
+        .next("name the plan that was measured");
   }
   Converted converted = TRY(read_converted(arguments));
   for (Measurement& m : converted.batch.measurements) {
@@ -86,9 +92,11 @@ Status convert(const ConvertArguments& arguments) {
   tell(fmt::format("{} measurements in {}{}\n", count, arguments.output,
                    converted.not_measured == 0
                        ? ""
-                       : fmt::format("; {} poses of {} not measured", converted.not_measured, arguments.joints)),
+                       : fmt::format("; {} poses of {} not measured", converted.not_measured,
+                                     arguments.joints)),
        {arguments.output, arguments.json});
-  return write_json(arguments.json, {{"measurements", count}, {"not_measured", converted.not_measured}});
+  return write_json(arguments.json,
+                    {{"measurements", count}, {"not_measured", converted.not_measured}});
 }
 
 struct ReferencesArguments {
@@ -110,16 +118,21 @@ const char* verdict_name(ReferenceVerdict verdict) {
 }
 
 std::string references_text(const ReferenceCheck& check) {
-  std::string text = fmt::format("{:<16}{:>15}{:>20}\n", "reflector", "difference mm", "after transform mm");
+  std::string text =
+      fmt::format("{:<16}{:>15}{:>20}\n", "reflector", "difference mm", "after transform mm");
   for (const ReferenceResidual& residual : check.residuals) {
-    text += fmt::format("{:<16}{:>15.4f}{:>20.4f}\n", residual.name, to_mm(residual.difference_W.norm()),
-                        to_mm(residual.remaining_W.norm()));
+    text += fmt::format("{:<16}{:>15.4f}{:>20.4f}\n", residual.name,
+                        to_mm(residual.difference_W.norm()), to_mm(residual.remaining_W.norm()));
   }
-  text += fmt::format("{:<16}{:>15.4f}{:>20.4f}\n", "rms", to_mm(check.rms), to_mm(check.rms_remaining));
-  if (!check.not_measured.empty()) text += fmt::format("not measured: {}\n", fmt::join(check.not_measured, ", "));
+  text += fmt::format("{:<16}{:>15.4f}{:>20.4f}\n", "rms", to_mm(check.rms),
+                      to_mm(check.rms_remaining));
+  if (!check.not_measured.empty())
+    text += fmt::format("not measured: {}\n", fmt::join(check.not_measured, ", "));
   if (!check.rigid) {
     return text +
-           fmt::format("the reflectors moved against each other, {} the most: nothing can be localised\n", check.worst);
+           fmt::format(
+               "the reflectors moved against each other, {} the most: nothing can be localised\n",
+               check.worst);
   }
   switch (check.verdict) {
     case ReferenceVerdict::kFine:
@@ -127,7 +140,8 @@ std::string references_text(const ReferenceCheck& check) {
     case ReferenceVerdict::kLocalise:
       return text + "localise: apply the transform to what is measured from now on\n";
     case ReferenceVerdict::kLocaliseAndRepeat:
-      return text + "localise and repeat: apply the transform, and repeat the test before this check\n";
+      return text +
+             "localise and repeat: apply the transform, and repeat the test before this check\n";
   }
   return text;
 }
@@ -148,14 +162,17 @@ ordered_json references_json(const ReferenceCheck& check) {
           {"worst", check.worst},
           {"reflectors", std::move(reflectors)},
           {"not_measured", check.not_measured},
-          {"transform", {{"xyz_mm", {p_mm.x(), p_mm.y(), p_mm.z()}}, {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}}}};
+          {"transform",
+           {{"xyz_mm", {p_mm.x(), p_mm.y(), p_mm.z()}}, {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}}}};
 }
 
 Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck& check) {
   if (arguments.batch.empty()) return {};
   if (!check.rigid) {
-    return refused("not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is reflector {}",
-                   to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst)
+    return refused(
+               "not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is "
+               "reflector {}",
+               to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst)
         .in(arguments.batch)
         .beyond(to_mm(check.rms_remaining), arguments.repeat_above_mm)
         .with_text(check.worst);
@@ -174,7 +191,8 @@ Status check_reflectors(const ReferencesArguments& arguments) {
   const PointList nominal = TRY(read_points(arguments.nominal));
   const PointList measured = TRY(read_points(arguments.measured));
   const ReferenceCheck check = TRY(
-      check_references(nominal, measured, {from_mm(arguments.localise_above_mm), from_mm(arguments.repeat_above_mm)}));
+      check_references(nominal, measured,
+                       {from_mm(arguments.localise_above_mm), from_mm(arguments.repeat_above_mm)}));
   tell(references_text(check), {arguments.output, arguments.json});
   TRY(write_json(arguments.json, references_json(check)));
   return localise_batch(arguments, check);
@@ -182,33 +200,38 @@ Status check_reflectors(const ReferencesArguments& arguments) {
 
 void add_convert(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ConvertArguments>();
-  CLI::App* command = app.add_subcommand("convert", "Make a batch of measurements that other programs exported");
+  CLI::App* command =
+      app.add_subcommand("convert", "Make a batch of measurements that other programs exported");
   CLI::Option_group* what = command->add_option_group("Measurements");
-  CLI::Option* points =
-      what->add_option("--points", arguments->points,
-                       "Points or frames exported by SpatialAnalyzer (ASCII) or Leica Tracker Pilot (CSV), "
-                       "with --joints");
-  what->add_option("--robodk", arguments->robodk, "Measurements exported by a RoboDK calibration project (CSV)");
-  CLI::Option* table =
-      what->add_option("--table", arguments->table, "A table without a header line, whose --columns you tell");
+  CLI::Option* points = what->add_option("--points", arguments->points,
+                                         "Points or frames exported by SpatialAnalyzer (ASCII) or "
+                                         "Leica Tracker Pilot (CSV), with --joints");
+  what->add_option("--robodk", arguments->robodk,
+                   "Measurements exported by a RoboDK calibration project (CSV)");
+  CLI::Option* table = what->add_option("--table", arguments->table,
+                                        "A table without a header line, whose --columns you tell");
   what->require_option(1);
   CLI::Option* columns =
       command
-          ->add_option("--columns", arguments->columns,
-                       "Columns of --table in their order, joined by commas: q1_deg,...,x_mm,y_mm,z_mm and any other "
-                       "of a batch; _rad and _m for other units, skip to pass one over")
+          ->add_option(
+              "--columns", arguments->columns,
+              "Columns of --table in their order, joined by commas: q1_deg,...,x_mm,y_mm,z_mm and "
+              "any other of a batch; _rad and _m for other units, skip to pass one over")
           ->delimiter(',')
           ->needs(table);
   table->needs(columns);
   command
       ->add_option("--joints", arguments->joints,
-                   "Plan that was measured (CSV: joints in deg, rails in mm); its pose_id is the point's name")
+                   "Plan that was measured (CSV: joints in deg, rails in mm); its pose_id is the "
+                   "point's name")
       ->needs(points);
   command
       ->add_flag("--in-order", arguments->in_order,
                  "The first point measures the first pose, and so on: names do not count")
       ->needs(points);
-  command->add_option("--unit", arguments->unit, "Unit of the points' lengths where the file does not say; else mm")
+  command
+      ->add_option("--unit", arguments->unit,
+                   "Unit of the points' lengths where the file does not say; else mm")
       ->check(one_of(kUnits))
       ->needs(points);
   command
@@ -222,7 +245,8 @@ void add_convert(CLI::App& app, Action& chosen) {
       ->check(one_of(kBehind))
       ->needs(points);
   command
-      ->add_option("--coverage", arguments->coverage, "How many standard deviations the uncertainties in the file are")
+      ->add_option("--coverage", arguments->coverage,
+                   "How many standard deviations the uncertainties in the file are")
       ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str()
       ->needs(points);
@@ -237,19 +261,22 @@ void add_convert(CLI::App& app, Action& chosen) {
 
 void add_references(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReferencesArguments>();
-  CLI::App* command =
-      app.add_subcommand("references", "Tell from reference reflectors whether the tracker has moved, and where to");
-  command->add_option("--nominal", arguments->nominal, "Reflectors as first measured (CSV: name, x_mm, y_mm, z_mm)")
+  CLI::App* command = app.add_subcommand(
+      "references", "Tell from reference reflectors whether the tracker has moved, and where to");
+  command
+      ->add_option("--nominal", arguments->nominal,
+                   "Reflectors as first measured (CSV: name, x_mm, y_mm, z_mm)")
       ->required();
   command
       ->add_option("--measured", arguments->measured,
                    "The same reflectors as measured now (CSV: name, x_mm, y_mm, z_mm)")
       ->required();
+  command->add_option("--batch", arguments->batch,
+                      "Batch to move into the frame of the nominal reflectors (needs --output); "
+                      "stays as it is where all is fine");
   command->add_option(
-      "--batch", arguments->batch,
-      "Batch to move into the frame of the nominal reflectors (needs --output); stays as it is where all is fine");
-  command->add_option("-o,--output", arguments->output,
-                      "The moved batch to write (CSV: joints in deg, rails in mm; positions in mm)");
+      "-o,--output", arguments->output,
+      "The moved batch to write (CSV: joints in deg, rails in mm; positions in mm)");
   command
       ->add_option("--localise-above-mm", arguments->localise_above_mm,
                    "Rms difference above which the tracker is to be localised again, mm")
@@ -259,7 +286,8 @@ void add_references(CLI::App& app, Action& chosen) {
                    "Rms difference above which the test before is to be repeated, too, mm")
       ->capture_default_str();
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return check_reflectors(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return check_reflectors(*arguments); }; });
 }
 
 }  // namespace

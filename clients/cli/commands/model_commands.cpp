@@ -54,13 +54,14 @@ struct TrainArguments {
   bool as_read = false;
 };
 
-/// Checks the batch against the model to start from, as the service does before training. Only the refitted sources may
-/// differ: another difference would be learned as part of them.
-Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
-                    const CheckedBatch& batch) {
+/// Checks the batch against the model to start from, as the service does before training. Only the
+/// refitted sources may differ: another difference would be learned as part of them.
+Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit,
+                    const Cell& cell, const CheckedBatch& batch) {
   TRY(check_may_start_from(from, cell, batch.rows(), refit));
   const auto& rows = batch.rows().measurements;
-  const bool known = std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return knows(from, m); });
+  const bool known =
+      std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return knows(from, m); });
   if (!known) return {};  // its tools are others: nothing to compare
   const Triage seen = triage(from, batch, with_known_tools(cell, from, refit));
   const auto is_refitted = [&](const Cause& cause) {
@@ -68,20 +69,25 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
     return whole != nullptr && std::find(refit.begin(), refit.end(), whole->cause) != refit.end();
   };
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
-                        is_refitted(seen.cause) && (!seen.tracker_elsewhere || corrects(refit, causes::Part::kBase));
+                        is_refitted(seen.cause) &&
+                        (!seen.tracker_elsewhere || corrects(refit, causes::Part::kBase));
   if (seen.learn || refitted) return {};
   return refused("{}", seen.sentence)
       .in("batch " + batch.id())
       .of("--refit")
-      .next(fmt::format("refitting {} would not learn that: train without --from", causes_in_words(refit)));
+      .next(fmt::format("refitting {} would not learn that: train without --from",
+                        causes_in_words(refit)));
 }
 
-/// What robots of the cell's type have in common, by the models of `paths`; empty where nobody wants to know.
-Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths, const Cell& cell) {
+/// What robots of the cell's type have in common, by the models of `paths`; empty where nobody
+/// wants to know.
+Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths,
+                                              const Cell& cell) {
   const CellRules rules = TRY(rules_of(cell));
   if (!rules.fleet_prior && paths.empty()) return std::optional<FleetPrior>();
   if (paths.empty()) {
-    return failure(ErrorCode::kUsage, "cell {} says prior: fleet, and no robot of its type is named", cell.name)
+    return failure(ErrorCode::kUsage,
+                   "cell {} says prior: fleet, and no robot of its type is named", cell.name)
         .of("--fleet")
         .next("name their models, --fleet once for each");
   }
@@ -90,7 +96,9 @@ Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& pa
     CompensatedModel model = TRY(load_model(path));
     members.push_back({path, std::move(model)});
   }
-  return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) { return std::optional(std::move(prior)); });
+  return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) {
+    return std::optional(std::move(prior));
+  });
 }
 
 std::string unlike_text(const std::vector<Unlike>& unlike) {
@@ -124,7 +132,8 @@ std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatc
 std::string jump_text(const std::optional<Jump>& jump) {
   if (!jump) return "";
   return fmt::format(
-      "note: something changed in the middle of the batch, {}; no single arm fits the poses before and after\n",
+      "note: something changed in the middle of the batch, {}; no single arm fits the poses before "
+      "and after\n",
       in_words(*jump));
 }
 
@@ -143,9 +152,10 @@ Status train_model(const TrainArguments& arguments) {
           .next("trammel help levels tells about kernels");
   }
   Cell cell = TRY(read_cell_to_train(
-      arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias}));
-  const CheckedBatch batch =
-      TRY(read_checked_batches(arguments.batches, cell, drawn(arguments.validation_share, arguments.seed)));
+      arguments.cell,
+      {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias}));
+  const CheckedBatch batch = TRY(read_checked_batches(
+      arguments.batches, cell, drawn(arguments.validation_share, arguments.seed)));
   TrainOptions options;
   options.level = arguments.level;
   options.bias = arguments.bias;
@@ -163,7 +173,8 @@ Status train_model(const TrainArguments& arguments) {
   }
   const auto shared = std::make_shared<const Cell>(std::move(cell));
   // A model to start from has judged the batch, or somebody has looked at it.
-  if (!arguments.as_read && arguments.from.empty()) TRY(check_first_batch(shared, batch, arguments.level));
+  if (!arguments.as_read && arguments.from.empty())
+    TRY(check_first_batch(shared, batch, arguments.level));
   const CompensatedModel model = TRY([&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
@@ -174,14 +185,18 @@ Status train_model(const TrainArguments& arguments) {
   }());
   TRY(write_output(arguments.output, serialize(model)));
   const auto& parts = model.parts();
-  const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
-  const std::optional<Jump> jump = arguments.as_read && !options.from ? jump_beside(model, batch) : std::nullopt;
+  const std::vector<Unlike> unlike =
+      options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
+  const std::optional<Jump> jump =
+      arguments.as_read && !options.from ? jump_beside(model, batch) : std::nullopt;
   tell(model_text(model) + unlike_text(unlike) + jump_text(jump) +
-           (parts.validation ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
-                                   evaluation_table(*parts.validation)
-                             : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
-                                           rows_of(parts.training), parts.provenance.figures_batch_id()) +
-                                   evaluation_table(parts.training)),
+           (parts.validation
+                ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
+                      evaluation_table(*parts.validation)
+                : fmt::format(
+                      "on the {} poses of batch {} it was trained on (none were held out):\n",
+                      rows_of(parts.training), parts.provenance.figures_batch_id()) +
+                      evaluation_table(parts.training)),
        {arguments.output, arguments.json});
   nlohmann::ordered_json json = model_json(model);
   if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
@@ -194,21 +209,25 @@ struct EvaluateArguments {
   std::vector<std::string> batches;
 };
 
-/// What the sessions of a batch stand on for a model, for people; empty where nothing had to be found.
+/// What the sessions of a batch stand on for a model, for people; empty where nothing had to be
+/// found.
 std::string located_text(const InWorld& world) {
   if (world.located.empty()) return "";
-  return fmt::format("note: where the instrument of session {} stood was found from its own poses\n",
-                     fmt::join(world.located, ", "));
+  return fmt::format(
+      "note: where the instrument of session {} stood was found from its own poses\n",
+      fmt::join(world.located, ", "));
 }
 
 std::string learned_text(std::ptrdiff_t poses) {
   if (poses == 0) return "";
   return fmt::format(
-      "note: the model was trained on {} of these poses: they say how well it fits, not how well it predicts\n", poses);
+      "note: the model was trained on {} of these poses: they say how well it fits, not how well "
+      "it predicts\n",
+      poses);
 }
 
-/// On standard error, where results for programs may not hide it: figures of poses that are not this robot's say
-/// nothing.
+/// On standard error, where results for programs may not hide it: figures of poses that are not
+/// this robot's say nothing.
 void warn_of_foreign_poses(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (const auto foreign = foreign_poses(model, batch))
     std::fputs(shown_lines(fmt::format("warning: {}\n", *foreign)).c_str(), stderr);
@@ -233,30 +252,36 @@ Status evaluate(const EvaluateArguments& arguments) {
   const std::vector<Note> notes = notes_of(model);
   warn_of_notes(notes);
   if (has_gauges(world.batch) && !arguments.residuals.empty() && has_positions(world.batch)) {
-    return failure(ErrorCode::kUsage, "residuals of positions and of distances or touches go into two files")
+    return failure(ErrorCode::kUsage,
+                   "residuals of positions and of distances or touches go into two files")
         .of("--residuals")
         .next("evaluate the rows of each kind by themselves");
   }
   const MeasurementBatch positions = positions_of(world.batch);
   const CompensatedModel::LevelErrors errors = model.errors_B(positions);
   const auto learned =
-      std::count_if(world.batch.measurements.begin(), world.batch.measurements.end(), LearnedFrom(model, batch.hash()));
-  const std::string structure = positions.measurements.empty() ? "" : structure_note(model, positions, errors);
-  tell(fmt::format("model {} on {} poses of {}:\n", model.provenance().id, rows_of(evaluation), batch.id()) +
-           evaluation_table(evaluation) + "the model rests on " + in_words(model.parts().measured, model.cell()) +
-           "\n" + located_text(world) + learned_text(learned) + (structure.empty() ? "" : "note: " + structure + "\n"),
+      std::count_if(world.batch.measurements.begin(), world.batch.measurements.end(),
+                    LearnedFrom(model, batch.hash()));
+  const std::string structure =
+      positions.measurements.empty() ? "" : structure_note(model, positions, errors);
+  tell(fmt::format("model {} on {} poses of {}:\n", model.provenance().id, rows_of(evaluation),
+                   batch.id()) +
+           evaluation_table(evaluation) + "the model rests on " +
+           in_words(model.parts().measured, model.cell()) + "\n" + located_text(world) +
+           learned_text(learned) + (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
     const Status written = write_output(
-        arguments.residuals, has_gauges(world.batch) ? gauge_residuals_csv(world.batch, model.gauge_errors(world.batch))
-                                                     : residuals_csv(positions, errors));
+        arguments.residuals, has_gauges(world.batch)
+                                 ? gauge_residuals_csv(world.batch, model.gauge_errors(world.batch))
+                                 : residuals_csv(positions, errors));
     if (!written) return written;
   }
   warn_of_foreign_poses(model, world.batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
   json["measured"] = measured_json(model);
-  json["budget"] =
-      positions.measurements.empty() ? nlohmann::ordered_json(nullptr) : budget_json(error_budget(model, positions));
+  json["budget"] = positions.measurements.empty() ? nlohmann::ordered_json(nullptr)
+                                                  : budget_json(error_budget(model, positions));
   json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;
@@ -275,16 +300,18 @@ Status report(const ReportArguments& arguments) {
     const CheckedBatch checked = TRY(read_checked_batches({arguments.batch}, model.cell()));
     TRY(require_positions(checked.rows(), "report --batch"));
     InWorld world = TRY(in_world_of(model, checked.rows()));
-    const std::size_t learned = std::erase_if(world.batch.measurements, LearnedFrom(model, checked.hash()));
+    const std::size_t learned =
+        std::erase_if(world.batch.measurements, LearnedFrom(model, checked.hash()));
     if (!world.batch.measurements.empty()) batch = std::move(world.batch);
     if (learned > 0)
-      note = fmt::format("note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
-                         learned, checked.size(), arguments.batch);
+      note = fmt::format(
+          "note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
+          learned, checked.size(), arguments.batch);
   }
   warn_of_notes(notes_of(model));
   if (batch) warn_of_foreign_poses(model, *batch);
-  if (const Status written =
-          write_output(arguments.output, with_pages_beside(model_page(model, batch), arguments.output));
+  if (const Status written = write_output(
+          arguments.output, with_pages_beside(model_page(model, batch), arguments.output));
       !written)
     return written;
   tell(note + fmt::format("report of model {} in {}\n", model.provenance().id, arguments.output),
@@ -294,58 +321,67 @@ Status report(const ReportArguments& arguments) {
 
 void add_train(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot, and learn what calibration leaves over");
+  CLI::App* command = app.add_subcommand(
+      "train", "Calibrate a cell's robot, and learn what calibration leaves over");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
   add_batches_option(*command, arguments->batches)->required();
-  command->add_option(
-      "--level", arguments->level,
-      "What to identify instead of the cell's error sources: M0 (nothing), M1 (base), M2 (base, geometry), M3 "
-      "(base, geometry, compliance), a list of sources, or a level and more: M2,gear_transmission:3");
-  command->add_option(
-      "--bias", arguments->bias,
-      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none, or auto (the simplest "
-      "that poses left out say is worth it)");
+  command->add_option("--level", arguments->level,
+                      "What to identify instead of the cell's error sources: M0 (nothing), M1 "
+                      "(base), M2 (base, geometry), M3 (base, geometry, compliance), a list of "
+                      "sources, or a level and more: M2,gear_transmission:3");
+  command->add_option("--bias", arguments->bias,
+                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, "
+                      "..., none, or auto (the simplest that poses left out say is worth it)");
   command->add_option("--from", arguments->from,
-                      "Model file of the same robot to start from: all but the sources of --refit stay as they are");
-  command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
+                      "Model file of the same robot to start from: all but the sources of --refit "
+                      "stay as they are");
+  command
+      ->add_option("--refit", arguments->refit,
+                   "With --from: error sources to identify anew, joined by commas")
       ->needs("--from")
       ->capture_default_str();
-  command->add_option("--fleet", arguments->fleet,
-                      "Model file of a robot of the same type, once for each, at least three: what they have in common "
-                      "is expected of this one, but for what it is unlike them in");
+  command->add_option(
+      "--fleet", arguments->fleet,
+      "Model file of a robot of the same type, once for each, at least three: what they have in "
+      "common is expected of this one, but for what it is unlike them in");
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
-                   "Share of the poses to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
+                   "Share of the poses to hold out, 0 to 0.9, where the batch has no set column; "
+                   "0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
-  command->add_flag(
-      "--as-read", arguments->as_read,
-      "Learn from the batch as it is, though another reading of it fits better or something changed in the "
-      "middle of it");
+  command->add_flag("--as-read", arguments->as_read,
+                    "Learn from the batch as it is, though another reading of it fits better or "
+                    "something changed in the middle of it");
   command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
 }
 
 void add_evaluate(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<EvaluateArguments>();
-  CLI::App* command =
-      app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
+  CLI::App* command = app.add_subcommand(
+      "evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
   add_batches_option(*command, arguments->batches)->required();
   command->add_option("--residuals", arguments->residuals,
-                      "Also write what is left of each pose, axis by axis, to this file (CSV; '-': standard output)");
+                      "Also write what is left of each pose, axis by axis, to this file (CSV; '-': "
+                      "standard output)");
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }
 
 void add_report(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReportArguments>();
-  CLI::App* command = app.add_subcommand("report", "Write a model's report as a page that opens offline");
+  CLI::App* command =
+      app.add_subcommand("report", "Write a model's report as a page that opens offline");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch,
-                      "Measurements to compare it with (CSV: joints in deg, rails in mm; positions in mm)");
+  command->add_option(
+      "--batch", arguments->batch,
+      "Measurements to compare it with (CSV: joints in deg, rails in mm; positions in mm)");
   command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });

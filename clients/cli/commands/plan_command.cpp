@@ -46,7 +46,8 @@ Status read_criterion(const std::string& text, PlanOptions& options) {
   }
   const std::size_t comma = text.find(',');
   if (!text.starts_with(separate) || comma == std::string::npos) {
-    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE{}", text,
+    return failure(ErrorCode::kUsage,
+                   "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE{}", text,
                    did_you_mean(text.substr(0, text.find(':')), kCriteria))
         .of("--criterion")
         .with_text(text);
@@ -75,14 +76,16 @@ ProgramOptions program_called_after(const std::string& path, ProgramOptions opti
   return options;
 }
 
-/// The plan and its programs as text, by the options that name their files. All are written together, or none is.
+/// The plan and its programs as text, by the options that name their files. All are written
+/// together, or none is.
 Result<Outputs> outputs_of(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   Outputs outputs;
   outputs.add("--output", arguments.output);
   outputs.put("--output", as_csv(cell, arguments.output, plan));
   const auto add = [&](const char* option, const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
-    Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
+    Result<std::string> text =
+        writer(cell.robot, plan, program_called_after(path, arguments.program));
     if (!text) return Failure(text.error()).as(ErrorCode::kRefused).in(path);
     outputs.add(option, path);
     outputs.put(option, std::move(*text));
@@ -90,7 +93,8 @@ Result<Outputs> outputs_of(const Cell& cell, const PlanArguments& arguments, con
   };
   for (const Status& added :
        {add("--rapid", arguments.rapid, to_rapid), add("--krl", arguments.krl, to_krl),
-        add("--fanuc", arguments.fanuc, to_fanuc), add("--urscript", arguments.urscript, to_urscript)}) {
+        add("--fanuc", arguments.fanuc, to_fanuc),
+        add("--urscript", arguments.urscript, to_urscript)}) {
     if (!added) return tl::make_unexpected(added.error());
   }
   outputs.add("--json", arguments.json);
@@ -99,55 +103,63 @@ Result<Outputs> outputs_of(const Cell& cell, const PlanArguments& arguments, con
 
 std::string separation_text(const PlanArguments& arguments, const Plan::Separation& separation) {
   const PlanOptions& options = arguments.options;
-  std::string text =
-      fmt::format("{} beside {}: strength {:.3g}, of a Latin hypercube {:.3g}\n", in_words(options.cause),
-                  in_words(options.other), separation.plan.strength, separation.latin_hypercube.strength);
+  std::string text = fmt::format("{} beside {}: strength {:.3g}, of a Latin hypercube {:.3g}\n",
+                                 in_words(options.cause), in_words(options.other),
+                                 separation.plan.strength, separation.latin_hypercube.strength);
   for (std::size_t i = 0; i < separation.plan.parameters.size(); ++i) {
     const ParameterSeparation& after = separation.plan.parameters[i];
     const ParameterSeparation& before = separation.latin_hypercube.parameters[i];
-    text += fmt::format("  {}: {:.1f} % of its effect is its own ({:.1f} %), strength {:.3g} ({:.3g})\n",
-                        after.parameter, 100 * after.share, 100 * before.share, after.strength, before.strength);
+    text += fmt::format(
+        "  {}: {:.1f} % of its effect is its own ({:.1f} %), strength {:.3g} ({:.3g})\n",
+        after.parameter, 100 * after.share, 100 * before.share, after.strength, before.strength);
   }
   if (separation.hopeless.empty()) return text;
   const bool all = separation.hopeless.size() == separation.plan.parameters.size();
   return text +
-         fmt::format("No pose of this cell separates {} from {} and the cell's other sources; {} would\n",
-                     all ? in_words(options.cause)
-                         : fmt::format("{} of {}", fmt::join(separation.hopeless, ", "), in_words(options.cause)),
-                     in_words(options.other), separation.needs);
+         fmt::format(
+             "No pose of this cell separates {} from {} and the cell's other sources; {} would\n",
+             all ? in_words(options.cause)
+                 : fmt::format("{} of {}", fmt::join(separation.hopeless, ", "),
+                               in_words(options.cause)),
+             in_words(options.other), separation.needs);
 }
 
 /// The change that this check shows worst.
 const SmallestEffect* hardest_seen(const Plan& plan) {
-  const auto rms = [](const SmallestEffect& one) { return one.rms.value_or(std::numeric_limits<double>::infinity()); };
-  const auto worst = std::max_element(plan.smallest.begin(), plan.smallest.end(),
-                                      [&](const auto& one, const auto& other) { return rms(one) < rms(other); });
+  const auto rms = [](const SmallestEffect& one) {
+    return one.rms.value_or(std::numeric_limits<double>::infinity());
+  };
+  const auto worst =
+      std::max_element(plan.smallest.begin(), plan.smallest.end(),
+                       [&](const auto& one, const auto& other) { return rms(one) < rms(other); });
   return worst == plan.smallest.end() ? nullptr : &*worst;
 }
 
 std::string check_text(const Plan& plan) {
   const SmallestEffect* hardest = hardest_seen(plan);
   if (hardest == nullptr) return "";
-  if (!hardest->rms) return fmt::format("No change of {} would be seen\n", in_words(hardest->cause));
+  if (!hardest->rms)
+    return fmt::format("No change of {} would be seen\n", in_words(hardest->cause));
   return fmt::format(
-      "Counting the instrument's noise alone, every single change of {:.3f} mm rms is seen with 95 %, hardest {}; what "
-      "a "
-      "model leaves over makes that larger: trammel check says how large\n",
+      "Counting the instrument's noise alone, every single change of {:.3f} mm rms is seen with 95 "
+      "%, hardest {}; what a model leaves over makes that larger: trammel check says how large\n",
       to_mm(*hardest->rms), in_words(hardest->cause));
 }
 
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   const DrawCount& draw = plan.draw;
   if (!arguments.from.empty()) {
-    return fmt::format("{} poses for cell {} in {}\n", plan.poses.size(), cell.name, arguments.output);
+    return fmt::format("{} poses for cell {} in {}\n", plan.poses.size(), cell.name,
+                       arguments.output);
   }
   std::string text = fmt::format(
-      "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {} out of sight, {} too near to a "
-      "joint limit\n",
-      plan.poses.size(), cell.name, arguments.output, draw.drawn, draw.kept, draw.outside, draw.unseen, draw.no_way);
+      "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {} out of sight, "
+      "{} too near to a joint limit\n",
+      plan.poses.size(), cell.name, arguments.output, draw.drawn, draw.kept, draw.outside,
+      draw.unseen, draw.no_way);
   if (arguments.options.criterion == PlanCriterion::kObservability) {
-    text += fmt::format("log det of the information: {:.2f}, of a Latin hypercube {:.2f}\n", plan.criterion,
-                        plan.criterion_of_latin_hypercube);
+    text += fmt::format("log det of the information: {:.2f}, of a Latin hypercube {:.2f}\n",
+                        plan.criterion, plan.criterion_of_latin_hypercube);
   }
   if (plan.separation) text += separation_text(arguments, *plan.separation);
   return text + check_text(plan);
@@ -156,7 +168,8 @@ std::string in_words(const Cell& cell, const PlanArguments& arguments, const Pla
 ordered_json as_json(const Separability& separability) {
   ordered_json parameters = ordered_json::array();
   for (const ParameterSeparation& p : separability.parameters) {
-    parameters.push_back({{"parameter", p.parameter}, {"strength", p.strength}, {"share", p.share}});
+    parameters.push_back(
+        {{"parameter", p.parameter}, {"strength", p.strength}, {"share", p.share}});
   }
   return {{"strength", separability.strength}, {"parameters", parameters}};
 }
@@ -210,7 +223,8 @@ Status plan(PlanArguments arguments) {
   arguments.options.orientation = !arguments.positions_only;
   Cell read = TRY(read_cell_to_train(arguments.cell, {.bias = false}));
   const auto cell = std::make_shared<const Cell>(std::move(read));
-  Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
+  Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options)
+                                                : plan_from(*cell, arguments.from);
   if (!planned) return tl::make_unexpected(planned.error());
   // A batch is measured in the order of the program, so the plan has it, too.
   if (arguments.writes_program() && !arguments.keep_order)
@@ -218,32 +232,39 @@ Status plan(PlanArguments arguments) {
   Outputs outputs = TRY(outputs_of(*cell, arguments, *planned));
   outputs.put("--json", json_text(as_json(*cell, arguments, *planned)));
   TRY(outputs.write());
-  tell(in_words(*cell, arguments, *planned),
-       {arguments.output, arguments.rapid, arguments.krl, arguments.fanuc, arguments.urscript, arguments.json});
+  tell(in_words(*cell, arguments, *planned), {arguments.output, arguments.rapid, arguments.krl,
+                                              arguments.fanuc, arguments.urscript, arguments.json});
   return {};
 }
 
 void add_program_options(CLI::App& command, PlanArguments& arguments) {
-  command.add_option("--rapid", arguments.rapid, "Program to write for an ABB controller (.mod)")->type_name("FILE");
-  command.add_option("--krl", arguments.krl, "Program to write for a KUKA controller (.src)")->type_name("FILE");
-  command.add_option("--fanuc", arguments.fanuc, "Program to write for a FANUC controller (.ls)")->type_name("FILE");
-  command.add_option("--urscript", arguments.urscript, "Program to write for a Universal Robots controller (.script)")
+  command.add_option("--rapid", arguments.rapid, "Program to write for an ABB controller (.mod)")
+      ->type_name("FILE");
+  command.add_option("--krl", arguments.krl, "Program to write for a KUKA controller (.src)")
+      ->type_name("FILE");
+  command.add_option("--fanuc", arguments.fanuc, "Program to write for a FANUC controller (.ls)")
+      ->type_name("FILE");
+  command
+      .add_option("--urscript", arguments.urscript,
+                  "Program to write for a Universal Robots controller (.script)")
       ->type_name("FILE");
   command.add_flag("--keep-order", arguments.keep_order,
-                   "Leave the poses of programs, and of the plan beside them, in the order of their choice, not in one "
-                   "in which the arm travels little");
+                   "Leave the poses of programs, and of the plan beside them, in the order of "
+                   "their choice, not in one in which the arm travels little");
   command
       .add_option("--fanuc-tool", arguments.program.fanuc_tool,
                   "Number of the tool frame in the FANUC controller that the program names")
       ->capture_default_str();
   command
-      .add_option("--rapid-tool", arguments.program.rapid_tool, "Tooldata of the ABB controller that the program names")
+      .add_option("--rapid-tool", arguments.program.rapid_tool,
+                  "Tooldata of the ABB controller that the program names")
       ->capture_default_str();
   command
       .add_option("--krl-tool", arguments.program.krl_tool,
                   "Number of the tool in the KUKA controller that the program names")
       ->capture_default_str();
-  command.add_option("--wait", arguments.program.wait_s, "How long a program waits at each pose, s")
+  command
+      .add_option("--wait", arguments.program.wait_s, "How long a program waits at each pose, s")
       ->capture_default_str();
 }
 
@@ -252,53 +273,56 @@ void add_program_options(CLI::App& command, PlanArguments& arguments) {
 void add_plan_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<PlanArguments>();
   PlanOptions& options = arguments->options;
-  CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell, and write them as robot programs");
+  CLI::App* command = app.add_subcommand(
+      "plan", "Plan measuring poses for a cell, and write them as robot programs");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  CLI::Option* count =
-      command->add_option("--count", options.count, "Number of poses; this, --check or --from is required")
-          ->check(CLI::Range(1, 1000000));
-  CLI::Option* check =
-      command
-          ->add_option(
-              "--check", arguments->check,
-              "Number of poses of a health check (command check): those that show most of what may have changed")
-          ->check(CLI::Range(1, 1000))
-          ->excludes(count);
+  CLI::Option* count = command
+                           ->add_option("--count", options.count,
+                                        "Number of poses; this, --check or --from is required")
+                           ->check(CLI::Range(1, 1000000));
+  CLI::Option* check = command
+                           ->add_option("--check", arguments->check,
+                                        "Number of poses of a health check (command check): those "
+                                        "that show most of what may have changed")
+                           ->check(CLI::Range(1, 1000))
+                           ->excludes(count);
   command
       ->add_option("--from", arguments->from,
-                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them, to "
-                   "write programs of")
+                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose "
+                   "--next-poses writes them, to write programs of")
       ->excludes(count)
       ->excludes(check);
   add_seed_option(*command, options.seed, "Seed of the draw");
   command
-      ->add_option(
-          "--criterion", arguments->criterion,
-          "How poses are chosen: lhs, spread evenly over the joint ranges (Latin hypercube); observability, so that "
-          "the "
-          "parameters of the cell's error sources become certain; separate:CAUSE,CAUSE, to tell the first cause "
-          "from the second")
+      ->add_option("--criterion", arguments->criterion,
+                   "How poses are chosen: lhs, spread evenly over the joint ranges (Latin "
+                   "hypercube); observability, so that the parameters of the cell's error sources "
+                   "become certain; separate:CAUSE,CAUSE, to tell the first cause from the second")
       ->capture_default_str();
   CLI::Option* twice = command->add_flag(
       "--bidirectional", options.bidirectional,
-      "Every pose twice, once with all joints from above and once from below (else once, each joint from "
-      "above at one half of the poses and from below at the other)");
+      "Every pose twice, once with all joints from above and once from below (else once, each "
+      "joint from above at one half of the poses and from below at the other)");
   command
       ->add_flag("--one-way", options.one_way,
-                 "Every pose once, all joints from below: a model of such poses promises nothing of poses that are "
-                 "approached from above")
+                 "Every pose once, all joints from below: a model of such poses promises nothing "
+                 "of poses that are approached from above")
       ->excludes(twice)
       ->excludes("--from");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Choose for a single reflector, which shows no orientations");
   command
-      ->add_option("--tool", options.tools, "Tool id of the cell; several, joined by commas, are planned for in turn")
+      ->add_option("--tool", options.tools,
+                   "Tool id of the cell; several, joined by commas, are planned for in turn")
       ->delimiter(',');
   command
       ->add_option("--payload", options.payloads,
                    "Payload id of the cell; several, joined by commas, are planned for in turn")
       ->delimiter(',');
-  command->add_option("-o,--output", arguments->output, "Plan to write (CSV: joints in deg, rails in mm)")->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Plan to write (CSV: joints in deg, rails in mm)")
+      ->required();
   add_program_options(*command, *arguments);
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return plan(*arguments); }; });

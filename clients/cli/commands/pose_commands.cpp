@@ -48,7 +48,8 @@ Status simulate_batch(const SimulateArguments& arguments) {
   options.payload = arguments.payload;
   MeasurementBatch batch = TRY(simulate(robot, poses, options));
   batch.joint_types = list.joint_types;
-  for (std::size_t i = 0; i < poses.size(); ++i) batch.measurements[i].pose_id = list.poses[i].pose_id;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    batch.measurements[i].pose_id = list.poses[i].pose_id;
   TRY(write_output(arguments.output, to_csv(batch)));
   tell(fmt::format("{} measurements in {}\n", batch.measurements.size(), arguments.output),
        {arguments.output, arguments.json});
@@ -62,23 +63,30 @@ void add_simulate(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Measure planned poses on a virtual robot");
   CLI::Option_group* what = command->add_option_group("Robot");
-  what->add_option("--robot", arguments->robot, "Robot file (YAML); it stands alone, and its flange is the tool");
+  what->add_option("--robot", arguments->robot,
+                   "Robot file (YAML); it stands alone, and its flange is the tool");
   what->add_option("--cell", arguments->cell, "Cell file (YAML)");
   what->require_option(1);
-  command->add_option("--truth", arguments->truth, "Truth file (YAML): what is really wrong with the virtual robot")
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Truth file (YAML): what is really wrong with the virtual robot")
       ->required();
-  command->add_option("--plan", arguments->plan, "Poses to measure (CSV: joints in deg, rails in mm)")->required();
+  command
+      ->add_option("--plan", arguments->plan, "Poses to measure (CSV: joints in deg, rails in mm)")
+      ->required();
   add_seed_option(*command, arguments->seed, "Seed of the measuring noise");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Leave out orientations, as a single reflector does");
-  command->add_flag("--noise-free", arguments->noise_free, "Write where the tool really is, without measuring noise");
+  command->add_flag("--noise-free", arguments->noise_free,
+                    "Write where the tool really is, without measuring noise");
   add_tool_options(*command, arguments->tool, arguments->payload);
   command
       ->add_option("-o,--output", arguments->output,
                    "Batch to write (CSV: joints in deg, rails in mm; positions in mm)")
       ->required();
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return simulate_batch(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return simulate_batch(*arguments); }; });
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
 
-PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot, const std::string& tool,
-                       const std::string& payload) {
+PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot,
+                       const std::string& tool, const std::string& payload) {
   PoseContext context;
   context.q = JointVector(robot.size());
   for (int j = 0; j < robot.size(); ++j) {
@@ -37,13 +37,15 @@ PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot, 
 
 cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
-             const std::vector<client::CommandedJoints>& poses) -> Result<client::Answer<client::PredictedError>> {
+             const std::vector<client::CommandedJoints>& poses)
+             -> Result<client::Answer<client::PredictedError>> {
     const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
     client::Answer<client::PredictedError> answer{info_of(model), {}};
     answer.items.resize(poses.size());
     const auto portion = [&](std::size_t k) {
       std::vector<PoseContext> contexts;
-      const std::size_t first = k * kPosesTogether, last = std::min(first + kPosesTogether, poses.size());
+      const std::size_t first = k * kPosesTogether,
+                        last = std::min(first + kPosesTogether, poses.size());
       for (std::size_t i = first; i < last; ++i)
         contexts.push_back(context_of(poses[i], model.cell().robot, known.tool, known.payload));
       const std::vector<ErrorPrediction> all = model.predict_all(contexts);
@@ -55,54 +57,59 @@ cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progr
   };
 }
 
-Result<cam::PredictedProgram> predict_here(const cam::Program& program, const PredictProgramArguments& arguments) {
+Result<cam::PredictedProgram> predict_here(const cam::Program& program,
+                                           const PredictProgramArguments& arguments) {
   const CompensatedModel model = TRY(load_model(arguments.model));
   ProgressLine progress;
-  return cam::predict_program(program, model.cell().robot, tools_of(model), ask_model(model, progress), arguments.tool,
-                              arguments.payload);
+  return cam::predict_program(program, model.cell().robot, tools_of(model),
+                              ask_model(model, progress), arguments.tool, arguments.payload);
 }
 
 Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
                                                  const PredictProgramArguments& arguments) {
   return with_served_model<cam::PredictedProgram>(
       arguments.model, arguments.service,
-      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model, const SawModel& saw) {
+      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model,
+          const SawModel& saw) {
         ProgressLine progress;
         const cam::AskPredictions ask = [&](const std::string& tool, const std::string& payload,
                                             const std::vector<client::CommandedJoints>& poses) {
           client::CallContext context = of;
           context.tool = tool;
           context.payload = payload;
-          auto answer =
-              session.predict_error_at(context, poses, [&](double share) { progress.show("predicting", share); });
+          auto answer = session.predict_error_at(
+              context, poses, [&](double share) { progress.show("predicting", share); });
           if (answer) saw(answer->model);
           return answer;
         };
-        return cam::predict_program(program, model.cell().robot, tools_of(model), ask, arguments.tool,
-                                    arguments.payload);
+        return cam::predict_program(program, model.cell().robot, tools_of(model), ask,
+                                    arguments.tool, arguments.payload);
       });
 }
 
 }  // namespace
 
 Result<Extent> predict_program(const PredictProgramArguments& arguments) {
-  const ProgramFiles files = TRY(read_program_files(arguments.inputs, arguments.format, arguments.task));
+  const ProgramFiles files =
+      TRY(read_program_files(arguments.inputs, arguments.format, arguments.task));
   cam::ReadOptions reading;
   reading.split = true;  // nothing is written, so a point may be used in several ways
   reading.idle_axes = arguments.idle_axes;
   reading.pulses_per_deg = arguments.pulses_per_deg;
   const cam::Program program = TRY(understood_program(files, reading, arguments.frames));
   const cam::PredictedProgram predicted =
-      TRY(arguments.service.service ? predict_by_service(program, arguments) : predict_here(program, arguments));
+      TRY(arguments.service.service ? predict_by_service(program, arguments)
+                                    : predict_here(program, arguments));
   warn_of_notes(predicted.model.notes);
   TRY(write_output(arguments.output, prediction_csv(predicted)));
   fmt::print(stderr, "{}", shown_lines(prediction_summary(predicted)));
   if (!arguments.json.empty()) {
     TRY(write_json(arguments.json, prediction_json(predicted)));
   }
-  const bool all = std::none_of(predicted.targets.begin(), predicted.targets.end(), [](const auto& target) {
-    return target.status == "refused" || target.status == "unreachable";
-  });
+  const bool all =
+      std::none_of(predicted.targets.begin(), predicted.targets.end(), [](const auto& target) {
+        return target.status == "refused" || target.status == "unreachable";
+      });
   return all ? Extent::kAll : Extent::kPart;
 }
 

@@ -22,7 +22,8 @@ Result<ordered_json> asked_of_service(const std::string& reference, const Servic
 
 }  // namespace
 
-Result<double> tell_recent_work(const RecentWorkArguments& arguments, const ServiceOptions& service) {
+Result<double> tell_recent_work(const RecentWorkArguments& arguments,
+                                const ServiceOptions& service) {
   Outputs outputs;
   outputs.add("--next-poses", arguments.next_poses);
   outputs.add("--json", arguments.json);

@@ -7,12 +7,15 @@
 
 namespace trammel::cli {
 
-/// The poses that a cell of a service was lately asked for, by its model in force and by another version beside it.
+/// The poses that a cell of a service was lately asked for, by its model in force and by another
+/// version beside it.
 struct RecentWorkArguments {
   std::string model;             ///< `cell` or `cell@version`
   std::string json, next_poses;  ///< where to write; empty: nowhere
 };
-/// Returns by how much the corrections of the two differ at most, mm; 0 where there is no other version.
-[[nodiscard]] Result<double> tell_recent_work(const RecentWorkArguments& arguments, const ServiceOptions& service);
+/// Returns by how much the corrections of the two differ at most, mm; 0 where there is no other
+/// version.
+[[nodiscard]] Result<double> tell_recent_work(const RecentWorkArguments& arguments,
+                                              const ServiceOptions& service);
 
 }  // namespace trammel::cli

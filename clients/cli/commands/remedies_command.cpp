@@ -26,7 +26,9 @@ struct RemediesArguments {
 Result<ErrorBudget> budget_asked(const CompensatedModel& model, const std::string& targets) {
   if (targets.empty()) {
     if (model.parts().budget) return *model.parts().budget;
-    return refused("the model has no error budget: no training pose has a position, or it is older than budgets")
+    return refused(
+               "the model has no error budget: no training pose has a position, or it is older "
+               "than budgets")
         .in("model " + model.provenance().id)
         .of("--model")
         .next("train it again, or give --targets");
@@ -46,12 +48,16 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
   const MakersWords words = makers_words(model.cell().robot);
   nlohmann::ordered_json zeros = nlohmann::ordered_json::array();
   for (const ZeroRemedy& zero : zero_remedies(budget))
-    zeros.push_back({{"joint", zero.joint + 1}, {"add", zero.add}, {"u95", zero.u95}, {"unit", zero.unit}});
+    zeros.push_back(
+        {{"joint", zero.joint + 1}, {"add", zero.add}, {"u95", zero.u95}, {"unit", zero.unit}});
   return {{"model", model.provenance().id},
           {"cell", model.cell().name},
           {"zeros", std::move(zeros)},
           {"controller",
-           {{"maker", words.maker}, {"zeros", words.zeros}, {"lengths", words.lengths}, {"load", words.load}}},
+           {{"maker", words.maker},
+            {"zeros", words.zeros},
+            {"lengths", words.lengths},
+            {"load", words.load}}},
           {"steps", remedy_steps_json(budget)},
           {"budget", budget_json(budget)},
           {"notes", notes_json(notes_of(model))}};
@@ -63,12 +69,14 @@ Status remedies(const RemediesArguments& arguments) {
   const std::string where = arguments.targets.empty()
                                 ? fmt::format("{} training poses", budget.poses)
                                 : fmt::format("{} targets of {}", budget.poses, arguments.targets);
-  std::string text = fmt::format("{}, model {}, {}:\n", model.cell().robot.name(), model.provenance().id, where);
+  std::string text =
+      fmt::format("{}, model {}, {}:\n", model.cell().robot.name(), model.provenance().id, where);
   for (const std::string& line : remedies_in_words(budget, model.cell().robot)) text += line + "\n";
   warn_of_notes(notes_of(model));
   tell(text, {arguments.output, arguments.json});
   if (!arguments.output.empty()) {
-    const std::string page = with_pages_beside(remedies_page(model, budget, where), arguments.output);
+    const std::string page =
+        with_pages_beside(remedies_page(model, budget, where), arguments.output);
     TRY(write_output(arguments.output, page));
   }
   return write_json(arguments.json, remedies_json(model, budget));
@@ -79,13 +87,17 @@ Status remedies(const RemediesArguments& arguments) {
 void add_remedies_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<RemediesArguments>();
   CLI::App* command = app.add_subcommand(
-      "remedies", "Tell what could be put right in the controller, step by step, and what each step leaves");
+      "remedies",
+      "Tell what could be put right in the controller, step by step, and what each step leaves");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--targets", arguments->targets,
-                      "Targets to say it of instead of the training poses (CSV: joints in deg, rails in mm)");
-  command->add_option("-o,--output", arguments->output, "Page to write (HTML); opens without a network");
+  command->add_option(
+      "--targets", arguments->targets,
+      "Targets to say it of instead of the training poses (CSV: joints in deg, rails in mm)");
+  command->add_option("-o,--output", arguments->output,
+                      "Page to write (HTML); opens without a network");
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return remedies(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return remedies(*arguments); }; });
 }
 
 }  // namespace trammel::cli

@@ -30,7 +30,8 @@ struct ReplayArguments {
 
 /// How an item is answered now, beside then.
 struct Different {
-  double by_mm = 0;                 ///< infinite where one has a number or a pose to command and the other has none
+  double by_mm =
+      0;  ///< infinite where one has a number or a pose to command and the other has none
   bool is_of_another_kind = false;  ///< however small that is: status, domain, branch
   std::string what;
 };
@@ -72,10 +73,12 @@ Different compared(const RecordedPose& then, const client::PredictedError& now) 
   const double error = apart(then.error_mm, {now.dx_mm, now.dy_mm, now.dz_mm});
   const double spread = apart(then.true_stddev_mm, {now.slx_mm, now.sly_mm, now.slz_mm});
   if (then.in_domain != now.in_domain)
-    return {std::max(error, spread), true,
-            fmt::format("{} then, {} now", domain_word(then.in_domain), domain_word(now.in_domain))};
-  return {std::max(error, spread), false,
-          fmt::format("the error by {:.3g} mm, its standard deviation by {:.3g} mm", error, spread)};
+    return {
+        std::max(error, spread), true,
+        fmt::format("{} then, {} now", domain_word(then.in_domain), domain_word(now.in_domain))};
+  return {
+      std::max(error, spread), false,
+      fmt::format("the error by {:.3g} mm, its standard deviation by {:.3g} mm", error, spread)};
 }
 
 /// rad; infinite where there are not as many of them.
@@ -88,27 +91,31 @@ double joints_apart(const std::vector<double>& a, const std::vector<double>& b) 
 
 Different compared(const client::CorrectedTarget& then, const client::CorrectedTarget& now) {
   if (then.status != now.status)
-    return {has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY, true,
-            fmt::format("{} then, {} now", then.status, now.status)};
+    return {
+        has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY,
+        true, fmt::format("{} then, {} now", then.status, now.status)};
   if (!has_command(then)) return {};
   const double moved = distance(then.commanded, now.commanded);
-  const double expected =
-      std::max({apart(then.error_before_mm, now.error_before_mm), apart(then.error_after_mm, now.error_after_mm),
-                apart(then.sigma_mm, now.sigma_mm)});
+  const double expected = std::max({apart(then.error_before_mm, now.error_before_mm),
+                                    apart(then.error_after_mm, now.error_after_mm),
+                                    apart(then.sigma_mm, now.sigma_mm)});
   const double turned = joints_apart(then.q_rad, now.q_rad);
   return {std::max(moved, expected), turned > kAnotherBranch,
-          fmt::format("the commanded pose by {:.3g} mm, its joints by {:.3g} rad, the errors expected by {:.3g} mm",
+          fmt::format("the commanded pose by {:.3g} mm, its joints by {:.3g} rad, the errors "
+                      "expected by {:.3g} mm",
                       moved, turned, expected)};
 }
 
-void note(Replayed& all, const RecordedCall& call, std::size_t item, Different different, double tolerance_mm) {
+void note(Replayed& all, const RecordedCall& call, std::size_t item, Different different,
+          double tolerance_mm) {
   ++all.items;
   const bool is_same = different.by_mm <= tolerance_mm && !different.is_of_another_kind;
   if (is_same) return void(all.largest_mm = std::max(all.largest_mm, different.by_mm));
   ++all.different;
   all.largest_mm = std::max(all.largest_mm, different.by_mm);
-  different.what = fmt::format("{} row {} item {}{}: {}", call.file, call.line, item + 1,
-                               call.trace.empty() ? "" : " (trace " + call.trace + ")", different.what);
+  different.what =
+      fmt::format("{} row {} item {}{}: {}", call.file, call.line, item + 1,
+                  call.trace.empty() ? "" : " (trace " + call.trace + ")", different.what);
   all.told.push_back(std::move(different));
   std::stable_sort(all.told.begin(), all.told.end(),
                    [](const Different& a, const Different& b) { return a.by_mm > b.by_mm; });
@@ -131,7 +138,8 @@ Result<Answers> answered_here(const CompensatedModel& model, const RecordedCall&
   const auto tool = resolve_tool(cell, call.tool), payload = resolve_payload(cell, call.payload);
   if (!tool) return at_line(tool.error());
   if (!payload) return at_line(payload.error());
-  if (const Status known = model.check_trained_with(*tool, *payload); !known) return at_line(known.error());
+  if (const Status known = model.check_trained_with(*tool, *payload); !known)
+    return at_line(known.error());
   std::vector<JointType> types;
   for (int j = 0; j < cell.robot.size(); ++j) types.push_back(cell.robot.joint(j).type);
   const auto joints = static_cast<std::size_t>(cell.robot.size());
@@ -153,12 +161,14 @@ Result<Answers> answered_here(const CompensatedModel& model, const RecordedCall&
   }
   for (const RecordedTarget& target : call.targets) {
     if (!target.asked.conf && target.asked.seed_rad.size() != joints) return of_another_robot();
-    answers.corrections.push_back(to_wire(model.correct(from_wire(target.asked, cell.robot), *tool, *payload), types));
+    answers.corrections.push_back(
+        to_wire(model.correct(from_wire(target.asked, cell.robot), *tool, *payload), types));
   }
   return answers;
 }
 
-Result<Answers> answered_by(client::Session& session, const ModelReference& model, const RecordedCall& call) {
+Result<Answers> answered_by(client::Session& session, const ModelReference& model,
+                            const RecordedCall& call) {
   client::CallContext context;
   context.cell = call.cell;
   context.tool = call.tool;
@@ -167,21 +177,24 @@ Result<Answers> answered_by(client::Session& session, const ModelReference& mode
   if (!call.poses.empty()) {
     std::vector<client::CommandedJoints> poses;
     for (const RecordedPose& pose : call.poses) poses.push_back(pose.asked);
-    return session.predict_error_at(context, poses).map([](client::Answer<client::PredictedError> answer) {
-      return Answers{answer.model.hash, std::move(answer.items), {}};
-    });
+    return session.predict_error_at(context, poses)
+        .map([](client::Answer<client::PredictedError> answer) {
+          return Answers{answer.model.hash, std::move(answer.items), {}};
+        });
   }
   std::vector<client::TargetMm> targets;
   for (const RecordedTarget& target : call.targets) targets.push_back(target.asked);
-  return session.correct_targets(context, targets).map([](client::Answer<client::CorrectedTarget> answer) {
-    return Answers{answer.model.hash, {}, std::move(answer.items)};
-  });
+  return session.correct_targets(context, targets)
+      .map([](client::Answer<client::CorrectedTarget> answer) {
+        return Answers{answer.model.hash, {}, std::move(answer.items)};
+      });
 }
 
 Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Replayed& all) {
   const Answers now = TRY(ask(call));
   ++all.requests;
-  all.models.insert(fmt::format("{}@{} ({})", call.cell, call.model_version, call.model_hash.substr(0, 8)));
+  all.models.insert(
+      fmt::format("{}@{} ({})", call.cell, call.model_version, call.model_hash.substr(0, 8)));
   all.models_now.insert(now.hash.substr(0, 8));
   if (now.hash != call.model_hash) ++all.of_other_models;
   for (std::size_t i = 0; i < call.poses.size(); ++i)
@@ -192,21 +205,25 @@ Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Re
 }
 
 std::string replayed_text(const Replayed& all, double tolerance_mm) {
-  std::string text = fmt::format("{} requests, {} items: {} differ by more than {:g} mm, the largest by {:.3g} mm\n",
-                                 all.requests, all.items, all.different, tolerance_mm, all.largest_mm);
+  std::string text = fmt::format(
+      "{} requests, {} items: {} differ by more than {:g} mm, the largest by {:.3g} mm\n",
+      all.requests, all.items, all.different, tolerance_mm, all.largest_mm);
   if (all.requests == 0) text = "no requests recorded there\n";
   if (all.requests > 0)
-    text +=
-        fmt::format("answered then by {}, now by {}\n", fmt::join(all.models, ", "), fmt::join(all.models_now, ", "));
+    text += fmt::format("answered then by {}, now by {}\n", fmt::join(all.models, ", "),
+                        fmt::join(all.models_now, ", "));
   if (all.of_other_models > 0)
-    text += fmt::format("{} of the requests were answered by another model than now\n", all.of_other_models);
+    text += fmt::format("{} of the requests were answered by another model than now\n",
+                        all.of_other_models);
   if (!all.other_cells.empty())
-    text += fmt::format("requests of other cells were left out: {}\n", fmt::join(all.other_cells, ", "));
+    text += fmt::format("requests of other cells were left out: {}\n",
+                        fmt::join(all.other_cells, ", "));
   for (const Different& one : all.told) text += one.what + "\n";
   for (const DamagedLines& damaged : all.damaged)
     text += fmt::format("{} damaged {} left out, the first: {}\n", damaged.count,
                         damaged.count == 1 ? "line was" : "lines were", sentence(damaged.first));
-  for (const std::string& half : all.half) text += fmt::format("{}: the last line is half and is left out\n", half);
+  for (const std::string& half : all.half)
+    text += fmt::format("{}: the last line is half and is left out\n", half);
   return text;
 }
 
@@ -220,35 +237,42 @@ ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
   ordered_json told = ordered_json::array();
   for (const Different& one : all.told)
     told.push_back(
-        {{"by_mm", std::isfinite(one.by_mm) ? ordered_json(one.by_mm) : ordered_json(nullptr)}, {"what", one.what}});
-  return {{"requests", all.requests},
-          {"items", all.items},
-          {"different", all.different},
-          {"tolerance_mm", tolerance_mm},
-          {"largest_mm", std::isfinite(all.largest_mm) ? ordered_json(all.largest_mm) : ordered_json(nullptr)},
-          {"answered_by_another_model", all.of_other_models},
-          {"other_cells", all.other_cells},
-          {"damaged_lines", damaged_lines(all)},
-          {"half_lines", all.half},
-          {"first_damaged",
-           all.damaged.empty() ? ordered_json(nullptr) : ordered_json(sentence(all.damaged.front().first))},
-          {"largest", told}};
+        {{"by_mm", std::isfinite(one.by_mm) ? ordered_json(one.by_mm) : ordered_json(nullptr)},
+         {"what", one.what}});
+  return {
+      {"requests", all.requests},
+      {"items", all.items},
+      {"different", all.different},
+      {"tolerance_mm", tolerance_mm},
+      {"largest_mm",
+       std::isfinite(all.largest_mm) ? ordered_json(all.largest_mm) : ordered_json(nullptr)},
+      {"answered_by_another_model", all.of_other_models},
+      {"other_cells", all.other_cells},
+      {"damaged_lines", damaged_lines(all)},
+      {"half_lines", all.half},
+      {"first_damaged", all.damaged.empty() ? ordered_json(nullptr)
+                                            : ordered_json(sentence(all.damaged.front().first))},
+      {"largest", told}};
 }
 
 /// Without records: what the service was lately asked.
 Result<Extent> replay_recent(const ReplayArguments& arguments) {
   if (!arguments.service.service)
-    return failure(ErrorCode::kUsage, "either files of recorded requests, or --service").of("records");
-  return tell_recent_work({arguments.model, arguments.json, arguments.next_poses}, arguments.service)
+    return failure(ErrorCode::kUsage, "either files of recorded requests, or --service")
+        .of("records");
+  return tell_recent_work({arguments.model, arguments.json, arguments.next_poses},
+                          arguments.service)
       .map([&](double differs_mm) {
-        return arguments.strict && differs_mm > arguments.tolerance_mm ? Extent::kPart : Extent::kAll;
+        return arguments.strict && differs_mm > arguments.tolerance_mm ? Extent::kPart
+                                                                       : Extent::kAll;
       });
 }
 
 Result<Extent> replay(const ReplayArguments& arguments) {
   if (arguments.inputs.empty()) return replay_recent(arguments);
   if (!arguments.next_poses.empty())
-    return failure(ErrorCode::kUsage, "--next-poses is of what a service was lately asked, not of records")
+    return failure(ErrorCode::kUsage,
+                   "--next-poses is of what a service was lately asked, not of records")
         .of("--next-poses");
   std::string cell;
   std::optional<CompensatedModel> here;
@@ -260,7 +284,9 @@ Result<Extent> replay(const ReplayArguments& arguments) {
     auto opened = TRY(open_session(arguments.service));
     session = std::move(opened);
     cell = model->cell;
-    ask = [&session, model = *model](const RecordedCall& call) { return answered_by(*session, model, call); };
+    ask = [&session, model = *model](const RecordedCall& call) {
+      return answered_by(*session, model, call);
+    };
   } else {
     auto model = TRY(load_model(arguments.model));
     here = std::move(model);
@@ -278,30 +304,35 @@ Result<Extent> replay(const ReplayArguments& arguments) {
     all.half.insert(all.half.end(), read.half.begin(), read.half.end());
   }
   if (all.requests == 0 && !all.other_cells.empty())
-    return refused("no request of cell {}, only of {}", cell, fmt::join(all.other_cells, ", ")).of("cell");
+    return refused("no request of cell {}, only of {}", cell, fmt::join(all.other_cells, ", "))
+        .of("cell");
   tell(replayed_text(all, arguments.tolerance_mm), {arguments.json});
   TRY(write_json(arguments.json, replayed_json(all, arguments.tolerance_mm)));
-  return !all.damaged.empty() || (arguments.strict && all.different > 0) ? Extent::kPart : Extent::kAll;
+  return !all.damaged.empty() || (arguments.strict && all.different > 0) ? Extent::kPart
+                                                                         : Extent::kAll;
 }
 
 }  // namespace
 
 void add_replay_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReplayArguments>();
-  CLI::App* command = app.add_subcommand(
-      "replay", "Ask again what a service has recorded, or was lately asked, and tell how the answers differ");
-  command->add_option(
-      "records", arguments->inputs,
-      "Files of recorded requests (record: in server.yaml), or folders of them; none: with --service the "
-      "last poses that the cell was asked for, by its model in force and by --model cell@version");
-  command->add_option("--model", arguments->model, "Model file; with --service a cell or cell@version")->required();
+  CLI::App* command = app.add_subcommand("replay",
+                                         "Ask again what a service has recorded, or was lately "
+                                         "asked, and tell how the answers differ");
+  command->add_option("records", arguments->inputs,
+                      "Files of recorded requests (record: in server.yaml), or folders of them; "
+                      "none: with --service the last poses that the cell was asked for, by its "
+                      "model in force and by --model cell@version");
+  command
+      ->add_option("--model", arguments->model, "Model file; with --service a cell or cell@version")
+      ->required();
   command->add_option("--tolerance", arguments->tolerance_mm, "Differences up to this are none, mm")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--strict", arguments->strict, "Exit 1 where an answer is another one");
-  command->add_option(
-      "--next-poses", arguments->next_poses,
-      "Of what a service was lately asked: the poses where it is least sure (CSV; plan --from reads it)");
+  command->add_option("--next-poses", arguments->next_poses,
+                      "Of what a service was lately asked: the poses where it is least sure (CSV; "
+                      "plan --from reads it)");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return replay(*arguments); }; });

@@ -37,7 +37,8 @@ Status export_robot(const RobotArguments& arguments) {
   outputs.put("--table", robot_table(model, robot));
   outputs.put("--json", json_text(robot_json(model, robot)));
   TRY(outputs.write());
-  tell(fmt::format("robot of model {} in {}\n{}", model.provenance().id, arguments.output, left_out_text(robot)),
+  tell(fmt::format("robot of model {} in {}\n{}", model.provenance().id, arguments.output,
+                   left_out_text(robot)),
        {arguments.output, arguments.table, arguments.json});
   return {};
 }
@@ -47,16 +48,20 @@ Status export_robot(const RobotArguments& arguments) {
 void add_robot_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<RobotArguments>();
   CLI::App* command = app.add_subcommand(
-      "export-robot", "Write the calibrated robot for other programs, and how much they cannot carry, mm");
+      "export-robot",
+      "Write the calibrated robot for other programs, and how much they cannot carry, mm");
   command->add_option("--model", arguments->model, "Model file")->required();
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Robot to write: URDF (.urdf; '-': standard output) or a robot file of ours (.yaml)")
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Robot to write: URDF (.urdf; '-': standard output) or a robot file of ours (.yaml)")
       ->required();
-  command->add_option("--table", arguments->table,
-                      "Also write nominal and calibrated parameters (CSV: mm, deg) with their uncertainty");
+  command->add_option(
+      "--table", arguments->table,
+      "Also write nominal and calibrated parameters (CSV: mm, deg) with their uncertainty");
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return export_robot(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return export_robot(*arguments); }; });
 }
 
 }  // namespace trammel::cli

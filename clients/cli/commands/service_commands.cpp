@@ -42,12 +42,15 @@ Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
-/// What a user of a version should know; 0: of the one in force. Nothing where the service does not say.
-Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell, int version) {
+/// What a user of a version should know; 0: of the one in force. Nothing where the service does not
+/// say.
+Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell,
+                                           int version) {
   const std::vector<client::ModelInfo> models = TRY(session.models(cell));
-  const auto asked = std::find_if(models.begin(), models.end(), [&](const client::ModelInfo& model) {
-    return version == 0 ? model.in_force : model.version == version;
-  });
+  const auto asked =
+      std::find_if(models.begin(), models.end(), [&](const client::ModelInfo& model) {
+        return version == 0 ? model.in_force : model.version == version;
+      });
   return asked == models.end() ? std::vector<Note>() : asked->notes;
 }
 
@@ -58,14 +61,16 @@ Result<std::vector<Note>> notes_of_made(client::Session& session, const client::
 }
 
 /// Follows a job to its end; a failed one is an error.
-Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+Result<Extent> follow(client::Session& session, std::int64_t job,
+                      const ServiceArguments& arguments) {
   const client::JobStatus end = TRY([&] {
     ProgressLine progress;
-    return session.wait_for_job(job, std::chrono::milliseconds(static_cast<std::int64_t>(arguments.limit_s * 1e3)),
-                                [&](const client::JobStatus& status) {
-                                  progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
-                                                status.share);
-                                });
+    return session.wait_for_job(
+        job, std::chrono::milliseconds(static_cast<std::int64_t>(arguments.limit_s * 1e3)),
+        [&](const client::JobStatus& status) {
+          progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
+                        status.share);
+        });
   }());
   const std::vector<Note> notes = TRY(notes_of_made(session, end));
   ordered_json json = job_json(end);
@@ -84,7 +89,8 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
 }
 
 /// Tells the job's number, or with --watch follows it.
-Result<Extent> started(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+Result<Extent> started(client::Session& session, std::int64_t job,
+                       const ServiceArguments& arguments) {
   if (arguments.watch) return follow(session, job, arguments);
   tell(fmt::format("job {}\n", job), {arguments.json});
   return write_json(arguments.json, {{"job", job}}).map([] { return Extent::kAll; });
@@ -93,9 +99,11 @@ Result<Extent> started(client::Session& session, std::int64_t job, const Service
 Result<Extent> submit(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const std::string csv = TRY(read_text_file(arguments.batch));
-  if (recognise_batch(csv) == BatchKind::kTrammel) tell_near_columns(csv, TableKind::kBatch, arguments.batch);
-  const std::string id =
-      arguments.batch_id.empty() ? std::filesystem::path(arguments.batch).stem().string() : arguments.batch_id;
+  if (recognise_batch(csv) == BatchKind::kTrammel)
+    tell_near_columns(csv, TableKind::kBatch, arguments.batch);
+  const std::string id = arguments.batch_id.empty()
+                             ? std::filesystem::path(arguments.batch).stem().string()
+                             : arguments.batch_id;
   const std::int64_t job = TRY(session.submit_measurements(cell, id, csv));
   return started(session, job, arguments);
 }
@@ -103,21 +111,27 @@ Result<Extent> submit(client::Session& session, const ServiceArguments& argument
 Result<Extent> retrain(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   if (arguments.release && arguments.batch_ids.empty()) {
-    return failure(ErrorCode::kUsage, "--release needs --batch").of("--batch").next("say which one is good");
+    return failure(ErrorCode::kUsage, "--release needs --batch")
+        .of("--batch")
+        .next("say which one is good");
   }
-  const std::int64_t job =
-      TRY(arguments.release ? session.release_and_train(cell, arguments.batch_ids, arguments.level, arguments.bias)
-                            : session.train(cell, arguments.batch_ids, arguments.level, arguments.bias));
+  const std::int64_t job = TRY(
+      arguments.release
+          ? session.release_and_train(cell, arguments.batch_ids, arguments.level, arguments.bias)
+          : session.train(cell, arguments.batch_ids, arguments.level, arguments.bias));
   return started(session, job, arguments);
 }
 
-bool is_checked(const ordered_json& cell) { return cell.contains("verdict") && cell["verdict"].is_string(); }
+bool is_checked(const ordered_json& cell) {
+  return cell.contains("verdict") && cell["verdict"].is_string();
+}
 
 /// What a server that answers does besides, as far as it says so.
 ordered_json part_of(const std::string& server, const std::vector<ordered_json>& answers) {
   ordered_json part = {{"serves", true}, {"trains", nullptr}, {"reachable", true}};
   for (const ordered_json& answer : answers)
-    if (answer.value("server", ordered_json()) == server) part["trains"] = answer.value("trains", ordered_json());
+    if (answer.value("server", ordered_json()) == server)
+      part["trains"] = answer.value("trains", ordered_json());
   return part;
 }
 
@@ -152,7 +166,8 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   const ordered_json fleet = fleet_of(answers);
   add_other_servers(fleet, list);
   text += record_text(record) + servers_text(fleet, record);
-  tell(text + models_text(models) + checked + jobs_text(jobs) + quarantine_text(apart), {arguments.json});
+  tell(text + models_text(models) + checked + jobs_text(jobs) + quarantine_text(apart),
+       {arguments.json});
   return write_json(arguments.json, {{"record", record},
                                      {"servers", list},
                                      {"fleet", fleet},
@@ -174,16 +189,20 @@ Status list_models(client::Session& session, const ServiceArguments& arguments) 
 }
 
 Status list_jobs(client::Session& session, const ServiceArguments& arguments) {
-  const std::string cell = TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
+  const std::string cell =
+      TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
   const std::vector<client::DatedJob> jobs = TRY(session.jobs(cell));
   tell(all_jobs_text(jobs), {arguments.json});
   return write_json(arguments.json, {{"jobs", jobs_json(jobs)}});
 }
 
 Status list_batches(client::Session& session, const ServiceArguments& arguments) {
-  const std::string cell = TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
+  const std::string cell =
+      TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
   if (arguments.batch_id.empty() != arguments.output.empty())
-    return failure(ErrorCode::kUsage, "--batch and --output go together: the batch is written there").of("--batch");
+    return failure(ErrorCode::kUsage,
+                   "--batch and --output go together: the batch is written there")
+        .of("--batch");
   if (!arguments.batch_id.empty()) {
     const std::string csv = TRY(session.export_batch(cell, arguments.batch_id));
     return write_output(arguments.output, csv);
@@ -193,17 +212,19 @@ Status list_batches(client::Session& session, const ServiceArguments& arguments)
   return write_json(arguments.json, {{"batches", batches_json(batches)}});
 }
 
-/// The version that the service's record has in force; 0: none. Empty: not among the versions that a list has.
+/// The version that the service's record has in force; 0: none. Empty: not among the versions that
+/// a list has.
 Result<std::optional<int>> version_in_force(client::Session& session, const std::string& cell) {
   const std::vector<client::ModelInfo> models = TRY(session.models(cell));
   if (models.empty()) return std::optional(0);
-  const auto in_force = std::find_if(models.begin(), models.end(), [](const auto& model) { return model.in_force; });
+  const auto in_force =
+      std::find_if(models.begin(), models.end(), [](const auto& model) { return model.in_force; });
   if (in_force != models.end()) return std::optional(in_force->version);
   return models.front().version == 1 ? std::optional(0) : std::nullopt;
 }
 
-/// A change that is refused where another version is in force than the user saw or, where that is not said, than there
-/// is now.
+/// A change that is refused where another version is in force than the user saw or, where that is
+/// not said, than there is now.
 Result<client::ChangeOptions> decided_against(client::Session& session, const std::string& cell,
                                               const ServiceArguments& arguments) {
   client::ChangeOptions change;
@@ -215,10 +236,12 @@ Result<client::ChangeOptions> decided_against(client::Session& session, const st
   return change;
 }
 
-using BatchChange = Status (client::Session::*)(const std::string&, const std::string&, const client::ChangeOptions&);
+using BatchChange = Status (client::Session::*)(const std::string&, const std::string&,
+                                                const client::ChangeOptions&);
 
 /// `now`: what the batch is afterwards.
-Status change_batch(client::Session& session, const ServiceArguments& arguments, BatchChange change, const char* now) {
+Status change_batch(client::Session& session, const ServiceArguments& arguments, BatchChange change,
+                    const char* now) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const client::ChangeOptions options = TRY(decided_against(session, cell, arguments));
   const std::string& batch = arguments.batch_id;
@@ -237,11 +260,13 @@ Status discard(client::Session& session, const ServiceArguments& arguments) {
 
 Status cancel(client::Session& session, const ServiceArguments& arguments) {
   TRY(session.cancel(arguments.job));
-  tell(fmt::format("job {} is cancelled; if it ran, it stops as soon as it can\n", arguments.job), {arguments.json});
+  tell(fmt::format("job {} is cancelled; if it ran, it stops as soon as it can\n", arguments.job),
+       {arguments.json});
   return write_json(arguments.json, {{"job", arguments.job}, {"is", "cancelled"}});
 }
 
-/// What the service says of what is in force in the cell, with the figures it was judged by; null where it does not.
+/// What the service says of what is in force in the cell, with the figures it was judged by; null
+/// where it does not.
 ordered_json in_force_at(client::Session& session, const std::string& cell) {
   const auto cells = health_at(session, cell, 1);
   if (!cells) return nullptr;
@@ -250,10 +275,12 @@ ordered_json in_force_at(client::Session& session, const std::string& cell) {
   return nullptr;
 }
 
-Status now_in_force(client::Session& session, const std::string& cell, int version, const ServiceArguments& arguments) {
+Status now_in_force(client::Session& session, const std::string& cell, int version,
+                    const ServiceArguments& arguments) {
   ordered_json now = in_force_json(cell, version, in_force_at(session, cell));
   // The change is made: what cannot be asked afterwards is no failure of it.
-  const std::vector<Note> notes = notes_of_version(session, cell, version).value_or(std::vector<Note>());
+  const std::vector<Note> notes =
+      notes_of_version(session, cell, version).value_or(std::vector<Note>());
   now["notes"] = notes_json(notes);
   warn_of_notes(notes);
   tell(in_force_text(now), {arguments.json});
@@ -284,14 +311,15 @@ Status rollback(client::Session& session, const ServiceArguments& arguments) {
 Status show_model(client::Session& session, const ServiceArguments& arguments) {
   const ModelReference asked = TRY(parse_model_reference(arguments.model));
   const auto text = TRY(session.export_model(asked.cell, asked.version));
-  const CompensatedModel model = TRY(deserialize(text, "the service's model of cell " + asked.cell));
+  const CompensatedModel model =
+      TRY(deserialize(text, "the service's model of cell " + asked.cell));
   const auto& judged = model.parts().validation;
   tell(model_text(model) + (judged ? evaluation_table(*judged) : ""), {arguments.json});
   return write_json(arguments.json, model_json(model));
 }
 
-/// What a user of a model should know that a service hands out or has taken; nothing of one that only the service
-/// reads.
+/// What a user of a model should know that a service hands out or has taken; nothing of one that
+/// only the service reads.
 std::vector<Note> notes_of_file(const std::string& text) {
   const auto model = deserialize(text, "the model");
   return model ? notes_of(*model) : std::vector<Note>();
@@ -303,10 +331,12 @@ Status export_model(client::Session& session, const ServiceArguments& arguments)
   TRY(write_output(arguments.output, text));
   const std::vector<Note> notes = notes_of_file(text);
   warn_of_notes(notes);
-  tell(fmt::format("model of cell {} in {}\n", model.cell, arguments.output), {arguments.output, arguments.json});
-  return write_json(
-      arguments.json,
-      {{"cell", model.cell}, {"file", arguments.output}, {"bytes", text.size()}, {"notes", notes_json(notes)}});
+  tell(fmt::format("model of cell {} in {}\n", model.cell, arguments.output),
+       {arguments.output, arguments.json});
+  return write_json(arguments.json, {{"cell", model.cell},
+                                     {"file", arguments.output},
+                                     {"bytes", text.size()},
+                                     {"notes", notes_json(notes)}});
 }
 
 Status import_model(client::Session& session, const ServiceArguments& arguments) {
@@ -316,7 +346,8 @@ Status import_model(client::Session& session, const ServiceArguments& arguments)
   const std::vector<Note> notes = notes_of_file(text);
   warn_of_notes(notes);
   tell(fmt::format("cell {}: the model is version {}\n", cell, version), {arguments.json});
-  return write_json(arguments.json, {{"cell", cell}, {"version", version}, {"notes", notes_json(notes)}});
+  return write_json(arguments.json,
+                    {{"cell", cell}, {"version", version}, {"notes", notes_json(notes)}});
 }
 
 /// Adds commands that talk to a service.
@@ -324,8 +355,8 @@ class ServiceCommands {
  public:
   ServiceCommands(CLI::App& app, Action& chosen) : app_(app), chosen_(chosen) {}
 
-  /// A command whose action opens a session and hands it to `talk`, a function of the session and the arguments that
-  /// answers as an Action does. Its options are added by `add_options`.
+  /// A command whose action opens a session and hands it to `talk`, a function of the session and
+  /// the arguments that answers as an Action does. Its options are added by `add_options`.
   template <typename Talk, typename AddOptions>
   void add(const char* name, const char* description, Talk talk, AddOptions add_options) {
     const auto arguments = std::make_shared<ServiceArguments>();
@@ -334,7 +365,8 @@ class ServiceCommands {
     add_json_option(*command, arguments->json);
     add_options_of_service_command(*command, arguments->service);
     command->callback([arguments, talk, &chosen = chosen_] {
-      chosen = [arguments, talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
+      chosen = [arguments,
+                talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
         const auto session = TRY(open_session(arguments->service));
         return talk(*session, *arguments);
       };
@@ -347,26 +379,28 @@ class ServiceCommands {
 };
 
 void add_cell(CLI::App& command, ServiceArguments& arguments) {
-  command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it")->required();
+  command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it")
+      ->required();
 }
 
 void add_any_cell(CLI::App& command, ServiceArguments& arguments) {
-  command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it; left out: all cells");
+  command.add_option("--cell", arguments.cell,
+                     "Cell id, or a cell file (.yaml) that names it; left out: all cells");
 }
 
 /// What a person who decides says besides.
 void add_decision(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--reason", arguments.reason, "Why, for the audit trail");
   command
-      .add_option(
-          "--expected", arguments.expected,
-          "Version that was in force when you decided (0: none); with another one nothing changes. Left out: the "
-          "one in force now")
+      .add_option("--expected", arguments.expected,
+                  "Version that was in force when you decided (0: none); with another one nothing "
+                  "changes. Left out: the one in force now")
       ->check(CLI::NonNegativeNumber);
 }
 
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
-  command.add_flag("--watch", arguments.watch, "Wait until the training is done, and say how it ended");
+  command.add_flag("--watch", arguments.watch,
+                   "Wait until the training is done, and say how it ended");
   command.add_option("--limit", arguments.limit_s, "Longest wait for the training, s")
       ->check(above_zero())
       ->capture_default_str();
@@ -374,30 +408,38 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
 
 /// What a job that runs may be asked.
 void add_running_jobs(ServiceCommands& commands) {
+  commands.add("watch", "Follow a training or a diagnosis until it is done, and say how it ended",
+               watch, [](CLI::App& command, ServiceArguments& arguments) {
+                 command
+                     .add_option("--job", arguments.job,
+                                 "Number of the job, as submit, retrain and status tell it")
+                     ->required();
+                 command.add_option("--limit", arguments.limit_s, "Longest wait, s")
+                     ->check(above_zero())
+                     ->capture_default_str();
+               });
   commands.add(
-      "watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
+      "cancel",
+      "Stop a training, a diagnosis or a check that waits or runs; the model in force stays",
+      cancel, [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--job", arguments.job, "Number of the job, as jobs and status tell it")
             ->required();
-        command.add_option("--limit", arguments.limit_s, "Longest wait, s")->check(above_zero())->capture_default_str();
-      });
-  commands.add(
-      "cancel", "Stop a training, a diagnosis or a check that waits or runs; the model in force stays", cancel,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--job", arguments.job, "Number of the job, as jobs and status tell it")->required();
       });
 }
 
 /// What is in force, what may be learned from, and models as files.
 void add_model_changes(ServiceCommands& commands) {
-  commands.add(
-      "activate", "Put a stored version of a cell's model in force", activate,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
-        command.add_flag("--force", arguments.force,
-                         "Even if it is worse than the version in force on the poses held out");
-        add_decision(command, arguments);
-      });
+  commands.add("activate", "Put a stored version of a cell's model in force", activate,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 command
+                     .add_option("--model", arguments.model,
+                                 "CELL@VERSION, as the command models lists them")
+                     ->required();
+                 command.add_flag(
+                     "--force", arguments.force,
+                     "Even if it is worse than the version in force on the poses held out");
+                 add_decision(command, arguments);
+               });
   commands.add("rollback", "Put back in force the model that was before", rollback,
                [](CLI::App& command, ServiceArguments& arguments) {
                  add_cell(command, arguments);
@@ -405,19 +447,48 @@ void add_model_changes(ServiceCommands& commands) {
                });
   const auto add_batch = [](CLI::App& command, ServiceArguments& arguments) {
     add_cell(command, arguments);
-    command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")->required();
+    command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")
+        ->required();
     add_decision(command, arguments);
   };
-  commands.add("release", "Let later trainings take a batch that is in quarantine", release, add_batch);
+  commands.add("release", "Let later trainings take a batch that is in quarantine", release,
+               add_batch);
   commands.add("discard", "Let nothing take a batch any more", discard, add_batch);
-  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
-    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
-    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
-  });
-  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
-               [](CLI::App& command, ServiceArguments& arguments) {
+  commands.add(
+      "export", "Fetch a model as a file", export_model,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command
+            .add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")
+            ->required();
+        command.add_option("-o,--output", arguments.output, "Model file to write")->required();
+      });
+  commands.add("import", "Add a model file to a cell's history; activate puts it in force",
+               import_model, [](CLI::App& command, ServiceArguments& arguments) {
                  add_cell(command, arguments);
                  command.add_option("--model", arguments.model, "Model file to add")->required();
+               });
+}
+
+void add_retrain(ServiceCommands& commands) {
+  commands.add("retrain", "Train again from batches that the service has", retrain,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command
+                     .add_option("--batch", arguments.batch_ids,
+                                 "Id of a batch that the service has; once for each to train from "
+                                 "together; left out: the newest")
+                     ->allow_extra_args(false);
+                 command.add_option(
+                     "--level", arguments.level,
+                     "What to identify instead of the cell's error sources, as train spells it");
+                 command.add_option(
+                     "--bias", arguments.bias,
+                     "Kernel of the learned bias instead of the cell's, as train spells it");
+                 command.add_flag("--release", arguments.release,
+                                  "The batches that --batch names are good: train from them though "
+                                  "they are in quarantine. They leave it when the new model is put "
+                                  "in force, or when too few poses can judge it");
+                 add_watch(command, arguments);
                });
 }
 
@@ -425,55 +496,44 @@ void add_model_changes(ServiceCommands& commands) {
 
 void add_service_commands(CLI::App& app, Action& chosen) {
   ServiceCommands commands(app, chosen);
-  commands.add(
-      "submit", "Hand measurements to a service, which trains a model from them and puts it in force if it is better",
-      submit, [](CLI::App& command, ServiceArguments& arguments) {
-        add_cell(command, arguments);
-        command
-            .add_option("--batch", arguments.batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
-            ->required();
-        command.add_option(
-            "--id", arguments.batch_id,
-            "Id of the batch, unique within the cell for ever; left out: the file's name without its ending");
-        add_watch(command, arguments);
-      });
-  commands.add(
-      "retrain", "Train again from batches that the service has", retrain,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        add_cell(command, arguments);
-        command
-            .add_option(
-                "--batch", arguments.batch_ids,
-                "Id of a batch that the service has; once for each to train from together; left out: the newest")
-            ->allow_extra_args(false);
-        command.add_option("--level", arguments.level,
-                           "What to identify instead of the cell's error sources, as train spells it");
-        command.add_option("--bias", arguments.bias,
-                           "Kernel of the learned bias instead of the cell's, as train spells it");
-        command.add_flag("--release", arguments.release,
-                         "The batches that --batch names are good: train from them though they are in quarantine. They "
-                         "leave it when the "
-                         "new model is put in force, or when too few poses can judge it");
-        add_watch(command, arguments);
-      });
-  commands.add("status", "Show the servers that answer, the models in force, jobs, and batches in quarantine", status,
-               [](CLI::App&, ServiceArguments&) {});
+  commands.add("submit",
+               "Hand measurements to a service, which trains a model from them and puts it in "
+               "force if it is better",
+               submit, [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command
+                     .add_option("--batch", arguments.batch,
+                                 "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+                     ->required();
+                 command.add_option("--id", arguments.batch_id,
+                                    "Id of the batch, unique within the cell for ever; left out: "
+                                    "the file's name without its ending");
+                 add_watch(command, arguments);
+               });
+  add_retrain(commands);
+  commands.add("status",
+               "Show the servers that answer, the models in force, jobs, and batches in quarantine",
+               status, [](CLI::App&, ServiceArguments&) {});
   add_running_jobs(commands);
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
   commands.add(
-      "show", "Tell what a stored version of a cell's model is, and how large its errors were", show_model,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
+      "show", "Tell what a stored version of a cell's model is, and how large its errors were",
+      show_model, [](CLI::App& command, ServiceArguments& arguments) {
+        command
+            .add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")
+            ->required();
       });
-  commands.add("jobs", "List jobs that wait, run, and ended lately, and how", list_jobs, add_any_cell);
-  commands.add("batches", "List the batches that a service has, or fetch one as a file", list_batches,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 add_any_cell(command, arguments);
-                 command.add_option("--batch", arguments.batch_id, "Id of the batch to fetch");
-                 command.add_option(
-                     "-o,--output", arguments.output,
-                     "File to write it to (CSV, as it came: joints in deg, rails in mm; positions in mm)");
-               });
+  commands.add("jobs", "List jobs that wait, run, and ended lately, and how", list_jobs,
+               add_any_cell);
+  commands.add(
+      "batches", "List the batches that a service has, or fetch one as a file", list_batches,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        add_any_cell(command, arguments);
+        command.add_option("--batch", arguments.batch_id, "Id of the batch to fetch");
+        command.add_option(
+            "-o,--output", arguments.output,
+            "File to write it to (CSV, as it came: joints in deg, rails in mm; positions in mm)");
+      });
   add_model_changes(commands);
 }
 

@@ -22,14 +22,17 @@ std::string shipped_file(const std::string& name) {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path installed = program.parent_path() / TRAMMEL_DATA_FROM_PROGRAM / name;
-  if (!error && std::filesystem::exists(installed, error)) return installed.lexically_normal().string();
+  if (!error && std::filesystem::exists(installed, error))
+    return installed.lexically_normal().string();
   return TRAMMEL_SOURCE_DATA "/" + name;
 }
 
 Result<VirtualRobot> robot_to_study(const StudyArguments& arguments) {
-  Cell cell = TRY(read_cell(arguments.cell.empty() ? shipped_file("config/cell-7.yaml") : arguments.cell));
-  return read_virtual_robot(arguments.truth.empty() ? shipped_file("models/truth/chapter-5.yaml") : arguments.truth,
-                            std::make_shared<const Cell>(std::move(cell)));
+  Cell cell =
+      TRY(read_cell(arguments.cell.empty() ? shipped_file("config/cell-7.yaml") : arguments.cell));
+  return read_virtual_robot(
+      arguments.truth.empty() ? shipped_file("models/truth/chapter-5.yaml") : arguments.truth,
+      std::make_shared<const Cell>(std::move(cell)));
 }
 
 Result<std::vector<TargetRow>> holes_to_drill(const Chain& robot) {
@@ -64,10 +67,16 @@ Status run(const StudyArguments& arguments) {
 void add_study_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<StudyArguments>();
   CLI::App* command = app.add_subcommand(
-      "study", "Repeat a study of the thesis on the shipped virtual robot: its figures beside ours, mm");
-  command->add_option("name", arguments->name, "Which study")->required()->check(CLI::IsMember(study_names()));
-  command->add_option("--cell", arguments->cell, "Cell file (YAML) instead of the shipped one")->type_name("FILE");
-  command->add_option("--truth", arguments->truth, "Truth file (YAML) of the virtual robot instead of the shipped one")
+      "study",
+      "Repeat a study of the thesis on the shipped virtual robot: its figures beside ours, mm");
+  command->add_option("name", arguments->name, "Which study")
+      ->required()
+      ->check(CLI::IsMember(study_names()));
+  command->add_option("--cell", arguments->cell, "Cell file (YAML) instead of the shipped one")
+      ->type_name("FILE");
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Truth file (YAML) of the virtual robot instead of the shipped one")
       ->type_name("FILE");
   add_seed_option(*command, arguments->seed, "Seed of all draws: poses, noise, search");
   command->add_option("--bias", arguments->bias,

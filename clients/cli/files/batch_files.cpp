@@ -30,7 +30,8 @@ Result<MeasurementBatch> read_batch_file(const std::string& path) {
   if (is_model(text)) return refused("this is a model file, not a batch").in(path);
   Result<MeasurementBatch> batch = parse_batch(text, path);
   if (batch && !batch->extra_columns.empty()) tell_near_columns(text, TableKind::kBatch, path);
-  return std::move(batch).map([&](MeasurementBatch read) { return dated(std::move(read), written_at(path)); });
+  return std::move(batch).map(
+      [&](MeasurementBatch read) { return dated(std::move(read), written_at(path)); });
 }
 
 Result<JointList> read_joint_file(const std::string& path) {
@@ -57,7 +58,8 @@ Result<CheckedBatch> read_checked_batches(const std::vector<std::string>& paths,
   CheckedBatch all = joined(std::move(checked));
   if (const int copies = all.rows().copies; copies > 0) {
     fmt::print(stderr,
-               "{} measurements stand in several of these files, to the last digit: each counts once, in the first\n",
+               "{} measurements stand in several of these files, to the last digit: each counts "
+               "once, in the first\n",
                copies);
   }
   return all;

@@ -28,7 +28,8 @@ struct Listing {
 };
 const std::array<Listing, 2>& listings() {
   static const std::array<Listing, 2> kAll = {
-      {{cam::Dialect::kFanuc, {"sysframe.va", "framevar.va"}}, {cam::Dialect::kInform, {"tool.cnd", "uframe.cnd"}}}};
+      {{cam::Dialect::kFanuc, {"sysframe.va", "framevar.va"}},
+       {cam::Dialect::kInform, {"tool.cnd", "uframe.cnd"}}}};
   return kAll;
 }
 
@@ -41,25 +42,31 @@ struct NotRead {
 const std::array<NotRead, 5>& not_read() {
   static const std::array<NotRead, 5> kAll = {
       {{cam::Dialect::kInform, ".prm",
-        "parameters of the controller are not read; --pulses-per-deg tells how many pulses make a degree"},
-       {cam::Dialect::kInform, ".dat", "data of the controller (home positions, variables) are not read"},
+        "parameters of the controller are not read; --pulses-per-deg tells how many pulses make a "
+        "degree"},
+       {cam::Dialect::kInform, ".dat",
+        "data of the controller (home positions, variables) are not read"},
        {cam::Dialect::kFanuc, ".sv",
-        "binary system variables are not read: save them as text (SYSFRAME.VA) for frames, tools and loads"},
+        "binary system variables are not read: save them as text (SYSFRAME.VA) for frames, tools "
+        "and loads"},
        {cam::Dialect::kUrScript, ".urp",
-        "PolyScope's own programs are not read and stay as they are: what they hold is run uncorrected, unless they "
-        "call "
-        "the corrected script"},
+        "PolyScope's own programs are not read and stay as they are: what they hold is run "
+        "uncorrected, unless they call the corrected script"},
        {cam::Dialect::kUrScript, ".installation",
-        "the installation is not read: tool and load are those that the script sets, or --frames and the cell tell"}}};
+        "the installation is not read: tool and load are those that the script sets, or --frames "
+        "and the cell tell"}}};
   return kAll;
 }
 
 /// The files of a folder that are called so, in lower case.
-Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names, const std::string& folder) {
+Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
+                                                  const std::string& folder) {
   std::vector<cam::SourceFile> found;
   std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error)) continue;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error))
+      continue;
     std::string text = TRY(read_text_file(it->path().string(), kLargestProgram));
     found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
   }
@@ -73,7 +80,8 @@ std::vector<std::string> left_unread(cam::Dialect dialect, const std::string& fo
     if (kind.dialect != dialect) continue;
     std::vector<std::string> names;
     std::error_code error;
-    for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+         it.increment(error)) {
       if (it->is_regular_file(error) && lower(it->path().extension().string()) == kind.ending)
         names.push_back(shown(fs::relative(it->path(), folder, error).string()));
     }
@@ -83,7 +91,8 @@ std::vector<std::string> left_unread(cam::Dialect dialect, const std::string& fo
     names.resize(names.size() - more);
     if (!names.empty())
       sentences.push_back(fmt::format("{}{}: {}", fmt::join(names, ", "),
-                                      more == 0 ? "" : fmt::format(" and {} more", more), kind.sentence));
+                                      more == 0 ? "" : fmt::format(" and {} more", more),
+                                      kind.sentence));
   }
   return sentences;
 }
@@ -101,7 +110,8 @@ bool is_of_the_controller(const std::string& name) {
 }
 
 Status read_values(const std::string& folder, ProgramFiles& program) {
-  const auto take = [&](const std::set<std::string>& names, std::vector<cam::SourceFile>& into) -> Status {
+  const auto take = [&](const std::set<std::string>& names,
+                        std::vector<cam::SourceFile>& into) -> Status {
     const std::vector<cam::SourceFile> files = TRY(files_called(names, folder));
     into.insert(into.end(), files.begin(), files.end());
     return {};
@@ -125,20 +135,25 @@ Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect diale
   const std::string ending = lower(fs::path(path).extension().string());
   const cam::Dialect own = ending == ".cnd" ? cam::Dialect::kInform : cam::Dialect::kFanuc;
   if (dialect != own)
-    return failure(ErrorCode::kUsage, "a list of a {} controller, for a {} program", cam::name_of(own),
-                   cam::name_of(dialect))
+    return failure(ErrorCode::kUsage, "a list of a {} controller, for a {} program",
+                   cam::name_of(own), cam::name_of(dialect))
         .in(path)
         .of("--frames");
   if (ending == ".sv")
-    return refused("binary system variables").in(path).of("--frames").next("save them as text: SYSFRAME.VA");
+    return refused("binary system variables")
+        .in(path)
+        .of("--frames")
+        .next("save them as text: SYSFRAME.VA");
   std::string text = TRY(read_text_file(path, kLargestProgram));
   const std::vector<const char*> wanted = own == cam::Dialect::kInform
                                               ? std::vector<const char*>{"//TOOL ", "BUSER"}
                                               : std::vector<const char*>{"$MNUFRAME", "$MNUTOOL"};
-  const bool any =
-      std::any_of(wanted.begin(), wanted.end(), [&](const char* word) { return text.find(word) != std::string::npos; });
+  const bool any = std::any_of(wanted.begin(), wanted.end(), [&](const char* word) {
+    return text.find(word) != std::string::npos;
+  });
   if (!any)
-    return refused("no frames or tools in it, expected {}", fmt::format("{}", fmt::join(wanted, " or ")))
+    return refused("no frames or tools in it, expected {}",
+                   fmt::format("{}", fmt::join(wanted, " or ")))
         .in(path)
         .of("--frames");
   return cam::SourceFile{fs::path(path).filename().string(), std::move(text)};

@@ -11,17 +11,18 @@ namespace trammel::cli {
 
 constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a file
 
-/// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat` and its folders
-/// System, Mada and Steu, ABB's system modules and parameters.
+/// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat`
+/// and its folders System, Mada and Steu, ABB's system modules and parameters.
 [[nodiscard]] bool is_of_the_controller(const std::string& name);
 
-/// Adds what a folder has beside its programs, for their dialect: parameters, lists of frames and tools, and sentences
-/// on what is not read.
+/// Adds what a folder has beside its programs, for their dialect: parameters, lists of frames and
+/// tools, and sentences on what is not read.
 [[nodiscard]] Status read_values(const std::string& folder, ProgramFiles& program);
 
 /// Whether --frames names a controller's own list, or what one keeps in binary form.
 [[nodiscard]] bool is_listing(const std::string& path);
-/// A controller's own list of frames and tools, as --frames names it. Refuses one of another kind of controller.
+/// A controller's own list of frames and tools, as --frames names it. Refuses one of another kind
+/// of controller.
 [[nodiscard]] Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect dialect);
 
 }  // namespace trammel::cli

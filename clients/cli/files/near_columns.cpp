@@ -21,7 +21,8 @@ std::vector<std::string> optional_columns(TableKind kind) {
   if (kind == TableKind::kTargets) return names;
   names.insert(names.end(), {"pose_id", "tool_id", "payload_id"});
   if (kind == TableKind::kJoints) return names;
-  names.insert(names.end(), {"sigma_mm", "session_id", "distance_mm", "touch_mm", "anchor_id", "minus_pose_id"});
+  names.insert(names.end(),
+               {"sigma_mm", "session_id", "distance_mm", "touch_mm", "anchor_id", "minus_pose_id"});
   return names;
 }
 
@@ -42,10 +43,12 @@ std::vector<std::string> near_columns(const std::vector<std::string>& columns, T
   for (const std::string& column : columns) std::erase(missing, lower(column));
   for (const std::string& column : columns) {
     const std::string word = lower(column);
-    if (word.size() < kShortest || std::find(known.begin(), known.end(), word) != known.end()) continue;
+    if (word.size() < kShortest || std::find(known.begin(), known.end(), word) != known.end())
+      continue;
     const std::string meant = near_miss(word, missing);
     if (meant.empty() || (word.size() < kLong && !differ_by_one(word, meant))) continue;
-    said.push_back(fmt::format("{}: column {} is not known and is left aside; {} was meant?", where, column, meant));
+    said.push_back(fmt::format("{}: column {} is not known and is left aside; {} was meant?", where,
+                               column, meant));
   }
   return said;
 }
@@ -54,7 +57,8 @@ void tell_near_columns(const std::string& text, TableKind kind, const std::strin
   const std::vector<TextLine> lines = first_lines(text, 1);
   if (lines.empty() || lines[0].text.size() > kLongestLine) return;
   const std::vector<std::string> header = split_fields(lines[0].text, separator_of(lines[0].text));
-  for (const std::string& one : near_columns(header, kind, where)) fmt::print(stderr, "{}\n", shown(one));
+  for (const std::string& one : near_columns(header, kind, where))
+    fmt::print(stderr, "{}\n", shown(one));
 }
 
 }  // namespace trammel::cli

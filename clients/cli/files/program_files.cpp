@@ -33,12 +33,13 @@ struct Found {
   std::string name, path;
 };
 
-/// By its ending; `.dat` is KRL only where it looks like it, since FANUC's and Yaskawa's controllers have such files
-/// too.
+/// By its ending; `.dat` is KRL only where it looks like it, since FANUC's and Yaskawa's
+/// controllers have such files too.
 std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
   const auto dialect = cam::dialect_of_file(path);
   const std::string ending = fs::path(path).extension().string();
-  if (dialect != cam::Dialect::kKrl || (ending != ".dat" && ending != ".DAT" && ending != ".Dat")) return dialect;
+  if (dialect != cam::Dialect::kKrl || (ending != ".dat" && ending != ".DAT" && ending != ".Dat"))
+    return dialect;
   constexpr std::size_t kHead = 1 << 16;  // bytes
   std::string head(kHead, ' ');
   std::ifstream file(path, std::ios::binary);
@@ -47,27 +48,32 @@ std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
 }
 
 /// The programs of a folder, by name.
-std::vector<Found> programs_in(const std::string& folder, const std::optional<cam::Dialect>& wanted) {
+std::vector<Found> programs_in(const std::string& folder,
+                               const std::optional<cam::Dialect>& wanted) {
   std::vector<Found> found;
   std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
     if (!it->is_regular_file(error)) continue;
     const std::string path = it->path().string();
     const auto dialect = dialect_of_found(path);
     if (dialect && (!wanted || dialect == wanted))
       found.push_back({fs::relative(it->path(), folder, error).string(), path});
   }
-  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+  std::sort(found.begin(), found.end(),
+            [](const Found& a, const Found& b) { return a.name < b.name; });
   return found;
 }
 
 /// Keeps those below the folder of a task, and returns the others.
 std::vector<Found> keep_task(const std::string& task, std::vector<Found>& programs) {
-  const auto others = std::stable_partition(programs.begin(), programs.end(), [&](const Found& program) {
-    const fs::path path(program.name);
-    return std::any_of(path.begin(), path.end(),
-                       [&](const fs::path& part) { return lower(part.string()) == lower(task); });
-  });
+  const auto others =
+      std::stable_partition(programs.begin(), programs.end(), [&](const Found& program) {
+        const fs::path path(program.name);
+        return std::any_of(path.begin(), path.end(), [&](const fs::path& part) {
+          return lower(part.string()) == lower(task);
+        });
+      });
   std::vector<Found> left(std::make_move_iterator(others), std::make_move_iterator(programs.end()));
   programs.erase(others, programs.end());
   return left;
@@ -84,13 +90,16 @@ Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& 
 Result<std::string> standard_input() {
   std::string text{std::istreambuf_iterator<char>(std::cin), {}};
   if (text.size() > kLargestProgram)
-    return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargestProgram).in("standard input");
+    return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargestProgram)
+        .in("standard input");
   return text;
 }
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
-  const auto place = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, error), error); };
+  const auto place = [&](const std::string& path) {
+    return fs::weakly_canonical(fs::absolute(path, error), error);
+  };
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
@@ -110,18 +119,45 @@ Status check_kind(const std::string& path, bool is_said) {
 
 bool is_program(const std::vector<std::string>& inputs, const std::string& format) {
   if (!format.empty()) return format != "csv";
-  if (inputs.size() == 1 && lower(fs::path(inputs[0]).extension().string()) == kOfPolyScope) return true;
+  if (inputs.size() == 1 && lower(fs::path(inputs[0]).extension().string()) == kOfPolyScope)
+    return true;
   return inputs.size() != 1 || inputs[0] == "-" || fs::is_directory(inputs[0]) ||
          cam::dialect_of_file(inputs[0]).has_value();
 }
 
-Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, const std::string& format,
-                                        const std::string& task) {
+namespace {
+
+/// The programs of a folder join `found`; those of other tasks stand beside them.
+Status take_folder(const std::string& folder, const std::optional<cam::Dialect>& wanted,
+                   ProgramFiles& program, std::vector<Found>& found) {
+  std::vector<Found> inside = programs_in(folder, wanted);
+  if (inside.empty()) return refused("a folder without programs").in(folder);
+  std::vector<Found> other_tasks;
+  if (!program.task.empty()) other_tasks = keep_task(program.task, inside);
+  if (inside.empty()) {
+    return refused("no programs of a task {}", shown(program.task))
+        .in(folder)
+        .of("--task")
+        .with_text(program.task);
+  }
+  TRY(read_into(program.beside, other_tasks));
+  found.insert(found.end(), inside.begin(), inside.end());
+  for (const Found& file : inside)
+    if (is_of_the_controller(file.name)) program.system.insert(file.name);
+  program.from_folder = true;
+  return {};
+}
+
+}  // namespace
+
+Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
+                                        const std::string& format, const std::string& task) {
   ProgramFiles program;
   program.task = task;
   const std::optional<cam::Dialect> wanted = cam::dialect_called(format);
   if (!format.empty() && !wanted) {
-    return failure(ErrorCode::kUsage, "--format '{}': known are csv, {}", format, cam::dialect_names())
+    return failure(ErrorCode::kUsage, "--format '{}': known are csv, {}", format,
+                   cam::dialect_names())
         .of("--format")
         .with_text(format);
   }
@@ -130,20 +166,11 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
   for (const std::string& input : inputs) {
     std::error_code error;
     if (fs::is_directory(input, error)) {
-      std::vector<Found> inside = programs_in(input, wanted);
-      if (inside.empty()) return refused("a folder without programs").in(input);
-      std::vector<Found> other_tasks;
-      if (!task.empty()) other_tasks = keep_task(task, inside);
-      if (inside.empty())
-        return refused("no programs of a task {}", shown(task)).in(input).of("--task").with_text(task);
-      TRY(read_into(program.beside, other_tasks));
+      TRY(take_folder(input, wanted, program, found));
       folders.push_back(input);
-      found.insert(found.end(), inside.begin(), inside.end());
-      for (const Found& file : inside)
-        if (is_of_the_controller(file.name)) program.system.insert(file.name);
-      program.from_folder = true;
     } else {
-      found.push_back({input == "-" ? "standard input" : fs::path(input).filename().string(), input});
+      found.push_back(
+          {input == "-" ? "standard input" : fs::path(input).filename().string(), input});
     }
   }
   std::optional<cam::Dialect> dialect = wanted;
@@ -152,13 +179,16 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
     const auto own = cam::dialect_of_file(file.path);
     TRY(check_kind(file.path, wanted.has_value()));
     if (!wanted && dialect && own != dialect) {
-      return failure(ErrorCode::kUsage, "a {} program beside a {} one", cam::name_of(*own), cam::name_of(*dialect))
+      return failure(ErrorCode::kUsage, "a {} program beside a {} one", cam::name_of(*own),
+                     cam::name_of(*dialect))
           .in(file.path)
           .next("hand over one program at a time, or choose with --format");
     }
     if (!dialect) dialect = own;
-    if (!names.insert(file.name).second) return refused("two files of the name {}", file.name).in(file.path);
-    std::string text = TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargestProgram));
+    if (!names.insert(file.name).second)
+      return refused("two files of the name {}", file.name).in(file.path);
+    std::string text =
+        TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargestProgram));
     program.files.push_back({file.name, std::move(text)});
     program.paths.push_back(file.path);
   }
@@ -183,7 +213,8 @@ Result<bool> may_be_unused(const CsvTable& table, std::size_t row) {
   const auto column = table.find("may_be_unused");
   const std::string said = column ? table.field(row, *column) : "no";
   if (said == "yes" || said == "no") return said == "yes";
-  return table.refuse(row, "may_be_unused is {}, expected yes or no", shown_short(said)).of("may_be_unused");
+  return table.refuse(row, "may_be_unused is {}, expected yes or no", shown_short(said))
+      .of("may_be_unused");
 }
 
 Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
@@ -210,8 +241,8 @@ Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
 }
 
 /// Refuses rows that do not reach the program: whoever wrote them believes that they do.
-Status check_used(const std::vector<GivenPose>& rows, const std::string& path, const cam::Program& program,
-                  cam::Dialect dialect) {
+Status check_used(const std::vector<GivenPose>& rows, const std::string& path,
+                  const cam::Program& program, cam::Dialect dialect) {
   const cam::FramesRows known = cam::rows_of(program);
   std::vector<Error> problems;
   for (const GivenPose& row : rows) {
@@ -221,15 +252,17 @@ Status check_used(const std::vector<GivenPose>& rows, const std::string& path, c
     if (row.may_be_unused || hidden || known.used.contains(row.name)) continue;
     std::set<std::string> names = known.used;
     names.insert(known.open.begin(), known.open.end());
-    problems.push_back(refused("{}: {}", shown_short(row.name),
-                               spelled ? "nothing in the program uses it"
-                                       : fmt::format("a {} program has no such name", cam::name_of(dialect)))
-                           .in(path)
-                           .at_row(row.line)
-                           .of("name")
-                           .with_text(row.name)
-                           .next(fmt::format("its names are: {}", shown(fmt::format("{}", fmt::join(names, ", ")))))
-                           .value());
+    problems.push_back(
+        refused("{}: {}", shown_short(row.name),
+                spelled ? "nothing in the program uses it"
+                        : fmt::format("a {} program has no such name", cam::name_of(dialect)))
+            .in(path)
+            .at_row(row.line)
+            .of("name")
+            .with_text(row.name)
+            .next(
+                fmt::format("its names are: {}", shown(fmt::format("{}", fmt::join(names, ", ")))))
+            .value());
   }
   if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
   return {};
@@ -244,12 +277,16 @@ Status check_pulses(const ProgramFiles& files, const std::vector<double>& pulses
   constexpr std::size_t kAxes = 6;
   constexpr double kLeast = 1e-3;
   if (pulses_per_deg.empty()) return {};
-  const auto fail = [](std::string what) { return failure(ErrorCode::kUsage, "{}", what).of("--pulses-per-deg"); };
+  const auto fail = [](std::string what) {
+    return failure(ErrorCode::kUsage, "{}", what).of("--pulses-per-deg");
+  };
   if (files.dialect != cam::Dialect::kInform)
     return fail(fmt::format("a {} program has no pulses", cam::name_of(files.dialect)));
-  if (pulses_per_deg.size() != kAxes) return fail(fmt::format("{} numbers, 6 are due", pulses_per_deg.size()));
+  if (pulses_per_deg.size() != kAxes)
+    return fail(fmt::format("{} numbers, 6 are due", pulses_per_deg.size()));
   for (const double number : pulses_per_deg) {
-    if (!(std::abs(number) >= kLeast) || !std::isfinite(number)) return fail("an axis without pulses to a degree");
+    if (!(std::abs(number) >= kLeast) || !std::isfinite(number))
+      return fail("an axis without pulses to a degree");
   }
   return {};
 }
@@ -259,7 +296,8 @@ Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
   std::vector<cam::ControllerRobot> robots;
   for (const cam::SourceFile& parameters : files.parameters) {
     auto robot = TRY(cam::read_controller_robot(parameters.text, parameters.name,
-                                                cam::unit_of_task(parameters.text, files.task), "--task says which"));
+                                                cam::unit_of_task(parameters.text, files.task),
+                                                "--task says which"));
     robots.push_back(std::move(robot));
   }
   return robots;
@@ -271,7 +309,8 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
                                         const std::string& frames) {
   TRY(check_pulses(files, options.pulses_per_deg));
   const auto robots = TRY(robots_of(files));
-  for (const cam::ControllerRobot& robot : robots) cam::take_stated(cam::stated_by(robot), options.stated);
+  for (const cam::ControllerRobot& robot : robots)
+    cam::take_stated(cam::stated_by(robot), options.stated);
   std::vector<GivenPose> rows;
   options.beside = files.beside;
   if (is_listing(frames)) {
@@ -284,9 +323,9 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   TRY(cam::check_files(program));
   for (const cam::ControllerRobot& robot : robots) {
     if (!robot.carried_by.empty())
-      program.notes.push_back(
-          fmt::format("{} line {}: {} carries {}, so that where the robot stands is not taken from there", robot.file,
-                      robot.line, shown(robot.carried_by), shown(robot.unit)));
+      program.notes.push_back(fmt::format(
+          "{} line {}: {} carries {}, so that where the robot stands is not taken from there",
+          robot.file, robot.line, shown(robot.carried_by), shown(robot.unit)));
   }
   program.notes.insert(program.notes.end(), files.not_read.begin(), files.not_read.end());
   TRY(cam::take_idle_axes(program, options.idle_axes));
@@ -300,7 +339,8 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   return refused("{}no motion of a {} program in it, expected {}", is_empty ? "it is empty: " : "",
                  cam::name_of(files.dialect), cam::motions_of(files.dialect))
       .in(where)
-      .next(fmt::format("see that it is the whole program; --format names another kind: {}", cam::dialect_names()));
+      .next(fmt::format("see that it is the whole program; --format names another kind: {}",
+                        cam::dialect_names()));
 }
 
 Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
@@ -311,26 +351,30 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
     if (!mark) continue;
     any = true;
     const std::string kept = cam::original_path(before.paths[k]);
-    Result<std::string> text =
-        before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargestProgram);
+    Result<std::string> text = before.paths[k] == "-" ? Result<std::string>(refused("not kept"))
+                                                      : read_text_file(kept, kLargestProgram);
     if (!text) {
       return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
           .in(before.paths[k])
           .next("fetch it from where it was corrected");
     }
     if (cam::short_hash(*text) != mark->original)
-      return refused("it is not what {} was corrected from: the mark names other bytes", before.files[k].name).in(kept);
+      return refused("it is not what {} was corrected from: the mark names other bytes",
+                     before.files[k].name)
+          .in(kept);
     before.files[k].text = std::move(*text);
   }
-  if (!any && !all) return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
+  if (!any && !all)
+    return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
   return before;
 }
 
-Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {
+Result<std::vector<std::string>> output_paths(const ProgramFiles& program,
+                                              const std::string& output) {
   std::vector<std::string> paths;
   std::error_code error;
-  const bool folder =
-      program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) || output.ends_with('/');
+  const bool folder = program.files.size() > 1 || program.from_folder ||
+                      fs::is_directory(output, error) || output.ends_with('/');
   if (folder && output == "-") {
     return failure(ErrorCode::kUsage, "{} files do not go to standard output", program.files.size())
         .of("--output")
@@ -345,7 +389,8 @@ Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const
     paths.push_back(folder ? (fs::path(output) / program.files[k].name).string() : output);
     for (const std::string& input : program.paths) {
       if (output == "-" || input == "-" || !same_file(paths.back(), input)) continue;
-      return failure(ErrorCode::kUsage, "--output {} would overwrite what it is made from", paths.back())
+      return failure(ErrorCode::kUsage, "--output {} would overwrite what it is made from",
+                     paths.back())
           .of("--output")
           .with_text(paths.back());
     }

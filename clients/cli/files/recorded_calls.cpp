@@ -22,7 +22,9 @@ std::optional<double> known(const json& value) {
   return value.is_null() ? std::nullopt : std::optional(value.get<double>());
 }
 
-std::array<double, 3> three(const json& list) { return {number(list.at(0)), number(list.at(1)), number(list.at(2))}; }
+std::array<double, 3> three(const json& list) {
+  return {number(list.at(0)), number(list.at(1)), number(list.at(2))};
+}
 
 client::PoseMm pose(const json& list) {
   return {number(list.at(0)), number(list.at(1)), number(list.at(2)), number(list.at(3)),
@@ -30,7 +32,8 @@ client::PoseMm pose(const json& list) {
 }
 
 client::Approach approach(const json& item) {
-  return {item.at("directions").get<std::vector<int>>(), known(item.at("temperature_c")), known(item.at("time_s"))};
+  return {item.at("directions").get<std::vector<int>>(), known(item.at("temperature_c")),
+          known(item.at("time_s"))};
 }
 
 RecordedPose pose_of(const json& item) {
@@ -93,12 +96,14 @@ struct ReadSoFar {
   DamagedLines damaged;
 };
 
-Status read_file(const std::string& path, const std::function<Status(const RecordedCall&)>& take, ReadSoFar& read) {
+Status read_file(const std::string& path, const std::function<Status(const RecordedCall&)>& take,
+                 ReadSoFar& read) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return failure(ErrorCode::kRefused, "cannot be read").in(path);
   std::string text;
   for (long line = 1; std::getline(file, text); ++line) {
-    const bool is_cut_off = file.eof();  // no end of line: it is being written, or the server was killed
+    const bool is_cut_off =
+        file.eof();  // no end of line: it is being written, or the server was killed
     const json record = json::parse(text, nullptr, false);
     if (record.is_discarded() && is_cut_off) {
       if (!text.empty()) read.damaged.half.push_back(fmt::format("{} row {}", path, line));
@@ -106,7 +111,8 @@ Status read_file(const std::string& path, const std::function<Status(const Recor
     }
     auto call = parse_record(record);
     if (!call) {
-      if (read.damaged.count++ == 0) read.damaged.first = Failure(call.error()).in(path).at_row(line).value();
+      if (read.damaged.count++ == 0)
+        read.damaged.first = Failure(call.error()).in(path).at_row(line).value();
       continue;
     }
     ++read.requests;
@@ -131,7 +137,8 @@ Result<std::vector<std::string>> files_of(const std::string& path) {
 
 }  // namespace
 
-Result<DamagedLines> read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take) {
+Result<DamagedLines> read_records(const std::string& path,
+                                  const std::function<Status(const RecordedCall&)>& take) {
   const auto files = TRY(files_of(path));
   ReadSoFar read;
   for (const std::string& file : files) {

@@ -40,13 +40,15 @@ struct RecordedCall {
 struct DamagedLines {
   std::size_t count = 0;
   Error first;  ///< with file and line
-  /// Last lines without an end, as a service leaves one that is writing or was killed: `a.jsonl row 7`. Not counted.
+  /// Last lines without an end, as a service leaves one that is writing or was killed: `a.jsonl row
+  /// 7`. Not counted.
   std::vector<std::string> half;
 };
 
-/// Calls `take` for each request of the file, or of all files of the folder, in their order. A last line that was not
-/// written to its end is left out and told. Refuses where no line is a record, with the first file and line.
-[[nodiscard]] Result<DamagedLines> read_records(const std::string& path,
-                                                const std::function<Status(const RecordedCall&)>& take);
+/// Calls `take` for each request of the file, or of all files of the folder, in their order. A last
+/// line that was not written to its end is left out and told. Refuses where no line is a record,
+/// with the first file and line.
+[[nodiscard]] Result<DamagedLines> read_records(
+    const std::string& path, const std::function<Status(const RecordedCall&)>& take);
 
 }  // namespace trammel::cli

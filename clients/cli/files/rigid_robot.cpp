@@ -16,15 +16,18 @@ std::vector<PoseContext> drawn_poses(const CompensatedModel& model, int count) {
   const ModelParts& parts = model.parts();
   std::mt19937_64 random(1);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
-  std::vector<std::pair<std::string, std::string>> carried(parts.trained_with.begin(), parts.trained_with.end());
+  std::vector<std::pair<std::string, std::string>> carried(parts.trained_with.begin(),
+                                                           parts.trained_with.end());
   std::vector<PoseContext> poses;
   for (int k = 0; k < count; ++k) {
     PoseContext pose;
     pose.q.resize(parts.q_min.size());
     for (Eigen::Index j = 0; j < pose.q.size(); ++j)
       pose.q(j) = parts.q_min(j) + unit() * (parts.q_max(j) - parts.q_min(j));
-    for (Eigen::Index j = 0; j < pose.q.size(); ++j) pose.direction.push_back(unit() < 0.5 ? -1 : 1);
-    if (!carried.empty()) std::tie(pose.tool, pose.payload) = carried[static_cast<std::size_t>(k) % carried.size()];
+    for (Eigen::Index j = 0; j < pose.q.size(); ++j)
+      pose.direction.push_back(unit() < 0.5 ? -1 : 1);
+    if (!carried.empty())
+      std::tie(pose.tool, pose.payload) = carried[static_cast<std::size_t>(k) % carried.size()];
     pose.temperature = parts.temperature_mean;
     pose.served = true;
     poses.push_back(std::move(pose));
@@ -45,7 +48,8 @@ PhysicalModel without(const PhysicalModel& all, const std::vector<bool>& left_ou
     }
     at += count;
   }
-  some.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  some.values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   return some;
 }
 
@@ -59,12 +63,14 @@ Eigen::VectorXd as_numbers(const ArmState& state, const std::vector<LinkGeometry
   std::vector<double> numbers;
   for (std::size_t j = 0; j < nominal.size(); ++j) {
     const LinkGeometry &is = state.links[j], &was = nominal[j];
-    numbers.insert(numbers.end(),
-                   {is.theta - was.theta, is.d - was.d, is.a - was.a, is.alpha - was.alpha, is.beta - was.beta});
+    numbers.insert(numbers.end(), {is.theta - was.theta, is.d - was.d, is.a - was.a,
+                                   is.alpha - was.alpha, is.beta - was.beta});
   }
-  for (const Pose& X : {state.X_WB, state.X_FT}) numbers.insert(numbers.end(), X.data(), X.data() + 16);
+  for (const Pose& X : {state.X_WB, state.X_FT})
+    numbers.insert(numbers.end(), X.data(), X.data() + 16);
   numbers.insert(numbers.end(), state.tip_W.data(), state.tip_W.data() + 6);
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(),
+                                           static_cast<Eigen::Index>(numbers.size()));
 }
 
 /// Whether the source moves links, base and tool by the same at all these poses, and nothing else.
@@ -94,14 +100,17 @@ struct Size {
   [[nodiscard]] double rms() const { return std::sqrt(sum_of_squares / std::max(count, 1)); }
 };
 
-Size size_between(const PhysicalModel& a, const PhysicalModel& b, const std::vector<PoseContext>& poses) {
+Size size_between(const PhysicalModel& a, const PhysicalModel& b,
+                  const std::vector<PoseContext>& poses) {
   Size size;
-  for (const PoseContext& pose : poses) size.add((a.pose_W(pose).translation() - b.pose_W(pose).translation()).norm());
+  for (const PoseContext& pose : poses)
+    size.add((a.pose_W(pose).translation() - b.pose_W(pose).translation()).norm());
   return size;
 }
 
 Vector3 served_position_W(const CompensatedModel& model, const PoseContext& pose) {
-  return model.parts().physics.X_WB * model.predict(pose.q, pose.tool, pose.payload).X_BT_predicted.translation();
+  return model.parts().physics.X_WB *
+         model.predict(pose.q, pose.tool, pose.payload).X_BT_predicted.translation();
 }
 
 }  // namespace
@@ -131,7 +140,8 @@ RigidRobot rigid_robot(const CompensatedModel& model) {
     std::vector<bool> this_one(all.sources.size(), false);
     this_one[s] = true;
     const Size size = size_between(all, without(all, this_one), poses);
-    robot.left_out.push_back({all.sources[s]->name(), all.sources[s]->explanation(), size.rms(), size.most});
+    robot.left_out.push_back(
+        {all.sources[s]->name(), all.sources[s]->explanation(), size.rms(), size.most});
   }
   Size bias, together;
   for (const PoseContext& pose : poses) {
@@ -141,7 +151,8 @@ RigidRobot rigid_robot(const CompensatedModel& model) {
     bias.add((served - all.pose_W(asked).translation()).norm());
     together.add((served - robot.physics.pose_W(asked).translation()).norm());
   }
-  if (model.bias()) robot.left_out.push_back({"bias", "what was learned of the rest", bias.rms(), bias.most});
+  if (model.bias())
+    robot.left_out.push_back({"bias", "what was learned of the rest", bias.rms(), bias.most});
   robot.rms = together.rms();
   robot.most = together.most;
   return robot;

@@ -6,8 +6,8 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// What of a model holds at every pose: links, base and tools. Programs that know no more than kinematics (URDF) can
-/// carry it; the rest is told with its size.
+/// What of a model holds at every pose: links, base and tools. Programs that know no more than
+/// kinematics (URDF) can carry it; the rest is told with its size.
 namespace trammel::cli {
 
 /// What rigid kinematics leaves out of a model.

@@ -56,7 +56,8 @@ class Columns {
   }
   /// All of `names`, or none.
   template <std::size_t N>
-  [[nodiscard]] std::optional<std::array<std::size_t, N>> all(const std::array<const char*, N>& names) const {
+  [[nodiscard]] std::optional<std::array<std::size_t, N>> all(
+      const std::array<const char*, N>& names) const {
     std::array<std::size_t, N> columns = {};
     for (std::size_t i = 0; i < N; ++i) {
       const auto column = find(names[i]);
@@ -78,7 +79,8 @@ class Columns {
   std::vector<ColumnName> names_;
 };
 
-/// The numbers of a column, in m or rad by its unit, in `otherwise` (SI per unit) where it names none.
+/// The numbers of a column, in m or rad by its unit, in `otherwise` (SI per unit) where it names
+/// none.
 Result<std::vector<double>> numbers(const Columns& columns, std::size_t column, double otherwise) {
   const std::string& unit = columns.unit(column);
   double scale = otherwise;
@@ -94,8 +96,8 @@ Result<std::vector<double>> numbers(const Columns& columns, std::size_t column, 
 }
 
 /// Three columns as one vector a row.
-Result<std::vector<Vector3>> vectors(const Columns& columns, const std::array<std::size_t, 3>& three,
-                                     double otherwise) {
+Result<std::vector<Vector3>> vectors(const Columns& columns,
+                                     const std::array<std::size_t, 3>& three, double otherwise) {
   std::vector<Vector3> all(columns.table().size());
   for (std::size_t k = 0; k < 3; ++k) {
     const std::vector<double> values = TRY(numbers(columns, three[k], otherwise));
@@ -113,18 +115,21 @@ Status read_joints(const Columns& columns, const Chain& robot, ShownPoses& shown
           .in(columns.table().where())
           .of(fmt::format("q{}_deg", j + 1));
     const bool turns = robot.joint(j).type == JointType::kRevolute;
-    const std::vector<double> values = TRY(numbers(columns, *column, turns ? from_deg(1) : from_mm(1)));
+    const std::vector<double> values =
+        TRY(numbers(columns, *column, turns ? from_deg(1) : from_mm(1)));
     for (std::size_t i = 0; i < values.size(); ++i) shown.q[i](j) = values[i];
   }
   if (columns.joint(robot.size() + 1)) {
-    return refused("a column of joint {}, and {} has {}", robot.size() + 1, robot.name(), robot.size())
+    return refused("a column of joint {}, and {} has {}", robot.size() + 1, robot.name(),
+                   robot.size())
         .in(columns.table().where())
         .of(columns.table().columns()[*columns.joint(robot.size() + 1)]);
   }
   return {};
 }
 
-Status read_quaternions(const Columns& columns, const std::array<std::size_t, 4>& wxyz, ShownPoses& shown) {
+Status read_quaternions(const Columns& columns, const std::array<std::size_t, 4>& wxyz,
+                        ShownPoses& shown) {
   ShownPoses::Orientations read{"a quaternion", {}};
   for (std::size_t row = 0; row < columns.table().size(); ++row) {
     const Matrix3 R = TRY(columns.table().rotation(row, {wxyz.begin(), wxyz.end()}));
@@ -134,16 +139,17 @@ Status read_quaternions(const Columns& columns, const std::array<std::size_t, 4>
   return {};
 }
 
-Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& three, ShownPoses& shown) {
+Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& three,
+                   ShownPoses& shown) {
   const bool said = !columns.unit(three[0]).empty();
   for (const double unit : {from_deg(1), 1.0}) {
     if (said && unit == 1.0) break;
     const std::vector<Vector3> angles = TRY(vectors(columns, three, unit));
     for (const Meaning& meaning : kMeanings) {
-      ShownPoses::Orientations read{
-          fmt::format("{} {} {}, {}", columns.table().columns()[three[0]], columns.table().columns()[three[1]],
-                      columns.table().columns()[three[2]], meaning.text),
-          {}};
+      ShownPoses::Orientations read{fmt::format("{} {} {}, {}", columns.table().columns()[three[0]],
+                                                columns.table().columns()[three[1]],
+                                                columns.table().columns()[three[2]], meaning.text),
+                                    {}};
       if (!said && unit == 1.0) read.meaning += ", rad";
       std::transform(angles.begin(), angles.end(), std::back_inserter(read.R), meaning.rotation);
       shown.orientations.push_back(std::move(read));
@@ -153,7 +159,8 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
 }
 
 Status read_orientations(const Columns& columns, ShownPoses& shown) {
-  if (const auto wxyz = columns.all<4>({"qw", "qx", "qy", "qz"})) return read_quaternions(columns, *wxyz, shown);
+  if (const auto wxyz = columns.all<4>({"qw", "qx", "qy", "qz"}))
+    return read_quaternions(columns, *wxyz, shown);
   for (const std::array<const char*, 3>& names : kAngleNames)
     if (const auto three = columns.all(names)) return read_angles(columns, *three, shown);
   return {};
@@ -161,13 +168,17 @@ Status read_orientations(const Columns& columns, ShownPoses& shown) {
 
 }  // namespace
 
-Result<ShownPoses> parse_shown_poses(const std::string& text, const std::string& where, const Chain& robot) {
+Result<ShownPoses> parse_shown_poses(const std::string& text, const std::string& where,
+                                     const Chain& robot) {
   const CsvTable table = TRY(CsvTable::parse(text, where));
   const Columns columns(table);
   ShownPoses shown;
   TRY(read_joints(columns, robot, shown));
   const auto xyz = columns.all<3>({"x", "y", "z"});
-  if (!xyz) return refused("no columns x_mm, y_mm, z_mm of the pose that the controller shows").in(where).of("x_mm");
+  if (!xyz)
+    return refused("no columns x_mm, y_mm, z_mm of the pose that the controller shows")
+        .in(where)
+        .of("x_mm");
   std::vector<Vector3> positions = TRY(vectors(columns, *xyz, from_mm(1)));
   shown.p = std::move(positions);
   TRY(read_orientations(columns, shown));
@@ -175,7 +186,8 @@ Result<ShownPoses> parse_shown_poses(const std::string& text, const std::string&
 }
 
 Result<ShownPoses> read_shown_poses(const std::string& path, const Chain& robot) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_shown_poses(text, path, robot); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_shown_poses(text, path, robot); });
 }
 
 }  // namespace trammel::cli

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPositionLimitMm = 1e6;
 constexpr int kHighestConf = 7;
-constexpr double kLargestMetres = 10;          // no arm reaches as many metres, and none its own foot in mm
+constexpr double kLargestMetres = 10;  // no arm reaches as many metres, and none its own foot in mm
 constexpr double kNearestShareOfReach = 0.01;  // of the targets in the middle
 
 /// m, of all its links; a gantry has none that says how far it goes.
@@ -40,7 +40,8 @@ struct TargetColumns {
 
 Result<TargetColumns> find_columns(const CsvTable& table) {
   PoseColumns commanded = TRY(PoseColumns::find(table));
-  std::vector<std::size_t> pose = TRY(table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"}));
+  std::vector<std::size_t> pose =
+      TRY(table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"}));
   TargetColumns columns{std::move(commanded), std::move(pose), table.find("conf")};
   const bool joints = !columns.commanded.joint_types().empty();
   if (columns.pose.empty() && !joints) {
@@ -50,12 +51,15 @@ Result<TargetColumns> find_columns(const CsvTable& table) {
         .next(fmt::format("the header has: {}", fmt::join(table.columns(), ",")));
   }
   if (!columns.conf && !joints) {
-    return refused("missing column conf, or q1_deg... as the seed of the poses").in(table.where()).of("conf");
+    return refused("missing column conf, or q1_deg... as the seed of the poses")
+        .in(table.where())
+        .of("conf");
   }
   return columns;
 }
 
-Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector<std::size_t>& columns) {
+Result<Pose> read_pose(const CsvTable& table, std::size_t row,
+                       const std::vector<std::size_t>& columns) {
   Pose X_BT = Pose::Identity();
   for (std::size_t k = 0; k < 3; ++k) {
     const double value = TRY(table.number(row, columns[k], kPositionLimitMm));
@@ -67,7 +71,8 @@ Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector
   });
 }
 
-Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns, Target& target) {
+Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns,
+                   Target& target) {
   PoseContext comes = TRY(columns.commanded.circumstances(table, row));
   target.direction = std::move(comes.direction);
   target.temperature = comes.temperature;
@@ -90,7 +95,8 @@ Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& 
   return {};
 }
 
-/// A file that `correct` wrote: to correct it again would send the tool away by the correction once more.
+/// A file that `correct` wrote: to correct it again would send the tool away by the correction once
+/// more.
 Status check_not_corrected(const CsvTable& table) {
   for (const char* column : {"status", "error_before_mm", "error_after_mm", "model_id"}) {
     if (!table.find(column)) return {};
@@ -108,12 +114,14 @@ Result<TargetFile> parse_targets_csv(const std::string& text, const std::string&
   const CsvTable table = TRY(CsvTable::parse(text, where));
   TRY(check_not_corrected(table));
   const TargetColumns columns = TRY(find_columns(table));
-  if (table.size() == 0) return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);
+  if (table.size() == 0)
+    return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);
   TargetFile file{where, columns.commanded.joint_types(), {}, table.columns()};
   for (std::size_t row = 0; row < table.size(); ++row) {
     TargetRow& target = file.rows.emplace_back();
     target.row = table.line(row);
-    for (std::size_t k = 0; k < file.columns.size(); ++k) target.fields.push_back(table.field(row, k));
+    for (std::size_t k = 0; k < file.columns.size(); ++k)
+      target.fields.push_back(table.field(row, k));
     TRY(read_target(table, row, columns, target.target));
   }
   return file;
@@ -128,15 +136,19 @@ Result<TargetFile> read_targets_csv(const std::string& path) {
 }
 
 bool may_be_metres(const TargetFile& file) {
-  return !file.rows.empty() && std::all_of(file.rows.begin(), file.rows.end(), [](const TargetRow& row) {
-    const Target& target = row.target;
-    return !target.joint_target && to_mm(target.X_BT.translation().lpNorm<Eigen::Infinity>()) < kLargestMetres;
-  });
+  return !file.rows.empty() &&
+         std::all_of(file.rows.begin(), file.rows.end(), [](const TargetRow& row) {
+           const Target& target = row.target;
+           return !target.joint_target &&
+                  to_mm(target.X_BT.translation().lpNorm<Eigen::Infinity>()) < kLargestMetres;
+         });
 }
 
 Error looks_like_metres(const TargetFile& file) {
   const Vector3 p = file.rows.front().target.X_BT.translation();
-  return refused("the positions look like metres: x_mm, y_mm and z_mm are mm, and all are below {:g}", kLargestMetres)
+  return refused(
+             "the positions look like metres: x_mm, y_mm and z_mm are mm, and all are below {:g}",
+             kLargestMetres)
       .in(file.where)
       .at_row(file.rows.front().row)
       .of("x_mm")
@@ -162,7 +174,8 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
   for (const TargetRow& row : file.rows) {
     const auto directions = static_cast<int>(row.target.direction.size());
     if (directions == 0 || directions == robot.size()) continue;
-    return refused("{} direction columns, robot {} has {} joints", directions, robot.name(), robot.size())
+    return refused("{} direction columns, robot {} has {} joints", directions, robot.name(),
+                   robot.size())
         .in(file.where)
         .of(fmt::format("dir{}", directions))
         .beyond(directions, robot.size());
@@ -171,8 +184,8 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;
-    return refused("conf is {}, but robot {} has no spherical wrist to number branches by", *row.target.conf,
-                   robot.name())
+    return refused("conf is {}, but robot {} has no spherical wrist to number branches by",
+                   *row.target.conf, robot.name())
         .in(file.where)
         .at_row(row.row)
         .of("conf")

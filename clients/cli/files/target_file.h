@@ -22,10 +22,12 @@ struct TargetFile {
   std::vector<std::string> columns = {};  ///< of the file, all of them
 };
 
-/// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or `q1_deg`... as the seed,
-/// or `q1_deg`... alone. `dir1`..., `temperature_c` and `time_s` say how the arm comes there. Other columns are kept.
-/// Refuses as batches are, and a pose with neither conf nor seed.
-[[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
+/// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or
+/// `q1_deg`... as the seed, or `q1_deg`... alone. `dir1`..., `temperature_c` and `time_s` say how
+/// the arm comes there. Other columns are kept. Refuses as batches are, and a pose with neither
+/// conf nor seed.
+[[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text,
+                                                   const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 
 /// Whether every position is so near to the base that its numbers may be metres.
@@ -33,8 +35,9 @@ struct TargetFile {
 /// The refusal of such a file.
 [[nodiscard]] Error looks_like_metres(const TargetFile& file);
 
-/// Refuses joint and direction columns that are not the robot's, conf where the robot's branches have no closed form,
-/// and positions that all may be metres where the one in the middle is within a hundredth of the arm's length.
+/// Refuses joint and direction columns that are not the robot's, conf where the robot's branches
+/// have no closed form, and positions that all may be metres where the one in the middle is within
+/// a hundredth of the arm's length.
 [[nodiscard]] Status check_targets(const TargetFile& file, const Chain& robot);
 
 }  // namespace trammel::cli

@@ -37,13 +37,16 @@ ordered_json pose_json(const client::PoseMm& pose) {
           {"qx", pose.qx},     {"qy", pose.qy},     {"qz", pose.qz}};
 }
 
-/// Whether there is a pose to command. If not, no numbers are written: a program could take them for a command.
+/// Whether there is a pose to command. If not, no numbers are written: a program could take them
+/// for a command.
 bool has_command(const client::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
 }
 
 /// A joint of the wire as its column holds it: deg, of a prismatic joint mm.
-double wire_to_column(double value, JointType type) { return type == JointType::kRevolute ? to_deg(value) : value; }
+double wire_to_column(double value, JointType type) {
+  return type == JointType::kRevolute ? to_deg(value) : value;
+}
 
 JointType type_of(const std::vector<JointType>& types, std::size_t joint) {
   return joint < types.size() ? types[joint] : JointType::kRevolute;
@@ -51,7 +54,8 @@ JointType type_of(const std::vector<JointType>& types, std::size_t joint) {
 
 std::size_t joint_count(const Corrections& corrections) {
   std::size_t joints = corrections.joint_types.size();
-  for (const client::CorrectedTarget& item : corrections.items) joints = std::max(joints, item.q_rad.size());
+  for (const client::CorrectedTarget& item : corrections.items)
+    joints = std::max(joints, item.q_rad.size());
   return joints;
 }
 
@@ -100,7 +104,8 @@ std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& 
   return wire;
 }
 
-client::CorrectedTarget to_wire(const Correction& correction, const std::vector<JointType>& joint_types) {
+client::CorrectedTarget to_wire(const Correction& correction,
+                                const std::vector<JointType>& joint_types) {
   return {std::string(to_string(correction.status)),
           to_wire(correction.X_BT_commanded),
           to_wire(correction.q, joint_types),
@@ -115,7 +120,8 @@ client::CorrectedTarget to_wire(const Correction& correction, const std::vector<
 }
 
 client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types) {
-  return {to_wire(target.X_BT), target.seed ? to_wire(*target.seed, joint_types) : std::vector<double>(), target.conf,
+  return {to_wire(target.X_BT),
+          target.seed ? to_wire(*target.seed, joint_types) : std::vector<double>(), target.conf,
           target.joint_target, client::Approach{target.direction, target.temperature, target.time}};
 }
 
@@ -125,7 +131,8 @@ Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
   if (!target.joint_target) {
     const client::PoseMm& pose = wanted.pose;
     const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
-    target.X_BT = make_pose(R.normalized().toRotationMatrix(), Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
+    target.X_BT = make_pose(R.normalized().toRotationMatrix(),
+                            Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
   }
   target.direction = wanted.approach.directions;
   target.temperature = wanted.approach.temperature_c;
@@ -150,31 +157,38 @@ JointUncertainty joint_uncertainty(const client::PredictedError& item) {
 
 Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& item) {
   if (std::isnan(item.srx_rad))
-    return refused("the model learned no orientations: its training poses did not all have one, or its bias is none");
+    return refused(
+        "the model learned no orientations: its training poses did not all have one, or its bias "
+        "is none");
   return RotationUncertainty{to_deg(item.srx_rad), to_deg(item.sry_rad), to_deg(item.srz_rad)};
 }
 
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
   std::string text = fmt::format(
-      "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id,slx_mm,sly_mm,slz_mm", kPoseColumns);
+      "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id,slx_mm,sly_mm,slz_mm",
+      kPoseColumns);
   if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2";
   if (!predictions.turned.empty()) text += ",srx_deg,sry_deg,srz_deg";
   text += "\n";
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
     const client::PredictedError& item = predictions.items[i];
-    for (const double value : {item.dx_mm, item.dy_mm, item.dz_mm, item.sx_mm, item.sy_mm, item.sz_mm}) {
+    for (const double value :
+         {item.dx_mm, item.dy_mm, item.dz_mm, item.sx_mm, item.sy_mm, item.sz_mm}) {
       text += csv_number(value) + ",";
     }
     text += fmt::format("{},{},{},{}", item.in_domain ? 1 : 0, pose_fields(item.predicted),
                         csv_field(list.poses[i].pose_id), predictions.model_id);
-    for (const double value : {item.slx_mm, item.sly_mm, item.slz_mm}) text += fmt::format(",{:.9g}", value);
+    for (const double value : {item.slx_mm, item.sly_mm, item.slz_mm})
+      text += fmt::format(",{:.9g}", value);
     if (!predictions.together.empty()) {
       const JointUncertainty& u = predictions.together[i];
-      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2}) text += fmt::format(",{:.9g}", value);
+      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2})
+        text += fmt::format(",{:.9g}", value);
     }
     if (!predictions.turned.empty()) {
       const RotationUncertainty& u = predictions.turned[i];
-      for (const double value : {u.srx_deg, u.sry_deg, u.srz_deg}) text += fmt::format(",{:.9g}", value);
+      for (const double value : {u.srx_deg, u.sry_deg, u.srz_deg})
+        text += fmt::format(",{:.9g}", value);
     }
     text += "\n";
   }
@@ -206,27 +220,33 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
     const JointUncertainty& u = predictions.together[i];
     items.back().update({{"cxy_mm2", u.cxy_mm2}, {"cxz_mm2", u.cxz_mm2}, {"cyz_mm2", u.cyz_mm2}});
   }
-  return {{"model", predictions.model_id}, {"notes", notes_json(predictions.notes)}, {"predictions", items}};
+  return {{"model", predictions.model_id},
+          {"notes", notes_json(predictions.notes)},
+          {"predictions", items}};
 }
 
 namespace {
 
 /// Of corrections_csv() without the columns of the target file.
 std::vector<std::string> correction_columns(const Corrections& corrections) {
-  std::vector<std::string> columns = {"row", "status", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"};
+  std::vector<std::string> columns = {"row", "status", "x_mm", "y_mm", "z_mm",
+                                      "qw",  "qx",     "qy",   "qz"};
   const std::size_t joints = joint_count(corrections);
   for (std::size_t j = 0; j < joints; ++j) {
     columns.push_back(joint_column(static_cast<int>(j), type_of(corrections.joint_types, j)));
   }
-  for (const char* name : {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message",
-                           "sigma_measured_mm", "turn_before_deg", "turn_after_deg"}) {
+  for (const char* name :
+       {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message",
+        "sigma_measured_mm", "turn_before_deg", "turn_after_deg"}) {
     columns.emplace_back(name);
   }
   return columns;
 }
 
-/// The names of the file's columns where `ours` stand behind them: none is named twice, whatever the case.
-std::vector<std::string> kept_columns(const std::vector<std::string>& columns, const std::vector<std::string>& ours) {
+/// The names of the file's columns where `ours` stand behind them: none is named twice, whatever
+/// the case.
+std::vector<std::string> kept_columns(const std::vector<std::string>& columns,
+                                      const std::vector<std::string>& ours) {
   std::set<std::string> taken;
   for (const std::string& name : ours) taken.insert(lower(name));
   std::vector<std::string> kept = columns;
@@ -244,7 +264,9 @@ std::vector<std::string> kept_columns(const std::vector<std::string>& columns, c
 
 /// Empty where there is nothing to say.
 std::string field_of(double value) { return std::isfinite(value) ? csv_number(value) : ""; }
-ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+ordered_json json_of(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
 
 }  // namespace
 
@@ -258,17 +280,20 @@ std::string corrections_csv(const TargetFile& file, const Corrections& correctio
     const client::CorrectedTarget& item = corrections.items[i];
     const bool command = has_command(item);
     for (const std::string& field : file.rows[i].fields) text += csv_field(field) + ",";
-    text += fmt::format("{},{},{}", file.rows[i].row, item.status, command ? pose_fields(item.commanded) : ",,,,,,");
+    text += fmt::format("{},{},{}", file.rows[i].row, item.status,
+                        command ? pose_fields(item.commanded) : ",,,,,,");
     for (std::size_t j = 0; j < joints; ++j) {
       text += ',';
       if (command && j < item.q_rad.size()) {
         text += csv_number(wire_to_column(item.q_rad[j], type_of(corrections.joint_types, j)));
       }
     }
-    text += fmt::format(",{},{},{},{},{},{}", field_of(item.error_before_mm), field_of(item.error_after_mm),
-                        field_of(item.sigma_mm), item.iterations, corrections.model_id, csv_field(item.message));
-    text += fmt::format(",{},{},{}\n", field_of(item.sigma_measured_mm), field_of(to_deg(item.turn_before_rad)),
-                        field_of(to_deg(item.turn_after_rad)));
+    text += fmt::format(",{},{},{},{},{},{}", field_of(item.error_before_mm),
+                        field_of(item.error_after_mm), field_of(item.sigma_mm), item.iterations,
+                        corrections.model_id, csv_field(item.message));
+    text +=
+        fmt::format(",{},{},{}\n", field_of(item.sigma_measured_mm),
+                    field_of(to_deg(item.turn_before_rad)), field_of(to_deg(item.turn_after_rad)));
   }
   return text;
 }
@@ -277,7 +302,8 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
   ordered_json items = ordered_json::array();
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
     const client::CorrectedTarget& item = corrections.items[i];
-    ordered_json json = {{"row", file.rows[i].row}, {"status", item.status}, {"message", item.message}};
+    ordered_json json = {
+        {"row", file.rows[i].row}, {"status", item.status}, {"message", item.message}};
     json["input"] = ordered_json::object();
     for (std::size_t k = 0; k < file.rows[i].fields.size(); ++k) {
       json["input"][file.columns[k]] = file.rows[i].fields[k];
@@ -322,11 +348,13 @@ std::string left_alone_text(const TargetFile& file, const Corrections& correctio
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
     const client::CorrectedTarget& item = corrections.items[i];
     if (has_command(item) || ++left > kLines) continue;
-    lines += fmt::format("  {} row {}: {}: {}\n", file.where, file.rows[i].row, item.status, item.message);
+    lines += fmt::format("  {} row {}: {}: {}\n", file.where, file.rows[i].row, item.status,
+                         item.message);
   }
   if (left == 0) return "";
   if (left > kLines) lines += fmt::format("  and {} more\n", left - kLines);
-  return fmt::format("{} of {} targets are left as they were:\n{}", left, corrections.items.size(), lines);
+  return fmt::format("{} of {} targets are left as they were:\n{}", left, corrections.items.size(),
+                     lines);
 }
 
 }  // namespace trammel::cli

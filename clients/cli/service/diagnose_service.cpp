@@ -18,7 +18,8 @@ using nlohmann::ordered_json;
 
 constexpr std::chrono::hours kLongest{1};
 
-Result<std::int64_t> ask(client::Session& session, const std::string& cell, const DiagnoseArguments& arguments) {
+Result<std::int64_t> ask(client::Session& session, const std::string& cell,
+                         const DiagnoseArguments& arguments) {
   const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
   if (!std::filesystem::exists(batch)) return session.diagnose(cell, batch, "", arguments.apply);
   const std::string csv = TRY(read_text_file(batch));
@@ -28,7 +29,8 @@ Result<std::int64_t> ask(client::Session& session, const std::string& cell, cons
 Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
   ProgressLine progress;
   return session.wait_for_job(job, kLongest, [&](const client::JobStatus& status) {
-    progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
+    progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
+                  status.share);
   });
 }
 
@@ -57,8 +59,10 @@ Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
 }  // namespace
 
 bool leaves_open(const ordered_json& json, const DiagnoseArguments& arguments) {
-  if (!arguments.strict || json.at("verdict") == std::string(to_string(Verdict::kNothing))) return false;
-  fmt::print(stderr, "the model lacks something: {}\n", shown_lines(json.at("sentence").get<std::string>()));
+  if (!arguments.strict || json.at("verdict") == std::string(to_string(Verdict::kNothing)))
+    return false;
+  fmt::print(stderr, "the model lacks something: {}\n",
+             shown_lines(json.at("sentence").get<std::string>()));
   return true;
 }
 
@@ -70,7 +74,8 @@ Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
   }
   Outputs outputs = outputs_of(arguments);
   if (arguments.batches.size() > 1)
-    return failure(ErrorCode::kUsage, "a service diagnoses one batch, {} are named", arguments.batches.size())
+    return failure(ErrorCode::kUsage, "a service diagnoses one batch, {} are named",
+                   arguments.batches.size())
         .of("--batch");
   const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
   TRY(outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}));
@@ -79,7 +84,9 @@ Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
   const std::int64_t job = TRY(ask(*session, cell, arguments));
   const client::JobStatus end = TRY(wait(*session, job));
   if (end.stage == "failed")
-    return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job").with_value(end.job);
+    return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what)
+        .of("job")
+        .with_value(end.job);
   auto found = TRY(session->diagnosis(cell, job, !arguments.report.empty()));
   Findings findings = TRY(findings_of(found.findings_json, job));
   ordered_json& json = findings.json;
@@ -92,9 +99,11 @@ Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
                        {"in_force", end.in_force},
                        {"version_in_force", now > 0 ? ordered_json(now) : ordered_json(nullptr)},
                        {"error_sources_in_force", found.in_force.level}};
-    say(fmt::format("\n{}{}\nin force now: {}\n",
-                    end.model_version > 0 ? fmt::format("version {}: ", end.model_version) : "", end.what,
-                    now > 0 ? fmt::format("version {} ({})", now, level_in_words(found.in_force.level)) : "no version"),
+    say(fmt::format(
+            "\n{}{}\nin force now: {}\n",
+            end.model_version > 0 ? fmt::format("version {}: ", end.model_version) : "", end.what,
+            now > 0 ? fmt::format("version {} ({})", now, level_in_words(found.in_force.level))
+                    : "no version"),
         arguments);
   }
   if (!arguments.report.empty() && found.page_html.empty()) {

@@ -15,7 +15,8 @@ Result<ordered_json> answer_in(const std::string& text) {
   TRY(check_json_limits(text, "the health of cells"));
   ordered_json json = ordered_json::parse(text, nullptr, false);
   if (!json.is_object() || !json.contains("cells") || !json["cells"].is_array())
-    return failure(ErrorCode::kInternal, "what the service says of the health of cells has no cells");
+    return failure(ErrorCode::kInternal,
+                   "what the service says of the health of cells has no cells");
   for (const auto& one : json["cells"])
     if (!one.is_object()) return failure(ErrorCode::kInternal, "the health of a cell is no object");
   return json;
@@ -23,7 +24,8 @@ Result<ordered_json> answer_in(const std::string& text) {
 
 }  // namespace
 
-Result<std::vector<ordered_json>> health_answers(client::Session& session, const std::string& cell, std::size_t most) {
+Result<std::vector<ordered_json>> health_answers(client::Session& session, const std::string& cell,
+                                                 std::size_t most) {
   const auto texts = TRY(session.health(cell, most));
   std::vector<ordered_json> answers;
   for (const std::string& text : texts) {
@@ -42,7 +44,8 @@ std::vector<ordered_json> cells_of(const std::vector<ordered_json>& answers) {
   return cells;
 }
 
-Result<std::vector<ordered_json>> health_at(client::Session& session, const std::string& cell, std::size_t most) {
+Result<std::vector<ordered_json>> health_at(client::Session& session, const std::string& cell,
+                                            std::size_t most) {
   return health_answers(session, cell, most).map(cells_of);
 }
 

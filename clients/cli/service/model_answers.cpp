@@ -17,8 +17,8 @@ cam::CellTools tools_of(const CompensatedModel& model) {
   return cell;
 }
 
-Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
-                                              const std::string& payload) {
+Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
+                                              const std::string& tool, const std::string& payload) {
   std::string known_tool = TRY(resolve_tool(model.cell(), tool));
   std::string known_payload = TRY(resolve_payload(model.cell(), payload));
   TRY(model.check_trained_with(known_tool, known_payload));

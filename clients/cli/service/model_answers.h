@@ -18,18 +18,21 @@ namespace trammel::cli {
 struct ToolAndPayload {
   std::string tool, payload;
 };
-/// Those that a program asks for, by the cell's names; empty: its only ones. Refuses what the model was not trained
-/// with.
-[[nodiscard]] Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
+/// Those that a program asks for, by the cell's names; empty: its only ones. Refuses what the model
+/// was not trained with.
+[[nodiscard]] Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
+                                                            const std::string& tool,
                                                             const std::string& payload);
 
 /// Tells which model answered a call.
 using SawModel = std::function<void(const client::ModelInfo&)>;
 
-/// Calls `work(session, context, model, saw)` with the model that the service answers with: it is fetched, and fetched
-/// again if another one has answered meanwhile. kBusy: that happened again and again.
+/// Calls `work(session, context, model, saw)` with the model that the service answers with: it is
+/// fetched, and fetched again if another one has answered meanwhile. kBusy: that happened again and
+/// again.
 template <typename T, typename Work>
-[[nodiscard]] Result<T> with_served_model(const std::string& name, const ServiceOptions& service, const Work& work) {
+[[nodiscard]] Result<T> with_served_model(const std::string& name, const ServiceOptions& service,
+                                          const Work& work) {
   constexpr int kAttempts = 5;
   const Result<ModelReference> reference = parse_model_reference(name);
   if (!reference) return tl::make_unexpected(reference.error());
@@ -50,7 +53,8 @@ template <typename T, typename Work>
     Result<T> done = work(**session, context, *model, saw);
     if (!another) return done;
   }
-  return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", reference->cell, kAttempts);
+  return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts",
+                 reference->cell, kAttempts);
 }
 
 }  // namespace trammel::cli

@@ -38,7 +38,8 @@ class Laboratory {
   const VirtualRobot& robot() const { return robot_; }
   const std::shared_ptr<const Cell>& cell() const { return robot_.truth.cell; }
 
-  Result<MeasurementBatch> measure(const Eigen::MatrixXd& q, std::uint64_t draw, const std::string& id) const {
+  Result<MeasurementBatch> measure(const Eigen::MatrixXd& q, std::uint64_t draw,
+                                   const std::string& id) const {
     SimulateOptions simulate_options;
     simulate_options.seed = seed_of(draw, 1);
     return simulate(robot_, q, simulate_options).map([&](MeasurementBatch batch) {
@@ -50,7 +51,8 @@ class Laboratory {
   Result<MeasurementBatch> measure(const RangesDeg& ranges_deg, int count, std::uint64_t draw,
                                    const std::string& id) const {
     JointRanges ranges;
-    for (const auto& [lower, upper] : ranges_deg) ranges.emplace_back(from_deg(lower), from_deg(upper));
+    for (const auto& [lower, upper] : ranges_deg)
+      ranges.emplace_back(from_deg(lower), from_deg(upper));
     return measure(latin_hypercube(ranges, count, seed_of(draw, 0)), draw, id);
   }
 
@@ -64,7 +66,8 @@ class Laboratory {
   }
   Result<CompensatedModel> learn(const std::string& level, const CompensatedModel& calibrated,
                                  const MeasurementBatch& batch) {
-    const std::string stage = fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
+    const std::string stage =
+        fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
     TrainOptions train_options = options(stage);
     train_options.bias = options_.bias;
     return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
@@ -73,7 +76,9 @@ class Laboratory {
   }
 
  private:
-  std::uint64_t seed_of(std::uint64_t draw, std::uint64_t part) const { return 64 * options_.seed + 2 * draw + part; }
+  std::uint64_t seed_of(std::uint64_t draw, std::uint64_t part) const {
+    return 64 * options_.seed + 2 * draw + part;
+  }
   /// Of the next step of work.
   TrainOptions options(const std::string& stage) {
     TrainOptions train_options;
@@ -126,8 +131,9 @@ void add_learned(const std::string& level, const CompensatedModel& model, const 
 /// Truth beside what `model` says of the same parameters.
 void add_parameters(const std::string& level, const CompensatedModel& model, Study& study) {
   for (const IdentifiedParameter& identified : model.parts().parameters) {
-    const auto known = std::find_if(study.parameters.begin(), study.parameters.end(),
-                                    [&](const StudyParameter& p) { return p.name == identified.parameter.name; });
+    const auto known =
+        std::find_if(study.parameters.begin(), study.parameters.end(),
+                     [&](const StudyParameter& p) { return p.name == identified.parameter.name; });
     if (known != study.parameters.end()) known->identified.emplace(level, identified);
   }
 }
@@ -136,16 +142,18 @@ std::vector<StudyParameter> true_parameters(const PhysicalModel& truth) {
   std::vector<StudyParameter> parameters;
   Eigen::Index k = 0;
   for (const Parameter& parameter : truth.parameters()) {
-    parameters.push_back(
-        {.name = parameter.name, .unit = parameter.unit, .truth = parameter.scale * truth.values(k++)});
+    parameters.push_back({.name = parameter.name,
+                          .unit = parameter.unit,
+                          .truth = parameter.scale * truth.values(k++)});
   }
   return parameters;
 }
 
 Status run_calibration_study(Laboratory& laboratory, Study& study) {
-  const auto training = TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
-  const auto validation =
-      TRY(laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation"));
+  const auto training = TRY(
+      laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto validation = TRY(laboratory.measure(kCalibrationRanges, kValidationPoses,
+                                                 kFullRangeValidationDraw, "validation"));
   study.parameters = true_parameters(laboratory.robot().truth);
   for (const std::string& level : kLevels) {
     const CompensatedModel model = TRY(laboratory.calibrate(level, training));
@@ -157,14 +165,17 @@ Status run_calibration_study(Laboratory& laboratory, Study& study) {
 }
 
 Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& study) {
-  const auto calibration =
-      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
-  const auto training = TRY(laboratory.measure(spec.ranges, spec.training_poses, kTrainingDraw, study.name));
-  const auto validation = TRY(laboratory.measure(spec.ranges, kValidationPoses, kValidationDraw, "validation"));
+  const auto calibration = TRY(
+      laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto training =
+      TRY(laboratory.measure(spec.ranges, spec.training_poses, kTrainingDraw, study.name));
+  const auto validation =
+      TRY(laboratory.measure(spec.ranges, kValidationPoses, kValidationDraw, "validation"));
   for (const std::string& level : kLevels) {
     const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
     const CompensatedModel learned = TRY(laboratory.learn(level, calibrated, training));
-    for (const auto& [set, batch] : {std::pair{kTraining, &training}, std::pair{kValidation, &validation}}) {
+    for (const auto& [set, batch] :
+         {std::pair{kTraining, &training}, std::pair{kValidation, &validation}}) {
       add_calibrated(level, calibrated, set, *batch, study);
       add_learned(level, learned, set, *batch, study);
     }
@@ -173,16 +184,19 @@ Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& stud
 }
 
 /// How the learned bias converges with the poses it learns from.
-Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>& levels, Study& study) {
+Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>& levels,
+                          Study& study) {
   const RangesDeg& ranges = kBiasStudies.back().ranges;
-  const auto calibration =
-      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
-  const auto validation = TRY(laboratory.measure(ranges, kValidationPoses, kValidationDraw, "validation"));
+  const auto calibration = TRY(
+      laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto validation =
+      TRY(laboratory.measure(ranges, kValidationPoses, kValidationDraw, "validation"));
   for (const std::string& level : levels) {
     const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
     add_calibrated(level, calibrated, kValidation, validation, study);
     for (std::size_t k = 0; k < kTrainingSizes.size(); ++k) {
-      const auto training = TRY(laboratory.measure(ranges, kTrainingSizes[k], kTrainingSizesDraw + k, "training"));
+      const auto training =
+          TRY(laboratory.measure(ranges, kTrainingSizes[k], kTrainingSizesDraw + k, "training"));
       const CompensatedModel learned = TRY(laboratory.learn(level, calibrated, training));
       add_learned(level, learned, kValidation, validation, study);
     }
@@ -192,11 +206,11 @@ Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>
 
 /// How the complete physical model converges with the poses it is identified from.
 Status run_calibration_sizes(Laboratory& laboratory, const std::string& level, Study& study) {
-  const auto validation =
-      TRY(laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation"));
+  const auto validation = TRY(laboratory.measure(kCalibrationRanges, kValidationPoses,
+                                                 kFullRangeValidationDraw, "validation"));
   for (std::size_t k = 0; k < kCalibrationSizes.size(); ++k) {
-    const auto training =
-        TRY(laboratory.measure(kCalibrationRanges, kCalibrationSizes[k], kCalibrationSizesDraw + k, "calibration"));
+    const auto training = TRY(laboratory.measure(kCalibrationRanges, kCalibrationSizes[k],
+                                                 kCalibrationSizesDraw + k, "calibration"));
     const CompensatedModel model = TRY(laboratory.calibrate(level, training));
     add_calibrated(level, model, "validation, full range", validation, study);
   }
@@ -217,7 +231,8 @@ Result<InverseResult> nominal_joints(const Cell& cell, const Pose& X_FT, const T
 }
 
 /// The same for every hole, in the file's order.
-Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT, const std::vector<TargetRow>& holes) {
+Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT,
+                                       const std::vector<TargetRow>& holes) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(holes.size()), cell.robot.size());
   for (std::size_t i = 0; i < holes.size(); ++i) {
     const InverseResult joints = TRY(nominal_joints(cell, X_FT, holes[i].target));
@@ -229,7 +244,8 @@ Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT, const
   return q;
 }
 
-MeasurementBatch part_of(const MeasurementBatch& batch, const std::function<bool(std::size_t)>& chosen) {
+MeasurementBatch part_of(const MeasurementBatch& batch,
+                         const std::function<bool(std::size_t)>& chosen) {
   MeasurementBatch part = batch;
   part.measurements.clear();
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
@@ -268,8 +284,8 @@ class PooledErrors {
 };
 
 /// Every hole is held out once, Tables 7.1 and 7.2.
-Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal, const MeasurementBatch& holes,
-                      Study& study) {
+Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal,
+                      const MeasurementBatch& holes, Study& study) {
   PooledErrors training_errors, validation_errors, training_without, validation_without;
   int training_poses = 0;
   for (int fold = 1; fold <= kFolds; ++fold) {
@@ -279,9 +295,11 @@ Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal, c
     const CompensatedModel learned = TRY(laboratory.learn("M0", nominal, training));
     training_poses = static_cast<int>(training.measurements.size());
     const bool without = !kFoldsLeftOut.contains(fold);
-    for (const auto& [batch, all, some] : {std::tuple{&training, &training_errors, &training_without},
-                                           std::tuple{&validation, &validation_errors, &validation_without}}) {
-      const Eigen::Matrix3Xd calibrated = leftover(nominal.parts().physics, *batch).residual_B.transpose();
+    for (const auto& [batch, all, some] :
+         {std::tuple{&training, &training_errors, &training_without},
+          std::tuple{&validation, &validation_errors, &validation_without}}) {
+      const Eigen::Matrix3Xd calibrated =
+          leftover(nominal.parts().physics, *batch).residual_B.transpose();
       const Eigen::Matrix3Xd left = left_by_bias(learned, *batch);
       all->add(calibrated, left);
       if (without) some->add(calibrated, left);
@@ -294,7 +312,8 @@ Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal, c
   return {};
 }
 
-/// Drills where the model's corrections say. `measured`: the same holes as they were measured uncorrected.
+/// Drills where the model's corrections say. `measured`: the same holes as they were measured
+/// uncorrected.
 void drill(const VirtualRobot& robot, const std::string& name, const CompensatedModel& model,
            const std::vector<TargetRow>& holes, const MeasurementBatch& measured, Study& study) {
   const Pose X_BW = robot.truth.X_WB.inverse();
@@ -303,12 +322,14 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
     const Correction correction = model.correct(holes[i].target, context.tool, context.payload);
     const auto true_error = [&](const JointVector& q) {
       context.q = q;
-      return ((X_BW * robot.truth.pose_W(context)).translation() - correction.X_BT_wanted.translation()).norm();
+      return ((X_BW * robot.truth.pose_W(context)).translation() -
+              correction.X_BT_wanted.translation())
+          .norm();
     };
     // One that is left alone is drilled where it is drilled uncorrected.
     const JointVector uncorrected = context.q;
-    const bool corrected =
-        correction.status == CorrectionStatus::kOk || correction.status == CorrectionStatus::kOutOfDomain;
+    const bool corrected = correction.status == CorrectionStatus::kOk ||
+                           correction.status == CorrectionStatus::kOutOfDomain;
     study.holes.push_back({.row = holes[i].row,
                            .model = name,
                            .status = correction.status,
@@ -318,13 +339,15 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
   }
 }
 
-Status run_drilling_study(Laboratory& laboratory, const std::vector<TargetRow>& holes, Study& study) {
+Status run_drilling_study(Laboratory& laboratory, const std::vector<TargetRow>& holes,
+                          Study& study) {
   const Cell& cell = *laboratory.cell();
   const std::string tool = TRY(resolve_tool(cell, ""));
-  const Eigen::MatrixXd q = TRY(nominal_joints(cell, laboratory.robot().truth.tools.at(tool), holes));
+  const Eigen::MatrixXd q =
+      TRY(nominal_joints(cell, laboratory.robot().truth.tools.at(tool), holes));
   const auto measured = TRY(laboratory.measure(q, kHolesDraw, "holes"));
-  const auto calibration =
-      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto calibration = TRY(
+      laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
   for (const std::string level : {"M0", "M3"}) {
     const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
     if (level == "M0") {
@@ -341,22 +364,25 @@ Status run_drilling_study(Laboratory& laboratory, const std::vector<TargetRow>& 
 int steps_of(const std::string& name) {
   if (name == "cal") return static_cast<int>(kLevels.size());
   if (name == "drilling") return kFolds + 4;
-  if (name == "quantity") return static_cast<int>(3 * (1 + kTrainingSizes.size()) + kCalibrationSizes.size());
+  if (name == "quantity")
+    return static_cast<int>(3 * (1 + kTrainingSizes.size()) + kCalibrationSizes.size());
   return static_cast<int>(2 * kLevels.size());
 }
 
 }  // namespace
 
 const std::vector<std::string>& study_names() {
-  static const std::vector<std::string> names = {"cal", "1dim", "3dim", "6dim-s", "6dim-l", "drilling", "quantity"};
+  static const std::vector<std::string> names = {"cal",    "1dim",     "3dim",    "6dim-s",
+                                                 "6dim-l", "drilling", "quantity"};
   return names;
 }
 
-Result<Study> run_study(const std::string& name, const VirtualRobot& robot, const StudyOptions& options) {
+Result<Study> run_study(const std::string& name, const VirtualRobot& robot,
+                        const StudyOptions& options) {
   const Cell& cell = *robot.truth.cell;
   if (cell.robot.size() != static_cast<int>(kCalibrationRanges.size())) {
-    return refused("cell {}: a robot of {} joints, the studies are of {}", cell.name, cell.robot.size(),
-                   kCalibrationRanges.size())
+    return refused("cell {}: a robot of {} joints, the studies are of {}", cell.name,
+                   cell.robot.size(), kCalibrationRanges.size())
         .of("joints")
         .beyond(cell.robot.size(), kCalibrationRanges.size());
   }
@@ -365,8 +391,8 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
   study.seed = options.seed;
   study.cell = cell.name;
   Laboratory laboratory(robot, options, steps_of(name));
-  const auto bias_study =
-      std::find_if(kBiasStudies.begin(), kBiasStudies.end(), [&](const BiasStudy& spec) { return spec.name == name; });
+  const auto bias_study = std::find_if(kBiasStudies.begin(), kBiasStudies.end(),
+                                       [&](const BiasStudy& spec) { return spec.name == name; });
   TRY([&]() -> Status {
     if (bias_study != kBiasStudies.end()) return run_bias_study(laboratory, *bias_study, study);
     if (name == "cal") return run_calibration_study(laboratory, study);

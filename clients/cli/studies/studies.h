@@ -31,7 +31,7 @@ struct StudyRow {
   int poses = 0;           ///< in the set
   ErrorFigures figures;    ///< with the learned bias applied at every pose, as the source does
   std::optional<Evaluation> served =
-      {};                      ///< of a learned bias: as answers are given, with the calibrated model off domain
+      {};  ///< of a learned bias: as answers are given, with the calibrated model off domain
   bool bias_left_out = false;  ///< `M3+GP` where none was worth it: the calibrated model as it is
 };
 
@@ -47,8 +47,9 @@ struct DrilledHole {
   int row = 0;  ///< in the file of targets
   std::string model;
   CorrectionStatus status = CorrectionStatus::kRefused;
-  double error_before = 0, error_after = 0;  ///< m, true distance from the wanted point, uncorrected and corrected
-  double expected_after = 0;                 ///< m, what the model said of error_after
+  double error_before = 0,
+         error_after = 0;     ///< m, true distance from the wanted point, uncorrected and corrected
+  double expected_after = 0;  ///< m, what the model said of error_after
 };
 
 struct Study {
@@ -63,8 +64,9 @@ struct Study {
 /// As on the command line.
 [[nodiscard]] const std::vector<std::string>& study_names();
 
-/// Same robot, name and seed, same study. Refuses an unknown name, a robot that does not have six joints or cannot
-/// reach the ranges of the study, and holes that it does not reach.
-[[nodiscard]] Result<Study> run_study(const std::string& name, const VirtualRobot& robot, const StudyOptions& options);
+/// Same robot, name and seed, same study. Refuses an unknown name, a robot that does not have six
+/// joints or cannot reach the ranges of the study, and holes that it does not reach.
+[[nodiscard]] Result<Study> run_study(const std::string& name, const VirtualRobot& robot,
+                                      const StudyOptions& options);
 
 }  // namespace trammel::cli

@@ -54,7 +54,10 @@ constexpr PrintedColumn kPrinted[] = {
     {"6dim-s", "training", "M0+GP", {{.000, .000, .000}, {.032, .012, .058}, .067, .427}},
     {"6dim-s", "training", "M1+GP", {{.000, .000, .000}, {.033, .013, .053}, .064, .429}},
     {"6dim-s", "training", "M2+GP", {{.000, .000, .000}, {.032, .013, .055}, .065, .420}},
-    {"6dim-s", "validation", "M0", {{2.418, 1.749, -10.940}, {2.800, 1.091, 1.397}, 11.813, 15.114}},
+    {"6dim-s",
+     "validation",
+     "M0",
+     {{2.418, 1.749, -10.940}, {2.800, 1.091, 1.397}, 11.813, 15.114}},
     {"6dim-s", "validation", "M1", {{-1.428, -.605, -4.312}, {2.044, .402, 1.202}, 5.175, 6.189}},
     {"6dim-s", "validation", "M2", {{-.636, -.686, -3.612}, {2.023, .361, 1.225}, 4.432, 5.730}},
     {"6dim-s", "validation", "M0+GP", {{.002, .001, .001}, {.043, .017, .077}, .089, .568}},
@@ -78,10 +81,22 @@ constexpr PrintedColumn kPrinted[] = {
     {"drilling", "training", "M0+GP", {{.000, .000, .000}, {.046, .017, .027}, .056, .501}},
     {"drilling", "validation", "M0", {{1.185, 3.286, -.379}, {.685, .180, .092}, 3.584, 3.910}},
     {"drilling", "validation", "M0+GP", {{-.017, .000, .005}, {.090, .033, .050}, .108, .339}},
-    {"drilling", "training without k = 1, 6", "M0", {{1.175, 3.288, -.379}, {.678, .180, .090}, 3.582, 3.910}},
-    {"drilling", "training without k = 1, 6", "M0+GP", {{.000, .000, .000}, {.090, .033, .050}, .063, .501}},
-    {"drilling", "validation without k = 1, 6", "M0", {{1.249, 3.271, -.384}, {.682, .163, .097}, 3.590, 3.906}},
-    {"drilling", "validation without k = 1, 6", "M0+GP", {{-.010, .003, .002}, {.035, .030, .053}, .070, .115}},
+    {"drilling",
+     "training without k = 1, 6",
+     "M0",
+     {{1.175, 3.288, -.379}, {.678, .180, .090}, 3.582, 3.910}},
+    {"drilling",
+     "training without k = 1, 6",
+     "M0+GP",
+     {{.000, .000, .000}, {.090, .033, .050}, .063, .501}},
+    {"drilling",
+     "validation without k = 1, 6",
+     "M0",
+     {{1.249, 3.271, -.384}, {.682, .163, .097}, 3.590, 3.906}},
+    {"drilling",
+     "validation without k = 1, 6",
+     "M0+GP",
+     {{-.010, .003, .002}, {.035, .030, .053}, .070, .115}},
 };
 
 struct AimedRow {
@@ -91,8 +106,9 @@ struct AimedRow {
 };
 
 constexpr AimedRow kAims[] = {
-    {"cal", "M0", 0, {9.5, 9.9}},       {"cal", "M3", 0, {0, .0237}},          {"1dim", "", 0, {0, .0235}},
-    {"3dim", "", 0, {0, .025}},         {"6dim-s", "", 0, {0, .025}},          {"6dim-l", "M2+GP", 0, {0, .040}},
+    {"cal", "M0", 0, {9.5, 9.9}},       {"cal", "M3", 0, {0, .0237}},
+    {"1dim", "", 0, {0, .0235}},        {"3dim", "", 0, {0, .025}},
+    {"6dim-s", "", 0, {0, .025}},       {"6dim-l", "M2+GP", 0, {0, .040}},
     {"6dim-l", "M3+GP", 0, {0, .0245}}, {"quantity", "M2+GP", 400, {0, .060}},
 };
 
@@ -135,22 +151,27 @@ constexpr PrintedParameter kParameters[] = {
 };
 
 bool is_length(std::string_view parameter) {
-  return parameter.size() == 2 && std::string_view("xyzda").find(parameter.front()) != std::string_view::npos;
+  return parameter.size() == 2 &&
+         std::string_view("xyzda").find(parameter.front()) != std::string_view::npos;
 }
 
 }  // namespace
 
-std::optional<PrintedFigures> printed_figures(std::string_view study, std::string_view set, std::string_view model) {
-  const auto* found = std::find_if(std::begin(kPrinted), std::end(kPrinted), [&](const PrintedColumn& column) {
-    return column.study == study && column.set == set && column.model == model;
-  });
+std::optional<PrintedFigures> printed_figures(std::string_view study, std::string_view set,
+                                              std::string_view model) {
+  const auto* found =
+      std::find_if(std::begin(kPrinted), std::end(kPrinted), [&](const PrintedColumn& column) {
+        return column.study == study && column.set == set && column.model == model;
+      });
   return found == std::end(kPrinted) ? std::nullopt : std::optional(found->figures);
 }
 
-std::optional<Aim> aim_of(std::string_view study, std::string_view set, std::string_view model, int training_poses) {
+std::optional<Aim> aim_of(std::string_view study, std::string_view set, std::string_view model,
+                          int training_poses) {
   if (set != "validation") return std::nullopt;
   const auto* found = std::find_if(std::begin(kAims), std::end(kAims), [&](const AimedRow& row) {
-    return row.study == study && (row.model.empty() ? model.ends_with("+GP") : row.model == model) &&
+    return row.study == study &&
+           (row.model.empty() ? model.ends_with("+GP") : row.model == model) &&
            (row.training_poses == 0 || row.training_poses == training_poses);
   });
   return found == std::end(kAims) ? std::nullopt : std::optional(found->aim);
@@ -158,11 +179,13 @@ std::optional<Aim> aim_of(std::string_view study, std::string_view set, std::str
 
 std::optional<double> printed_parameter(std::string_view parameter, std::string_view model) {
   constexpr std::array<std::string_view, 3> kModels = {"M1", "M2", "M3"};
-  const auto* row = std::find_if(std::begin(kParameters), std::end(kParameters),
-                                 [&](const PrintedParameter& printed) { return printed.name == parameter; });
+  const auto* row =
+      std::find_if(std::begin(kParameters), std::end(kParameters),
+                   [&](const PrintedParameter& printed) { return printed.name == parameter; });
   const auto* column = std::find(kModels.begin(), kModels.end(), model);
   if (row == std::end(kParameters) || column == kModels.end()) return std::nullopt;
-  const std::optional<double> value = row->identified[static_cast<std::size_t>(column - kModels.begin())];
+  const std::optional<double> value =
+      row->identified[static_cast<std::size_t>(column - kModels.begin())];
   if (!value || is_length(parameter)) return value;
   return 1e-3 * *value;
 }

@@ -5,7 +5,8 @@
 #include <string_view>
 #include <utility>
 
-/// What the source prints about its studies (chapters 5 and 7), and what is aimed at. Units as printed.
+/// What the source prints about its studies (chapters 5 and 7), and what is aimed at. Units as
+/// printed.
 namespace trammel::cli {
 
 using RangesDeg = std::array<std::pair<double, double>, 6>;
@@ -34,8 +35,10 @@ struct PrintedFigures {
   std::array<double, 3> mean_mm, stddev_mm;
   double rms_mm, max_mm;
 };
-/// `study` as on the command line; `set` and `model` as StudyRow names them. Empty: the source prints nothing of it.
-[[nodiscard]] std::optional<PrintedFigures> printed_figures(std::string_view study, std::string_view set,
+/// `study` as on the command line; `set` and `model` as StudyRow names them. Empty: the source
+/// prints nothing of it.
+[[nodiscard]] std::optional<PrintedFigures> printed_figures(std::string_view study,
+                                                            std::string_view set,
                                                             std::string_view model);
 
 /// The rms that a row should have, mm.
@@ -43,11 +46,13 @@ struct Aim {
   double least_mm = 0, most_mm = 0;
 };
 /// `training_poses` tells the rows of a convergence study apart.
-[[nodiscard]] std::optional<Aim> aim_of(std::string_view study, std::string_view set, std::string_view model,
-                                        int training_poses);
+[[nodiscard]] std::optional<Aim> aim_of(std::string_view study, std::string_view set,
+                                        std::string_view model, int training_poses);
 
-/// Table 5.5 in mm and rad: what M1, M2 and M3 identify. Empty where it prints nothing; its compliances are left out,
-/// because the rows are shifted against the true values that the same table gives.
-[[nodiscard]] std::optional<double> printed_parameter(std::string_view parameter, std::string_view model);
+/// Table 5.5 in mm and rad: what M1, M2 and M3 identify. Empty where it prints nothing; its
+/// compliances are left out, because the rows are shifted against the true values that the same
+/// table gives.
+[[nodiscard]] std::optional<double> printed_parameter(std::string_view parameter,
+                                                      std::string_view model);
 
 }  // namespace trammel::cli

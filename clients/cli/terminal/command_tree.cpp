@@ -34,8 +34,10 @@ std::vector<std::string> words_of(const std::string& range) {
 
 std::string range_text(const std::string& range) {
   const auto open = range.find('['), dash = range.find(" - "), close = range.find(']');
-  if (open == std::string::npos || dash == std::string::npos || close == std::string::npos) return range;
-  return range.substr(open + 1, dash - open - 1) + " to " + range.substr(dash + 3, close - dash - 3);
+  if (open == std::string::npos || dash == std::string::npos || close == std::string::npos)
+    return range;
+  return range.substr(open + 1, dash - open - 1) + " to " +
+         range.substr(dash + 3, close - dash - 3);
 }
 
 std::string related(const char* what, const std::set<CLI::Option*>& others) {
@@ -73,17 +75,21 @@ OptionText described(const CLI::Option& option, const std::string& group) {
   }
   if (text.required) more.emplace_back("required");
   if (!more.empty()) text.description += fmt::format(" ({})", fmt::join(more, "; "));
-  text.description += related("Needs", option.get_needs()) + related("Excludes", option.get_excludes());
+  text.description +=
+      related("Needs", option.get_needs()) + related("Excludes", option.get_excludes());
   return text;
 }
 
-void add_options(const CLI::App& app, const std::string& heading, std::vector<OptionText>& options) {
+void add_options(const CLI::App& app, const std::string& heading,
+                 std::vector<OptionText>& options) {
   for (const CLI::Option* option : app.get_options()) {
     if (option->get_group().empty()) continue;  // hidden
     options.push_back(described(*option, heading.empty() ? option->get_group() : heading));
   }
-  for (const CLI::App* inner : app.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); })) {
-    const bool exactly_one = inner->get_require_option_min() == 1 && inner->get_require_option_max() == 1;
+  for (const CLI::App* inner :
+       app.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); })) {
+    const bool exactly_one =
+        inner->get_require_option_min() == 1 && inner->get_require_option_max() == 1;
     add_options(*inner, inner->get_group() + (exactly_one ? " (exactly one)" : ""), options);
   }
 }
@@ -101,7 +107,8 @@ std::string two_columns(const std::string& left, const std::string& right) {
 }
 
 std::string help_of(const CommandText& command, const std::string& program) {
-  std::string text = wrapped(command.description) + "\n" + wrapped("Usage: " + command.usage(program), 2) + "\n";
+  std::string text =
+      wrapped(command.description) + "\n" + wrapped("Usage: " + command.usage(program), 2) + "\n";
   std::vector<std::string> groups;
   for (const OptionText& option : command.options) {
     const std::string group = option.positional ? "Arguments" : option.group;
@@ -126,14 +133,16 @@ class HelpFormat : public CLI::Formatter {
   std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode) const override {
     const std::size_t blank = name.rfind(' ');
     const bool of_command = app->get_parent() != nullptr;
-    const std::string program = of_command ? (blank == std::string::npos ? "trammel" : name.substr(0, blank)) : "";
+    const std::string program =
+        of_command ? (blank == std::string::npos ? "trammel" : name.substr(0, blank)) : "";
     return help_of(trammel::cli::described(*app), program);
   }
 };
 
 /// How many columns a text takes: bytes that continue a character count nothing.
 std::size_t columns(const std::string& text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 std::string wrapped_line(const std::string& line, std::size_t indent, std::size_t width) {
@@ -154,7 +163,8 @@ std::string wrapped_line(const std::string& line, std::size_t indent, std::size_
 
 std::string OptionText::label() const {
   if (positional) return names.front() + (repeated ? " ..." : "");
-  return fmt::format("{}{}{}", fmt::join(names, ", "), value.empty() ? "" : " " + value, repeated ? " ..." : "");
+  return fmt::format("{}{}{}", fmt::join(names, ", "), value.empty() ? "" : " " + value,
+                     repeated ? " ..." : "");
 }
 
 std::string CommandText::usage(const std::string& program) const {
@@ -168,7 +178,8 @@ std::string CommandText::usage(const std::string& program) const {
     text += fmt::format(" {} {}", option.names.back(), option.value);
   }
   for (const OptionText& option : options) {
-    if (option.positional) text += " " + (option.required ? option.names.front() : "[" + option.names.front() + "]");
+    if (option.positional)
+      text += " " + (option.required ? option.names.front() : "[" + option.names.front() + "]");
     if (option.positional && option.repeated) text += "...";
   }
   if (any) text += " [OPTIONS]";
@@ -178,8 +189,10 @@ std::string CommandText::usage(const std::string& program) const {
 CommandText described(const CLI::App& app) {
   CommandText text{app.get_name(), app.get_description(), app.get_footer(), {}, {}};
   add_options(app, "", text.options);
-  std::stable_partition(text.options.begin(), text.options.end(), [](const OptionText& one) { return one.positional; });
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); })) {
+  std::stable_partition(text.options.begin(), text.options.end(),
+                        [](const OptionText& one) { return one.positional; });
+  for (const CLI::App* command :
+       app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); })) {
     if (!command->get_group().empty()) text.commands.push_back(described(*command));
   }
   return text;

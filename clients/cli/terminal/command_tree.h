@@ -7,7 +7,8 @@ namespace CLI {
 class App;
 }
 
-/// The commands and options of the parser as plain text: what help, manual pages and shell completions are made of.
+/// The commands and options of the parser as plain text: what help, manual pages and shell
+/// completions are made of.
 namespace trammel::cli {
 
 struct OptionText {
@@ -33,9 +34,11 @@ struct CommandText {
 
 [[nodiscard]] CommandText described(const CLI::App& app);
 
-/// Lines of at most `width` columns, broken between words only; those after the first are indented by `indent`. Line
-/// ends in `text` stay; a line that begins with a blank is an example and stays whole.
-[[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent = 0, std::size_t width = 80);
+/// Lines of at most `width` columns, broken between words only; those after the first are indented
+/// by `indent`. Line ends in `text` stay; a line that begins with a blank is an example and stays
+/// whole.
+[[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent = 0,
+                                  std::size_t width = 80);
 
 /// Help in 80 columns for `app` and its commands.
 void set_help_format(CLI::App& app);

@@ -16,8 +16,9 @@ namespace trammel::cli {
 
 namespace {
 
-const std::vector<std::string> kNames = {"host", "discovery-server", "port", "security", "domain", "timeout", "cell",
-                                         "tool", "payload",          "seed"};
+const std::vector<std::string> kNames = {
+    "host", "discovery-server", "port", "security", "domain", "timeout", "cell",
+    "tool", "payload",          "seed"};
 
 struct Default {
   std::string name, value;
@@ -27,9 +28,11 @@ constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
 Result<std::vector<Default>> read_defaults(const std::string& path) {
   const Result<std::string> text = read_text_file(path, 100'000);
-  if (!text) return Failure(text.error()).as(ErrorCode::kUsage).next("TRAMMEL_DEFAULTS= takes no defaults");
+  if (!text)
+    return Failure(text.error()).as(ErrorCode::kUsage).next("TRAMMEL_DEFAULTS= takes no defaults");
   std::vector<Default> found;
-  std::istringstream lines(text->starts_with(kByteOrderMark) ? text->substr(kByteOrderMark.size()) : *text);
+  std::istringstream lines(text->starts_with(kByteOrderMark) ? text->substr(kByteOrderMark.size())
+                                                             : *text);
   long row = 0;
   for (std::string line; std::getline(lines, line);) {
     ++row;
@@ -37,14 +40,16 @@ Result<std::vector<Default>> read_defaults(const std::string& path) {
     if (line.empty()) continue;
     const auto equals = line.find('=');
     const std::string name(trimmed(std::string_view(line).substr(0, equals)));
-    const std::string value(equals == std::string::npos ? "" : trimmed(std::string_view(line).substr(equals + 1)));
+    const std::string value(
+        equals == std::string::npos ? "" : trimmed(std::string_view(line).substr(equals + 1)));
     if (value.empty())
       return failure(ErrorCode::kUsage, "'{}' is no name = value", shown_short(line))
           .in(path)
           .at_row(row)
           .next("write for example port = 17501");
     if (std::find(kNames.begin(), kNames.end(), name) == kNames.end())
-      return failure(ErrorCode::kUsage, "unknown default '{}'{}", shown_short(name), did_you_mean(name, kNames))
+      return failure(ErrorCode::kUsage, "unknown default '{}'{}", shown_short(name),
+                     did_you_mean(name, kNames))
           .in(path)
           .at_row(row)
           .of(shown_short(name))
@@ -55,8 +60,9 @@ Result<std::vector<Default>> read_defaults(const std::string& path) {
 }
 
 bool says(const std::vector<std::string>& words, const std::string& option) {
-  return std::any_of(words.begin(), words.end(),
-                     [&](const std::string& word) { return word == option || word.starts_with(option + "="); });
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+    return word == option || word.starts_with(option + "=");
+  });
 }
 
 }  // namespace
@@ -77,7 +83,9 @@ Result<std::vector<std::string>> with_defaults(const CLI::App& app, std::vector<
                                                const std::string& path) {
   if (path.empty() || words.empty()) return words;
   const std::vector<Default> defaults = TRY(read_defaults(path));
-  const auto is_command = [&](const CLI::App* one) { return one->get_name() == words[0] && !words[0].empty(); };
+  const auto is_command = [&](const CLI::App* one) {
+    return one->get_name() == words[0] && !words[0].empty();
+  };
   const auto commands = app.get_subcommands(is_command);
   const bool asks_help = says(words, "--help") || says(words, "-h");
   if (commands.empty() || asks_help) return words;
@@ -85,7 +93,8 @@ Result<std::vector<std::string>> with_defaults(const CLI::App& app, std::vector<
   for (const Default& one : defaults) {
     const std::string option = "--" + one.name;
     const CLI::Option* known = commands.front()->get_option_no_throw(option);
-    if (known == nullptr || says(words, option) || (one.name == "cell" && !known->get_required())) continue;
+    if (known == nullptr || says(words, option) || (one.name == "cell" && !known->get_required()))
+      continue;
     added.push_back(option);
     added.push_back(one.value);
   }

@@ -12,14 +12,16 @@ class App;
 /// What people would say with every command, from one file.
 namespace trammel::cli {
 
-/// The file that TRAMMEL_DEFAULTS names, else `trammel/defaults` in XDG_CONFIG_HOME or ~/.config; empty where there is
-/// none.
+/// The file that TRAMMEL_DEFAULTS names, else `trammel/defaults` in XDG_CONFIG_HOME or ~/.config;
+/// empty where there is none.
 [[nodiscard]] std::string defaults_path();
 
-/// `words` (without the program's name) with the options of the defaults file behind them, each where the command has
-/// it and `words` do not say it. Refuses (kUsage) a file that cannot be read, a line that is no `name = value`, and a
-/// name that is none of host, discovery-server, port, security, domain, timeout, cell, tool, payload, seed.
-[[nodiscard]] Result<std::vector<std::string>> with_defaults(const CLI::App& app, std::vector<std::string> words,
+/// `words` (without the program's name) with the options of the defaults file behind them, each
+/// where the command has it and `words` do not say it. Refuses (kUsage) a file that cannot be read,
+/// a line that is no `name = value`, and a name that is none of host, discovery-server, port,
+/// security, domain, timeout, cell, tool, payload, seed.
+[[nodiscard]] Result<std::vector<std::string>> with_defaults(const CLI::App& app,
+                                                             std::vector<std::string> words,
                                                              const std::string& path);
 
 }  // namespace trammel::cli

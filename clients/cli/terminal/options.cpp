@@ -18,8 +18,8 @@ constexpr double kLongestTimeout = 3600;  // s
 void add_discovery_option(CLI::App& command, ServiceOptions& options) {
   command
       .add_option("--discovery-server", options.discovery_servers,
-                  "A discovery server that tells where services are: a name or IPv4 address, with :PORT behind it or "
-                  "not; once for each, in the order of their numbers")
+                  "A discovery server that tells where services are: a name or IPv4 address, with "
+                  ":PORT behind it or not; once for each, in the order of their numbers")
       ->allow_extra_args(false)
       ->group("Service");
 }
@@ -27,31 +27,36 @@ void add_discovery_option(CLI::App& command, ServiceOptions& options) {
 void add_service_options(CLI::App& command, ServiceOptions& options, const std::string& help) {
   command.add_flag("--service", options.service, help)->group("Service");
   command
-      .add_option(
-          "--host", options.hosts,
-          "Where the service runs: a name or IPv4 address, with :PORT behind it or not; once for each server on "
-          "another host")
+      .add_option("--host", options.hosts,
+                  "Where the service runs: a name or IPv4 address, with :PORT behind it or not; "
+                  "once for each server on another host")
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
   command.get_option("--host")->each([&options](const std::string&) { options.hosts_said = true; });
   add_discovery_option(command, options);
   command
-      .add_option("--port", options.ports,
-                  "UDP port of the service on each host that is named without one; once for each server")
+      .add_option(
+          "--port", options.ports,
+          "UDP port of the service on each host that is named without one; once for each server")
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
-  command.add_option("--domain", options.domain, "DDS domain of the service; servers of other domains are not heard")
+  command
+      .add_option("--domain", options.domain,
+                  "DDS domain of the service; servers of other domains are not heard")
       ->check(CLI::Range(0, 232))
       ->capture_default_str()
       ->group("Service");
   command
-      .add_option("--security", options.security,
-                  "Folder with the certificate, key and permissions that a secured service asks for")
+      .add_option(
+          "--security", options.security,
+          "Folder with the certificate, key and permissions that a secured service asks for")
       ->type_name("FOLDER")
       ->group("Service");
-  command.add_option("--timeout", options.timeout_s, "Longest wait for one answer, finding the service included, s")
+  command
+      .add_option("--timeout", options.timeout_s,
+                  "Longest wait for one answer, finding the service included, s")
       ->check(CLI::Range(0.01, kLongestTimeout))
       ->capture_default_str()
       ->group("Service");
@@ -71,13 +76,19 @@ Result<std::vector<HostPort>> discovery_servers_of(const ServiceOptions& options
   std::vector<HostPort> places;
   for (const std::string& text : options.discovery_servers) {
     auto place = parse_host_port(text, kDiscoveryPort);
-    if (!place) return Failure(std::move(place.error())).of("--discovery-server").next("name it as line-3:11811");
+    if (!place)
+      return Failure(std::move(place.error()))
+          .of("--discovery-server")
+          .next("name it as line-3:11811");
     if (std::find(places.begin(), places.end(), *place) != places.end())
-      return failure(ErrorCode::kUsage, "{} is given twice", text).of("--discovery-server").with_text(text);
+      return failure(ErrorCode::kUsage, "{} is given twice", text)
+          .of("--discovery-server")
+          .with_text(text);
     places.push_back(*std::move(place));
   }
   if (places.size() > kMostDiscoveryServers)
-    return failure(ErrorCode::kUsage, "{} discovery servers, limit {}", places.size(), kMostDiscoveryServers)
+    return failure(ErrorCode::kUsage, "{} discovery servers, limit {}", places.size(),
+                   kMostDiscoveryServers)
         .of("--discovery-server");
   return places;
 }
@@ -85,7 +96,8 @@ Result<std::vector<HostPort>> discovery_servers_of(const ServiceOptions& options
 Result<std::vector<HostPort>> places_of(const ServiceOptions& options) {
   if (!options.discovery_servers.empty() && !options.hosts_said) return std::vector<HostPort>();
   auto places = parse_hosts(options.hosts, options.ports);
-  if (!places) return Failure(std::move(places.error())).of("--host").next("name it as --host line-3:17500");
+  if (!places)
+    return Failure(std::move(places.error())).of("--host").next("name it as --host line-3:17500");
   return places;
 }
 
@@ -109,14 +121,16 @@ void need_finite_numbers(CLI::App& app) {
         char* end = nullptr;
         const double value = std::strtod(text.c_str(), &end);
         const bool is_number = !text.empty() && *end == '\0';
-        return is_number && !std::isfinite(value) ? fmt::format("{} is no number that can be used", text)
-                                                  : std::string();
+        return is_number && !std::isfinite(value)
+                   ? fmt::format("{} is no number that can be used", text)
+                   : std::string();
       },
       "");
   for (CLI::Option* option : app.get_options()) {
     if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
   }
-  for (CLI::App* below : app.get_subcommands([](CLI::App*) { return true; })) need_finite_numbers(*below);
+  for (CLI::App* below : app.get_subcommands([](CLI::App*) { return true; }))
+    need_finite_numbers(*below);
 }
 
 CLI::Validator above_zero() {
@@ -135,8 +149,9 @@ void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& 
   // Read as an unsigned number, -1 would silently become the largest one.
   const CLI::Validator whole(
       [](const std::string& text) {
-        const bool digits = !text.empty() &&
-                            std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
+        const bool digits =
+            !text.empty() && std::all_of(text.begin(), text.end(),
+                                         [](unsigned char c) { return c >= '0' && c <= '9'; });
         return digits ? std::string() : "'" + text + "', expected a whole number from 0";
       },
       "");
@@ -145,23 +160,27 @@ void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& 
 
 void add_json_option(CLI::App& command, std::string& path) {
   command
-      .add_option("--json", path, "Also write the result as JSON, for programs, to this file ('-': standard output)")
+      .add_option(
+          "--json", path,
+          "Also write the result as JSON, for programs, to this file ('-': standard output)")
       ->type_name("FILE");
 }
 
 CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths) {
   return command
       .add_option("--batch", paths,
-                  "Measurements (CSV: joints in deg, rails in mm; positions in mm); again for each measuring session: "
-                  "the tracker may stand elsewhere in each")
+                  "Measurements (CSV: joints in deg, rails in mm; positions in mm); again for each "
+                  "measuring session: the tracker may stand elsewhere in each")
       ->allow_extra_args(false);
 }
 
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload) {
-  command.add_option("--tool", tool,
-                     "Tool id of the cell, for rows that name none; may be left out where the cell has only one");
+  command.add_option(
+      "--tool", tool,
+      "Tool id of the cell, for rows that name none; may be left out where the cell has only one");
   command.add_option("--payload", payload,
-                     "Payload id of the cell, for rows that name none; may be left out where the cell has only one");
+                     "Payload id of the cell, for rows that name none; may be left out where the "
+                     "cell has only one");
 }
 
 Result<ModelReference> parse_model_reference(const std::string& text) {

@@ -20,10 +20,11 @@ namespace trammel::cli {
 /// Whether to ask a service, and which.
 struct ServiceOptions {
   bool service = false;
-  std::vector<std::string> hosts = {"127.0.0.1"};  ///< names or addresses, each with a port behind it or not
-  std::vector<std::string> discovery_servers;      ///< likewise
-  bool hosts_said = false;                         ///< else only those count that discovery servers tell of, if any
-  std::string security;                            ///< folder of certificate and permissions; empty: none
+  std::vector<std::string> hosts = {
+      "127.0.0.1"};  ///< names or addresses, each with a port behind it or not
+  std::vector<std::string> discovery_servers;  ///< likewise
+  bool hosts_said = false;  ///< else only those count that discovery servers tell of, if any
+  std::string security;     ///< folder of certificate and permissions; empty: none
   std::uint32_t domain = 0;
   std::vector<std::uint16_t> ports = {17500};
   double timeout_s = 5;
@@ -32,8 +33,8 @@ struct ServiceOptions {
 void add_service_options(CLI::App& command, ServiceOptions& options);
 /// Of commands that only a service can carry out: `--service` may be said and changes nothing.
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
-/// Where servers are looked for: each host with its own port, or with every port; nowhere where only discovery servers
-/// were said. kUsage: a host that nobody knows.
+/// Where servers are looked for: each host with its own port, or with every port; nowhere where
+/// only discovery servers were said. kUsage: a host that nobody knows.
 [[nodiscard]] Result<std::vector<HostPort>> places_of(const ServiceOptions& options);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 

@@ -20,17 +20,22 @@ namespace fs = std::filesystem;
 
 bool is_standard_output(const std::string& path) { return path == "-" || path == "/dev/stdout"; }
 
-/// Whether writing one would change the other. Devices do not count: nothing is read back from them.
+/// Whether writing one would change the other. Devices do not count: nothing is read back from
+/// them.
 bool same_file(const std::string& a, const std::string& b) {
-  if (is_standard_output(a) || is_standard_output(b)) return is_standard_output(a) && is_standard_output(b);
+  if (is_standard_output(a) || is_standard_output(b))
+    return is_standard_output(a) && is_standard_output(b);
   std::error_code error;
   if (fs::is_character_file(a, error)) return false;
   // Of what is not there yet `p` and `./p` are the same as absolute paths only.
-  const auto place = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, error), error); };
+  const auto place = [&](const std::string& path) {
+    return fs::weakly_canonical(fs::absolute(path, error), error);
+  };
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
-/// Whether this process has written a result to standard output. A second one after it would not be valid JSON.
+/// Whether this process has written a result to standard output. A second one after it would not be
+/// valid JSON.
 bool& standard_output_is_taken() {
   static bool taken = false;
   return taken;
@@ -41,7 +46,8 @@ bool& standard_output_is_taken() {
 Status write_output(const std::string& path, const std::string& text) {
   if (path != "-") return write_text_file(path, text);
   standard_output_is_taken() = true;
-  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  const bool written =
+      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
   if (written) return {};
   return refused("cannot be written: {}", std::strerror(errno))
       .in("standard output")
@@ -77,7 +83,8 @@ Status write_json(const std::string& path, const nlohmann::ordered_json& value) 
 
 std::string json_text(const nlohmann::ordered_json& value) {
   // What JSON leaves as it is may still control a terminal; its escapes are JSON's own.
-  return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) + "\n";
+  return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) +
+         "\n";
 }
 
 void tell(const std::string& text, std::initializer_list<std::string> paths) {
@@ -85,7 +92,8 @@ void tell(const std::string& text, std::initializer_list<std::string> paths) {
   std::fputs(shown_lines(text).c_str(), stdout);
 }
 
-void Outputs::add(const std::string& option, const std::string& path, const std::string& may_replace) {
+void Outputs::add(const std::string& option, const std::string& path,
+                  const std::string& may_replace) {
   if (!path.empty()) outputs_.push_back({{option, path}, may_replace, {}});
 }
 
@@ -101,7 +109,9 @@ Status Outputs::check_apart(const std::vector<NamedFile>& inputs) const {
           .next("name another file for one of them");
     }
     for (const NamedFile& input : inputs) {
-      if (input.path.empty() || input.option == outputs_[k].may_replace || !same_file(path, input.path)) continue;
+      if (input.path.empty() || input.option == outputs_[k].may_replace ||
+          !same_file(path, input.path))
+        continue;
       return failure(ErrorCode::kUsage, "{} {} would overwrite {}", option, path, input.option)
           .of(option)
           .with_text(path)
@@ -150,8 +160,8 @@ Status write_together(const std::vector<OutputText>& texts) {
 std::string emphasised(const std::string& text) {
   const char* terminal = std::getenv("TERM");
   const char* plain = std::getenv("NO_COLOR");
-  const bool colours = ::isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::strcmp(terminal, "dumb") != 0 &&
-                       (plain == nullptr || *plain == '\0');
+  const bool colours = ::isatty(STDERR_FILENO) == 1 && terminal != nullptr &&
+                       std::strcmp(terminal, "dumb") != 0 && (plain == nullptr || *plain == '\0');
   return colours ? "\033[1;31m" + text + "\033[0m" : text;
 }
 
@@ -176,7 +186,8 @@ void ProgressLine::show(const std::string& what, double share) {
   if (share < share_) began_ = now;  // the work begins again
   share_ = share;
   const std::string left = time_left(std::chrono::duration<double>(now - began_).count(), share);
-  const std::string line = fmt::format("{} {:.0f} %{}", shown(what), 100 * std::clamp(share, 0.0, 1.0), left);
+  const std::string line =
+      fmt::format("{} {:.0f} %{}", shown(what), 100 * std::clamp(share, 0.0, 1.0), left);
   if (line == shown_) return;
   fmt::print(stderr, "\r\033[K{}", line);
   std::fflush(stderr);

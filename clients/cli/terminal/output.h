@@ -19,14 +19,14 @@ namespace trammel::cli {
 /// The members of an error that are known, and the whole sentence.
 [[nodiscard]] nlohmann::ordered_json error_json(const Error& error);
 
-/// Writes a refusal as `{"error": {...}}` to standard output, if the JSON result would have gone there and none was
-/// written yet. Files stay as they were.
+/// Writes a refusal as `{"error": {...}}` to standard output, if the JSON result would have gone
+/// there and none was written yet. Files stay as they were.
 void tell_refusal(const Error& error, const std::string& json_path);
 
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
-/// Text for people on standard output, control characters of foreign text spelled out; left out when a result for
-/// programs goes there (`paths`: where results go).
+/// Text for people on standard output, control characters of foreign text spelled out; left out
+/// when a result for programs goes there (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
 
 /// What one command reads or writes, and the option that names it.
@@ -39,7 +39,8 @@ class Outputs {
  public:
   /// An empty path is no output. `may_replace`: the input that it may be the new state of.
   void add(const std::string& option, const std::string& path, const std::string& may_replace = "");
-  /// Refuses as wrong usage two outputs in one file or on standard output, and an output that is also an input.
+  /// Refuses as wrong usage two outputs in one file or on standard output, and an output that is
+  /// also an input.
   [[nodiscard]] Status check_apart(const std::vector<NamedFile>& inputs) const;
   /// Likewise, and as kRefused an output that cannot be written.
   [[nodiscard]] Status check(const std::vector<NamedFile>& inputs) const;
@@ -63,15 +64,16 @@ struct OutputText {
 /// Writes all of them, or none.
 [[nodiscard]] Status write_together(const std::vector<OutputText>& texts);
 
-/// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not set; else as it is.
+/// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not
+/// set; else as it is.
 [[nodiscard]] std::string emphasised(const std::string& text);
 
-/// `, about 40 s left`, from how long a share of the work took; empty while that says little (under 2 s or 2 %) and at
-/// the end.
+/// `, about 40 s left`, from how long a share of the work took; empty while that says little (under
+/// 2 s or 2 %) and at the end.
 [[nodiscard]] std::string time_left(double elapsed_s, double share);
 
-/// One line on standard error that is written over as work goes on, with the time that is left. Silent where standard
-/// error is no terminal.
+/// One line on standard error that is written over as work goes on, with the time that is left.
+/// Silent where standard error is no terminal.
 class ProgressLine {
  public:
   ProgressLine();

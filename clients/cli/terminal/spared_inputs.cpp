@@ -19,9 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// In the order in which two that are the same are named.
-constexpr std::array<std::string_view, 11> kOutputs = {"--output",     "--report", "--receipt", "--residuals",
-                                                       "--next-poses", "--rapid",  "--krl",     "--fanuc",
-                                                       "--urscript",   "--frames", "--json"};
+constexpr std::array<std::string_view, 11> kOutputs = {
+    "--output", "--report", "--receipt",  "--residuals", "--next-poses", "--rapid",
+    "--krl",    "--fanuc",  "--urscript", "--frames",    "--json"};
 /// What a command may write over by design, or judges by itself.
 constexpr std::array<std::string_view, 2> kJudgedElsewhere = {"--cell-out", "--store"};
 
@@ -32,7 +32,8 @@ bool is_one_of(const Names& names, const std::string& name) {
 
 /// `import-backup` writes the frames that `correct` and `predict` read.
 bool is_output(const CLI::App& command, const std::string& option) {
-  return is_one_of(kOutputs, option) && (option != "--frames" || command.get_name() == "import-backup");
+  return is_one_of(kOutputs, option) &&
+         (option != "--frames" || command.get_name() == "import-backup");
 }
 
 bool is_input(const CLI::App& command, const std::string& option) {
@@ -69,7 +70,8 @@ std::vector<NamedFile> robots_of(const std::vector<NamedFile>& inputs) {
   std::vector<NamedFile> robots;
   for (const NamedFile& input : inputs) {
     if (input.option != "--cell") continue;
-    if (const auto path = robot_path_of(input.path)) robots.push_back({"the robot file of --cell", *path});
+    if (const auto path = robot_path_of(input.path))
+      robots.push_back({"the robot file of --cell", *path});
   }
   return robots;
 }
@@ -81,7 +83,8 @@ std::string folder_of_program(const CLI::App& correct, const std::string& output
   if (!is_program(inputs, format.empty() ? "" : format.front()) || output == "-") return "";
   std::error_code error;
   const auto is_folder = [&](const std::string& path) { return fs::is_directory(path, error); };
-  if (inputs.size() > 1 || output.ends_with('/') || is_folder(output) || is_folder(inputs.front())) return output;
+  if (inputs.size() > 1 || output.ends_with('/') || is_folder(output) || is_folder(inputs.front()))
+    return output;
   const std::string parent = fs::path(output).parent_path().string();
   return parent.empty() ? "." : parent;
 }
@@ -93,12 +96,14 @@ std::string folder_that_is_made(const CLI::App& command) {
   return command.get_name() == "manual" ? output : folder_of_program(command, output);
 }
 
-/// That the folder may be written to, or can be made. What is a file is refused by whoever needs a folder.
+/// That the folder may be written to, or can be made. What is a file is refused by whoever needs a
+/// folder.
 Status check_can_be_made(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error)) return {};
   fs::path there = fs::weakly_canonical(fs::absolute(folder, error), error);
-  while (!there.empty() && there != there.root_path() && !fs::exists(there, error)) there = there.parent_path();
+  while (!there.empty() && there != there.root_path() && !fs::exists(there, error))
+    there = there.parent_path();
   const Status writable = check_writable((there / "a file").string());
   if (writable) return {};
   Error refusal = writable.error();

@@ -25,7 +25,8 @@ const CLI::App* command_of(const CLI::App& app, const std::string& name) {
 
 std::vector<std::string> command_names(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* one : app.get_subcommands([](const CLI::App* c) { return !c->get_name().empty(); }))
+  for (const CLI::App* one :
+       app.get_subcommands([](const CLI::App* c) { return !c->get_name().empty(); }))
     names.push_back(one->get_name());
   return names;
 }
@@ -33,7 +34,8 @@ std::vector<std::string> command_names(const CLI::App& app) {
 void add_option_names(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::Option* option : app.get_options())
     names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
-  for (const CLI::App* inner : app.get_subcommands([](const CLI::App* c) { return c->get_name().empty(); }))
+  for (const CLI::App* inner :
+       app.get_subcommands([](const CLI::App* c) { return c->get_name().empty(); }))
     add_option_names(*inner, names);
 }
 
@@ -54,7 +56,8 @@ Error unknown_command(const CLI::App& app, const std::string& word) {
   return failure(ErrorCode::kUsage, "{}: no such command{}", shown_short(word), question("", near))
       .of("command")
       .with_text(shown_short(word))
-      .next(near.empty() ? "trammel help lists them all" : fmt::format("trammel {} --help tells about it", near))
+      .next(near.empty() ? "trammel help lists them all"
+                         : fmt::format("trammel {} --help tells about it", near))
       .value();
 }
 
@@ -62,7 +65,8 @@ Error unknown_option(const CLI::App& command, const std::string& word) {
   std::vector<std::string> names;
   add_option_names(command, names);
   const std::string name = word.substr(0, word.find('='));
-  const std::string near = meant(name.substr(std::min(name.find_first_not_of('-'), name.size())), names);
+  const std::string near =
+      meant(name.substr(std::min(name.find_first_not_of('-'), name.size())), names);
   return failure(ErrorCode::kUsage, "{}: no such option{}", shown_short(name), question("--", near))
       .of(shown_short(name))
       .with_text(shown_short(word))
@@ -74,7 +78,8 @@ bool is_option(const std::string& word) {
   return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
 }
 
-/// What kind of file each option takes, by its ending, and the keys that stand at the top of this kind alone.
+/// What kind of file each option takes, by its ending, and the keys that stand at the top of this
+/// kind alone.
 struct FileKind {
   const char* option;  ///< nullptr: none takes it
   std::array<const char*, 4> endings;
@@ -120,7 +125,8 @@ const CLI::Option* named_by(const CLI::App& command, const std::string& file) {
     const auto& said = option->results();
     if (std::find(said.begin(), said.end(), file) != said.end()) return option;
   }
-  for (const CLI::App* inner : command.get_subcommands([](const CLI::App* c) { return c->get_name().empty(); })) {
+  for (const CLI::App* inner :
+       command.get_subcommands([](const CLI::App* c) { return c->get_name().empty(); })) {
     if (const CLI::Option* option = named_by(*inner, file)) return option;
   }
   return nullptr;
@@ -128,9 +134,11 @@ const CLI::Option* named_by(const CLI::App& command, const std::string& file) {
 
 std::string like_it(const std::string& file) {
   std::error_code error;
-  const fs::path folder = fs::path(file).has_parent_path() ? fs::path(file).parent_path() : fs::path(".");
+  const fs::path folder =
+      fs::path(file).has_parent_path() ? fs::path(file).parent_path() : fs::path(".");
   std::vector<std::string> names;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end && names.size() < 10'000; it.increment(error))
+  for (fs::directory_iterator it(folder, error), end; !error && it != end && names.size() < 10'000;
+       it.increment(error))
     names.push_back(it->path().filename().string());
   std::sort(names.begin(), names.end());
   const std::string near = near_miss(fs::path(file).filename().string(), names);
@@ -140,27 +148,35 @@ std::string like_it(const std::string& file) {
 
 std::string of_missing_file(const std::string& file, const CLI::App& command) {
   std::error_code error;
-  if (const std::string near = like_it(file); !near.empty()) return fmt::format("did you mean {}?", shown(near));
+  if (const std::string near = like_it(file); !near.empty())
+    return fmt::format("did you mean {}?", shown(near));
   const CLI::Option* option = named_by(command, file);
-  const bool may_be_cell = option != nullptr && option->check_name("--model") && !fs::path(file).has_extension() &&
+  const bool may_be_cell = option != nullptr && option->check_name("--model") &&
+                           !fs::path(file).has_extension() &&
                            command.get_option_no_throw("--service") != nullptr;
-  if (may_be_cell) return fmt::format("to ask a daemon for the model of cell {}, add --service", shown(file));
-  return fmt::format("paths count from the folder you are in, {}", fs::current_path(error).string());
+  if (may_be_cell)
+    return fmt::format("to ask a daemon for the model of cell {}, add --service", shown(file));
+  return fmt::format("paths count from the folder you are in, {}",
+                     fs::current_path(error).string());
 }
 
-/// What the option takes that named this file, where its ending is that of another kind; else empty.
+/// What the option takes that named this file, where its ending is that of another kind; else
+/// empty.
 std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
   std::error_code ignored;
   const std::string ending = fs::path(file).extension().string();
-  const auto right =
-      std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& kind) { return takes(kind, ending); });
+  const auto right = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const FileKind& kind) { return takes(kind, ending); });
   const FileKind* taken = kind_taken_by(option);
-  if (!fs::is_regular_file(file, ignored) || right == kKinds.end() || taken == nullptr || takes(*taken, ending))
+  if (!fs::is_regular_file(file, ignored) || right == kKinds.end() || taken == nullptr ||
+      takes(*taken, ending))
     return "";
-  return fmt::format("{} takes {}; a {} file goes to {}", taken->option, taken->what, ending, right->option);
+  return fmt::format("{} takes {}; a {} file goes to {}", taken->option, taken->what, ending,
+                     right->option);
 }
 
-/// What the option takes that named this file, where keys that are wrong are those of one other kind; else empty.
+/// What the option takes that named this file, where keys that are wrong are those of one other
+/// kind; else empty.
 std::string of_other_keys(const Error& error, const CLI::Option& option) {
   const FileKind* taken = kind_taken_by(option);
   std::set<const FileKind*> kinds;
@@ -168,14 +184,16 @@ std::string of_other_keys(const Error& error, const CLI::Option& option) {
   kinds.erase(nullptr);
   kinds.erase(taken);  // its own keys may be wrong or missing
   if (taken == nullptr || error.also.empty() || kinds.size() != 1) return "";
-  return fmt::format("this looks like {}; {} takes {}", (*kinds.begin())->what, taken->option, taken->what);
+  return fmt::format("this looks like {}; {} takes {}", (*kinds.begin())->what, taken->option,
+                     taken->what);
 }
 
 std::string of_file(const Error& error, const CLI::App& command) {
   std::error_code ignored;
   if (fs::is_directory(error.file, ignored)) return "name a file in it";
   const CLI::Option* option = named_by(command, error.file);
-  const bool is_of_all_of_it = error.code == ErrorCode::kRefused && !error.row && error.field.empty();
+  const bool is_of_all_of_it =
+      error.code == ErrorCode::kRefused && !error.row && error.field.empty();
   if (option != nullptr && is_of_all_of_it && !fs::exists(error.file, ignored))
     return of_missing_file(error.file, command);
   const std::string ending = fs::path(error.file).extension().string();
@@ -192,21 +210,23 @@ std::string of_kind(const Error& error, const std::string& command) {
     case ErrorCode::kUsage:
       return fmt::format("trammel {} --help tells its options, with examples", command);
     case ErrorCode::kUnreachable:
-      return "start one (trammeld --config SERVER.yaml) or name its --port, and its --security where it asks for "
-             "certificates; trammel doctor says what is in the way";
+      return "start one (trammeld --config SERVER.yaml) or name its --port, and its --security "
+             "where it asks for certificates; trammel doctor says what is in the way";
     case ErrorCode::kBusy:
       return "run the command again in a moment";
     case ErrorCode::kNotFound:
       return "trammel status lists what there is";
     default:
-      return fmt::format("mend that and run the command again; trammel {} --help tells what it takes", command);
+      return fmt::format(
+          "mend that and run the command again; trammel {} --help tells what it takes", command);
   }
 }
 
 }  // namespace
 
 std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::string>& words) {
-  if (words.empty() || words[0] == "--help" || words[0] == "-h" || words[0] == "--version") return std::nullopt;
+  if (words.empty() || words[0] == "--help" || words[0] == "-h" || words[0] == "--version")
+    return std::nullopt;
   const CLI::App* command = command_of(app, words[0]);
   if (command == nullptr && is_option(words[0])) {
     return failure(ErrorCode::kUsage, "{}: options stand behind a command", shown_short(words[0]))
@@ -222,7 +242,8 @@ std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::st
       continue;
     }
     const bool is_long = words[k].starts_with("--");
-    const std::string name = is_long ? words[k].substr(0, words[k].find('=')) : words[k].substr(0, 2);
+    const std::string name =
+        is_long ? words[k].substr(0, words[k].find('=')) : words[k].substr(0, 2);
     if (command->get_option_no_throw(name) == nullptr) return unknown_option(*command, words[k]);
   }
   return std::nullopt;
@@ -240,17 +261,20 @@ bool is_number(const std::string& word) {
 std::string no_number(const CLI::App& app, const std::string& command, const std::string& option,
                       const std::string& word) {
   const CLI::App* of = command_of(app, command);
-  const CLI::Option* taken = of == nullptr || option.empty() ? nullptr : of->get_option_no_throw(option);
+  const CLI::Option* taken =
+      of == nullptr || option.empty() ? nullptr : of->get_option_no_throw(option);
   const std::string type = taken == nullptr ? "" : taken->get_type_name();
   const bool is_whole = type.starts_with("INT") || type.starts_with("UINT");
-  const bool has_digits_alone = !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
+  const bool has_digits_alone =
+      !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
   if (is_whole && is_number(word) && !has_digits_alone && word[0] != '-')
     return fmt::format("{} is no whole number", shown_short(word));
   if (is_number(word)) return "";
   return fmt::format("{} is no {}number", shown_short(word), is_whole ? "whole " : "");
 }
 
-/// The word that the parser's sentence is about: `--count: Value abc not in range 1 to 9`, `--domain = abc`.
+/// The word that the parser's sentence is about: `--count: Value abc not in range 1 to 9`,
+/// `--domain = abc`.
 std::string word_in(const std::string& what, bool unconverted) {
   const std::string before = ": Value ", behind = " not in range ";
   const std::size_t begin = what.find(before), end = what.rfind(behind);
@@ -263,11 +287,12 @@ std::string word_in(const std::string& what, bool unconverted) {
 }  // namespace
 
 Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::string& command) {
-  // The parser tells the option in its sentence alone: `Could not convert: --seed = x`, `--cell is required`.
+  // The parser tells the option in its sentence alone: `Could not convert: --seed = x`, `--cell is
+  // required`.
   std::string what = error.what();
   const std::size_t behind = what.find(": ");
-  const bool unconverted =
-      dynamic_cast<const CLI::ConversionError*>(&error) != nullptr && behind != std::string::npos && !is_option(what);
+  const bool unconverted = dynamic_cast<const CLI::ConversionError*>(&error) != nullptr &&
+                           behind != std::string::npos && !is_option(what);
   if (unconverted) what.erase(0, behind + 2);
   const std::string option = is_option(what) ? what.substr(0, what.find_first_of(": ")) : "";
   const std::string word = word_in(what, unconverted);
@@ -279,15 +304,18 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::
   return failure(ErrorCode::kUsage, "{}", what)
       .of(option)
       .with_text(shown_short(word))
-      .next(command.empty() ? "trammel help lists commands and topics"
-                            : fmt::format("trammel {} --help tells its options, with examples", command))
+      .next(command.empty()
+                ? "trammel help lists commands and topics"
+                : fmt::format("trammel {} --help tells its options, with examples", command))
       .value();
 }
 
 std::optional<Error> empty_word(const CLI::App& command) {
-  for (const char* name : {"--cell", "--model", "--batch", "--robot", "--truth", "--plan", "--joints", "--output"}) {
+  for (const char* name :
+       {"--cell", "--model", "--batch", "--robot", "--truth", "--plan", "--joints", "--output"}) {
     const CLI::Option* option = command.get_option_no_throw(name);
-    const std::vector<std::string> said = option == nullptr ? std::vector<std::string>() : option->results();
+    const std::vector<std::string> said =
+        option == nullptr ? std::vector<std::string>() : option->results();
     if (std::find(said.begin(), said.end(), "") == said.end()) continue;
     return failure(ErrorCode::kUsage, "{} is empty", name)
         .of(name)
@@ -299,12 +327,14 @@ std::optional<Error> empty_word(const CLI::App& command) {
 
 Error advised(Error error, const CLI::App& command) {
   for (Error& other : error.also) other = advised(std::move(other), command);
-  if (const CLI::Option* option = error.file.empty() ? nullptr : named_by(command, error.file); option != nullptr) {
+  if (const CLI::Option* option = error.file.empty() ? nullptr : named_by(command, error.file);
+      option != nullptr) {
     if (std::string other = of_other_keys(error, *option); !other.empty()) {
       error.also.clear();
       error.next = std::move(other);
     }
-    if (std::string other = of_wrong_kind(error.file, *option); !other.empty()) error.next = std::move(other);
+    if (std::string other = of_wrong_kind(error.file, *option); !other.empty())
+      error.next = std::move(other);
   }
   if (!error.next.empty()) return error;
   if (!error.file.empty()) error.next = of_file(error, command);

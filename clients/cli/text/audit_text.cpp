@@ -13,8 +13,8 @@ std::string time_text(std::int64_t unix_s) {
   const std::time_t time = unix_s;
   std::tm parts{};
   if (::gmtime_r(&time, &parts) == nullptr) return "-";
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday,
-                     parts.tm_hour, parts.tm_min, parts.tm_sec);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", parts.tm_year + 1900, parts.tm_mon + 1,
+                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
 }
 
 std::string change_text(const AuditRow& row) {
@@ -23,8 +23,9 @@ std::string change_text(const AuditRow& row) {
 }
 
 std::string row_text(const AuditRow& row) {
-  std::string text = fmt::format("{:>6} {} {}{}: {}", row.number, time_text(row.at),
-                                 row.cell.empty() ? "" : "cell " + row.cell + ", ", row.what, row.subject);
+  std::string text =
+      fmt::format("{:>6} {} {}{}: {}", row.number, time_text(row.at),
+                  row.cell.empty() ? "" : "cell " + row.cell + ", ", row.what, row.subject);
   if (const std::string change = change_text(row); !change.empty()) text += ": " + change;
   text += ", by " + row.who;
   if (!row.server.empty()) text += " on " + row.server;

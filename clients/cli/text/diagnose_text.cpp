@@ -37,7 +37,8 @@ std::string causes_text(const ordered_json& causes) {
 }
 
 std::string micrometres(const ordered_json& millimetres) {
-  return millimetres.is_null() ? "-" : fmt::format("{:.3g} um", kMicrometres * millimetres.get<double>());
+  return millimetres.is_null() ? "-"
+                               : fmt::format("{:.3g} um", kMicrometres * millimetres.get<double>());
 }
 
 std::string parameters_line(const ordered_json& parameters) {
@@ -45,8 +46,8 @@ std::string parameters_line(const ordered_json& parameters) {
   for (const auto& [name, estimate] : parameters.items()) {
     const ShownValue shown = show_with_uncertainty(estimate.at("value"), estimate.at("u95"));
     const std::string unit = estimate.at("unit");
-    text += fmt::format("{}{} = {} ± {}{}{}", text.empty() ? "" : ", ", name, shown.value, shown.expanded,
-                        unit.empty() ? "" : " ", unit);
+    text += fmt::format("{}{} = {} ± {}{}{}", text.empty() ? "" : ", ", name, shown.value,
+                        shown.expanded, unit.empty() ? "" : " ", unit);
   }
   return text;
 }
@@ -57,8 +58,9 @@ std::string beginning_line(const ordered_json& beginning) {
     return one.at("pose_id").get<std::string>() +
            (time.is_null() ? "" : fmt::format(" ({:.0f} s)", time.get<double>()));
   };
-  return fmt::format("      may have begun at any of {} poses from {} to {} (95 %)\n", beginning.at("pose_ids").size(),
-                     place(beginning.at("earliest")), place(beginning.at("latest")));
+  return fmt::format("      may have begun at any of {} poses from {} to {} (95 %)\n",
+                     beginning.at("pose_ids").size(), place(beginning.at("earliest")),
+                     place(beginning.at("latest")));
 }
 
 std::string p_text(const ordered_json& value) {
@@ -75,10 +77,12 @@ std::string name_of(const ordered_json& finding) {
 std::string finding_lines(const ordered_json& finding, std::size_t width) {
   std::string text =
       fmt::format("  {:<{}}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", name_of(finding), width,
-                  kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
-                  p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
+                  kMicrometres * finding.at("effect_rms_mm").get<double>(),
+                  finding.at("strength").get<double>(), p_text(finding.at("p_value")),
+                  finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
-  if (!finding.at("parameters").empty()) text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
+  if (!finding.at("parameters").empty())
+    text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
   if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
     text += beginning_line(finding.at("may_begin_at"));
   }
@@ -98,23 +102,26 @@ std::string findings_table(const ordered_json& findings) {
   std::size_t width = 34;
   for (const ordered_json& finding : findings) width = std::max(width, name_of(finding).size() + 1);
   constexpr auto kColumns = "  {:<{}}{:>10}{:>10}{:>10}{:>10}{:>10}\n";
-  std::string text = "\n" + fmt::format(kColumns, "", width, "effect", "strength", "p", "held out", "") +
-                     fmt::format(kColumns, "cause", width, "um rms", "lambda", "", "before mm", "after mm");
+  std::string text =
+      "\n" + fmt::format(kColumns, "", width, "effect", "strength", "p", "held out", "") +
+      fmt::format(kColumns, "cause", width, "um rms", "lambda", "", "before mm", "after mm");
   for (const ordered_json& finding : findings) text += finding_lines(finding, width);
   return text + "  (± is U(k=2): two standard uncertainties)\n";
 }
 
 std::string figures_line(const char* name, const ordered_json& figures) {
   if (figures.is_null()) return "";
-  return fmt::format("  {:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, figures.at("rms_mm").get<double>(),
-                     figures.at("mean_mm").get<double>(), figures.at("p997_mm").get<double>(),
-                     figures.at("max_mm").get<double>());
+  return fmt::format("  {:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name,
+                     figures.at("rms_mm").get<double>(), figures.at("mean_mm").get<double>(),
+                     figures.at("p997_mm").get<double>(), figures.at("max_mm").get<double>());
 }
 
 std::string figures_table(const ordered_json& diagnosis) {
   const ordered_json& held_out = diagnosis.at("held_out");
-  std::string text = fmt::format("\n  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
-                     figures_line("before", diagnosis.at("before")) + figures_line("after", diagnosis.at("after")) +
+  std::string text = fmt::format("\n  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean",
+                                 "99.7 %", "max") +
+                     figures_line("before", diagnosis.at("before")) +
+                     figures_line("after", diagnosis.at("after")) +
                      figures_line("held out, before", held_out.at("before")) +
                      figures_line("held out, after", held_out.at("after")) +
                      figures_line("  but suspects", held_out.at("before_without_suspects")) +
@@ -152,8 +159,10 @@ struct Saying {
 };
 
 /// Says the same once: `of` is added to what is said already, after `between`.
-void say(std::vector<Saying>& sayings, const std::string& what, const std::string& of, const char* between) {
-  const auto known = std::find_if(sayings.begin(), sayings.end(), [&](const Saying& one) { return one.what == what; });
+void say(std::vector<Saying>& sayings, const std::string& what, const std::string& of,
+         const char* between) {
+  const auto known = std::find_if(sayings.begin(), sayings.end(),
+                                  [&](const Saying& one) { return one.what == what; });
   if (known == sayings.end()) {
     sayings.push_back({what, of});
   } else {
@@ -161,16 +170,21 @@ void say(std::vector<Saying>& sayings, const std::string& what, const std::strin
   }
 }
 
-/// Causes that this batch could not have shown, or not for certain, and what they need; a line for all joints alike.
+/// Causes that this batch could not have shown, or not for certain, and what they need; a line for
+/// all joints alike.
 std::string unseen_lines(const ordered_json& unseen) {
   std::vector<Saying> sayings;
   for (const ordered_json& one : unseen) {
     const auto needs = one.at("needs").get<std::string>();
     if (!one.at("smallest_mm").is_null() || needs.empty()) continue;
     const bool by_order = one.value("looked_for_by_order", false);
-    const char* how = by_order ? "been named for certain (looked for by the order of the poses)" : "shown";
-    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
-    say(sayings, fmt::format("would not have {}: {}: needs {}", how, kind_in_words(cause_of(one)), needs), joint, "");
+    const char* how =
+        by_order ? "been named for certain (looked for by the order of the poses)" : "shown";
+    const std::string joint =
+        one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
+    say(sayings,
+        fmt::format("would not have {}: {}: needs {}", how, kind_in_words(cause_of(one)), needs),
+        joint, "");
   }
   std::string text;
   for (const auto& [what, joints] : sayings) {
@@ -182,7 +196,8 @@ std::string unseen_lines(const ordered_json& unseen) {
 /// What a cause would need to show, empty where nothing is said.
 std::string need_of(const ordered_json& unseen, const std::string& name) {
   for (const ordered_json& one : unseen) {
-    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
+    const std::string joint =
+        one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
     if (one.at("cause").get<std::string>() + joint == name) return one.at("needs");
   }
   return "";
@@ -191,7 +206,8 @@ std::string need_of(const ordered_json& unseen, const std::string& name) {
 /// Whether nothing at all of the cause shows, which is said elsewhere.
 bool is_never_shown(const ordered_json& unseen, const std::string& name) {
   return std::any_of(unseen.begin(), unseen.end(), [&](const ordered_json& one) {
-    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
+    const std::string joint =
+        one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
     return one.at("smallest_mm").is_null() && one.at("cause").get<std::string>() + joint == name;
   });
 }
@@ -202,7 +218,8 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
   for (const ordered_json& group : diagnosis.at("not_separable")) {
     if (is_never_shown(diagnosis.at("could_not_have_seen"), group.front())) continue;
     std::vector<std::string> others;
-    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(in_words(group[k].get<std::string>()));
+    for (std::size_t k = 1; k < group.size(); ++k)
+      others.push_back(in_words(group[k].get<std::string>()));
     say(sayings, group.front(), fmt::format("{}", fmt::join(others, ", ")), ", ");
   }
   std::string text;
@@ -216,18 +233,22 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
 
 std::string limits_text(const ordered_json& diagnosis) {
   std::string text;
-  for (const ordered_json& limit : diagnosis.at("limits")) text += fmt::format("  {}\n", limit.get<std::string>());
+  for (const ordered_json& limit : diagnosis.at("limits"))
+    text += fmt::format("  {}\n", limit.get<std::string>());
   text += not_separable_lines(diagnosis);
   text += unseen_lines(diagnosis.at("could_not_have_seen"));
-  return text.empty() ? "" : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
+  return text.empty()
+             ? ""
+             : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
 }
 
 std::string next_poses_text(const ordered_json& diagnosis) {
   if (diagnosis.at("next_poses").empty()) return "";
   const ordered_json& worth = diagnosis.at("next_poses_for");
-  std::string text = fmt::format("\nNext poses, to tell apart {} (uncertain by {} now, by {} with them):\n",
-                                 causes_text(worth.at("separate")), uncertain_by(worth.at("stddev_now")),
-                                 uncertain_by(worth.at("stddev_expected")));
+  std::string text =
+      fmt::format("\nNext poses, to tell apart {} (uncertain by {} now, by {} with them):\n",
+                  causes_text(worth.at("separate")), uncertain_by(worth.at("stddev_now")),
+                  uncertain_by(worth.at("stddev_expected")));
   for (const ordered_json& pose : diagnosis.at("next_poses")) {
     text += " ";
     for (const ordered_json& value : pose) text += fmt::format("{:>10.2f}", value.get<double>());
@@ -239,9 +260,11 @@ std::string next_poses_text(const ordered_json& diagnosis) {
 /// What is left of a pose, as one length: it stands beside the other errors.
 std::string noise_line(const ordered_json& diagnosis) {
   const double noise = diagnosis.at("noise_mm"), root = std::sqrt(3.0);
-  return fmt::format("{} poses. Noise: {} rms, what is left of a position when all that was found is corrected ({}).\n",
-                     diagnosis.at("poses").get<int>(), micrometres(root * noise),
-                     diagnosis.at("noise_from").get<std::string>());
+  return fmt::format(
+      "{} poses. Noise: {} rms, what is left of a position when all that was found is corrected "
+      "({}).\n",
+      diagnosis.at("poses").get<int>(), micrometres(root * noise),
+      diagnosis.at("noise_from").get<std::string>());
 }
 
 std::string extended_line(const char* name, const CompensatedModel& model) {
@@ -262,9 +285,11 @@ std::string budget_text(const ordered_json& budget) {
 std::string diagnosis_text(const ordered_json& diagnosis) {
   return fmt::format("{}: {}\n", diagnosis.at("verdict").get<std::string>(),
                      diagnosis.at("sentence").get<std::string>()) +
-         noise_line(diagnosis) + findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
-         unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
-         budget_text(diagnosis.value("budget", ordered_json())) + limits_text(diagnosis) + next_poses_text(diagnosis);
+         noise_line(diagnosis) + findings_table(diagnosis.at("findings")) +
+         figures_table(diagnosis) + unexplained_text(diagnosis.at("unexplained")) +
+         suspects_text(diagnosis.at("suspect_poses")) +
+         budget_text(diagnosis.value("budget", ordered_json())) + limits_text(diagnosis) +
+         next_poses_text(diagnosis);
 }
 
 std::string next_poses_csv(const ordered_json& diagnosis) {
@@ -285,11 +310,13 @@ std::string next_poses_csv(const ordered_json& diagnosis) {
 std::string extension_text(const Extension& extension) {
   const int poses = extension.after.parts().validation->poses;
   return fmt::format("\nWith bias, on {} poses held out from diagnosis and training:\n", poses) +
-         fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+         fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %",
+                     "max") +
          extended_line("before", extension.before) + extended_line("extended", extension.after) +
          fmt::format("  {}\n", to_string(extension.gain)) +
-         fmt::format("  {}\n",
-                     extension.day ? to_string(*extension.day) : "too few poses to say what another day gains by it") +
+         fmt::format("  {}\n", extension.day
+                                   ? to_string(*extension.day)
+                                   : "too few poses to say what another day gains by it") +
          (extension.left_out.empty() ? "" : fmt::format("  {}\n", to_string(extension.left_out)));
 }
 
@@ -309,7 +336,8 @@ ordered_json another_day_json(const std::optional<DayGain>& day) {
 
 ordered_json extension_json(const Extension& extension) {
   ordered_json left_out = ordered_json::array();
-  for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
+  for (const Unsupported& one : extension.left_out)
+    left_out.push_back({{"source", one.source}, {"z", one.z}});
   return {{"better", extension.why_not().empty()},
           {"z", extension.gain.z()},
           {"z_limit", PairedGain::kBeyondChance},

@@ -23,14 +23,15 @@ namespace {
 using nlohmann::ordered_json;
 
 std::string figures_line(const char* level, const ErrorFigures& figures) {
-  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms), to_mm(figures.mean),
-                     to_mm(figures.p997), to_mm(figures.max));
+  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms),
+                     to_mm(figures.mean), to_mm(figures.p997), to_mm(figures.max));
 }
 
 std::string nlpd_line(const Evaluation& evaluation) {
   if (!evaluation.nlpd) return "";
-  return fmt::format("  {:.3f} nat: mean negative log predictive density of a coordinate, mm, compensated\n",
-                     nlpd_in_mm(*evaluation.nlpd));
+  return fmt::format(
+      "  {:.3f} nat: mean negative log predictive density of a coordinate, mm, compensated\n",
+      nlpd_in_mm(*evaluation.nlpd));
 }
 
 std::string doubt_line(const Evaluation& evaluation) {
@@ -41,10 +42,12 @@ std::string doubt_line(const Evaluation& evaluation) {
 std::string orientation_lines(const std::optional<OrientationFigures>& orientation) {
   if (!orientation) return "";
   std::string text = fmt::format(
-      "  orientation, deg rms of {} poses: nominal {:.4f}, calibrated {:.4f}, compensated {:.4f}", orientation->poses,
-      to_deg(orientation->nominal), to_deg(orientation->calibrated), to_deg(orientation->compensated));
+      "  orientation, deg rms of {} poses: nominal {:.4f}, calibrated {:.4f}, compensated {:.4f}",
+      orientation->poses, to_deg(orientation->nominal), to_deg(orientation->calibrated),
+      to_deg(orientation->compensated));
   if (orientation->coverage_95)
-    text += fmt::format("; {:.1f} % of rotations inside their 95 % interval", 100 * *orientation->coverage_95);
+    text += fmt::format("; {:.1f} % of rotations inside their 95 % interval",
+                        100 * *orientation->coverage_95);
   return text + "\n";
 }
 
@@ -52,16 +55,18 @@ std::string orientation_lines(const std::optional<OrientationFigures>& orientati
 std::string stated_coverage_line(std::optional<double> share) {
   constexpr double kFar = 0.5;  // a model that leaves as much again as the instrument has 0.83
   if (!share || *share >= kFar) return "";
-  return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n", 100 * *share);
+  return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n",
+                     100 * *share);
 }
 
 std::string gauge_lines(const std::optional<GaugeFigures>& gauges) {
   if (!gauges) return "";
   const std::string text = fmt::format(
-      "  distances and touches, mm rms of {} values (of the value, not of a position): nominal {:.4f}, calibrated "
-      "{:.4f}, compensated {:.4f}, max {:.4f}; {} in domain; {:.1f} % inside their 95 % interval\n",
-      gauges->rows, to_mm(gauges->nominal), to_mm(gauges->calibrated), to_mm(gauges->compensated), to_mm(gauges->max),
-      gauges->in_domain, 100 * gauges->coverage_95);
+      "  distances and touches, mm rms of {} values (of the value, not of a position): nominal "
+      "{:.4f}, calibrated {:.4f}, compensated {:.4f}, max {:.4f}; {} in domain; {:.1f} % inside "
+      "their 95 % interval\n",
+      gauges->rows, to_mm(gauges->nominal), to_mm(gauges->calibrated), to_mm(gauges->compensated),
+      to_mm(gauges->max), gauges->in_domain, 100 * gauges->coverage_95);
   return text + stated_coverage_line(gauges->coverage_95_stated);
 }
 
@@ -94,20 +99,25 @@ ordered_json orientation_json(const OrientationFigures& orientation) {
 
 std::string evaluation_table(const Evaluation& evaluation) {
   if (evaluation.poses == 0 && evaluation.gauges) return gauge_lines(evaluation.gauges);
-  return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
-         figures_line("nominal", evaluation.nominal) + figures_line("calibrated", evaluation.calibrated) +
+  return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %",
+                     "max") +
+         figures_line("nominal", evaluation.nominal) +
+         figures_line("calibrated", evaluation.calibrated) +
          figures_line("compensated", evaluation.compensated) +
-         fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
-                     evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
+         fmt::format(
+             "  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
+             evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
          stated_coverage_line(evaluation.coverage_95_stated) + nlpd_line(evaluation) +
-         orientation_lines(evaluation.orientation) + gauge_lines(evaluation.gauges) + doubt_line(evaluation);
+         orientation_lines(evaluation.orientation) + gauge_lines(evaluation.gauges) +
+         doubt_line(evaluation);
 }
 
-std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors) {
+std::string residuals_csv(const MeasurementBatch& batch,
+                          const CompensatedModel::LevelErrors& errors) {
   constexpr double kSuspect = 5.5;  // norm of 3 axes that 1 in 10^6 good poses exceeds
   std::string text =
-      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,cz_mm,nominal_mm,"
-      "in_domain,suspect\n";
+      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,"
+      "cz_mm,nominal_mm,in_domain,suspect\n";
   const auto rounded = [](double value) { return fmt::format("{:.6g}", value); };
   const auto three = [&](const Vector3& v) {
     return fmt::format("{},{},{}", rounded(v.x()), rounded(v.y()), rounded(v.z()));
@@ -117,28 +127,32 @@ std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel:
     const Vector3 e = errors.compensated.col(i);
     const Vector3 z = e.cwiseQuotient(Vector3(errors.stddev.col(i)));
     const Vector3 calibrated = errors.calibrated.col(i);
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row, rounded(to_mm(e.norm())),
-                        three(to_mm(1) * e), three(to_mm(1) * errors.stddev.col(i)), three(z),
-                        rounded(to_mm(calibrated.norm())), three(to_mm(1) * calibrated),
-                        rounded(to_mm(errors.nominal.col(i).norm())),
-                        errors.in_domain[static_cast<std::size_t>(i)] ? 1 : 0, z.norm() > kSuspect ? 1 : 0);
+    text += fmt::format(
+        "{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row, rounded(to_mm(e.norm())),
+        three(to_mm(1) * e), three(to_mm(1) * errors.stddev.col(i)), three(z),
+        rounded(to_mm(calibrated.norm())), three(to_mm(1) * calibrated),
+        rounded(to_mm(errors.nominal.col(i).norm())),
+        errors.in_domain[static_cast<std::size_t>(i)] ? 1 : 0, z.norm() > kSuspect ? 1 : 0);
   }
   return text;
 }
 
-std::string gauge_residuals_csv(const MeasurementBatch& batch, const CompensatedModel::GaugeErrors& errors) {
+std::string gauge_residuals_csv(const MeasurementBatch& batch,
+                                const CompensatedModel::GaugeErrors& errors) {
   constexpr double kSuspect = 4.89;  // of one number, that 1 in 10^6 good ones exceeds
-  std::string text = "pose_id,row,anchor_id,value_mm,error_mm,s_mm,z,calibrated_mm,nominal_mm,in_domain,suspect\n";
+  std::string text =
+      "pose_id,row,anchor_id,value_mm,error_mm,s_mm,z,calibrated_mm,nominal_mm,in_domain,suspect\n";
   const auto rounded = [](double value) { return fmt::format("{:.6g}", value); };
   for (std::size_t i = 0; i < errors.rows.size(); ++i) {
     const Measurement& m = batch.measurements[errors.rows[i]];
     const auto at = static_cast<Eigen::Index>(i);
     const double z = errors.compensated(at) / errors.stddev(at);
-    text +=
-        fmt::format("{},{},{},{:.6f},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row, csv_field(m.gauge->anchor),
-                    to_mm(m.gauge->value), rounded(to_mm(errors.compensated(at))), rounded(to_mm(errors.stddev(at))),
-                    rounded(z), rounded(to_mm(errors.calibrated(at))), rounded(to_mm(errors.nominal(at))),
-                    errors.in_domain[i] ? 1 : 0, std::abs(z) > kSuspect ? 1 : 0);
+    text += fmt::format("{},{},{},{:.6f},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row,
+                        csv_field(m.gauge->anchor), to_mm(m.gauge->value),
+                        rounded(to_mm(errors.compensated(at))), rounded(to_mm(errors.stddev(at))),
+                        rounded(z), rounded(to_mm(errors.calibrated(at))),
+                        rounded(to_mm(errors.nominal(at))), errors.in_domain[i] ? 1 : 0,
+                        std::abs(z) > kSuspect ? 1 : 0);
   }
   return text;
 }
@@ -152,7 +166,8 @@ std::string structure_note(const CompensatedModel& model, const MeasurementBatch
 ordered_json evaluation_json(const Evaluation& evaluation) {
   ordered_json json = {{"poses", evaluation.poses}};
   if (evaluation.gauges) json["gauges"] = gauges_json(*evaluation.gauges);
-  if (evaluation.poses == 0 && evaluation.gauges) return json;  // figures of positions would be of nothing
+  if (evaluation.poses == 0 && evaluation.gauges)
+    return json;  // figures of positions would be of nothing
   json.update(figures_json(evaluation.compensated));
   json["levels"] = {{"nominal", figures_json(evaluation.nominal)},
                     {"calibrated", figures_json(evaluation.calibrated)},
@@ -171,25 +186,29 @@ namespace {
 std::string rotation_text(const CompensatedModel::Parts& parts) {
   if (parts.rotation_bias) return "the bias corrects orientations too\n";
   if (!parts.bias || parts.oriented_poses == 0) return "";
-  return fmt::format("the bias corrects positions only: {} of its {} poses have an orientation, all must\n",
-                     parts.oriented_poses, parts.bias->q.rows());
+  return fmt::format(
+      "the bias corrects positions only: {} of its {} poses have an orientation, all must\n",
+      parts.oriented_poses, parts.bias->q.rows());
 }
 
 std::string candidate_line(const BiasCandidate& c) {
-  if (c.skipped) return fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
-  return fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
-                     to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
+  if (c.skipped)
+    return fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-",
+                       c.verdict);
+  return fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel,
+                     to_mm(c.leave_one_out_rms), to_mm(c.time_block_rms), to_mm(c.joint_block_rms),
+                     nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
 }
 
 std::string choice_text(const BiasChoice& choice) {
   std::string text = choice.sentence + "\n";
   if (choice.candidates.empty()) return text;
-  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "one by one", "in time",
-                      "in space", "nlpd (mm)");
+  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "one by one",
+                      "in time", "in space", "nlpd (mm)");
   for (const BiasCandidate& candidate : choice.candidates) text += candidate_line(candidate);
   return text +
-         "  one by one, nlpd: each pose left out of the bias, not of the physics (so `none` is its residual); in time, "
-         "in space: eighths left out of both\n";
+         "  one by one, nlpd: each pose left out of the bias, not of the physics (so `none` is its "
+         "residual); in time, in space: eighths left out of both\n";
 }
 
 ordered_json choice_json(const BiasChoice& choice) {
@@ -218,13 +237,15 @@ std::string negative_play_text(const CompensatedModel::Parts& parts) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const std::size_t first = next;
     next += source->parameters().size();
-    if (source->cause().search != causes::SearchFamily::kPlay || next > parts.parameters.size()) continue;
+    if (source->cause().search != causes::SearchFamily::kPlay || next > parts.parameters.size())
+      continue;
     const IdentifiedParameter& play = parts.parameters[first];
     const double expanded = kExpanded * play.stddev;
     if (play.value + expanded >= 0) continue;
     text += fmt::format(
-        "{} is {:.0f} urad (U {:.0f}), but play is positive by definition: joints read or measured before they stood "
-        "still, a servo that overshoots or lags, or a dir{} column of the wrong sign?\n",
+        "{} is {:.0f} urad (U {:.0f}), but play is positive by definition: joints read or measured "
+        "before they stood still, a servo that overshoots or lags, or a dir{} column of the wrong "
+        "sign?\n",
         play.parameter.name, 1e6 * play.value, 1e6 * expanded, source->joint() + 1);
   }
   return text;
@@ -236,10 +257,11 @@ std::string provenance_text(const CompensatedModel& model) {
   const auto identified = std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                         [](const IdentifiedParameter& p) { return p.identified; });
   std::string text = fmt::format(
-      "model {} of cell {}: error sources: {}; bias {}\ntrained on {} poses of batch {}; {} of {} parameters "
-      "identified (rank {})\n",
-      provenance.id, model.cell().name, level_in_words(provenance.level), parts.bias ? parts.bias->kernel : "none",
-      provenance.training_poses, provenance.batch_id, identified, parts.parameters.size(), parts.rank);
+      "model {} of cell {}: error sources: {}; bias {}\ntrained on {} poses of batch {}; {} of {} "
+      "parameters identified (rank {})\n",
+      provenance.id, model.cell().name, level_in_words(provenance.level),
+      parts.bias ? parts.bias->kernel : "none", provenance.training_poses, provenance.batch_id,
+      identified, parts.parameters.size(), parts.rank);
   for (const RefitRecord& refit : provenance.refits) {
     text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
                         causes_in_words(refit.sources), refit.poses, refit.batch_id, refit.model);
@@ -250,13 +272,15 @@ std::string provenance_text(const CompensatedModel& model) {
 std::string unidentifiable_text(const std::vector<UnidentifiableCombination>& combinations) {
   if (combinations.empty()) return "";
   std::string text = "not identifiable from these poses:\n";
-  for (const UnidentifiableCombination& one : combinations) text += fmt::format("  {}\n", one.sentence);
+  for (const UnidentifiableCombination& one : combinations)
+    text += fmt::format("  {}\n", one.sentence);
   return text;
 }
 
 std::string suspects_text(const std::vector<SuspectPose>& suspects) {
   if (suspects.empty()) return "";
-  std::string text = "poses that do not fit the others (bounded in their pull; measure them again):\n";
+  std::string text =
+      "poses that do not fit the others (bounded in their pull; measure them again):\n";
   for (const SuspectPose& pose : suspects) {
     text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
                         to_mm(pose.distance), pose.sigmas);
@@ -268,7 +292,8 @@ std::string suspects_text(const std::vector<SuspectPose>& suspects) {
 std::string budget_text(const ModelParts& parts) {
   if (!parts.budget) return "";
   std::string text;
-  for (const std::string& line : in_words(*parts.budget)) text += (text.empty() ? "" : "  ") + line + "\n";
+  for (const std::string& line : in_words(*parts.budget))
+    text += (text.empty() ? "" : "  ") + line + "\n";
   return text;
 }
 
@@ -277,10 +302,12 @@ std::string budget_text(const ModelParts& parts) {
 std::string model_text(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   const std::vector<Note> notes = notes_of(model);
-  std::string text = notes_text(grave(notes)) + provenance_text(model) + notes_text(for_information(notes));
+  std::string text =
+      notes_text(grave(notes)) + provenance_text(model) + notes_text(for_information(notes));
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
-  return text + budget_text(parts) + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);
+  return text + budget_text(parts) + unidentifiable_text(parts.unidentifiable) +
+         suspects_text(parts.suspects);
 }
 
 namespace {
@@ -295,10 +322,12 @@ ordered_json correlations_json(const CompensatedModel::Parts& parts) {
     for (std::size_t j = 0; j < i; ++j) {
       const auto a = static_cast<Eigen::Index>(i);
       const auto b = static_cast<Eigen::Index>(j);
-      const double correlation = parts.covariance(a, b) / std::sqrt(parts.covariance(a, a) * parts.covariance(b, b));
+      const double correlation =
+          parts.covariance(a, b) / std::sqrt(parts.covariance(a, a) * parts.covariance(b, b));
       if (std::abs(correlation) < kWorthTelling) continue;
-      pairs.push_back({{"parameters", {parts.parameters[j].parameter.name, parts.parameters[i].parameter.name}},
-                       {"correlation", correlation}});
+      pairs.push_back(
+          {{"parameters", {parts.parameters[j].parameter.name, parts.parameters[i].parameter.name}},
+           {"correlation", correlation}});
     }
   }
   return pairs;
@@ -335,8 +364,9 @@ ordered_json sessions_json(const CompensatedModel::Parts& parts) {
 ordered_json unidentifiable_json(const std::vector<UnidentifiableCombination>& combinations) {
   ordered_json list = ordered_json::array();
   for (const UnidentifiableCombination& one : combinations) {
-    list.push_back(
-        {{"parameters", one.parameters}, {"singular_value", one.singular_value}, {"sentence", one.sentence}});
+    list.push_back({{"parameters", one.parameters},
+                    {"singular_value", one.singular_value},
+                    {"sentence", one.sentence}});
   }
   return list;
 }
@@ -344,8 +374,10 @@ ordered_json unidentifiable_json(const std::vector<UnidentifiableCombination>& c
 ordered_json suspects_json(const std::vector<SuspectPose>& suspects) {
   ordered_json list = ordered_json::array();
   for (const SuspectPose& pose : suspects) {
-    list.push_back(
-        {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"sigmas", pose.sigmas}});
+    list.push_back({{"pose_id", pose.pose_id},
+                    {"row", pose.row},
+                    {"distance_mm", to_mm(pose.distance)},
+                    {"sigmas", pose.sigmas}});
   }
   return list;
 }
@@ -365,18 +397,18 @@ ordered_json refits_json(const std::vector<RefitRecord>& refits) {
 ordered_json provenance_json(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   const ModelProvenance& provenance = parts.provenance;
-  return {
-      {"model", provenance.id},
-      {"hash", provenance.hash},
-      {"cell", model.cell().name},
-      {"level", provenance.level},
-      {"bias", parts.bias ? parts.bias->kernel : "none"},
-      {"batch", provenance.batch_id},
-      {"batch_hash", provenance.batch_hash},
-      {"trained_at_unix_s", provenance.trained_at},
-      {"measured_at_unix_s", provenance.measured_at ? ordered_json(*provenance.measured_at) : ordered_json(nullptr)},
-      {"training_poses", provenance.training_poses},
-      {"seed", provenance.seed}};
+  return {{"model", provenance.id},
+          {"hash", provenance.hash},
+          {"cell", model.cell().name},
+          {"level", provenance.level},
+          {"bias", parts.bias ? parts.bias->kernel : "none"},
+          {"batch", provenance.batch_id},
+          {"batch_hash", provenance.batch_hash},
+          {"trained_at_unix_s", provenance.trained_at},
+          {"measured_at_unix_s",
+           provenance.measured_at ? ordered_json(*provenance.measured_at) : ordered_json(nullptr)},
+          {"training_poses", provenance.training_poses},
+          {"seed", provenance.seed}};
 }
 
 }  // namespace
@@ -397,9 +429,12 @@ ordered_json model_json(const CompensatedModel& model) {
   json["budget"] = parts.budget ? budget_json(*parts.budget) : ordered_json(nullptr);
   json["notes"] = notes_json(notes_of(model));
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
-  if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
-  if (!parts.sessions.empty()) json["between_sessions"] = session_changes_json(session_changes(model));
-  if (!parts.sessions.empty()) json["changes"] = json["between_sessions"];  // as it was called before
+  if (!parts.sessions.empty())
+    json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
+  if (!parts.sessions.empty())
+    json["between_sessions"] = session_changes_json(session_changes(model));
+  if (!parts.sessions.empty())
+    json["changes"] = json["between_sessions"];  // as it was called before
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;

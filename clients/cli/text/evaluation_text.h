@@ -10,14 +10,18 @@ namespace trammel::cli {
 
 /// `nominal`, `calibrated` and `compensated`, a line each, mm.
 [[nodiscard]] std::string evaluation_table(const Evaluation& evaluation);
-/// A row a pose: errors (measured - predicted, in B) with and without the bias, stated standard deviations, errors over
-/// them, and whether the pose is a suspect: farther off than one in a million.
-[[nodiscard]] std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors);
+/// A row a pose: errors (measured - predicted, in B) with and without the bias, stated standard
+/// deviations, errors over them, and whether the pose is a suspect: farther off than one in a
+/// million.
+[[nodiscard]] std::string residuals_csv(const MeasurementBatch& batch,
+                                        const CompensatedModel::LevelErrors& errors);
 /// The same of rows that tell one number: a row each, errors of that number.
 [[nodiscard]] std::string gauge_residuals_csv(const MeasurementBatch& batch,
                                               const CompensatedModel::GaugeErrors& errors);
-/// A sentence where what the calibrated model leaves of these poses is no noise; empty where it may be.
-[[nodiscard]] std::string structure_note(const CompensatedModel& model, const MeasurementBatch& batch,
+/// A sentence where what the calibrated model leaves of these poses is no noise; empty where it may
+/// be.
+[[nodiscard]] std::string structure_note(const CompensatedModel& model,
+                                         const MeasurementBatch& batch,
                                          const CompensatedModel::LevelErrors& errors);
 /// The keys of `evaluate --json`.
 [[nodiscard]] nlohmann::ordered_json evaluation_json(const Evaluation& evaluation);

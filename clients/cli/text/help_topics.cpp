@@ -20,9 +20,10 @@ constexpr std::array kTopics = {
               "\n"
               "Without a robot at hand: trammel simulate measures a plan on a virtual one."},
     HelpTopic{"formats", "the columns of every table that is read",
-              "All tables are text in columns with a header line: separated by ',', ';' or tabs, as the header is. "
-              "With ';' or tabs numbers may have decimal commas. Names of columns may be in capitals. Spreadsheets "
-              "(.xlsx) are exported first: Save As, \"CSV UTF-8\". What may be read in two ways is refused.\n"
+              "All tables are text in columns with a header line: separated by ',', ';' or tabs, "
+              "as the header is. With ';' or tabs numbers may have decimal commas. Names of "
+              "columns may be in capitals. Spreadsheets (.xlsx) are exported first: Save As, \"CSV "
+              "UTF-8\". What may be read in two ways is refused.\n"
               "\n"
               "Batch, what was measured (train, evaluate, diagnose, check, submit):\n"
               "  q1_deg ... qn_deg     joints as commanded, deg; a rail has q7_mm\n"
@@ -40,59 +41,58 @@ constexpr std::array kTopics = {
               "\n"
               "Points of a tracker (convert, references):\n"
               "  name, x_mm, y_mm, z_mm             or a SpatialAnalyzer ASCII export"},
-    HelpTopic{
-        "cell", "what a cell file says",
-        "YAML. The shortest one:\n"
-        "  version: 1\n"
-        "  cell: cell-7\n"
-        "  robot: ../models/abb_irb6640-205-275.yaml   # relative to this file\n"
-        "  base: null                        # unknown: found from the data\n"
-        "  gravity: [0, 0, -1]\n"
-        "  tools: {spindle: null}            # unknown: found from the data\n"
-        "  tracker: {sigma_mm: 0.013}\n"
-        "  model: {error_sources: [base, geometry, compliance], bias: se}\n"
-        "\n"
-        "Unknown keys are refused, all problems of a file are said in one run. trammeld --check looks at a server "
-        "file and at all of its cells."},
+    HelpTopic{"cell", "what a cell file says",
+              "YAML. The shortest one:\n"
+              "  version: 1\n"
+              "  cell: cell-7\n"
+              "  robot: ../models/abb_irb6640-205-275.yaml   # relative to this file\n"
+              "  base: null                        # unknown: found from the data\n"
+              "  gravity: [0, 0, -1]\n"
+              "  tools: {spindle: null}            # unknown: found from the data\n"
+              "  tracker: {sigma_mm: 0.013}\n"
+              "  model: {error_sources: [base, geometry, compliance], bias: se}\n"
+              "\n"
+              "Unknown keys are refused, all problems of a file are said in one run. trammeld "
+              "--check looks at a server file and at all of its cells."},
     HelpTopic{
         "units", "in which unit each number is",
-        "Joints are in deg, rails in mm, positions in mm, weights in kg, forces in N, times in s, temperatures in "
-        "degrees Celsius. The name of a column or key ends in its unit: q1_deg, x_mm, mass_kg. u95 is two standard "
-        "uncertainties; sigma_mm is one, per axis."},
+        "Joints are in deg, rails in mm, positions in mm, weights in kg, forces in N, times in s, "
+        "temperatures in degrees Celsius. The name of a column or key ends in its unit: q1_deg, "
+        "x_mm, mass_kg. u95 is two standard uncertainties; sigma_mm is one, per axis."},
     HelpTopic{
         "levels", "what a training identifies (--level, --bias)",
-        "M0 nothing, M1 base, M2 base and geometry, M3 base, geometry and compliance; a list, or a level and more:\n"
+        "M0 nothing, M1 base, M2 base and geometry, M3 base, geometry and compliance; a list, or a "
+        "level and more:\n"
         "  trammel train --cell c.yaml --batch b.csv --level M2,gear_transmission:3 -o m\n"
         "\n"
-        "--bias spells the kernel of what is learned of the rest: se, matern32, matern52, none, auto, sums and "
-        "products of them. An \"rbf\" kernel of other programs is called se here."},
-    HelpTopic{
-        "service", "asking a daemon, and which one (--port, --host)",
-        "With --service, or for commands that only a daemon can do, trammel asks a running trammeld on this host:\n"
-        "  trammeld --config config/server.yaml --check\n"
-        "  deploy/supervise trammeld --config config/server.yaml\n"
-        "  trammel status\n"
-        "\n"
-        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each server. Where a discovery "
-        "server runs (dds: discovery_servers of the server file), --discovery-server HOST instead: it tells where "
-        "services are. trammel doctor says "
-        "what is in the way where nothing answers."},
+        "--bias spells the kernel of what is learned of the rest: se, matern32, matern52, none, "
+        "auto, sums and products of them. An \"rbf\" kernel of other programs is called se here."},
+    HelpTopic{"service", "asking a daemon, and which one (--port, --host)",
+              "With --service, or for commands that only a daemon can do, trammel asks a running "
+              "trammeld on this host:\n"
+              "  trammeld --config config/server.yaml --check\n"
+              "  deploy/supervise trammeld --config config/server.yaml\n"
+              "  trammel status\n"
+              "\n"
+              "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each "
+              "server. Where a discovery server runs (dds: discovery_servers of the server file), "
+              "--discovery-server HOST instead: it tells where services are. trammel doctor says "
+              "what is in the way where nothing answers."},
     HelpTopic{"defaults", "one file for what you would say every time",
-              "The file that the environment variable TRAMMEL_DEFAULTS names, else ~/.config/trammel/defaults, holds "
-              "options as name = value, one a line; # begins a comment:\n"
+              "The file that the environment variable TRAMMEL_DEFAULTS names, else "
+              "~/.config/trammel/defaults, holds options as name = value, one a line; # begins a "
+              "comment:\n"
               "  port = 17501\n"
               "  cell = /data/cells/cell-7.yaml\n"
               "\n"
-              "Taken are host, discovery-server, port, domain, timeout, cell, tool, payload and seed, by each command "
-              "that has the option, cell only where a command needs one. What the command line says comes first. "
-              "TRAMMEL_DEFAULTS= (empty) "
-              "takes none."},
-    HelpTopic{
-        "exit-codes", "what a script may rely on",
-        "0 done; 1 done but not all (targets left as they were, a new model not in force, findings of doctor, and of "
-        "diagnose and check where --strict asks); 2 "
-        "wrong usage; 3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "
-        "{\"error\": {code, message, file, row, field, value, limit, next, sentence}}."},
+              "Taken are host, discovery-server, port, domain, timeout, cell, tool, payload and "
+              "seed, by each command that has the option, cell only where a command needs one. "
+              "What the command line says comes first. TRAMMEL_DEFAULTS= (empty) takes none."},
+    HelpTopic{"exit-codes", "what a script may rely on",
+              "0 done; 1 done but not all (targets left as they were, a new model not in force, "
+              "findings of doctor, and of diagnose and check where --strict asks); 2 wrong usage; "
+              "3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "
+              "{\"error\": {code, message, file, row, field, value, limit, next, sentence}}."},
 };
 
 constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
@@ -187,11 +187,12 @@ std::string_view examples_of(std::string_view command) {
 }
 
 std::string_view common_footer() {
-  return "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of what they belong to.\n"
-         "An output file named '-' is standard output. Errors go to standard error and name file, row, value and "
-         "limit.\n"
-         "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong "
-         "usage; 3 refused data; 4 service unreachable or busy.\n"
+  return "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of "
+         "what they belong to.\n"
+         "An output file named '-' is standard output. Errors go to standard error and name file, "
+         "row, value and limit.\n"
+         "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in "
+         "force); 2 wrong usage; 3 refused data; 4 service unreachable or busy.\n"
          "trammel help lists commands and topics: formats, cell, units, service, ...";
 }
 

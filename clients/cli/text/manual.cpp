@@ -50,30 +50,36 @@ std::string options_text(const CommandText& command) {
   return page.empty() ? "" : ".SH OPTIONS\n" + page;
 }
 
-std::string head(const std::string& name, const std::string& version, const std::string& description,
-                 const std::string& usage) {
-  return fmt::format(".TH {} 1 \"\" \"trammel {}\" \"Trammel\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n",
-                     troff(upper(name)), version, troff(name), troff(description), troff(usage));
+std::string head(const std::string& name, const std::string& version,
+                 const std::string& description, const std::string& usage) {
+  return fmt::format(
+      ".TH {} 1 \"\" \"trammel {}\" \"Trammel\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n",
+      troff(upper(name)), version, troff(name), troff(description), troff(usage));
 }
 
 constexpr const char* kEnd =
-    ".SH EXIT STATUS\n0 done; 1 done but not all; 2 wrong usage; 3 refused data; 4 service unreachable or busy.\n"
-    ".SH ENVIRONMENT\n.TP\n.B TRAMMEL_DEFAULTS\nFile of options that every command takes, name = value, one a line.\n"
+    ".SH EXIT STATUS\n0 done; 1 done but not all; 2 wrong usage; 3 refused data; 4 service "
+    "unreachable or busy.\n"
+    ".SH ENVIRONMENT\n.TP\n.B TRAMMEL_DEFAULTS\nFile of options that every command takes, name = "
+    "value, one a line.\n"
     ".TP\n.B NO_COLOR\nNo colours on a terminal, where it is set.\n";
 
 std::string page_of(const CommandText& command, const std::string& version) {
   std::string page =
-      head("trammel-" + command.name, version, command.description, command.usage("trammel")) + options_text(command);
+      head("trammel-" + command.name, version, command.description, command.usage("trammel")) +
+      options_text(command);
   if (const auto examples = examples_of(command.name); !examples.empty())
     page += ".SH EXAMPLES\n" + example_block(std::string(examples));
   return page + kEnd + ".SH SEE ALSO\n.BR trammel (1)\n";
 }
 
 std::string page_of_program(const CommandText& program, const std::string& version) {
-  std::string page = head("trammel", version, program.description, program.usage("")) + options_text(program);
+  std::string page =
+      head("trammel", version, program.description, program.usage("")) + options_text(program);
   page += ".SH COMMANDS\n";
   for (const CommandText& command : program.commands)
-    page += fmt::format(".TP\n.BR trammel\\-{} (1)\n{}\n", troff(command.name), troff(command.description));
+    page += fmt::format(".TP\n.BR trammel\\-{} (1)\n{}\n", troff(command.name),
+                        troff(command.description));
   for (const HelpTopic& topic : help_topics()) {
     page += fmt::format(".SH {}\n{}", troff(upper(topic.name)), paragraphs(topic.text));
   }
@@ -98,14 +104,16 @@ std::string topic_names() {
 std::string positional_words(const CommandText& command, const std::string& commands) {
   if (command.name == "help") return commands + topic_names();
   for (const OptionText& option : command.options) {
-    if (option.positional && !option.words.empty()) return fmt::format("{}", fmt::join(option.words, " "));
+    if (option.positional && !option.words.empty())
+      return fmt::format("{}", fmt::join(option.words, " "));
   }
   return "";
 }
 
 std::string command_names(const CommandText& program) {
   std::string names;
-  for (const CommandText& command : program.commands) names += (names.empty() ? "" : " ") + command.name;
+  for (const CommandText& command : program.commands)
+    names += (names.empty() ? "" : " ") + command.name;
   return names;
 }
 
@@ -114,10 +122,12 @@ std::string quoted(const std::string& text) { return replaced(text, "'", "'\\''"
 
 }  // namespace
 
-std::vector<TextFile> manual_pages(const CommandText& program, const std::string& version, const std::string& folder) {
+std::vector<TextFile> manual_pages(const CommandText& program, const std::string& version,
+                                   const std::string& folder) {
   std::vector<TextFile> pages = {{folder + "/trammel.1", page_of_program(program, version)}};
   for (const CommandText& command : program.commands)
-    pages.push_back({fmt::format("{}/trammel-{}.1", folder, command.name), page_of(command, version)});
+    pages.push_back(
+        {fmt::format("{}/trammel-{}.1", folder, command.name), page_of(command, version)});
   return pages;
 }
 
@@ -127,11 +137,13 @@ std::string bash_completion(const CommandText& program) {
     std::string values;
     for (const OptionText& option : command.options) {
       if (option.words.empty() || option.positional) continue;
-      values += fmt::format("        {}) words='{}' ;;\n", fmt::join(option.names, "|"), fmt::join(option.words, " "));
+      values += fmt::format("        {}) words='{}' ;;\n", fmt::join(option.names, "|"),
+                            fmt::join(option.words, " "));
     }
     if (!values.empty()) values = "      case \"$previous\" in\n" + values + "      esac\n";
-    cases += fmt::format("    {})\n      options='{}'\n      arguments='{}'\n{}      ;;\n", command.name,
-                         option_names(command), positional_words(command, command_names(program)), values);
+    cases += fmt::format("    {})\n      options='{}'\n      arguments='{}'\n{}      ;;\n",
+                         command.name, option_names(command),
+                         positional_words(command, command_names(program)), values);
   }
   return fmt::format(
       "# bash completion of trammel; made by: trammel completion bash\n"
@@ -165,17 +177,19 @@ std::string zsh_completion(const CommandText& program) {
     commands += fmt::format("    '{}:{}'\n", command.name, described_as(command.description));
     std::string arguments;
     for (const OptionText& option : command.options) {
-      const std::string action = option.words.empty() ? "_files" : fmt::format("({})", fmt::join(option.words, " "));
+      const std::string action =
+          option.words.empty() ? "_files" : fmt::format("({})", fmt::join(option.words, " "));
       if (option.positional) continue;
       for (const std::string& name : option.names) {
         arguments +=
-            fmt::format(" \\\n        '{}{}[{}]{}'", option.repeated ? "*" : "", name, described_as(option.description),
+            fmt::format(" \\\n        '{}{}[{}]{}'", option.repeated ? "*" : "", name,
+                        described_as(option.description),
                         option.value.empty() ? "" : fmt::format(":{}:{}", option.value, action));
       }
     }
     const std::string words = positional_words(command, command_names(program));
-    cases += fmt::format("    {})\n      _arguments{} \\\n        '*:argument:{}' ;;\n", command.name, arguments,
-                         words.empty() ? "_files" : "(" + words + ")");
+    cases += fmt::format("    {})\n      _arguments{} \\\n        '*:argument:{}' ;;\n",
+                         command.name, arguments, words.empty() ? "_files" : "(" + words + ")");
   }
   return fmt::format(
       "#compdef trammel\n"
@@ -198,17 +212,19 @@ std::string zsh_completion(const CommandText& program) {
 std::string fish_completion(const CommandText& program) {
   std::string lines = "# fish completion of trammel; made by: trammel completion fish\n";
   for (const CommandText& command : program.commands) {
-    lines += fmt::format("complete -c trammel -n __fish_use_subcommand -f -a {} -d '{}'\n", command.name,
-                         quoted(command.description));
-    const std::string here = fmt::format("complete -c trammel -n '__fish_seen_subcommand_from {}'", command.name);
+    lines += fmt::format("complete -c trammel -n __fish_use_subcommand -f -a {} -d '{}'\n",
+                         command.name, quoted(command.description));
+    const std::string here =
+        fmt::format("complete -c trammel -n '__fish_seen_subcommand_from {}'", command.name);
     for (const OptionText& option : command.options) {
       if (option.positional) continue;
       std::string names;
       for (const std::string& name : option.names)
         names += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
-      const std::string value = option.value.empty()   ? ""
-                                : option.words.empty() ? " -r"
-                                                       : fmt::format(" -x -a '{}'", fmt::join(option.words, " "));
+      const std::string value = option.value.empty() ? ""
+                                : option.words.empty()
+                                    ? " -r"
+                                    : fmt::format(" -x -a '{}'", fmt::join(option.words, " "));
       lines += fmt::format("{}{}{} -d '{}'\n", here, names, value, quoted(option.description));
     }
     const std::string words = positional_words(command, command_names(program));

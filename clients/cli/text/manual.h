@@ -9,8 +9,10 @@
 /// Manual pages and shell completions of the commands, from the same tree as their help.
 namespace trammel::cli {
 
-/// One page in troff for the program, `trammel.1`, and one for each command, `trammel-plan.1`, into `folder`.
-[[nodiscard]] std::vector<TextFile> manual_pages(const CommandText& program, const std::string& version,
+/// One page in troff for the program, `trammel.1`, and one for each command, `trammel-plan.1`, into
+/// `folder`.
+[[nodiscard]] std::vector<TextFile> manual_pages(const CommandText& program,
+                                                 const std::string& version,
                                                  const std::string& folder);
 
 [[nodiscard]] std::string bash_completion(const CommandText& program);

@@ -23,8 +23,9 @@ std::vector<Note> for_information(const std::vector<Note>& notes) {
 std::string notes_text(const std::vector<Note>& notes) {
   std::string text;
   for (const Note& note : notes)
-    text +=
-        fmt::format("{}: {}\n", note.severity == Note::Severity::kInfo ? "note" : to_text(note.severity), note.text);
+    text += fmt::format("{}: {}\n",
+                        note.severity == Note::Severity::kInfo ? "note" : to_text(note.severity),
+                        note.text);
   return text;
 }
 

@@ -14,7 +14,8 @@ namespace trammel::cli {
 /// A line each: `stop: ...`, `warning: ...`, `note: ...`.
 [[nodiscard]] std::string notes_text(const std::vector<Note>& notes);
 
-/// Those that nobody who uses the model may overlook, on standard error, where results for programs do not hide them.
+/// Those that nobody who uses the model may overlook, on standard error, where results for programs
+/// do not hide them.
 void warn_of_notes(const std::vector<Note>& notes);
 
 }  // namespace trammel::cli

@@ -21,7 +21,9 @@ bool has_prediction(const PredictedTarget& target) {
 }
 
 /// mm, to a hundredth of a micrometre: more nobody knows.
-std::string millimetres(double value) { return std::isfinite(value) ? fmt::format("{:.5f}", value) : ""; }
+std::string millimetres(double value) {
+  return std::isfinite(value) ? fmt::format("{:.5f}", value) : "";
+}
 double rounded(double value) { return std::round(value * 1e5) / 1e5; }
 
 double error_mm(const PredictedTarget& target) {
@@ -38,17 +40,19 @@ double expected_mm(const PredictedTarget& target) {
 
 std::string prediction_csv(const PredictedProgram& program) {
   std::string text =
-      "file,line,name,motion,used_at,tool,frame,status,x_mm,y_mm,z_mm,px_mm,py_mm,pz_mm,dx_mm,dy_mm,dz_mm,error_mm,"
-      "slx_mm,sly_mm,slz_mm,expected_mm,model_id,message\n";
+      "file,line,name,motion,used_at,tool,frame,status,x_mm,y_mm,z_mm,px_mm,py_mm,pz_mm,dx_mm,dy_"
+      "mm,dz_mm,error_mm,slx_mm,sly_mm,slz_mm,expected_mm,model_id,message\n";
   for (const PredictedTarget& row : program.targets) {
-    text += fmt::format("{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
-                        csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
+    text += fmt::format("{},{},{},{},{},{},{},{},", csv_field(row.file), row.line,
+                        csv_field(row.name), csv_field(row.motion),
+                        csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
                         csv_field(row.tool), csv_field(row.frame), row.status);
     const client::PredictedError& item = row.predicted;
     std::vector<double> values = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
-    const std::vector<double> known = {item.predicted.x_mm, item.predicted.y_mm, item.predicted.z_mm, item.dx_mm,
-                                       item.dy_mm,          item.dz_mm,          error_mm(row),       item.slx_mm,
-                                       item.sly_mm,         item.slz_mm,         expected_mm(row)};
+    const std::vector<double> known = {
+        item.predicted.x_mm, item.predicted.y_mm, item.predicted.z_mm, item.dx_mm,
+        item.dy_mm,          item.dz_mm,          error_mm(row),       item.slx_mm,
+        item.sly_mm,         item.slz_mm,         expected_mm(row)};
     const std::vector<double> unknown(known.size(), cam::kNotKnown);
     values.insert(values.end(), has_prediction(row) ? known.begin() : unknown.begin(),
                   has_prediction(row) ? known.end() : unknown.end());
@@ -61,10 +65,12 @@ std::string prediction_csv(const PredictedProgram& program) {
 ordered_json prediction_json(const PredictedProgram& program) {
   ordered_json targets = ordered_json::array();
   for (const PredictedTarget& row : program.targets) {
-    ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
-                         {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
-                         {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
-    if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+    ordered_json item = {
+        {"file", row.file},     {"line", row.line},       {"name", row.name},
+        {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
+        {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
+    if (std::isfinite(row.p_B.x()))
+      item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
     if (has_prediction(row)) {
       const client::PredictedError& of = row.predicted;
       item["predicted_mm"] = {of.predicted.x_mm, of.predicted.y_mm, of.predicted.z_mm};
@@ -75,7 +81,8 @@ ordered_json prediction_json(const PredictedProgram& program) {
     targets.push_back(std::move(item));
   }
   std::vector<Note> notes = program.model.notes;
-  for (const std::string& one : program.notes) notes.push_back({"program", Note::Severity::kInfo, one});
+  for (const std::string& one : program.notes)
+    notes.push_back({"program", Note::Severity::kInfo, one});
   return {{"model", program.model_id}, {"notes", notes_json(notes)}, {"targets", targets}};
 }
 
@@ -87,8 +94,8 @@ std::string prediction_summary(const PredictedProgram& program) {
   for (const PredictedTarget& row : program.targets) {
     ++counts[row.status];
     if (!has_prediction(row)) {
-      left += fmt::format("  {} line {}: {}{}: {}\n", row.file, row.line, row.name.empty() ? "" : row.name + ": ",
-                          row.status, row.message);
+      left += fmt::format("  {} line {}: {}{}: {}\n", row.file, row.line,
+                          row.name.empty() ? "" : row.name + ": ", row.status, row.message);
       continue;
     }
     ++known;
@@ -102,7 +109,8 @@ std::string prediction_summary(const PredictedProgram& program) {
     separator = ", ";
   }
   if (known > 0)
-    text += fmt::format("; expected error {:.3f} mm rms, {:.3f} mm at most", std::sqrt(squares / known), most);
+    text += fmt::format("; expected error {:.3f} mm rms, {:.3f} mm at most",
+                        std::sqrt(squares / known), most);
   text += "\n";
   for (const std::string& note : program.notes) text += "note: " + note + "\n";
   return text + left;

@@ -51,15 +51,17 @@ std::string figures(const CorrectedProgram& program, double ReceiptRow::*column)
     ++count;
   }
   if (count == 0) return "not known";
-  return fmt::format("{:.3f} mm rms, {:.3f} mm at most", std::sqrt(sum / static_cast<double>(count)), most);
+  return fmt::format("{:.3f} mm rms, {:.3f} mm at most",
+                     std::sqrt(sum / static_cast<double>(count)), most);
 }
 
 /// `8 of 8 targets are corrected: 8.437 mm rms expected before, 0.017 mm after.`
 std::string verdict_of(const CorrectedProgram& program, double tolerance_mm) {
   const std::size_t left = program.left_alone(), all = program.rows.size();
-  std::string text = all == 0 ? "No target in it is understood: it is as it was."
-                              : fmt::format("{} of {} targets are corrected{}.", all - left, all,
-                                            left == 0 ? "" : "; the others are left as they were, see below");
+  std::string text =
+      all == 0 ? "No target in it is understood: it is as it was."
+               : fmt::format("{} of {} targets are corrected{}.", all - left, all,
+                             left == 0 ? "" : "; the others are left as they were, see below");
   const auto count = [&](const char* status) {
     return std::count_if(program.rows.begin(), program.rows.end(),
                          [&](const ReceiptRow& r) { return r.status == status; });
@@ -67,7 +69,8 @@ std::string verdict_of(const CorrectedProgram& program, double tolerance_mm) {
   if (const auto outside = count("out_of_domain"); outside > 0)
     text += fmt::format(" {} are outside the poses that the model learned from.", outside);
   if (tolerance_mm > 0)
-    text += " Held against " + verdict_text(tolerance_verdict(expected_errors(program), tolerance_mm)) + ".";
+    text += " Held against " +
+            verdict_text(tolerance_verdict(expected_errors(program), tolerance_mm)) + ".";
   return text;
 }
 
@@ -77,14 +80,17 @@ std::string facts(const CorrectedProgram& program) {
     if (!row.tool.empty()) ++tools[row.tool];
   }
   std::vector<std::string> names;
-  for (const auto& [name, count] : tools) names.push_back(fmt::format("{} ({} targets)", html_text(name), count));
+  for (const auto& [name, count] : tools)
+    names.push_back(fmt::format("{} ({} targets)", html_text(name), count));
   std::vector<HtmlRow> rows = {
       {{"Model", html_text(fmt::format("{} of cell {}", program.model_id, program.model.cell))}},
       {{"Error sources in it", html_text(level_in_words(program.model.level))}},
       {{"Newest measurement in it", date_of(program.model.measured_at_unix_s)}},
       {{"Tools", fmt::format("{}", fmt::join(names, ", "))}},
-      {{"Motions", fmt::format("{}, {} to corrected targets", program.moves, program.moves_corrected)}},
-      {{"Targets", fmt::format("{}, {} left as they were", program.rows.size(), program.left_alone())}},
+      {{"Motions",
+        fmt::format("{}, {} to corrected targets", program.moves, program.moves_corrected)}},
+      {{"Targets",
+        fmt::format("{}, {} left as they were", program.rows.size(), program.left_alone())}},
       {{"Expected error before", figures(program, &ReceiptRow::error_before_mm)}},
       {{"Expected error after", figures(program, &ReceiptRow::error_after_mm)}},
   };
@@ -97,20 +103,24 @@ std::string targets(const CorrectedProgram& program) {
   for (const ReceiptRow& row : program.rows) {
     if (rows.size() == kMostRows) break;
     const std::string said =
-        row.message + (row.suggestion.empty() ? "" : (row.message.empty() ? "" : "; ") + row.suggestion);
-    rows.push_back({{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(row.name), html_text(row.motion),
-                     html_text(row.tool), html_text(row.frame), html_text(row.status), mm(row.error_before_mm),
-                     mm(row.error_after_mm), mm(row.sigma_mm), mm(row.rounding_mm), html_text(said)},
+        row.message +
+        (row.suggestion.empty() ? "" : (row.message.empty() ? "" : "; ") + row.suggestion);
+    rows.push_back({{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(row.name),
+                     html_text(row.motion), html_text(row.tool), html_text(row.frame),
+                     html_text(row.status), mm(row.error_before_mm), mm(row.error_after_mm),
+                     mm(row.sigma_mm), mm(row.rounding_mm), html_text(said)},
                     row.corrected() ? row.status : "left"});
   }
   return html_table({"targets",
-                     {"place", "name", "motion", "tool", "frame", "status", "before, mm", "after, mm", "sigma, mm",
-                      "rounding, mm", ""},
+                     {"place", "name", "motion", "tool", "frame", "status", "before, mm",
+                      "after, mm", "sigma, mm", "rounding, mm", ""},
                      rows});
 }
 
 ordered_json points(const CorrectedProgram& program) {
-  const auto number = [](double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); };
+  const auto number = [](double value) {
+    return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+  };
   std::vector<const ReceiptRow*> path;
   for (const ReceiptRow& row : program.rows) {
     if (std::isfinite(row.p_B.x())) path.push_back(&row);
@@ -123,8 +133,9 @@ ordered_json points(const CorrectedProgram& program) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     const ReceiptRow& row = *path[i];
     if (i % step != 0 && (row.status == "ok" || all.size() >= 2 * kMostPoints)) continue;
-    all.push_back({to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z()), number(row.error_before_mm),
-                   number(row.error_after_mm), row.status, fmt::format("{} {}:{}", row.name, row.file, row.line)});
+    all.push_back({to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z()),
+                   number(row.error_before_mm), number(row.error_after_mm), row.status,
+                   fmt::format("{} {}:{}", row.name, row.file, row.line)});
   }
   return all;
 }
@@ -144,22 +155,26 @@ std::string files_of(const CorrectedProgram& program) {
 std::vector<ExpectedError> expected_errors(const CorrectedProgram& program) {
   std::vector<ExpectedError> errors;
   for (const ReceiptRow& row : program.rows) {
-    errors.push_back({row.error_before_mm, row.error_after_mm, row.sigma_mm, row.status != "out_of_domain"});
+    errors.push_back(
+        {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.status != "out_of_domain"});
   }
   return errors;
 }
 
-std::string receipt_page(const CorrectedProgram& program, double tolerance_mm, const CellPapers& papers) {
+std::string receipt_page(const CorrectedProgram& program, double tolerance_mm,
+                         const CellPapers& papers) {
   std::string more;
   if (program.rows.size() > kMostRows)
-    more = fmt::format("<p>The first {} of {} targets; the CSV receipt has all.</p>", kMostRows, program.rows.size());
+    more = fmt::format("<p>The first {} of {} targets; the CSV receipt has all.</p>", kMostRows,
+                       program.rows.size());
   return fill_in(kReceiptPage,
                  {{"page_css", std::string(page_style())},
                   {"mark", page_mark({"program", program.model.cell, program.model_id})},
                   {"verdict", html_text(verdict_of(program, tolerance_mm))},
                   {"view3d_js", std::string(view3d_script())},
-                  {"subtitle", html_text(fmt::format("{} · cell {} · {}{}", files_of(program), program.model.cell,
-                                                     shown_day(unix_now()), papers_text(papers)))},
+                  {"subtitle", html_text(fmt::format("{} · cell {} · {}{}", files_of(program),
+                                                     program.model.cell, shown_day(unix_now()),
+                                                     papers_text(papers)))},
                   {"facts", facts(program)},
                   {"targets", targets(program) + more},
                   {"points", script_json(points(program))},

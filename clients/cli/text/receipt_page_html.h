@@ -4,8 +4,8 @@
 
 namespace trammel::cli {
 
-/// The page of a receipt, with `{{...}}` where its content goes. The path turns and zooms in a canvas
-/// (view3d_script()); nothing is loaded.
+/// The page of a receipt, with `{{...}}` where its content goes. The path turns and zooms in a
+/// canvas (view3d_script()); nothing is loaded.
 constexpr std::string_view kReceiptPage = R"page(<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -21,7 +21,8 @@ using cam::ReceiptRow;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kNumbers = 7;  // of the longest kind of target
-// Bytes a target: a text of a long program that grows by doubling takes three times its size for a moment.
+// Bytes a target: a text of a long program that grows by doubling takes three times its size for a
+// moment.
 constexpr std::size_t kCsvBytes = 400;
 constexpr std::size_t kJsonBytes = 900;
 
@@ -29,7 +30,8 @@ constexpr std::size_t kJsonBytes = 900;
 
 void add_number(std::string& text, double value, std::chars_format format, int digits) {
   std::array<char, 400> written{};
-  text.append(written.data(), std::to_chars(written.begin(), written.end(), value, format, digits).ptr);
+  text.append(written.data(),
+              std::to_chars(written.begin(), written.end(), value, format, digits).ptr);
 }
 
 /// Nothing where it is not known.
@@ -69,10 +71,14 @@ std::string domain_of(const ReceiptRow& row) {
   return row.status == "ok" ? "inside" : row.status == "out_of_domain" ? "outside" : "";
 }
 
-ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+ordered_json json_of(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
 
 /// To a tenth of a micrometre, as in the CSV.
-ordered_json json_mm(double value) { return json_of(std::isfinite(value) ? std::round(value * 1e5) / 1e5 : value); }
+ordered_json json_mm(double value) {
+  return json_of(std::isfinite(value) ? std::round(value * 1e5) / 1e5 : value);
+}
 
 ordered_json item_of(const ReceiptRow& row) {
   ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
@@ -88,7 +94,8 @@ ordered_json item_of(const ReceiptRow& row) {
     item["joints"] = row.joints;
     item["folded"] = row.folded;
   }
-  if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+  if (std::isfinite(row.p_B.x()))
+    item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
   item["error_before_mm"] = json_mm(row.error_before_mm);
   item["error_after_mm"] = json_mm(row.error_after_mm);
   item["sigma_mm"] = json_mm(row.sigma_mm);
@@ -110,34 +117,39 @@ std::string receipt_csv(const CorrectedProgram& program) {
   for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",before_{}", k);
   for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",after_{}", k);
   text +=
-      ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
-      "path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,suggestion\n";
+      ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,"
+      "domain,iterations,path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,"
+      "suggestion\n";
   text.reserve(text.size() + kCsvBytes * program.rows.size());
   const auto out = std::back_inserter(text);
   for (const ReceiptRow& row : program.rows) {
-    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
-                   csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
-                   csv_field(row.tool), csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
+    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line,
+                   csv_field(row.name), csv_field(row.motion),
+                   csv_field(fmt::format("{}", fmt::join(row.used_at, " "))), csv_field(row.tool),
+                   csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
                    row.before.empty() ? "" : spelled(row.coordinates));
     add_numbers(text, row.before);
     add_numbers(text, row.after);
     for (Eigen::Index k = 0; k < 3; ++k) add_fixed(text, to_mm(row.p_B(k)), 4);
     // Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
-    for (const double value :
-         {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm})
+    for (const double value : {row.error_before_mm, row.error_after_mm, row.sigma_mm,
+                               row.sigma_measured_mm, row.rounding_mm})
       add_fixed(text, value, 5);
     fmt::format_to(out, "{},{},", domain_of(row), row.iterations);
     add_fixed(text, row.path_limit_before_mm_s, 1);
     add_fixed(text, row.path_limit_after_mm_s, 1);
-    fmt::format_to(out, "{},{},{}\n", program.model_id, csv_field(row.message), csv_field(row.suggestion));
+    fmt::format_to(out, "{},{},{}\n", program.model_id, csv_field(row.message),
+                   csv_field(row.suggestion));
   }
   return text;
 }
 
-std::string receipt_json(const CorrectedProgram& program, const std::optional<ToleranceVerdict>& verdict,
+std::string receipt_json(const CorrectedProgram& program,
+                         const std::optional<ToleranceVerdict>& verdict,
                          const std::vector<Note>& of_model) {
   std::vector<Note> notes = of_model;
-  for (const std::string& one : program.notes) notes.push_back({"program", Note::Severity::kInfo, one});
+  for (const std::string& one : program.notes)
+    notes.push_back({"program", Note::Severity::kInfo, one});
   ordered_json inserted = ordered_json::array();
   for (const cam::InsertedLine& line : program.inserted)
     inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
@@ -152,7 +164,8 @@ std::string receipt_json(const CorrectedProgram& program, const std::optional<To
                          {"line", program.largest_step_line}}},
                        {"inserted_lines", inserted}};
   if (verdict) head["tolerance"] = tolerance_json(*verdict);
-  // A line a target: all of them at once as a JSON value would take hundreds of megabytes of a long program.
+  // A line a target: all of them at once as a JSON value would take hundreds of megabytes of a long
+  // program.
   std::string text = json_text(head);
   text.erase(text.rfind("\n}"));
   text += ",\n  \"targets\": [";
@@ -186,12 +199,14 @@ std::string left_alone_text(const CorrectedProgram& program) {
   constexpr std::size_t kLines = 10;
   const std::size_t left = program.left_alone();
   if (left == 0) return "";
-  std::string text = fmt::format("{} of {} targets are left as they were:\n", left, program.rows.size());
+  std::string text =
+      fmt::format("{} of {} targets are left as they were:\n", left, program.rows.size());
   std::size_t told = 0;
   for (const ReceiptRow& row : program.rows) {
     if (row.corrected() || ++told > kLines) continue;
-    text += fmt::format("  {} line {}: {}{}: {}{}\n", row.file, row.line, row.name.empty() ? "" : row.name + ": ",
-                        row.status, row.message, row.suggestion.empty() ? "" : "; " + row.suggestion);
+    text += fmt::format("  {} line {}: {}{}: {}{}\n", row.file, row.line,
+                        row.name.empty() ? "" : row.name + ": ", row.status, row.message,
+                        row.suggestion.empty() ? "" : "; " + row.suggestion);
   }
   if (left > kLines) text += fmt::format("  and {} more\n", left - kLines);
   return text;

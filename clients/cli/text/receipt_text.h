@@ -11,8 +11,9 @@
 /// What became of a program, for people and programs.
 namespace trammel::cli {
 
-/// One row a target: `file,line,name,motion,used_at,tool,frame,status`, the numbers before and after in the units of
-/// the file, `x_mm` ... of the position in the robot's base, errors to expect, `rounding_mm`, `message`, `suggestion`.
+/// One row a target: `file,line,name,motion,used_at,tool,frame,status`, the numbers before and
+/// after in the units of the file, `x_mm` ... of the position in the robot's base, errors to
+/// expect, `rounding_mm`, `message`, `suggestion`.
 [[nodiscard]] std::string receipt_csv(const cam::CorrectedProgram& program);
 [[nodiscard]] std::string receipt_json(const cam::CorrectedProgram& program,
                                        const std::optional<ToleranceVerdict>& verdict,

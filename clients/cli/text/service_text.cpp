@@ -21,8 +21,8 @@ std::string date_text(std::int64_t unix_s) {
   const std::time_t time = unix_s;
   std::tm parts{};
   if (::gmtime_r(&time, &parts) == nullptr) return "-";
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday,
-                     parts.tm_hour, parts.tm_min);
+  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
+                     parts.tm_mday, parts.tm_hour, parts.tm_min);
 }
 
 template <typename Number>
@@ -54,10 +54,12 @@ std::string kind_in_words(const std::string& kind) {
 
 std::string job_line(const client::DatedJob& job) {
   const client::JobStatus& status = job.status;
-  std::string text = fmt::format("job {} of cell {} ({}", status.job, status.cell, kind_in_words(job.kind));
+  std::string text =
+      fmt::format("job {} of cell {} ({}", status.job, status.cell, kind_in_words(job.kind));
   if (!job.batches.empty()) text += fmt::format(" of {}", fmt::join(job.batches, ", "));
   text += fmt::format(") {}", status.stage);
-  if (status.stage == "training" || status.stage == "storing") text += fmt::format(" {:.0f} %", 100 * status.share);
+  if (status.stage == "training" || status.stage == "storing")
+    text += fmt::format(" {:.0f} %", 100 * status.share);
   text += fmt::format(", accepted {}", date_text(job.created_unix_s));
   if (job.started_unix_s) text += fmt::format(", begun {}", date_text(*job.started_unix_s));
   if (job.finished_unix_s) text += fmt::format(", ended {}", date_text(*job.finished_unix_s));
@@ -128,14 +130,16 @@ ordered_json models_json(const std::vector<client::ModelInfo>& models) {
 
 std::string models_text(const std::vector<client::ModelInfo>& models) {
   if (models.empty()) return "no models\n";
-  std::string text = fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id", "poses",
-                                 "held out mm", "trained", "data of", "error sources");
+  std::string text =
+      fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id",
+                  "poses", "held out mm", "trained", "data of", "error sources");
   for (const client::ModelInfo& model : models) {
-    text += fmt::format("{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ', model.cell,
-                        model.version, model.id, model.training_poses,
-                        model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
-                        date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
-                        level_in_words(model.level));
+    text += fmt::format(
+        "{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ',
+        model.cell, model.version, model.id, model.training_poses,
+        model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
+        date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
+        level_in_words(model.level));
   }
   text += "  (* in force; dates in UTC)\n";
   for (const client::ModelInfo& model : models) {
@@ -146,11 +150,14 @@ std::string models_text(const std::vector<client::ModelInfo>& models) {
 }
 
 std::string server_text(const client::ServerStatus& server) {
-  return fmt::format("server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
-                     server.server_id, server.version, server.state, server.uptime_s, server.requests, server.refused,
-                     server.queued_jobs,
-                     server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " "))) +
-         (server.trouble.empty() ? "" : fmt::format("server {} in trouble: {}\n", server.server_id, server.trouble));
+  return fmt::format(
+             "server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
+             server.server_id, server.version, server.state, server.uptime_s, server.requests,
+             server.refused, server.queued_jobs,
+             server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " "))) +
+         (server.trouble.empty()
+              ? ""
+              : fmt::format("server {} in trouble: {}\n", server.server_id, server.trouble));
 }
 
 ordered_json server_json(const client::ServerStatus& server) {
@@ -179,7 +186,8 @@ std::string word_in(const ordered_json& object, const char* key) {
 }
 
 std::int64_t number_in(const ordered_json& object, const char* key) {
-  const bool is_there = object.is_object() && object.contains(key) && object[key].is_number_integer();
+  const bool is_there =
+      object.is_object() && object.contains(key) && object[key].is_number_integer();
   return is_there ? object[key].get<std::int64_t>() : 0;
 }
 
@@ -196,14 +204,18 @@ const ordered_json& list_in(const ordered_json& object, const char* key) {
 /// `serves 3 cells, trains, works on job 7 of cell-7`.
 std::string part_text(const ordered_json& server) {
   std::size_t served = 0;
-  for (const ordered_json& cell : list_in(server, "cells")) served += number_in(cell, "version") > 0 ? 1 : 0;
+  for (const ordered_json& cell : list_in(server, "cells"))
+    served += number_in(cell, "version") > 0 ? 1 : 0;
   std::vector<std::string> parts;
-  if (says_yes(server, "serves")) parts.push_back(fmt::format("serves {} cell{}", served, served == 1 ? "" : "s"));
+  if (says_yes(server, "serves"))
+    parts.push_back(fmt::format("serves {} cell{}", served, served == 1 ? "" : "s"));
   if (says_yes(server, "trains")) parts.push_back("trains");
   for (const ordered_json& job : list_in(server, "works_on"))
-    parts.push_back(fmt::format("works on job {} of {}", number_in(job, "job"), word_in(job, "cell")));
+    parts.push_back(
+        fmt::format("works on job {} of {}", number_in(job, "job"), word_in(job, "cell")));
   const std::int64_t behind = number_in(server, "changes_behind");
-  parts.push_back(behind == 0 ? "up to date" : fmt::format("{} change{} behind", behind, behind == 1 ? "" : "s"));
+  parts.push_back(behind == 0 ? "up to date"
+                              : fmt::format("{} change{} behind", behind, behind == 1 ? "" : "s"));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -213,8 +225,9 @@ void add_other_servers(const ordered_json& of_record, ordered_json& servers) {
   if (!of_record.is_array()) return;
   for (const ordered_json& one : of_record) {
     const std::string name = word_in(one, "server");
-    const bool answers = std::any_of(servers.begin(), servers.end(),
-                                     [&](const ordered_json& known) { return word_in(known, "server") == name; });
+    const bool answers =
+        std::any_of(servers.begin(), servers.end(),
+                    [&](const ordered_json& known) { return word_in(known, "server") == name; });
     if (answers || name.empty()) continue;
     servers.push_back({{"server", name},
                        {"serves", says_yes(one, "serves")},
@@ -227,14 +240,16 @@ std::string record_text(const ordered_json& record) {
   if (word_in(record, "kind") != "postgresql") return "";
   const std::string place = word_in(record, "place");
   if (!says_yes(record, "reachable"))
-    return fmt::format("record: {} is away since {} UTC; what is in force is served, and every change is refused\n",
-                       place, date_text(number_in(record, "away_since_unix_s")));
+    return fmt::format(
+        "record: {} is away since {} UTC; what is in force is served, and every change is "
+        "refused\n",
+        place, date_text(number_in(record, "away_since_unix_s")));
   const bool is_unsafe = record.contains("trail_is_safe") && record["trail_is_safe"] == false;
-  return fmt::format("record: {}; an acknowledged change survives {}\n", place, word_in(record, "survives")) +
-         (is_unsafe
-              ? "record: the servers' role could change the audit trail; trammel store init --grant lets in one that "
-                "cannot\n"
-              : "");
+  return fmt::format("record: {}; an acknowledged change survives {}\n", place,
+                     word_in(record, "survives")) +
+         (is_unsafe ? "record: the servers' role could change the audit trail; trammel store init "
+                      "--grant lets in one that cannot\n"
+                    : "");
 }
 
 std::string servers_text(const ordered_json& servers, const ordered_json& record) {
@@ -242,16 +257,19 @@ std::string servers_text(const ordered_json& servers, const ordered_json& record
   if (!servers.is_array()) return "which servers are there is not known while the record is away\n";
   std::string text;
   for (const ordered_json& server : servers) {
-    const std::string who = fmt::format("{} on {}", word_in(server, "server"), word_in(server, "host"));
+    const std::string who =
+        fmt::format("{} on {}", word_in(server, "server"), word_in(server, "host"));
     if (says_yes(server, "gone")) {
-      text += fmt::format("  {}: gone, not heard of since {} UTC ({} s)\n", who,
-                          date_text(number_in(server, "heard_unix_s")), number_in(server, "silent_s"));
+      text +=
+          fmt::format("  {}: gone, not heard of since {} UTC ({} s)\n", who,
+                      date_text(number_in(server, "heard_unix_s")), number_in(server, "silent_s"));
       continue;
     }
-    text += fmt::format("  {} ({}, process {}): {}\n", who, word_in(server, "version"), number_in(server, "pid"),
-                        part_text(server));
+    text += fmt::format("  {} ({}, process {}): {}\n", who, word_in(server, "version"),
+                        number_in(server, "pid"), part_text(server));
     for (const ordered_json& cell : list_in(server, "cells"))
-      if (const std::string why = word_in(cell, "why"); !why.empty()) text += fmt::format("    {}\n", why);
+      if (const std::string why = word_in(cell, "why"); !why.empty())
+        text += fmt::format("    {}\n", why);
   }
   return "servers of the record:\n" + text;
 }
@@ -259,8 +277,8 @@ std::string servers_text(const ordered_json& servers, const ordered_json& record
 std::string quarantine_text(const std::vector<client::BatchOfService>& batches) {
   std::string text;
   for (const client::BatchOfService& one : batches) {
-    text +=
-        fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell, one.poses, one.reason);
+    text += fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell,
+                        one.poses, one.reason);
   }
   return text;
 }
@@ -268,7 +286,8 @@ std::string quarantine_text(const std::vector<client::BatchOfService>& batches) 
 ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches) {
   ordered_json list = ordered_json::array();
   for (const client::BatchOfService& one : batches) {
-    list.push_back({{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
+    list.push_back(
+        {{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
   }
   return list;
 }
@@ -285,15 +304,17 @@ std::string state_of(const client::BatchOfService& batch) {
 std::string batches_text(const std::vector<client::BatchOfService>& batches) {
   if (batches.empty()) return "no batches\n";
   // Each server says what it knows of a batch, which may differ.
-  const bool several = std::any_of(batches.begin(), batches.end(), [&](const client::BatchOfService& one) {
-    return one.server != batches.front().server;
-  });
-  const auto server = [&](const std::string& name) { return several ? fmt::format("{:<16}", name) : ""; };
-  std::string text =
-      fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server("server"), "cell", "batch", "poses", "accepted", "state");
+  const bool several = std::any_of(
+      batches.begin(), batches.end(),
+      [&](const client::BatchOfService& one) { return one.server != batches.front().server; });
+  const auto server = [&](const std::string& name) {
+    return several ? fmt::format("{:<16}", name) : "";
+  };
+  std::string text = fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server("server"), "cell",
+                                 "batch", "poses", "accepted", "state");
   for (const client::BatchOfService& one : batches) {
-    text += fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server(one.server), one.cell, one.batch, one.poses,
-                        date_text(one.accepted_unix_s), state_of(one));
+    text += fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server(one.server), one.cell, one.batch,
+                        one.poses, date_text(one.accepted_unix_s), state_of(one));
   }
   return text + "(dates in UTC)\n";
 }
@@ -318,7 +339,8 @@ ordered_json in_force_json(const std::string& cell, int version, const ordered_j
   ordered_json now = {{"cell", cell}, {"version", version}};
   const bool is_it = said.is_object() && said.value("version", ordered_json()) == version;
   for (const char* key : {"before_mm", "after_mm", "limit_mm"})
-    now[key] = is_it && said.contains(key) && said[key].is_number() ? said[key] : ordered_json(nullptr);
+    now[key] =
+        is_it && said.contains(key) && said[key].is_number() ? said[key] : ordered_json(nullptr);
   for (const char* key : {"why", "next"})
     now[key] = is_it && said.contains(key) && said[key].is_string() ? said[key] : ordered_json("");
   if (now["why"] == "") now["why"] = "it was never held against another one on poses held out";
@@ -326,11 +348,13 @@ ordered_json in_force_json(const std::string& cell, int version, const ordered_j
 }
 
 std::string in_force_text(const ordered_json& now) {
-  std::string text =
-      fmt::format("cell {}: version {} in force\n", now.at("cell").get<std::string>(), now.at("version").get<int>());
+  std::string text = fmt::format("cell {}: version {} in force\n",
+                                 now.at("cell").get<std::string>(), now.at("version").get<int>());
   std::vector<std::string> figures;
-  for (const auto& [name, key] : {std::pair("before", "before_mm"), {"after", "after_mm"}, {"limit", "limit_mm"}})
-    if (now.at(key).is_number()) figures.push_back(fmt::format("{} {:.4f} mm", name, now.at(key).get<double>()));
+  for (const auto& [name, key] :
+       {std::pair("before", "before_mm"), {"after", "after_mm"}, {"limit", "limit_mm"}})
+    if (now.at(key).is_number())
+      figures.push_back(fmt::format("{} {:.4f} mm", name, now.at(key).get<double>()));
   if (!figures.empty()) text += fmt::format("held-out rms: {}\n", fmt::join(figures, ", "));
   text += fmt::format("why: {}\n", now.at("why").get<std::string>());
   const std::string next = now.at("next").get<std::string>();
@@ -348,25 +372,27 @@ std::string ended_text(const client::JobStatus& job) {
   const bool then = put_in_force(job);
   if (job.model_version > 0) {
     const char* what = then == job.in_force ? (then ? "in force" : "not in force")
-                       : then               ? "was put in force, and another version is in force now"
-                                            : "was not put in force by the job, and is in force now";
+                       : then ? "was put in force, and another version is in force now"
+                              : "was not put in force by the job, and is in force now";
     text += fmt::format(": version {}, {}", job.model_version, what);
   }
   const bool has_changed = job.model_version > 0 && then != job.in_force;
-  if (!job.what.empty()) text += fmt::format("\n{}{}", has_changed ? "when it ended: " : "", job.what);
+  if (!job.what.empty())
+    text += fmt::format("\n{}{}", has_changed ? "when it ended: " : "", job.what);
   return text + "\n";
 }
 
 std::string next_step(const client::JobStatus& job) {
   if (job.verdict == "quarantined") {
     return fmt::format(
-        "next: trammel diagnose --service --cell {0} says what the batch differs in; trammel retrain --service --cell "
-        "{0} --batch ID --release learns from it, if it is good",
+        "next: trammel diagnose --service --cell {0} says what the batch differs in; trammel "
+        "retrain --service --cell {0} --batch ID --release learns from it, if it is good",
         job.cell);
   }
   if (job.model_version > 0 && !job.in_force && !put_in_force(job)) {
-    return fmt::format("next: trammel activate --service --model {}@{} puts it in force, if it is wanted", job.cell,
-                       job.model_version);
+    return fmt::format(
+        "next: trammel activate --service --model {}@{} puts it in force, if it is wanted",
+        job.cell, job.model_version);
   }
   return job.next.empty() ? "" : "next: " + job.next;
 }

@@ -17,7 +17,9 @@ constexpr double to_mm_per_nmm(double bias) { return bias; }
 
 double shown(double value, bool length) { return length ? to_mm(value) : to_deg(value); }
 
-ordered_json vector_json(const Eigen::VectorXd& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
+ordered_json vector_json(const Eigen::VectorXd& v) {
+  return std::vector<double>(v.data(), v.data() + v.size());
+}
 
 std::string parameter_lines(const CirclePointResult& result, bool length) {
   std::string text;
@@ -25,11 +27,13 @@ std::string parameter_lines(const CirclePointResult& result, bool length) {
     if (parameter.length != length) continue;
     const std::string name = fmt::format("{} [{}]", parameter.name, length ? "mm" : "deg");
     if (!parameter.measured) {
-      text += fmt::format("  {:<14}{:>12.4f}{:>12}{:>10}\n", name, shown(parameter.nominal, length), "-", "-");
+      text += fmt::format("  {:<14}{:>12.4f}{:>12}{:>10}\n", name, shown(parameter.nominal, length),
+                          "-", "-");
       continue;
     }
-    text += fmt::format("  {:<14}{:>12.4f}{:>12.4f}{:>10.4f}\n", name, shown(parameter.nominal, length),
-                        shown(parameter.deviation, length), shown(parameter.u, length));
+    text +=
+        fmt::format("  {:<14}{:>12.4f}{:>12.4f}{:>10.4f}\n", name, shown(parameter.nominal, length),
+                    shown(parameter.deviation, length), shown(parameter.u, length));
   }
   return text;
 }
@@ -37,21 +41,23 @@ std::string parameter_lines(const CirclePointResult& result, bool length) {
 }  // namespace
 
 std::string circle_point_text(const CirclePointResult& result) {
-  std::string text = fmt::format("  {:<12}{:>7}{:>10}{:>12}{:>13}{:>13}{:>13}{:>14}\n", "arc", "points", "span, deg",
-                                 "radius, mm", "plane, um", "circle, um", "centre U, um", "normal U, deg");
+  std::string text = fmt::format("  {:<12}{:>7}{:>10}{:>12}{:>13}{:>13}{:>13}{:>14}\n", "arc",
+                                 "points", "span, deg", "radius, mm", "plane, um", "circle, um",
+                                 "centre U, um", "normal U, deg");
   for (const CircleFit& circle : result.circles) {
     const std::string name = fmt::format("J{} {}", circle.joint + 1, circle.reflector);
-    text +=
-        fmt::format("  {:<12}{:>7}{:>10.1f}{:>12.3f}{:>13.2f}{:>13.2f}{:>13.1f}{:>14.5f}\n", name, circle.points,
-                    to_deg(circle.span), to_mm(circle.radius), to_um(circle.plane_rms), to_um(circle.circle_rms),
-                    to_um(circle.centre_u), to_deg(result.axes[static_cast<std::size_t>(circle.joint)].direction_u));
+    text += fmt::format("  {:<12}{:>7}{:>10.1f}{:>12.3f}{:>13.2f}{:>13.2f}{:>13.1f}{:>14.5f}\n",
+                        name, circle.points, to_deg(circle.span), to_mm(circle.radius),
+                        to_um(circle.plane_rms), to_um(circle.circle_rms), to_um(circle.centre_u),
+                        to_deg(result.axes[static_cast<std::size_t>(circle.joint)].direction_u));
   }
   const std::string header = fmt::format("{:>12}{:>12}{:>10}\n", "nominal", "deviation", "U(k=2)");
   text += fmt::format("\n  {:<14}{}", "lengths", header) + parameter_lines(result, true);
   text += fmt::format("\n  {:<14}{}", "angles", header) + parameter_lines(result, false);
   text += "\n";
   for (const MeasuredParameter& parameter : result.parameters) {
-    if (!parameter.measured) text += fmt::format("  {} not measured: {}\n", parameter.name, parameter.note);
+    if (!parameter.measured)
+      text += fmt::format("  {} not measured: {}\n", parameter.name, parameter.note);
   }
   for (const Note& note : result.notes) text += fmt::format("  {}\n", note.text);
   return text;
@@ -105,7 +111,8 @@ ordered_json circle_point_json(const CirclePointResult& result) {
   for (std::size_t j = 0; j < result.axes.size(); ++j)
     if (result.axes[j].sigma > 0 || !result.axes[j].direction_W.isZero())
       json["axes"].push_back(axis_json(result.axes[j], j + 1));
-  for (const MeasuredParameter& parameter : result.parameters) json["parameters"].push_back(parameter_json(parameter));
+  for (const MeasuredParameter& parameter : result.parameters)
+    json["parameters"].push_back(parameter_json(parameter));
   json["notes"] = notes_json(result.notes);
   const Eigen::Quaterniond q(result.X_WB.linear());
   json["base"] = {{"xyz_mm", vector_json(result.X_WB.translation() * to_mm(1))},
@@ -117,12 +124,13 @@ std::string circle_point_csv(const CirclePointResult& result) {
   std::string text = "parameter,unit,nominal,deviation,u95,measured,note\n";
   for (const MeasuredParameter& parameter : result.parameters) {
     const bool length = parameter.length;
-    const std::string numbers = parameter.measured ? csv_number(shown(parameter.deviation, length)) + "," +
-                                                         csv_number(shown(parameter.u, length))
-                                                   : std::string(",");
+    const std::string numbers = parameter.measured
+                                    ? csv_number(shown(parameter.deviation, length)) + "," +
+                                          csv_number(shown(parameter.u, length))
+                                    : std::string(",");
     text += fmt::format("{},{},{},{},{},{}\n", parameter.name, length ? "mm" : "deg",
-                        csv_number(shown(parameter.nominal, length)), numbers, parameter.measured ? 1 : 0,
-                        csv_field(parameter.note));
+                        csv_number(shown(parameter.nominal, length)), numbers,
+                        parameter.measured ? 1 : 0, csv_field(parameter.note));
   }
   return text;
 }
@@ -149,9 +157,10 @@ std::string fit_line(const char* model, const DeflectionFit& fit) {
     bias = fmt::format("  Bx {:.4g}  Bz {:.4g} mm/Nmm", to_mm_per_nmm(fit.load_bias->x()),
                        to_mm_per_nmm(fit.load_bias->y()));
   }
-  return fmt::format("    {:<9}{:>12}{:>14.4g}{:>12.2g}{:>9.3f}{:>9.3f}{:>12.4f}{:>12.4f}{}\n", model, stiffness,
-                     to_rad_per_nmm(fit.compliance), to_rad_per_nmm(fit.compliance_u), to_mm(fit.offset.x()),
-                     to_mm(fit.offset.y()), to_mm(fit.rms_train), to_mm(fit.rms_validation), bias);
+  return fmt::format("    {:<9}{:>12}{:>14.4g}{:>12.2g}{:>9.3f}{:>9.3f}{:>12.4f}{:>12.4f}{}\n",
+                     model, stiffness, to_rad_per_nmm(fit.compliance),
+                     to_rad_per_nmm(fit.compliance_u), to_mm(fit.offset.x()), to_mm(fit.offset.y()),
+                     to_mm(fit.rms_train), to_mm(fit.rms_validation), bias);
 }
 
 ordered_json fit_json(const DeflectionFit& fit) {
@@ -173,14 +182,14 @@ ordered_json fit_json(const DeflectionFit& fit) {
 }
 
 std::string element_text(const ElementResult& element) {
-  std::string text =
-      fmt::format("\n  element {}\n    {:<9}{:>12}{:>14}{:>12}{:>9}{:>9}{:>12}{:>12}\n", element.element, "",
-                  "EI, Nmm^2", "C, rad/Nmm", "U(k=2)", "Ax, mm", "Az, mm", "train, mm", "valid., mm");
+  std::string text = fmt::format(
+      "\n  element {}\n    {:<9}{:>12}{:>14}{:>12}{:>9}{:>9}{:>12}{:>12}\n", element.element, "",
+      "EI, Nmm^2", "C, rad/Nmm", "U(k=2)", "Ax, mm", "Az, mm", "train, mm", "valid., mm");
   if (element.beam) text += fit_line("model 1", *element.beam);
   text += fit_line("model 2", element.rigid);
   if (element.beam) {
-    text += fmt::format("    beam term: F {:.3g}, p {:.2g}, AIC better by {:.3g}\n", element.f, element.p_value,
-                        element.aic_gain);
+    text += fmt::format("    beam term: F {:.3g}, p {:.2g}, AIC better by {:.3g}\n", element.f,
+                        element.p_value, element.aic_gain);
   }
   return text + fmt::format("    {}\n", element.sentence);
 }
@@ -188,11 +197,13 @@ std::string element_text(const ElementResult& element) {
 }  // namespace
 
 std::string deflection_text(const DeflectionResult& result) {
-  std::string text = fmt::format("trained on {:.3f} N, validated on {:.3f} N\n", fmt::join(result.training_loads, ", "),
-                                 fmt::join(result.validation_loads, ", "));
+  std::string text =
+      fmt::format("trained on {:.3f} N, validated on {:.3f} N\n",
+                  fmt::join(result.training_loads, ", "), fmt::join(result.validation_loads, ", "));
   for (const ElementResult& element : result.elements) text += element_text(element);
-  return text + fmt::format("\n  rms |dp|, mm: nothing predicted {:.4f}, model 1 {:.4f}, model 2 {:.4f}\n",
-                            to_mm(result.rms_still), to_mm(result.rms_beam), to_mm(result.rms_rigid));
+  return text +
+         fmt::format("\n  rms |dp|, mm: nothing predicted {:.4f}, model 1 {:.4f}, model 2 {:.4f}\n",
+                     to_mm(result.rms_still), to_mm(result.rms_beam), to_mm(result.rms_rigid));
 }
 
 namespace {
@@ -220,7 +231,8 @@ ordered_json deflection_json(const DeflectionResult& result) {
                        {"validation_loads_n", result.validation_loads},
                        {"variance_factor", result.variance_factor},
                        {"freedom", result.freedom}};
-  for (const ElementResult& element : result.elements) json["elements"].push_back(element_json(element));
+  for (const ElementResult& element : result.elements)
+    json["elements"].push_back(element_json(element));
   json["rms_mm"] = {{"nothing_predicted", to_mm(result.rms_still)},
                     {"model_1", to_mm(result.rms_beam)},
                     {"model_2", to_mm(result.rms_rigid)}};

@@ -55,18 +55,24 @@ ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, do
 
 std::string verdict_text(const ToleranceVerdict& verdict) {
   return fmt::format(
-             "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); {:.1f} are expected "
-             "inside",
-             verdict.tolerance_mm, verdict.after, verdict.targets, verdict.before, verdict.expected_after) +
-         (verdict.unknown > 0 ? fmt::format("; of {} the error is not known", verdict.unknown) : "");
+             "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); "
+             "{:.1f} are expected inside",
+             verdict.tolerance_mm, verdict.after, verdict.targets, verdict.before,
+             verdict.expected_after) +
+         (verdict.unknown > 0 ? fmt::format("; of {} the error is not known", verdict.unknown)
+                              : "");
 }
 
-Status check_strictly(const std::string& left_alone, const std::optional<ToleranceVerdict>& verdict) {
-  if (!left_alone.empty()) return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
+Status check_strictly(const std::string& left_alone,
+                      const std::optional<ToleranceVerdict>& verdict) {
+  if (!left_alone.empty())
+    return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
   if (!verdict) return {};
-  if (verdict->after == verdict->targets && verdict->unknown == 0 && verdict->out_of_domain == 0) return {};
+  if (verdict->after == verdict->targets && verdict->unknown == 0 && verdict->out_of_domain == 0)
+    return {};
   std::string why = verdict_text(*verdict);
-  if (verdict->out_of_domain > 0) why += fmt::format("; {} are out of domain", verdict->out_of_domain);
+  if (verdict->out_of_domain > 0)
+    why += fmt::format("; {} are out of domain", verdict->out_of_domain);
   return refused("nothing is written: {}", why);
 }
 

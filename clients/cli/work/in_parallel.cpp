@@ -23,7 +23,8 @@ void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work
     return first < count;
   };
   const std::size_t useful = (count + kTogether - 1) / kTogether;
-  const std::size_t threads = std::min({useful, kMostThreads, std::size_t{std::thread::hardware_concurrency()}});
+  const std::size_t threads =
+      std::min({useful, kMostThreads, std::size_t{std::thread::hardware_concurrency()}});
   std::vector<std::jthread> others;
   for (std::size_t k = 1; k < threads; ++k) {
     others.emplace_back([&] {
@@ -32,7 +33,8 @@ void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work
     });
   }
   while (take())
-    progress(std::min(1.0, static_cast<double>(next.load()) / static_cast<double>(std::max<std::size_t>(count, 1))));
+    progress(std::min(1.0, static_cast<double>(next.load()) /
+                               static_cast<double>(std::max<std::size_t>(count, 1))));
 }
 
 }  // namespace trammel::cli

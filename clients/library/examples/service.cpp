@@ -21,7 +21,8 @@ int main(int count, char** arguments) {
     for (const std::string& cell : server.cells) {
       const std::vector<double> joints_deg(6, 0.0);
       const auto answer = session->predict({.cell = cell, .context = {}}, joints_deg);
-      const std::string said = answer ? "model " + std::to_string(answer->model.version) : to_text(answer.error().code);
+      const std::string said =
+          answer ? "model " + std::to_string(answer->model.version) : to_text(answer.error().code);
       std::printf("%s: %s\n", cell.c_str(), said.c_str());
     }
   }

@@ -11,8 +11,8 @@
 #include "trammel/result.h"
 #include "trammel/types.h"
 
-/// Everything that works on files, without a service. All classes are immutable values, cheap to copy and thread-safe.
-/// Work runs in the calling thread.
+/// Everything that works on files, without a service. All classes are immutable values, cheap to
+/// copy and thread-safe. Work runs in the calling thread.
 namespace trammel::api {
 
 /// A cell as its file describes it: the robot, its base, tools, payloads and tracker.
@@ -59,7 +59,8 @@ class TRAMMEL_API Batch {
   [[nodiscard]] std::size_t size() const;
   /// Its text as it came.
   [[nodiscard]] std::string csv() const;
-  /// The same rows as a batch file of the plain kind: commas, decimal points, names in lower case, no comments.
+  /// The same rows as a batch file of the plain kind: commas, decimal points, names in lower case,
+  /// no comments.
   [[nodiscard]] std::string table() const;
 
   /// What it is made of.
@@ -85,27 +86,29 @@ struct Figures {
 
 /// Orientation errors, where orientations were measured: rms of the rotation angle.
 struct OrientationErrors {
-  int poses = 0;                      ///< with a measured orientation
-  double nominal_rms_deg = 0;         ///< of the drawing, deg
-  double calibrated_rms_deg = 0;      ///< with the error sources identified, deg
-  double compensated_rms_deg = 0;     ///< with the learned bias, deg
-  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; empty: not learned
+  int poses = 0;                   ///< with a measured orientation
+  double nominal_rms_deg = 0;      ///< of the drawing, deg
+  double calibrated_rms_deg = 0;   ///< with the error sources identified, deg
+  double compensated_rms_deg = 0;  ///< with the learned bias, deg
+  std::optional<double>
+      coverage_95;  ///< share of coordinates inside their 95 % interval; empty: not learned
 };
 
 /// The three levels of one model on the same poses.
 struct Evaluation {
-  int poses = 0;                                 ///< number of poses
-  int in_domain = 0;                             ///< of them in domain
-  double coverage_95 = 0;                        ///< share of coordinates inside their 95 % interval
-  Figures nominal;                               ///< of the drawing
-  Figures calibrated;                            ///< with the error sources identified
-  Figures compensated;                           ///< with the learned bias
-  std::optional<double> nlpd;                    ///< mean negative log predictive density, nat, positions in mm
+  int poses = 0;               ///< number of poses
+  int in_domain = 0;           ///< of them in domain
+  double coverage_95 = 0;      ///< share of coordinates inside their 95 % interval
+  Figures nominal;             ///< of the drawing
+  Figures calibrated;          ///< with the error sources identified
+  Figures compensated;         ///< with the learned bias
+  std::optional<double> nlpd;  ///< mean negative log predictive density, nat, positions in mm
   std::optional<OrientationErrors> orientation;  ///< where orientations were measured
-  std::string doubt_of_bias;                     ///< where the bias does not help, a sentence; else empty
-  int trained_on = 0;  ///< of the poses, those that the model was trained on: they say how well it fits
-  /// Share of coordinates inside the 95 % interval of the stated sigma alone: whether the model is as good as the
-  /// instrument.
+  std::string doubt_of_bias;  ///< where the bias does not help, a sentence; else empty
+  int trained_on =
+      0;  ///< of the poses, those that the model was trained on: they say how well it fits
+  /// Share of coordinates inside the 95 % interval of the stated sigma alone: whether the model is
+  /// as good as the instrument.
   std::optional<double> coverage_95_stated;
 };
 
@@ -120,17 +123,17 @@ struct Parameter {
 
 /// What the training poses of a model were: what it promises is about these.
 struct Measured {
-  std::string sentence;                     ///< all of it in words; where it is not on record, that
-  int poses = 0;                            ///< 0: not on record, in models from before it was recorded
-  std::vector<int> from_above;              ///< poses that each joint fell into
-  std::vector<int> from_below;              ///< poses that each joint rose into
+  std::string sentence;         ///< all of it in words; where it is not on record, that
+  int poses = 0;                ///< 0: not on record, in models from before it was recorded
+  std::vector<int> from_above;  ///< poses that each joint fell into
+  std::vector<int> from_below;  ///< poses that each joint rose into
   std::optional<double> temperature_min_c;  ///< degrees Celsius; empty: not measured
   std::optional<double> temperature_max_c;  ///< likewise
   std::array<double, 3> lower_mm{};         ///< a corner of the box in B that the tool was in, mm
   std::array<double, 3> upper_mm{};         ///< the opposite corner, mm
-  double volume_m3 = 0;                     ///< of the box, what is within reach of a place where the tool was
-  std::optional<double> reach_mm;           ///< mm: a pose farther from all measured places is out of domain
-  std::string instrument;                   ///< as the cell file names it, with its stated sigma
+  double volume_m3 = 0;  ///< of the box, what is within reach of a place where the tool was
+  std::optional<double> reach_mm;  ///< mm: a pose farther from all measured places is out of domain
+  std::string instrument;          ///< as the cell file names it, with its stated sigma
 };
 
 /// Nominal chain, identified error sources and learned bias.
@@ -159,20 +162,20 @@ class TRAMMEL_API Model {
   [[nodiscard]] Evaluation figures() const;
   /// What its promise is about.
   [[nodiscard]] Measured measured() const;
-  /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no training pose has a
-  /// position.
+  /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no
+  /// training pose has a position.
   [[nodiscard]] std::string budget_json() const;
   /// What a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 
-  /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a rail mm). Refuses
-  /// joints beyond the robot's limits, numbers that are not finite, and a tool with a payload that no training pose
-  /// had.
+  /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a
+  /// rail mm). Refuses joints beyond the robot's limits, numbers that are not finite, and a tool
+  /// with a payload that no training pose had.
   [[nodiscard]] Result<std::vector<Prediction>> predict(std::span<const double> joints_deg,
                                                         const Context& context = {}) const;
-  /// What to command so that the tool lands on each target. A target that cannot be corrected says so in its status.
-  /// Refuses targets that are none (wrong number of joints, no branch, no unit quaternion), and tools as predict()
-  /// does.
+  /// What to command so that the tool lands on each target. A target that cannot be corrected says
+  /// so in its status. Refuses targets that are none (wrong number of joints, no branch, no unit
+  /// quaternion), and tools as predict() does.
   [[nodiscard]] Result<std::vector<CorrectedTarget>> correct(std::span<const Target> targets,
                                                              const Context& context = {}) const;
   /// Measured against predicted. Several batches are sessions of one arm.
@@ -189,15 +192,17 @@ class TRAMMEL_API Model {
 
 /// How to train.
 struct TrainOptions {
-  std::optional<std::string> level;  ///< instead of the cell's error sources: `M0` to `M3`, `M2,gear_transmission:3`
-  std::optional<std::string> bias;   ///< instead of the cell's: `none`, `auto`, a kernel
-  std::uint64_t seed = 1;            ///< of the search for hyperparameters and of the rows held out
-  double validation_share = 0;       ///< of the rows, held out where the batch has no column `set`
-  Progress progress;                 ///< may be empty
-  bool as_read = false;              ///< somebody has looked at the batches: learn from them as they are
+  std::optional<std::string>
+      level;  ///< instead of the cell's error sources: `M0` to `M3`, `M2,gear_transmission:3`
+  std::optional<std::string> bias;  ///< instead of the cell's: `none`, `auto`, a kernel
+  std::uint64_t seed = 1;           ///< of the search for hyperparameters and of the rows held out
+  double validation_share = 0;      ///< of the rows, held out where the batch has no column `set`
+  Progress progress;                ///< may be empty
+  bool as_read = false;  ///< somebody has looked at the batches: learn from them as they are
 };
 /// A model of the cell, from batches of measurements. Several batches are sessions of one arm.
-/// Refuses what the service keeps out: a batch that was read wrongly, or in the middle of which something changed.
+/// Refuses what the service keeps out: a batch that was read wrongly, or in the middle of which
+/// something changed.
 [[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
                                               const TrainOptions& options = {});
 
@@ -207,18 +212,20 @@ struct DiagnoseOptions {
   Progress progress;       ///< may be empty
 };
 /// What the cell's model lacks, as JSON: the text that `trammel diagnose --json` writes.
-[[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches,
+[[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell,
+                                                       std::span<const Batch> batches,
                                                        const DiagnoseOptions& options = {});
 
 /// What extending a cell by what a diagnosis found is worth.
 struct Extension {
-  std::string findings;                    ///< the diagnosis, as diagnose() writes it
-  std::optional<Model> model;              ///< the extended model; empty where it is not to be applied
+  std::string findings;        ///< the diagnosis, as diagnose() writes it
+  std::optional<Model> model;  ///< the extended model; empty where it is not to be applied
   std::vector<std::string> error_sources;  ///< of it, those that belong into the cell file
-  std::string why_not;                     ///< why nothing is applied, in the words of every door; empty: apply it
+  std::string why_not;  ///< why nothing is applied, in the words of every door; empty: apply it
 };
-/// What `trammel diagnose --apply` does, without writing anything: some rows are set aside before the batch is looked
-/// at, the cell is extended by what is found, and the model is one to apply where a service would put it in force.
+/// What `trammel diagnose --apply` does, without writing anything: some rows are set aside before
+/// the batch is looked at, the cell is extended by what is found, and the model is one to apply
+/// where a service would put it in force.
 [[nodiscard]] TRAMMEL_API Result<Extension> extend(const Cell& cell, std::span<const Batch> batches,
                                                    const DiagnoseOptions& options = {});
 
@@ -246,6 +253,7 @@ struct SimulateOptions {
 };
 /// Measures a plan (its CSV) on a virtual robot; `truth` is the path of a truth file.
 [[nodiscard]] TRAMMEL_API Result<Batch> simulate(const Cell& cell, const std::string& truth,
-                                                 const std::string& plan_csv, const SimulateOptions& options = {});
+                                                 const std::string& plan_csv,
+                                                 const SimulateOptions& options = {});
 
 }  // namespace trammel::api

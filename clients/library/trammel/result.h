@@ -8,8 +8,8 @@
 /// What may leave libtrammel.
 #define TRAMMEL_API __attribute__((visibility("default")))
 
-/// Trammel for other programs. Nothing here throws. Lengths are mm and angles deg, as in files and on the command line;
-/// frames are W (tracker world), B (robot base), F (flange) and T (tool).
+/// Trammel for other programs. Nothing here throws. Lengths are mm and angles deg, as in files and
+/// on the command line; frames are W (tracker world), B (robot base), F (flange) and T (tool).
 namespace trammel::api {
 
 /// The kind of an error.
@@ -32,14 +32,15 @@ struct Error {
   ErrorCode code = ErrorCode::kInternal;  ///< its kind
   std::string message;                    ///< one clause that says what, with value and limit
   std::string file;                       ///< path or id of what was read: a file, a batch, a model
-  std::optional<long> row;                ///< line of the file, from 1 with its header; of an array the index, from 0
-  std::string field;                      ///< column, key or argument
-  std::optional<double> value;            ///< as given, in the unit of the field
-  std::optional<double> limit;            ///< the limit that was broken, in the same unit
-  std::string text;                       ///< the value as given, where it is a word
-  std::string next;                       ///< what to do about it, as one clause
-  std::vector<Error> also;                ///< what else is wrong, found in the same reading
-  std::string sentence;                   ///< all of it for people
+  std::optional<long>
+      row;            ///< line of the file, from 1 with its header; of an array the index, from 0
+  std::string field;  ///< column, key or argument
+  std::optional<double> value;  ///< as given, in the unit of the field
+  std::optional<double> limit;  ///< the limit that was broken, in the same unit
+  std::string text;             ///< the value as given, where it is a word
+  std::string next;             ///< what to do about it, as one clause
+  std::vector<Error> also;      ///< what else is wrong, found in the same reading
+  std::string sentence;         ///< all of it for people
 };
 
 /// A value, or why there is none.

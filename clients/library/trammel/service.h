@@ -17,13 +17,15 @@ namespace trammel::api {
 
 /// Where the service is.
 struct SessionOptions {
-  std::uint32_t domain = 0;                    ///< DDS domain, 0 to 232
-  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on each host that is named without one, one per server
-  std::chrono::milliseconds timeout{5000};     ///< of one request, discovery included
-  /// The hosts of the service, names or IPv4 addresses, with `:port` behind them or not. Empty: this host, on
-  /// 127.0.0.1.
+  std::uint32_t domain = 0;  ///< DDS domain, 0 to 232
+  std::vector<std::uint16_t> ports = {
+      17500};  ///< UDP ports on each host that is named without one, one per server
+  std::chrono::milliseconds timeout{5000};  ///< of one request, discovery included
+  /// The hosts of the service, names or IPv4 addresses, with `:port` behind them or not. Empty:
+  /// this host, on 127.0.0.1.
   std::vector<std::string> hosts = {};
-  /// Folder with the certificate, key and permissions that a secured service asks for; empty: without.
+  /// Folder with the certificate, key and permissions that a secured service asks for; empty:
+  /// without.
   std::string security = {};
 };
 
@@ -43,12 +45,13 @@ struct Answer {
 
 /// A job of a service.
 struct Job {
-  std::int64_t id = 0;    ///< its number
-  std::string cell;       ///< its cell
-  std::string stage;      ///< `queued training storing done failed`
-  std::string what;       ///< what is being done, or what became of it
-  double share = 0;       ///< done of all, [0, 1]
-  std::string verdict;    ///< `open in_force not_better undecided diagnosed quarantined refused broken ...`
+  std::int64_t id = 0;  ///< its number
+  std::string cell;     ///< its cell
+  std::string stage;    ///< `queued training storing done failed`
+  std::string what;     ///< what is being done, or what became of it
+  double share = 0;     ///< done of all, [0, 1]
+  std::string
+      verdict;  ///< `open in_force not_better undecided diagnosed quarantined refused broken ...`
   int version = 0;        ///< of the model that it made; 0: none
   bool in_force = false;  ///< whether that model serves its cell
   std::string why;        ///< of a job that made no model
@@ -66,9 +69,10 @@ struct Server {
   int queued_jobs = 0;             ///< that wait
 };
 
-/// One client of the service; one per process is enough. Thread-safe; calls from several threads overlap. A request
-/// without an answer is sent once more with the same id, so what changes something happens once. Errors: kUnreachable
-/// where no server answered in time, else the server's.
+/// One client of the service; one per process is enough. Thread-safe; calls from several threads
+/// overlap. A request without an answer is sent once more with the same id, so what changes
+/// something happens once. Errors: kUnreachable where no server answered in time, else the
+/// server's.
 class TRAMMEL_API Session {
  public:
   /// Does not wait for a server.
@@ -88,50 +92,67 @@ class TRAMMEL_API Session {
   [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version = 0) const;
 
   /// As Model::predict(), by the model in force: N x n values, deg; of a rail mm.
-  [[nodiscard]] Result<Answer<Prediction>> predict(const Asked& asked, std::span<const double> joints_deg) const;
+  [[nodiscard]] Result<Answer<Prediction>> predict(const Asked& asked,
+                                                   std::span<const double> joints_deg) const;
   /// As Model::correct(), by the model in force.
-  [[nodiscard]] Result<Answer<CorrectedTarget>> correct(const Asked& asked, std::span<const Target> targets) const;
+  [[nodiscard]] Result<Answer<CorrectedTarget>> correct(const Asked& asked,
+                                                        std::span<const Target> targets) const;
 
-  /// Hands in measurements (CSV), from which the service trains. Returns the job. The same id with the same content is
-  /// the same submission.
+  /// Hands in measurements (CSV), from which the service trains. Returns the job. The same id with
+  /// the same content is the same submission.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv) const;
   /// Trains from stored batches (empty: the newest) and returns the job. `level` and `bias`
   /// instead of what the cell asks for; empty: as it asks.
-  [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids = {},
-                                             const std::string& level = {}, const std::string& bias = {}) const;
-  /// Asks what the cell's model lacks by a stored batch (its id; empty: the newest) or, with `csv`, by measurements
-  /// that are not kept. Returns the job; once it is done, findings() has what `trammel diagnose --json` prints. With
-  /// `apply` a model with the causes found is trained, and put in force if it is better.
-  [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id = {},
-                                              const std::string& csv = {}, bool apply = false) const;
-  /// Asks whether the robot is still as its model in force has it, by a few poses, stored or in `csv`. `tolerance_mm`
-  /// instead of what the cell holds. Returns the job; then findings() has what `trammel check --json` prints.
-  [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id = {},
-                                           const std::string& csv = {}, std::optional<double> tolerance_mm = {}) const;
+  [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell,
+                                             const std::vector<std::string>& batch_ids = {},
+                                             const std::string& level = {},
+                                             const std::string& bias = {}) const;
+  /// Asks what the cell's model lacks by a stored batch (its id; empty: the newest) or, with `csv`,
+  /// by measurements that are not kept. Returns the job; once it is done, findings() has what
+  /// `trammel diagnose --json` prints. With `apply` a model with the causes found is trained, and
+  /// put in force if it is better.
+  [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell,
+                                              const std::string& batch_id = {},
+                                              const std::string& csv = {},
+                                              bool apply = false) const;
+  /// Asks whether the robot is still as its model in force has it, by a few poses, stored or in
+  /// `csv`. `tolerance_mm` instead of what the cell holds. Returns the job; then findings() has
+  /// what `trammel check --json` prints.
+  [[nodiscard]] Result<std::int64_t> check(const std::string& cell,
+                                           const std::string& batch_id = {},
+                                           const std::string& csv = {},
+                                           std::optional<double> tolerance_mm = {}) const;
   /// What a diagnosis or a check that is done has found: JSON.
   [[nodiscard]] Result<std::string> findings(const std::string& cell, std::int64_t job) const;
-  /// Waits until the job is done or failed, and tells `listener`, if any, how far it is. kUnreachable: `limit` is over.
-  /// kNotFound: no server knows it.
+  /// Waits until the job is done or failed, and tells `listener`, if any, how far it is.
+  /// kUnreachable: `limit` is over. kNotFound: no server knows it.
   [[nodiscard]] Result<Job> wait_for(std::int64_t job, std::chrono::milliseconds limit,
                                      const std::function<void(const Job&)>& listener = {}) const;
   /// Jobs that wait or run or ended lately, of one cell or (empty) of all, oldest first.
   [[nodiscard]] Result<std::vector<Job>> jobs(const std::string& cell) const;
-  /// Puts a version in force; refused where `expected_version` is not, and where it is worse than the version in force
-  /// or cannot be judged, unless `force` is said. `reason` is for the audit trail.
-  [[nodiscard]] Result<int> activate(const std::string& cell, int version, const std::string& reason = {},
-                                     std::optional<int> expected_version = {}, bool force = false) const;
-  /// Adds a model file's text to the history of its cell; activate() puts it in force. Returns its version.
+  /// Puts a version in force; refused where `expected_version` is not, and where it is worse than
+  /// the version in force or cannot be judged, unless `force` is said. `reason` is for the audit
+  /// trail.
+  [[nodiscard]] Result<int> activate(const std::string& cell, int version,
+                                     const std::string& reason = {},
+                                     std::optional<int> expected_version = {},
+                                     bool force = false) const;
+  /// Adds a model file's text to the history of its cell; activate() puts it in force. Returns its
+  /// version.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) const;
-  /// Puts the version before in force again, and returns it; refused where `expected_version` is not in force.
+  /// Puts the version before in force again, and returns it; refused where `expected_version` is
+  /// not in force.
   [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {},
                                       std::optional<int> expected_version = {}) const;
-  /// Lets a batch out of quarantine, so that models may learn from it; refused where `expected_version` is not in
-  /// force.
-  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const std::string& reason = {},
+  /// Lets a batch out of quarantine, so that models may learn from it; refused where
+  /// `expected_version` is not in force.
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id,
+                               const std::string& reason = {},
                                std::optional<int> expected_version = {}) const;
   /// Nothing learns from the batch any more; refused where `expected_version` is not in force.
-  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const std::string& reason = {},
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id,
+                               const std::string& reason = {},
                                std::optional<int> expected_version = {}) const;
 
  private:

@@ -42,16 +42,19 @@ enum ParameterId : std::uint16_t {
 };
 
 constexpr std::size_t kLocator = 24, kGuid = 16;
-constexpr unsigned char kListBigEndian = 0x02, kListLittleEndian = 0x03;  // how a list is serialized
-constexpr std::uint32_t kMostItems = 256;  // partitions, properties, representations of one endpoint
-constexpr int kMostLocators = 64;          // of one announcement
+constexpr unsigned char kListBigEndian = 0x02,
+                        kListLittleEndian = 0x03;  // how a list is serialized
+constexpr std::uint32_t kMostItems =
+    256;                           // partitions, properties, representations of one endpoint
+constexpr int kMostLocators = 64;  // of one announcement
 
 /// A length and that many bytes, padded to 4.
 bool skip_octets(Reader& value) {
   const auto length = value.u32();
   if (!length) return false;
   const std::size_t padded = (std::size_t{*length} + 3) & ~std::size_t{3};
-  return value.take(padded).has_value() || (*length == value.rest().size() && value.take(*length).has_value());
+  return value.take(padded).has_value() ||
+         (*length == value.rest().size() && value.take(*length).has_value());
 }
 
 /// As octets, and its last byte is the NUL that the library looks for.
@@ -81,7 +84,8 @@ bool skip_token_with(Reader& value, const SkipBinary& skip_binary) {
 }
 bool skip_token(Reader& value) { return skip_token_with(value, skip_binary_property); }
 
-/// A list of texts that the library reads until their NUL. Empty partition names have length 0 or 1.
+/// A list of texts that the library reads until their NUL. Empty partition names have length 0
+/// or 1.
 bool skip_partition(Reader& value) {
   const std::size_t before = value.rest().size();
   return skip_string(value) && before - value.rest().size() > 4;
@@ -131,10 +135,13 @@ bool fits(std::uint16_t id, Reader value) {
 
 bool is_locator(std::uint16_t id) {
   return id == kUnicastLocator || id == kMulticastLocator || id == kDefaultUnicastLocator ||
-         id == kDefaultMulticastLocator || id == kMetatrafficUnicastLocator || id == kMetatrafficMulticastLocator;
+         id == kDefaultMulticastLocator || id == kMetatrafficUnicastLocator ||
+         id == kMetatrafficMulticastLocator;
 }
 
-bool is_of(Bytes guid, Bytes source) { return std::equal(source.begin(), source.end(), guid.begin()); }
+bool is_of(Bytes guid, Bytes source) {
+  return std::equal(source.begin(), source.end(), guid.begin());
+}
 
 /// False when the lease is negative.
 bool cut_lease(const Parameter& lease, EditedMessage& message, Reachable& reachable) {
@@ -167,7 +174,9 @@ bool has_wildcard(Reader list) {
   for (std::uint32_t i = 0; i < count; ++i) {
     Reader ahead = list;
     const Bytes name = ahead.take(ahead.u32().value_or(0)).value_or(Bytes());
-    if (std::find_first_of(name.begin(), name.end(), kWildcards.begin(), kWildcards.end()) != name.end()) return true;
+    if (std::find_first_of(name.begin(), name.end(), kWildcards.begin(), kWildcards.end()) !=
+        name.end())
+      return true;
     if (!skip_partition(list)) return false;
   }
   return false;
@@ -177,7 +186,8 @@ bool is_blanked(std::uint16_t id) {
   return id == kTypeId || id == kTypeObject || id == kTypeInformation || id == kContentFilter;
 }
 
-/// The list's next parameter, its length a multiple of 4. `list` is left behind the sentinel at the end.
+/// The list's next parameter, its length a multiple of 4. `list` is left behind the sentinel at the
+/// end.
 struct Next {
   Fault fault;
   std::optional<Parameter> parameter;
@@ -192,14 +202,15 @@ Next next_checked(Reader& list) {
   return {{}, Parameter{*id, *value}};
 }
 
-/// The GUID in an announcement as the handshake has it, which the library holds against the certificate, and against
-/// nothing else. `list` is big endian.
+/// The GUID in an announcement as the handshake has it, which the library holds against the
+/// certificate, and against nothing else. `list` is big endian.
 bool announces(Reader list, Bytes source) {
   while (true) {
     const auto id = list.u16();
     const auto length = list.u16();
     if (!id || !length || *id == kSentinel) return false;
-    if (*id == kParticipantGuid || *id == kKeyHash) return list.rest().size() >= kGuid && is_of(list.rest(), source);
+    if (*id == kParticipantGuid || *id == kKeyHash)
+      return list.rest().size() >= kGuid && is_of(list.rest(), source);
     if (!list.take((std::size_t{*length} + 3) & ~std::size_t{3})) return false;
   }
 }
@@ -209,7 +220,8 @@ bool proves_no_other(Reader property, Bytes source) {
   constexpr std::string_view kAnnouncement = "c.pdata";
   Reader ahead = property;
   const Bytes name = ahead.take(ahead.u32().value_or(0)).value_or(Bytes());
-  if (name.size() < kAnnouncement.size() || !std::equal(kAnnouncement.begin(), kAnnouncement.end(), name.begin()))
+  if (name.size() < kAnnouncement.size() ||
+      !std::equal(kAnnouncement.begin(), kAnnouncement.end(), name.begin()))
     return true;
   skip_string(property);
   const auto length = property.u32();
@@ -228,11 +240,13 @@ Fault check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says
     if (parameter.id == kStatusInfo) says_status = true;
     if (parameter.id == kKeyHash && parameter.value.size() != kGuid) return Dropped::kParameters;
     if (parameter.id == kStatusInfo && parameter.value.size() != 4) return Dropped::kParameters;
-    if (parameter.id == kKeyHash && names_source && !is_of(parameter.value, source)) return Dropped::kSource;
+    if (parameter.id == kKeyHash && names_source && !is_of(parameter.value, source))
+      return Dropped::kSource;
   }
 }
 
-Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Reachable& reachable) {
+Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message,
+                         Reachable& reachable) {
   if (payload.size() < 4 || payload[0] != 0) return Dropped::kParameters;
   if (payload[1] != kListBigEndian && payload[1] != kListLittleEndian) return Dropped::kParameters;
   const bool little_endian = payload[1] == kListLittleEndian;
@@ -251,13 +265,18 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Re
     }
     if (!fits(parameter.id, Reader(parameter.value, little_endian))) return Dropped::kParameters;
     if (is_locator(parameter.id) && ++locators > kMostLocators) return Dropped::kParameters;
-    if (is_locator(parameter.id) && !take_locator(Reader(parameter.value, little_endian), here.first(2), reachable))
+    if (is_locator(parameter.id) &&
+        !take_locator(Reader(parameter.value, little_endian), here.first(2), reachable))
       message.put(here.first(2), std::uint16_t{kPadding}, little_endian);
-    const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid || parameter.id == kKeyHash;
+    const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid ||
+                       parameter.id == kKeyHash;
     if (names && !is_of(parameter.value, source)) return Dropped::kSource;
-    if (parameter.id == kEndpointGuid) reachable.endpoint = Reader(parameter.value.last(4), false).entity();
-    if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian))) return Dropped::kWildcard;
-    if (parameter.id == kLease && !cut_lease(parameter, message, reachable)) return Dropped::kParameters;
+    if (parameter.id == kEndpointGuid)
+      reachable.endpoint = Reader(parameter.value.last(4), false).entity();
+    if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian)))
+      return Dropped::kWildcard;
+    if (parameter.id == kLease && !cut_lease(parameter, message, reachable))
+      return Dropped::kParameters;
   }
 }
 
@@ -269,10 +288,12 @@ std::optional<Bytes> guid_in_inline_qos(Reader inline_qos) {
 }
 
 std::optional<Bytes> guid_in_key(Bytes key) {
-  if (key.size() < 4 || key[0] != 0 || (key[1] != kListBigEndian && key[1] != kListLittleEndian)) return std::nullopt;
+  if (key.size() < 4 || key[0] != 0 || (key[1] != kListBigEndian && key[1] != kListLittleEndian))
+    return std::nullopt;
   Reader list(key.subspan(4), key[1] == kListLittleEndian);
   while (const auto parameter = next_parameter(list)) {
-    const bool names = parameter->id == kParticipantGuid || parameter->id == kEndpointGuid || parameter->id == kKeyHash;
+    const bool names = parameter->id == kParticipantGuid || parameter->id == kEndpointGuid ||
+                       parameter->id == kKeyHash;
     if (names && parameter->value.size() == kGuid) return parameter->value;
   }
   return std::nullopt;

@@ -12,9 +12,10 @@
 
 namespace trammel::wire {
 
-/// Inline QoS at the front of `rest`, which is shortened by it. `names_source`: a key hash is an endpoint's GUID and
-/// must be of `source` (empty: of anybody).
-[[nodiscard]] std::optional<Dropped> check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says_status);
+/// Inline QoS at the front of `rest`, which is shortened by it. `names_source`: a key hash is an
+/// endpoint's GUID and must be of `source` (empty: of anybody).
+[[nodiscard]] std::optional<Dropped> check_inline_qos(Reader& rest, Bytes source, bool names_source,
+                                                      bool& says_status);
 
 inline constexpr std::uint32_t kLongestLeaseSeconds = 120;
 inline constexpr std::uint32_t kUsualLeaseSeconds = 100;  // RTPS 2.2, table 9.12
@@ -45,24 +46,29 @@ struct Reachable {
   Bytes lease{};                                     ///< where it stands; empty: none is said
   bool little_endian = true;
   NamedSockets sockets{};
-  std::array<Bytes, NamedSockets::kMost> stands{};  ///< where the id of each of the sockets' parameters stands
-  std::optional<std::uint32_t> endpoint{};          ///< its entity id, the first octet the highest
+  std::array<Bytes, NamedSockets::kMost>
+      stands{};  ///< where the id of each of the sockets' parameters stands
+  std::optional<std::uint32_t> endpoint{};  ///< its entity id, the first octet the highest
 };
 
-/// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its
-/// parameter, GUIDs of `source` (empty: of anybody). Parameters that only this library reads, that nobody here needs
-/// and whose parsers trust what they read (type objects, content filters) are blanked in `message`, and so are locators
-/// beyond the first NamedSockets::kMost. Leases are cut to kLongestLeaseSeconds.
-[[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
+/// The payload of a participant's, writer's or reader's announcement by `source`: each length and
+/// count within its parameter, GUIDs of `source` (empty: of anybody). Parameters that only this
+/// library reads, that nobody here needs and whose parsers trust what they read (type objects,
+/// content filters) are blanked in `message`, and so are locators beyond the first
+/// NamedSockets::kMost. Leases are cut to kLongestLeaseSeconds.
+[[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source,
+                                                        EditedMessage& message,
                                                         Reachable& reachable);
 
 /// The GUID that the inline QoS say is meant. Empty: none.
 [[nodiscard]] std::optional<Bytes> guid_in_inline_qos(Reader inline_qos);
-/// The GUID in the key of a participant or endpoint that has gone: a list of parameters. Empty: there is none.
+/// The GUID in the key of a participant or endpoint that has gone: a list of parameters. Empty:
+/// there is none.
 [[nodiscard]] std::optional<Bytes> guid_in_key(Bytes key);
 
-/// The payload of a message of the authentication handshake, which comes before anybody is known. It is of `source`,
-/// and so is the announcement within: the library compares that with the certificate, and not with who speaks.
+/// The payload of a message of the authentication handshake, which comes before anybody is known.
+/// It is of `source`, and so is the announcement within: the library compares that with the
+/// certificate, and not with who speaks.
 [[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload, Bytes source);
 
 }  // namespace trammel::wire

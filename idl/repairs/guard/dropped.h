@@ -7,7 +7,8 @@
 
 namespace trammel::wire {
 
-/// Why a packet never reaches the library. README.md of this folder says what the library would do with each.
+/// Why a packet never reaches the library. README.md of this folder says what the library would do
+/// with each.
 enum class Dropped : std::uint8_t {
   kHeader,        ///< no RTPS 2 message, or larger than a datagram may be
   kLength,        ///< a submessage that does not fit, or is shorter than its fields
@@ -36,8 +37,12 @@ inline constexpr std::size_t kDroppedReasons = 18;
 /// How many packets were dropped for each reason. Thread-safe.
 class DropCounts {
  public:
-  void add(Dropped reason) { counts_[static_cast<std::size_t>(reason)].fetch_add(1, std::memory_order_relaxed); }
-  [[nodiscard]] std::uint64_t of(Dropped reason) const { return counts_[static_cast<std::size_t>(reason)]; }
+  void add(Dropped reason) {
+    counts_[static_cast<std::size_t>(reason)].fetch_add(1, std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::uint64_t of(Dropped reason) const {
+    return counts_[static_cast<std::size_t>(reason)];
+  }
   [[nodiscard]] std::uint64_t all() const {
     std::uint64_t sum = 0;
     for (const auto& count : counts_) sum += count;

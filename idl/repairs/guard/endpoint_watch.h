@@ -11,13 +11,15 @@
 
 namespace trammel::wire {
 
-/// How many endpoints each participant has announced. The library keeps some kilobytes of each until it is said to have
-/// gone or its participant's lease is over, and asks each writer that it reads from for its first sample time and
-/// again.
+/// How many endpoints each participant has announced. The library keeps some kilobytes of each
+/// until it is said to have gone or its participant's lease is over, and asks each writer that it
+/// reads from for its first sample time and again.
 class EndpointWatch {
  public:
-  static constexpr std::size_t kMostOfServer = 32768;  ///< it has a writer for each operation of each client
-  static constexpr std::size_t kMostOfClient = 512;    ///< also of a node of ROS 2 with all that is not for us
+  static constexpr std::size_t kMostOfServer =
+      32768;  ///< it has a writer for each operation of each client
+  static constexpr std::size_t kMostOfClient =
+      512;  ///< also of a node of ROS 2 with all that is not for us
 
   explicit EndpointWatch(std::size_t most_of_one) : most_of_one_(most_of_one) {}
 
@@ -37,8 +39,8 @@ class EndpointWatch {
     if (at != own->second.end() && *at == entity) own->second.erase(at);
   }
   void left(Bytes prefix) { endpoints_.erase(key_of(prefix)); }
-  /// All participants that have endpoints here, when they have become many: those that are no longer there are to be
-  /// forgotten. Else none.
+  /// All participants that have endpoints here, when they have become many: those that are no
+  /// longer there are to be forgotten. Else none.
   [[nodiscard]] std::vector<std::array<unsigned char, kPrefix>> to_be_looked_at() {
     std::vector<Prefix> all;
     if (endpoints_.size() < look_at_) return all;

@@ -21,8 +21,9 @@ struct Fragments {
   [[nodiscard]] std::uint32_t of_sample() const { return (sample_size + size - 1) / size; }
 };
 
-/// Samples that arrive in fragments. The library reserves the whole sample with its first fragment and keeps it for as
-/// long as its writer lives, so what is begun and unfinished is bounded, per participant and in all.
+/// Samples that arrive in fragments. The library reserves the whole sample with its first fragment
+/// and keeps it for as long as its writer lives, so what is begun and unfinished is bounded, per
+/// participant and in all.
 class UnfinishedSamples {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -44,10 +45,12 @@ class UnfinishedSamples {
   static constexpr std::size_t kSamples = 512;
   std::optional<Dropped> begin(const EndpointKey& writer, const Fragments& fragments, Time now);
 
-  std::unique_ptr<std::array<Sample, kSamples>> samples_ = std::make_unique<std::array<Sample, kSamples>>();
+  std::unique_ptr<std::array<Sample, kSamples>> samples_ =
+      std::make_unique<std::array<Sample, kSamples>>();
 };
 
-/// Samples that were sent in fragments: the library sends whatever fragment somebody asks for, also beyond the sample.
+/// Samples that were sent in fragments: the library sends whatever fragment somebody asks for, also
+/// beyond the sample.
 class SentSamples {
  public:
   void add(const Fragments& fragments);

@@ -9,22 +9,23 @@
 namespace trammel::wire {
 namespace {
 
-constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message",       "lengths",
-                                                             "statistics submessage", "in another's name",
-                                                             "sequence numbers",      "number sets",
-                                                             "parameter lists",       "fragments",
-                                                             "sample size",           "unfinished samples",
-                                                             "counts that jump",      "numbers skipped",
-                                                             "too many participants", "fragments that were never sent",
-                                                             "security submessages",  "partitions with wildcards",
-                                                             "too many endpoints",    "too much asked for again"};
+constexpr std::array<const char*, kDroppedReasons> kNames = {
+    "no RTPS message",       "lengths",
+    "statistics submessage", "in another's name",
+    "sequence numbers",      "number sets",
+    "parameter lists",       "fragments",
+    "sample size",           "unfinished samples",
+    "counts that jump",      "numbers skipped",
+    "too many participants", "fragments that were never sent",
+    "security submessages",  "partitions with wildcards",
+    "too many endpoints",    "too much asked for again"};
 
 }  // namespace
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, Proof proof,
-             std::size_t most_endpoints)
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts,
+             std::vector<Relay> relays, Proof proof, std::size_t most_endpoints)
     : largest_sample_(largest_sample),
       counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()),
       relays_(std::move(relays)),
@@ -34,8 +35,9 @@ Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, s
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
   const bool relayed = is_of_relay(message, socket);
-  MessageCheck check({largest_sample_, socket, now, relayed, proof_ != Proof::kNone, proof_ == Proof::kOfMessages},
-                     memory_, message, edited);
+  MessageCheck check(
+      {largest_sample_, socket, now, relayed, proof_ != Proof::kNone, proof_ == Proof::kOfMessages},
+      memory_, message, edited);
   if (const auto dropped = check.run()) {
     counts_->add(*dropped);
     return std::nullopt;
@@ -86,7 +88,8 @@ void Guard::sent(Bytes message) {
       const auto number = reader.sequence_number();
       if (!writer || !number || *number < 1) continue;
       const MutexLock lock(memory_.mutex);
-      memory_.repairs.sent(*writer, *number, submessage->body.size(), std::chrono::steady_clock::now());
+      memory_.repairs.sent(*writer, *number, submessage->body.size(),
+                           std::chrono::steady_clock::now());
     }
   }
 }

@@ -15,24 +15,25 @@
 
 namespace trammel::wire {
 
-/// Stands before the library's receiver: drops what would end, stop or flood it, and passes everything that an honest
-/// participant sends, secured or not. README.md says what is dropped and why. Reads hostile bytes: it never reads
-/// beyond a message, allocates nothing but for an endpoint that is new, and throws nothing. Thread-safe; it takes its
-/// one lock only for messages whose sender it must remember.
+/// Stands before the library's receiver: drops what would end, stop or flood it, and passes
+/// everything that an honest participant sends, secured or not. README.md says what is dropped and
+/// why. Reads hostile bytes: it never reads beyond a message, allocates nothing but for an endpoint
+/// that is new, and throws nothing. Thread-safe; it takes its one lock only for messages whose
+/// sender it must remember.
 class Guard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   /// `largest_sample`: bytes that a sample of any topic may have.
   /// `relays` may announce others.
-  /// `proof`: what is said without the proof that all give sends none of them away and skips nothing of theirs.
-  /// `most_endpoints`: of one participant.
+  /// `proof`: what is said without the proof that all give sends none of them away and skips
+  /// nothing of theirs. `most_endpoints`: of one participant.
   explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr,
                  std::vector<Relay> relays = {}, Proof proof = Proof::kNone,
                  std::size_t most_endpoints = EndpointWatch::kMostOfServer);
 
-  /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
-  /// Empty: nothing. Valid until the calling thread's next call.
+  /// What of a message that was received from `socket` (address and port) the library may see: all
+  /// of it, as a rule. Empty: nothing. Valid until the calling thread's next call.
   [[nodiscard]] std::optional<Bytes> check(Bytes message, std::uint64_t socket,
                                            Time now = std::chrono::steady_clock::now());
   /// A message of our own that leaves.

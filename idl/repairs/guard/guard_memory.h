@@ -24,14 +24,17 @@ struct GuardMemory {
   ParticipantWatch participants TRAMMEL_GUARDED_BY(mutex);
   EndpointWatch endpoints TRAMMEL_GUARDED_BY(mutex);
   RepairWatch repairs TRAMMEL_GUARDED_BY(mutex);
-  std::array<unsigned char, kPrefix> own TRAMMEL_GUARDED_BY(mutex) = {};  // prefix; zeros: nothing was sent yet
-  std::atomic<bool> knows_strangers{false};                               // among `participants`
+  std::array<unsigned char, kPrefix> own
+      TRAMMEL_GUARDED_BY(mutex) = {};        // prefix; zeros: nothing was sent yet
+  std::atomic<bool> knows_strangers{false};  // among `participants`
 
   [[nodiscard]] bool is_own(Bytes prefix) const TRAMMEL_REQUIRES(mutex) {
     return std::equal(own.begin(), own.end(), prefix.begin());
   }
   /// After a change of `participants`.
-  void note_strangers() TRAMMEL_REQUIRES(mutex) { knows_strangers = participants.knows_strangers(); }
+  void note_strangers() TRAMMEL_REQUIRES(mutex) {
+    knows_strangers = participants.knows_strangers();
+  }
 };
 
 }  // namespace trammel::wire

@@ -10,20 +10,26 @@
 namespace trammel::wire {
 namespace {
 
-constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kLiveliness = 0x000200c2;
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2,
+                        kLiveliness = 0x000200c2;
 constexpr std::uint32_t kSecureAnnouncer = 0xff0101c2, kSecurePublications = 0xff0003c2,
                         kSecureSubscriptions = 0xff0004c2, kSecureLiveliness = 0xff0200c2;
 constexpr std::uint32_t kHandshake = 0x000201c3, kHandshakeReader = 0x000201c4;
 constexpr std::uint32_t kMostHistory = 1u << 24;  // samples that a HEARTBEAT may offer
-constexpr std::size_t kStatisticsBody = 56;       // a locator, a time, a sequence; as this library lays it out
-constexpr std::size_t kSmallestFragment = 64;     // the library keeps a list in the first octets of each
+constexpr std::size_t kStatisticsBody =
+    56;  // a locator, a time, a sequence; as this library lays it out
+constexpr std::size_t kSmallestFragment =
+    64;  // the library keeps a list in the first octets of each
 constexpr std::size_t kGapBody = 28;
 
 bool is_announcement_writer(std::uint32_t writer) {
-  return writer == kAnnouncer || writer == kPublications || writer == kSubscriptions || writer == kSecureAnnouncer ||
-         writer == kSecurePublications || writer == kSecureSubscriptions;
+  return writer == kAnnouncer || writer == kPublications || writer == kSubscriptions ||
+         writer == kSecureAnnouncer || writer == kSecurePublications ||
+         writer == kSecureSubscriptions;
 }
-bool is_liveliness_writer(std::uint32_t writer) { return writer == kLiveliness || writer == kSecureLiveliness; }
+bool is_liveliness_writer(std::uint32_t writer) {
+  return writer == kLiveliness || writer == kSecureLiveliness;
+}
 }  // namespace
 
 std::optional<Fragments> fragments_of(const Submessage& submessage) {
@@ -57,7 +63,8 @@ std::optional<Dropped> MessageCheck::check_header() {
   if (message_.size() < kHeader || message_.size() > EditedMessage::kMost) return Dropped::kHeader;
   if (!std::equal(kBegin.begin(), kBegin.end(), message_.begin())) return Dropped::kHeader;
   const Bytes prefix = message_.subspan(kPrefixAt, kPrefix);
-  if (std::all_of(prefix.begin(), prefix.end(), [](unsigned char b) { return b == 0; })) return Dropped::kSource;
+  if (std::all_of(prefix.begin(), prefix.end(), [](unsigned char b) { return b == 0; }))
+    return Dropped::kSource;
   return {};
 }
 
@@ -115,14 +122,16 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   Reader after(reader.rest(), reader.little_endian());
   const auto head = take_head(reader);
   const auto number = reader.sequence_number();
-  if (!to_inline_qos || !head || !number || *to_inline_qos < 16 || !after.take(*to_inline_qos)) return Dropped::kLength;
+  if (!to_inline_qos || !head || !number || *to_inline_qos < 16 || !after.take(*to_inline_qos))
+    return Dropped::kLength;
   if (!is_number(number)) return Dropped::kNumber;
 
   const bool announcement = is_announcement_writer(head->writer);
   bool says_status = false;
   const Reader inline_qos = after;
   if ((submessage.flags & kInlineQos) != 0) {
-    if (const Fault fault = check_inline_qos(after, named_, announcement, says_status)) return fault;
+    if (const Fault fault = check_inline_qos(after, named_, announcement, says_status))
+      return fault;
   }
   const bool payload = (submessage.flags & kPayload) != 0, key = (submessage.flags & kKey) != 0;
   if (payload && key) return Dropped::kLength;
@@ -131,9 +140,12 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
     return {};
   }
   if ((!payload || says_status) && head->writer == kAnnouncer && !received_.relayed) {
-    // To a reader that nobody has. The library would forget the participant here, while it may be looking in another
-    // thread whether its lease is over: an assertion of PDP.cpp then ends the process.
-    if (!signed_) edited_.put(submessage.body.subspan(4, 4), std::array<unsigned char, 4>{0xff, 0xff, 0xff, 0xff});
+    // To a reader that nobody has. The library would forget the participant here, while it may be
+    // looking in another thread whether its lease is over: an assertion of PDP.cpp then ends the
+    // process.
+    if (!signed_)
+      edited_.put(submessage.body.subspan(4, 4),
+                  std::array<unsigned char, 4>{0xff, 0xff, 0xff, 0xff});
     const MutexLock lock(memory_.mutex);
     memory_.participants.left(source_);
     memory_.endpoints.left(source_);
@@ -141,7 +153,8 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   }
   const bool of_endpoint = head->writer == kPublications || head->writer == kSubscriptions;
   const bool has_ended = (!payload || says_status) && of_endpoint && !received_.relayed;
-  if (has_ended && (submessage.flags & kInlineQos) != 0) note_end_of_endpoint(guid_in_inline_qos(inline_qos));
+  if (has_ended && (submessage.flags & kInlineQos) != 0)
+    note_end_of_endpoint(guid_in_inline_qos(inline_qos));
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
   if (has_ended && key) note_end_of_endpoint(guid_in_key(after.rest()));
@@ -151,15 +164,16 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
                    : check_announced(submessage, head->writer, *number, after.rest());
 }
 
-/// Cyclone DDS says by a key alone who has gone. The library takes that from the inline QoS only: the key moves there,
-/// over the sentinel of the QoS and its own beginning.
+/// Cyclone DDS says by a key alone who has gone. The library takes that from the inline QoS only:
+/// the key moves there, over the sentinel of the QoS and its own beginning.
 std::optional<Dropped> MessageCheck::check_key_of_gone(const Submessage& data, Bytes key) {
   constexpr std::uint16_t kKeyHash = 0x0070;
   const auto guid = guid_in_key(key);
   if (!guid) return Dropped::kParameters;
   if (!std::equal(named_.begin(), named_.end(), guid->begin())) return Dropped::kSource;
   if ((data.flags & kInlineQos) == 0) return {};
-  const Bytes place = message_.subspan(static_cast<std::size_t>(key.data() - message_.data()) - 4, 8 + guid->size());
+  const Bytes place = message_.subspan(static_cast<std::size_t>(key.data() - message_.data()) - 4,
+                                       8 + guid->size());
   edited_.put(place.first(2), kKeyHash, data.little_endian());
   edited_.put(place.subspan(2, 2), static_cast<std::uint16_t>(guid->size()), data.little_endian());
   edited_.put(place.subspan(4, guid->size()), *guid);
@@ -169,8 +183,8 @@ std::optional<Dropped> MessageCheck::check_key_of_gone(const Submessage& data, B
   return {};
 }
 
-/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So what may not
-/// pass is said not to exist.
+/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits.
+/// So what may not pass is said not to exist.
 std::optional<Dropped> MessageCheck::check_relayed_data(const Submessage& submessage) {
   const Fault fault = check_data(submessage);
   if (!fault) return {};
@@ -187,23 +201,27 @@ void MessageCheck::make_gap(const Submessage& data, std::int64_t number) {
   const bool little_endian = data.little_endian();
   edited_.put(id_of(data), std::array<unsigned char, 1>{kGap});
   edited_.put(flags_of(data), std::array{static_cast<unsigned char>(data.flags & kLittleEndian)});
-  edited_.put(data.body.first(16), data.body.subspan(4, 16));  // reader, writer, the first number that is skipped
+  edited_.put(data.body.first(16),
+              data.body.subspan(4, 16));  // reader, writer, the first number that is skipped
   edited_.put_sequence_number(data.body.subspan(16, 8), number + 1, little_endian);
   edited_.put(data.body.subspan(24, 4), std::uint32_t{0}, little_endian);
 }
 
-/// Where participants prove who they are: whether a writer of announcements is one that anybody can speak for.
+/// Where participants prove who they are: whether a writer of announcements is one that anybody can
+/// speak for.
 bool MessageCheck::is_unproven(std::uint32_t writer) const {
-  return received_.secured && !signed_ && (writer == kAnnouncer || writer == kPublications || writer == kSubscriptions);
+  return received_.secured && !signed_ &&
+         (writer == kAnnouncer || writer == kPublications || writer == kSubscriptions);
 }
 
-/// Whether it speaks for an endpoint whose words are all proven, and proves nothing: anybody could have sent it, to
-/// make a reader skip what it has not read.
+/// Whether it speaks for an endpoint whose words are all proven, and proves nothing: anybody could
+/// have sent it, to make a reader skip what it has not read.
 bool MessageCheck::lacks_proof(const Submessage& submessage) const {
   if (!received_.secured || signed_) return false;
   const bool data = submessage.id == kData || submessage.id == kDataFrag;
-  const bool other = submessage.id == kHeartbeat || submessage.id == kHeartbeatFrag || submessage.id == kGap ||
-                     submessage.id == kAckNack || submessage.id == kNackFrag;
+  const bool other = submessage.id == kHeartbeat || submessage.id == kHeartbeatFrag ||
+                     submessage.id == kGap || submessage.id == kAckNack ||
+                     submessage.id == kNackFrag;
   if (!data && !other) return false;
   Reader reader(submessage.body, submessage.little_endian());
   if (data && !reader.take(4)) return false;
@@ -215,22 +233,25 @@ bool MessageCheck::lacks_proof(const Submessage& submessage) const {
 
 /// A message that is signed may begin with its header once more.
 bool MessageCheck::repeats_source(Bytes body) const {
-  return body.size() >= kPrefix && std::equal(source_.begin(), source_.end(), body.last(kPrefix).begin());
+  return body.size() >= kPrefix &&
+         std::equal(source_.begin(), source_.end(), body.last(kPrefix).begin());
 }
 
-/// Said without proof, that a participant has gone, or one of its endpoints: its lease decides. Writers of endpoints'
-/// announcements are reliable, so of them the number is skipped.
+/// Said without proof, that a participant has gone, or one of its endpoints: its lease decides.
+/// Writers of endpoints' announcements are reliable, so of them the number is skipped.
 void MessageCheck::ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number) {
   if (writer != kAnnouncer && data.body.size() >= kGapBody) return make_gap(data, number);
   blank(data);
 }
 
 Bytes MessageCheck::id_of(const Submessage& submessage) const {
-  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 1);
+  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4,
+                          1);
 }
 
 Bytes MessageCheck::flags_of(const Submessage& submessage) const {
-  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 3, 1);
+  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 3,
+                          1);
 }
 
 void MessageCheck::blank(const Submessage& submessage) {
@@ -242,13 +263,15 @@ std::optional<Dropped> MessageCheck::check_destination(const Submessage& submess
   if (submessage.body.size() < kPrefix) return Dropped::kLength;
   if (!memory_.knows_strangers) return {};
   const MutexLock lock(memory_.mutex);
-  if (memory_.is_own(submessage.body.first(kPrefix))) memory_.participants.spoke(source_, received_.now);
+  if (memory_.is_own(submessage.body.first(kPrefix)))
+    memory_.participants.spoke(source_, received_.now);
   memory_.note_strangers();
   return {};
 }
 
-std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessage, std::uint32_t writer,
-                                                     std::int64_t number, Bytes payload) {
+std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessage,
+                                                     std::uint32_t writer, std::int64_t number,
+                                                     Bytes payload) {
   Reachable reachable;
   if (is_announcement_writer(writer)) {
     if (const Fault fault = check_announcement(payload, named_, edited_, reachable)) return fault;
@@ -263,11 +286,12 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
   }
   NamedSockets here;
   for (const std::uint64_t socket : reachable.sockets.all()) {
-    if (static_cast<std::uint32_t>(socket) == static_cast<std::uint32_t>(received_.socket)) here.add(socket);
+    if (static_cast<std::uint32_t>(socket) == static_cast<std::uint32_t>(received_.socket))
+      here.add(socket);
   }
   blank_others(reachable, here);
-  const auto admission =
-      memory_.participants.announced(source_, received_.socket, reachable, received_.secured, received_.now);
+  const auto admission = memory_.participants.announced(source_, received_.socket, reachable,
+                                                        received_.secured, received_.now);
   memory_.note_strangers();
   const auto lease = static_cast<std::uint32_t>(admission.lease.count());
   if (admission.ignored) {
@@ -279,7 +303,8 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
 }
 
 /// The library knows no endpoints of participants that it does not know.
-void MessageCheck::check_endpoint(const Submessage& submessage, std::int64_t number, Reachable& reachable) {
+void MessageCheck::check_endpoint(const Submessage& submessage, std::int64_t number,
+                                  Reachable& reachable) {
   if (!memory_.participants.is_there(source_, received_.now)) return;
   for (const auto& prefix : memory_.endpoints.to_be_looked_at()) {
     if (!memory_.participants.is_there(prefix, received_.now)) memory_.endpoints.left(prefix);
@@ -303,7 +328,8 @@ void MessageCheck::note_end_of_endpoint(std::optional<Bytes> guid) {
   memory_.endpoints.lost(source_, Reader(guid->last(4), false).entity().value_or(0));
 }
 
-/// The library would send there without end. Where none is left of an endpoint it takes those of its participant.
+/// The library would send there without end. Where none is left of an endpoint it takes those of
+/// its participant.
 void MessageCheck::blank_others(Reachable& reachable, const NamedSockets& allowed) {
   constexpr std::uint16_t kPadding = 0;
   const auto all = reachable.sockets.all();
@@ -320,7 +346,8 @@ std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessag
   const bool too_large = fragments->sample_size > received_.largest_sample;
   if (too_large && fragments->first != 1) return Dropped::kSampleSize;
   if ((fragments->writer & kBuiltIn) == kBuiltIn) return Dropped::kFragment;
-  if (fragments->size < kSmallestFragment || fragments->first < 1 || fragments->count < 1) return Dropped::kFragment;
+  if (fragments->size < kSmallestFragment || fragments->first < 1 || fragments->count < 1)
+    return Dropped::kFragment;
   const std::uint64_t last = std::uint64_t{fragments->first} + fragments->count - 1;
   if (last > fragments->of_sample()) return Dropped::kFragment;
 
@@ -341,13 +368,15 @@ std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessag
   return memory_.unfinished.add(source_, *fragments, received_.now);
 }
 
-/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So the first
-/// fragment becomes a whole sample, in place, and its reader tells the writer why it is refused.
+/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits.
+/// So the first fragment becomes a whole sample, in place, and its reader tells the writer why it
+/// is refused.
 std::optional<Dropped> MessageCheck::cut_too_large(const Submessage& submessage, Bytes payload,
                                                    std::uint32_t sample_size) {
   constexpr unsigned char kKeyOfFragment = 0x04;
   if ((submessage.flags & kKeyOfFragment) != 0) return Dropped::kSampleSize;
-  const auto flags = static_cast<unsigned char>((submessage.flags & (kLittleEndian | kInlineQos)) | kPayload);
+  const auto flags =
+      static_cast<unsigned char>((submessage.flags & (kLittleEndian | kInlineQos)) | kPayload);
   edited_.put(id_of(submessage), std::array<unsigned char, 1>{kData});
   edited_.put(flags_of(submessage), std::array{flags});
   edited_.put(payload.subspan(kOptionsAt, 2), options_of_cut(sample_size));
@@ -364,9 +393,12 @@ std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessag
   if (!is_number(first) || *last < *first - 1 || *last > kLargestNumber) return Dropped::kNumber;
   if (*last - *first > kMostHistory) return Dropped::kNumber;
   const MutexLock lock(memory_.mutex);
-  if (!memory_.sequences.count(key_of(source_, head->writer), *count, received_.now)) return Dropped::kCount;
-  const auto step = signed_ || wrapped_ ? SequenceWatch::kSignedStep : SequenceWatch::kHeartbeatStep;
-  const std::int64_t allowed = memory_.sequences.heartbeat(key_of(source_, head->writer), *first, step, received_.now);
+  if (!memory_.sequences.count(key_of(source_, head->writer), *count, received_.now))
+    return Dropped::kCount;
+  const auto step =
+      signed_ || wrapped_ ? SequenceWatch::kSignedStep : SequenceWatch::kHeartbeatStep;
+  const std::int64_t allowed =
+      memory_.sequences.heartbeat(key_of(source_, head->writer), *first, step, received_.now);
   if (allowed >= *first) return {};
   if (signed_ || wrapped_) return Dropped::kSkipped;  // a signature does not outlive a change
   edited_.put_sequence_number(first_field.first(8), allowed, reader.little_endian());
@@ -391,7 +423,8 @@ std::optional<Dropped> MessageCheck::check_gap(const Submessage& submessage) {
   if (!is_number(start) || !is_number(base) || *base < *start) return Dropped::kNumber;
   if (const NumberSet set = take_set(reader); set.fault) return set.fault;
   const MutexLock lock(memory_.mutex);
-  const auto range = memory_.sequences.gap(key_of(source_, head->writer), {*start, *base}, received_.now);
+  const auto range =
+      memory_.sequences.gap(key_of(source_, head->writer), {*start, *base}, received_.now);
   if (range.start == *start && range.end == *base) return {};
   if (range.end <= range.start || signed_ || wrapped_) return Dropped::kSkipped;
   edited_.put_sequence_number(fields.first(8), range.start, reader.little_endian());

@@ -51,7 +51,8 @@ class MessageCheck {
   void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
   [[nodiscard]] bool repeats_source(Bytes body) const;
   Fault check_destination(const Submessage& submessage);
-  Fault check_announced(const Submessage& submessage, std::uint32_t writer, std::int64_t number, Bytes payload);
+  Fault check_announced(const Submessage& submessage, std::uint32_t writer, std::int64_t number,
+                        Bytes payload);
   void check_endpoint(const Submessage& submessage, std::int64_t number, Reachable& reachable)
       TRAMMEL_REQUIRES(memory_.mutex);
   void note_end_of_endpoint(std::optional<Bytes> guid);
@@ -61,7 +62,8 @@ class MessageCheck {
   Fault check_heartbeat(const Submessage& submessage);
   Fault check_heartbeat_frag(const Submessage& submessage);
   Fault check_gap(const Submessage& submessage);
-  Fault check_repairs(std::uint32_t writer, std::int64_t base, const NumberSet& asked, bool little_endian);
+  Fault check_repairs(std::uint32_t writer, std::int64_t base, const NumberSet& asked,
+                      bool little_endian);
   Fault check_acknack(const Submessage& submessage);
   Fault check_nack_frag(const Submessage& submessage);
   Fault check_statistics(const Submessage& submessage, Bytes behind);

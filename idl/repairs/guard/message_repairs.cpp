@@ -17,14 +17,16 @@ std::optional<Dropped> MessageCheck::check_acknack(const Submessage& submessage)
   const auto count = reader.u32();
   if (!count) return Dropped::kLength;
   if (set.count > 0) {
-    if (const Fault fault = check_repairs(head->writer, *base, set, reader.little_endian())) return fault;
+    if (const Fault fault = check_repairs(head->writer, *base, set, reader.little_endian()))
+      return fault;
   }
   return check_count(head->reader, head->writer ^ kAcks, *count);
 }
 
-/// The first of the numbers asked for pass, as far as they may be sent again now. The reader asks for the rest anew.
-std::optional<Dropped> MessageCheck::check_repairs(std::uint32_t writer, std::int64_t base, const NumberSet& asked,
-                                                   bool little_endian) {
+/// The first of the numbers asked for pass, as far as they may be sent again now. The reader asks
+/// for the rest anew.
+std::optional<Dropped> MessageCheck::check_repairs(std::uint32_t writer, std::int64_t base,
+                                                   const NumberSet& asked, bool little_endian) {
   const MutexLock lock(memory_.mutex);
   // The library sends nothing to those that it does not know.
   if (!memory_.participants.is_there(source_, received_.now)) return {};
@@ -39,7 +41,8 @@ std::optional<Dropped> MessageCheck::check_repairs(std::uint32_t writer, std::in
     for (std::uint32_t i = 0; i < std::min<std::uint32_t>(32, asked.bits - at); ++i) {
       const std::uint32_t bit = 0x80000000u >> i;
       if ((word & bit) == 0) continue;
-      const double more = is_full ? 0 : memory_.repairs.bytes_of(writer, base + at + i, received_.now);
+      const double more =
+          is_full ? 0 : memory_.repairs.bytes_of(writer, base + at + i, received_.now);
       is_full = is_full || bytes + more > allowed;
       if (is_full) {
         passes &= ~bit;
@@ -69,7 +72,8 @@ std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessag
   if (std::uint64_t{*base} + kMostBits > UINT32_MAX) return Dropped::kNotSent;
   {
     const MutexLock lock(memory_.mutex);
-    const std::uint32_t each = memory_.sent.fragment_bytes(head->writer, *number, *base + set.highest);
+    const std::uint32_t each =
+        memory_.sent.fragment_bytes(head->writer, *number, *base + set.highest);
     if (each == 0) return Dropped::kNotSent;
     if (memory_.participants.is_there(source_, received_.now)) {
       if (memory_.repairs.allowed(source_, received_.now) <= 0) return Dropped::kRepairs;
@@ -79,10 +83,13 @@ std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessag
   return check_count(head->reader, head->writer ^ kNacks, *count);
 }
 
-std::optional<Dropped> MessageCheck::check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count) {
+std::optional<Dropped> MessageCheck::check_count(std::uint32_t endpoint, std::uint32_t tag,
+                                                 std::uint32_t count) {
   const MutexLock lock(memory_.mutex);
   const std::uint32_t mixed = endpoint * 0x9e3779b1u ^ tag;
-  return memory_.sequences.count(key_of(source_, mixed), count, received_.now) ? Fault() : Fault(Dropped::kCount);
+  return memory_.sequences.count(key_of(source_, mixed), count, received_.now)
+             ? Fault()
+             : Fault(Dropped::kCount);
 }
 
 }  // namespace trammel::wire

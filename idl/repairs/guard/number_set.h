@@ -37,7 +37,8 @@ struct NumberSet {
     const std::uint32_t used = *bits - 32 * i;  // of this word; the rest of it counts for nothing
     const std::uint32_t set_bits = used >= 32 ? word : word & ~(UINT32_MAX >> used);
     set.count += std::popcount(set_bits);
-    if (set_bits != 0) set.highest = 32 * i + 31 - static_cast<std::uint32_t>(std::countr_zero(set_bits));
+    if (set_bits != 0)
+      set.highest = 32 * i + 31 - static_cast<std::uint32_t>(std::countr_zero(set_bits));
   }
   return set;
 }

@@ -33,14 +33,17 @@ bool ParticipantWatch::may_be_new(Time now) {
 }
 
 bool ParticipantWatch::has_room(const EndpointKey& key, Time now) {
-  if (participants_.count([now](const Participant& one) { return one.until > now; }) >= kMost) return false;
+  if (participants_.count([now](const Participant& one) { return one.until > now; }) >= kMost)
+    return false;
   return strangers_.size() < kCrowd || std::exchange(seen_.at(key, now).before, true);
 }
 
-ParticipantWatch::Admission ParticipantWatch::announced(Bytes prefix, std::uint64_t socket, const Reachable& reachable,
-                                                        bool pinned, Time now) {
+ParticipantWatch::Admission ParticipantWatch::announced(Bytes prefix, std::uint64_t socket,
+                                                        const Reachable& reachable, bool pinned,
+                                                        Time now) {
   const EndpointKey key = key_of(prefix, 0);
-  const std::chrono::seconds lease(reachable.lease_seconds), short_lease = std::min(lease, kStrangersLease);
+  const std::chrono::seconds lease(reachable.lease_seconds),
+      short_lease = std::min(lease, kStrangersLease);
   Participant* const known = participants_.find(key, now);
   const bool is_known = known != nullptr && known->until > now;
   if (is_known && !known->is_stranger) {
@@ -57,14 +60,16 @@ ParticipantWatch::Admission ParticipantWatch::announced(Bytes prefix, std::uint6
   }
   Socket& from = sockets_.at(key_of_socket(socket), now);
   if (now - from.since > kWindow) from = {now, 0};
-  if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now)) return {Dropped::kParticipants};
+  if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now))
+    return {Dropped::kParticipants};
   ++from.participants;
   participants_.at(key, now) = {now + short_lease, true, said_in(reachable), reachable.sockets};
   strangers_.push_back({key, now + short_lease, kAnswers, reachable.sockets});
   return {{}, short_lease};
 }
 
-void ParticipantWatch::hear_again(const EndpointKey& key, Participant& known, const Reachable& reachable, Time now) {
+void ParticipantWatch::hear_again(const EndpointKey& key, Participant& known,
+                                  const Reachable& reachable, Time now) {
   const std::chrono::seconds lease(reachable.lease_seconds);
   known.until = now + (known.is_stranger ? std::min(lease, kStrangersLease) : lease);
   known.said = said_in(reachable);
@@ -109,13 +114,14 @@ void ParticipantWatch::forget_stranger(const EndpointKey& key) {
 }
 
 ParticipantWatch::Stranger* ParticipantWatch::stranger(const EndpointKey& key) {
-  const auto found =
-      std::find_if(strangers_.begin(), strangers_.end(), [&key](const Stranger& one) { return one.key == key; });
+  const auto found = std::find_if(strangers_.begin(), strangers_.end(),
+                                  [&key](const Stranger& one) { return one.key == key; });
   return found == strangers_.end() ? nullptr : &*found;
 }
 
 void ParticipantWatch::note_sockets(const NamedSockets& sockets, Time now, Time until) {
-  for (const std::uint64_t socket : sockets.all()) listens_.at(key_of_socket(socket), now).until = until;
+  for (const std::uint64_t socket : sockets.all())
+    listens_.at(key_of_socket(socket), now).until = until;
 }
 
 bool ParticipantWatch::lets_out(std::uint64_t socket, Time now) {

@@ -27,7 +27,8 @@ inline EndpointKey key_of(Bytes prefix, std::uint32_t entity) {
   return key;
 }
 
-/// What is known of the endpoints heard last. Of fixed size: the one not heard for longest makes room.
+/// What is known of the endpoints heard last. Of fixed size: the one not heard for longest makes
+/// room.
 template <typename Value, std::size_t kSets>
 class RecentTable {
  public:

@@ -12,18 +12,21 @@
 
 namespace trammel::wire {
 
-/// How much of what our writers have sent is asked for again. The library sends it whenever it is asked, in the one
-/// thread that sends all of it again: a question of 60 bytes may cost a gigabyte, and the thread is away for seconds.
-/// What is asked for is charged with the bytes that it has.
+/// How much of what our writers have sent is asked for again. The library sends it whenever it is
+/// asked, in the one thread that sends all of it again: a question of 60 bytes may cost a gigabyte,
+/// and the thread is away for seconds. What is asked for is charged with the bytes that it has.
 class RepairWatch {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  /// Bytes. An honest reader asks for what was lost on the way, or was more than the buffer of its socket holds.
+  /// Bytes. An honest reader asks for what was lost on the way, or was more than the buffer of its
+  /// socket holds.
   static constexpr double kAtOnce = 128e6, kPerSecond = 64e6;  ///< of one participant
   static constexpr double kAllAtOnce = 512e6, kAllPerSecond = 256e6;
-  /// What is left may be exceeded by as much as comes back within this time: by the largest sample, in any case.
+  /// What is left may be exceeded by as much as comes back within this time: by the largest sample,
+  /// in any case.
   static constexpr double kDebtSeconds = 2;
-  static constexpr std::size_t kHistory = 64;  ///< samples of a writer that are known each; no history is deeper
+  static constexpr std::size_t kHistory =
+      64;  ///< samples of a writer that are known each; no history is deeper
 
   /// One of our writers has sent a sample, or a part of it.
   void sent(std::uint32_t writer, std::int64_t number, std::size_t sample_bytes, Time now) {
@@ -31,11 +34,13 @@ class RepairWatch {
     if (!sizes.newest) sizes.newest = std::make_unique<std::array<Sample, kHistory>>();
     Sample& place = (*sizes.newest)[static_cast<std::size_t>(number) % kHistory];
     if (number < place.number) return;
-    if (place.number != 0 && place.number != number) sizes.largest_before = std::max(sizes.largest_before, place.bytes);
+    if (place.number != 0 && place.number != number)
+      sizes.largest_before = std::max(sizes.largest_before, place.bytes);
     place = {number, static_cast<std::uint32_t>(sample_bytes)};
   }
-  /// What the library may send where somebody asks for this number. Of one that has left the histories of requests and
-  /// replies it sends nothing; announcements of endpoints it keeps, and they are small.
+  /// What the library may send where somebody asks for this number. Of one that has left the
+  /// histories of requests and replies it sends nothing; announcements of endpoints it keeps, and
+  /// they are small.
   [[nodiscard]] double bytes_of(std::uint32_t writer, std::int64_t number, Time now) {
     const Sizes* const sizes = sizes_.find(key_of_writer(writer), now);
     if (sizes == nullptr || number < 1) return 0;
@@ -44,8 +49,8 @@ class RepairWatch {
     const bool is_kept = number < place.number && (writer & kBuiltIn) == kBuiltIn;
     return is_kept ? sizes->largest_before : 0;
   }
-  /// How many bytes the participant may be sent again now, 0: none, its reader has to ask anew. Whoever has asked for
-  /// little is sent it also where all together have asked for too much.
+  /// How many bytes the participant may be sent again now, 0: none, its reader has to ask anew.
+  /// Whoever has asked for little is sent it also where all together have asked for too much.
   [[nodiscard]] double allowed(Bytes prefix, Time now) {
     Bucket& own = buckets_.at(key_of(prefix, 0), now);
     own.refill(kAtOnce, kPerSecond, now);

@@ -35,12 +35,14 @@ enum SubmessageId : unsigned char {
   kStatistics = 0x80,  ///< of eProsima
 };
 
-inline constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04, kKey = 0x08;
+inline constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04,
+                               kKey = 0x08;
 
-inline constexpr std::uint32_t kBuiltIn = 0xc0;  ///< in the last octet of an entity id: of discovery, no topic
+inline constexpr std::uint32_t kBuiltIn =
+    0xc0;  ///< in the last octet of an entity id: of discovery, no topic
 
-/// Whether an endpoint is one of those that DDS-Security adds and that say nothing in the clear: not that of
-/// liveliness, which plants leave unprotected.
+/// Whether an endpoint is one of those that DDS-Security adds and that say nothing in the clear:
+/// not that of liveliness, which plants leave unprotected.
 inline constexpr bool is_of_security(std::uint32_t entity) {
   constexpr std::uint32_t kLiveliness = 0xff0200c2;
   return entity >> 24 == 0xff && entity != kLiveliness;
@@ -120,8 +122,9 @@ struct Submessage {
   [[nodiscard]] bool little_endian() const { return (flags & kLittleEndian) != 0; }
 };
 
-/// The next submessage of `rest`, which is shortened by it; empty at the end, or when its length is not within `rest`.
-/// A length of 0 means: to the end of the message, but for the two kinds that may be empty.
+/// The next submessage of `rest`, which is shortened by it; empty at the end, or when its length is
+/// not within `rest`. A length of 0 means: to the end of the message, but for the two kinds that
+/// may be empty.
 inline std::optional<Submessage> next_submessage(Bytes& rest) {
   if (rest.size() < 4) return std::nullopt;
   Submessage result{rest[0], rest[1], {}};

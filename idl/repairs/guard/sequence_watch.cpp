@@ -4,7 +4,8 @@
 
 namespace trammel::wire {
 
-std::int64_t SequenceWatch::granted(std::int64_t wanted, std::int64_t step, std::int64_t weight, Time now) {
+std::int64_t SequenceWatch::granted(std::int64_t wanted, std::int64_t step, std::int64_t weight,
+                                    Time now) {
   if (wanted <= kFreely) return wanted;
   const auto since = std::chrono::duration_cast<std::chrono::microseconds>(now - refilled_).count();
   if (since > 0) {
@@ -17,7 +18,8 @@ std::int64_t SequenceWatch::granted(std::int64_t wanted, std::int64_t step, std:
   return grant;
 }
 
-std::int64_t SequenceWatch::heartbeat(const EndpointKey& writer, std::int64_t first, std::int64_t step, Time now) {
+std::int64_t SequenceWatch::heartbeat(const EndpointKey& writer, std::int64_t first,
+                                      std::int64_t step, Time now) {
   Known& known = known_.at(writer, now);
   const std::int64_t wanted = first - 1 - known.confirmed;
   if (wanted <= kFreely) return first;
@@ -33,7 +35,8 @@ SequenceWatch::Range SequenceWatch::gap(const EndpointKey& writer, Range asked, 
   if (asked.end - asked.start <= kFreely) return asked;
   Known& known = known_.at(writer, now);
   Range range = asked;
-  if (known.gap.start == asked.start && known.gap.end < asked.end) range.start = std::max(asked.start, known.gap.end);
+  if (known.gap.start == asked.start && known.gap.end < asked.end)
+    range.start = std::max(asked.start, known.gap.end);
   range.end = range.start + granted(range.end - range.start, kGapStep, kGapWeight, now);
   known.gap = {asked.start, range.end};
   return range;

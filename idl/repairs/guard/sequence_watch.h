@@ -9,17 +9,20 @@ namespace trammel::wire {
 /// Largest sequence number that passes: a million samples a second for nine years.
 inline constexpr std::int64_t kLargestNumber = std::int64_t{1} << 48;
 
-/// Lets writers skip sequence numbers in steps that the library takes in milliseconds: it counts through all that a
-/// HEARTBEAT or a GAP leaves out, one by one, with its reader locked. Small ranges pass. Larger ones are cut to a step
-/// beyond what our own reader has confirmed; the rest comes with the writer's next message. All writers together have a
-/// budget. Also notes counts: the library ignores every message whose count is not above the highest before.
+/// Lets writers skip sequence numbers in steps that the library takes in milliseconds: it counts
+/// through all that a HEARTBEAT or a GAP leaves out, one by one, with its reader locked. Small
+/// ranges pass. Larger ones are cut to a step beyond what our own reader has confirmed; the rest
+/// comes with the writer's next message. All writers together have a budget. Also notes counts: the
+/// library ignores every message whose count is not above the highest before.
 class SequenceWatch {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::int64_t kFreely = 4096;  ///< numbers skipped without counting them
-  /// Under half a second on a slow host: who stands still for longer than a lease takes himself for one that slept.
+  /// Under half a second on a slow host: who stands still for longer than a lease takes himself for
+  /// one that slept.
   static constexpr std::int64_t kHeartbeatStep = std::int64_t{1} << 20;
-  /// Of a signed message, which passes whole or not at all: what an honest writer skips at most when it is met again.
+  /// Of a signed message, which passes whole or not at all: what an honest writer skips at most
+  /// when it is met again.
   static constexpr std::int64_t kSignedStep = std::int64_t{1} << 22;
   static constexpr std::int64_t kGapStep = std::int64_t{1} << 17;
   static constexpr std::uint32_t kCountStep = 1u << 24;
@@ -29,7 +32,8 @@ class SequenceWatch {
     known_.at(writer, now).confirmed = number;
   }
   /// What `first` of a HEARTBEAT may be at most, in steps of so many numbers.
-  [[nodiscard]] std::int64_t heartbeat(const EndpointKey& writer, std::int64_t first, std::int64_t step, Time now);
+  [[nodiscard]] std::int64_t heartbeat(const EndpointKey& writer, std::int64_t first,
+                                       std::int64_t step, Time now);
   /// The part of GAP [start, end) that may pass; empty: none now.
   struct Range {
     std::int64_t start, end;
@@ -52,7 +56,8 @@ class SequenceWatch {
   RecentTable<Known, 1024> known_;
   std::int64_t budget_ = kBudget;
   Time refilled_{};
-  static constexpr std::int64_t kBudget = std::int64_t{1} << 26;  // of HEARTBEATs' numbers, a second
+  static constexpr std::int64_t kBudget = std::int64_t{1}
+                                          << 26;  // of HEARTBEATs' numbers, a second
   static constexpr std::int64_t kGapWeight = 16;
 };
 

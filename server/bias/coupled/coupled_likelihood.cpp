@@ -27,7 +27,8 @@ AlignedMatrix assembled(const Kernel& kernel, const CoupledData& data, const GpH
     const Index cols = std::min(kTile, n - j);
     for (Index i = j; i < n; i += 4 * kTile) {
       const Index rows = std::min(4 * kTile, n - i);
-      kernel.tile(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols), tile.data(), tile.rows());
+      kernel.tile(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols), tile.data(),
+                  tile.rows());
       matrix.map().block(i, j, rows, cols) = signal * tile.map().topLeftCorner(rows, cols);
     }
   }
@@ -42,8 +43,8 @@ AlignedMatrix assembled(const Kernel& kernel, const CoupledData& data, const GpH
 
 }  // namespace
 
-std::optional<CoupledSolution> solve(const Kernel& kernel, const LinearBlocks& blocks, const CoupledData& data,
-                                     const CoupledHyperparameters& at) {
+std::optional<CoupledSolution> solve(const Kernel& kernel, const LinearBlocks& blocks,
+                                     const CoupledData& data, const CoupledHyperparameters& at) {
   const Index n = data.q.rows();
   const Index p = blocks.column_count();
   const Index outputs = data.y.cols();
@@ -61,7 +62,8 @@ std::optional<CoupledSolution> solve(const Kernel& kernel, const LinearBlocks& b
     AlignedMatrix matrix = assembled(kernel, data, output, features, solution.column_scale, d);
     AlignedMatrix work(numerics().work_size(n + 1 + p), 1);
     double log_det = 0;
-    if (!numerics().sweep(n, 1 + p, matrix.data(), matrix.rows(), work.data(), &log_det)) return std::nullopt;
+    if (!numerics().sweep(n, 1 + p, matrix.data(), matrix.rows(), work.data(), &log_det))
+      return std::nullopt;
     A.triangularView<Eigen::Lower>() -= matrix.map().block(n + 1, n + 1, p, p);
     b -= matrix.map().col(n).segment(n + 1, p);
     minus_two += -matrix(n, n) + log_det + static_cast<double>(n) * kLogTwoPi;
@@ -72,7 +74,8 @@ std::optional<CoupledSolution> solve(const Kernel& kernel, const LinearBlocks& b
   if (solution.root.info() != Eigen::Success) return std::nullopt;
   solution.A = std::move(A);
   solution.weights = solution.root.solve(b);
-  minus_two += 2 * solution.root.matrixLLT().diagonal().array().log().sum() - b.dot(solution.weights);
+  minus_two +=
+      2 * solution.root.matrixLLT().diagonal().array().log().sum() - b.dot(solution.weights);
   solution.log_likelihood = -0.5 * minus_two;
   solution.alpha.resize(n, outputs);
   for (Index d = 0; d < outputs; ++d) {
@@ -99,8 +102,8 @@ AlignedMatrix precision_of(const CoupledSolution& solution, Index points, Index 
   return matrix;
 }
 
-CoupledLikelihood::CoupledLikelihood(std::shared_ptr<const Kernel> kernel, LinearBlocks blocks, CoupledData data,
-                                     CoupledPrior prior)
+CoupledLikelihood::CoupledLikelihood(std::shared_ptr<const Kernel> kernel, LinearBlocks blocks,
+                                     CoupledData data, CoupledPrior prior)
     : kernel_(std::move(kernel)),
       blocks_(std::move(blocks)),
       data_(std::move(data)),
@@ -114,8 +117,8 @@ CoupledHyperparameters CoupledLikelihood::unpack(const VectorXd& x) const {
   const Index scales = kernel_sets() * kernel_parameters_;
   for (Index d = 0; d < outputs(); ++d) {
     const Index set = prior_.shared_scales ? 0 : d;
-    at.outputs.push_back(
-        {x.segment(set * kernel_parameters_, kernel_parameters_), x[scales + d], x[scales + outputs() + d]});
+    at.outputs.push_back({x.segment(set * kernel_parameters_, kernel_parameters_), x[scales + d],
+                          x[scales + outputs() + d]});
   }
   at.blocks = x.tail(blocks_.parameter_count());
   return at;
@@ -147,15 +150,18 @@ bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
   for (Index d = 0; d < outputs(); ++d) {
     const AlignedMatrix precision = precision_of(*solution, size(), d);
     if (d == 0) inverse_diagonal = -precision.map().diagonal().head(p);
-    const VectorXd part = contract(*solution, at.outputs[static_cast<std::size_t>(d)], precision, d);
+    const VectorXd part =
+        contract(*solution, at.outputs[static_cast<std::size_t>(d)], precision, d);
     const Index set = prior_.shared_scales ? 0 : d;
-    out->gradient.segment(set * kernel_parameters_, kernel_parameters_) += part.head(kernel_parameters_);
+    out->gradient.segment(set * kernel_parameters_, kernel_parameters_) +=
+        part.head(kernel_parameters_);
     out->gradient[scales + d] = part[kernel_parameters_];
     out->gradient[scales + outputs() + d] = part[kernel_parameters_ + 1];
   }
   if (blocks_.parameter_count() > 0) {
     // ½ (1 - (A⁻¹)_kk - ŵ_k²) by each log variance.
-    const VectorXd slope = 0.5 * (1.0 - inverse_diagonal.array() - solution->weights.array().square());
+    const VectorXd slope =
+        0.5 * (1.0 - inverse_diagonal.array() - solution->weights.array().square());
     out->gradient.tail(blocks_.parameter_count()) = solution->variance_slope.transpose() * slope;
   }
   add_prior(x, out);
@@ -179,19 +185,21 @@ VectorXd CoupledLikelihood::contract(const CoupledSolution& solution, const GpHy
       const Index rows = std::min(kTile, n - i);
       auto g = weight.map();
       g.setZero();
-      g.topLeftCorner(rows, cols) = signal * (precision.map().block(p + i, p + j, rows, cols) -
-                                              alpha.segment(i, rows) * alpha.segment(j, cols).transpose());
+      g.topLeftCorner(rows, cols) =
+          signal * (precision.map().block(p + i, p + j, rows, cols) -
+                    alpha.segment(i, rows) * alpha.segment(j, cols).transpose());
       if (i == j) {
         g.triangularView<Eigen::StrictlyUpper>().setZero();
         g.diagonal() *= 0.5;
         gradient[kernel_parameters_ + 1] +=
             2 * noise / signal * g.diagonal().head(cols).dot(data_.noise_shape.segment(j, cols));
       }
-      kernel_->tile(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols), value.data(), value.rows());
+      kernel_->tile(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols), value.data(),
+                    value.rows());
       gradient[kernel_parameters_] +=
           2 * g.topLeftCorner(rows, cols).cwiseProduct(value.map().topLeftCorner(rows, cols)).sum();
-      kernel_->tile_gradient(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols), g.data(), kTile,
-                             gradient.data());
+      kernel_->tile_gradient(at.kernel, rows_of(features, i, rows), rows_of(features, j, cols),
+                             g.data(), kTile, gradient.data());
     }
   }
   return gradient;
@@ -204,11 +212,13 @@ void CoupledLikelihood::add_prior(const VectorXd& x, ObjectiveValue* out) const 
     out->gradient[k] += away / spread;
   };
   const Index scales = kernel_sets() * kernel_parameters_;
-  for (Index k = 0; k < scales; ++k) pull(k, prior_.parameter_centre[k % kernel_parameters_], prior_.parameter_spread);
+  for (Index k = 0; k < scales; ++k)
+    pull(k, prior_.parameter_centre[k % kernel_parameters_], prior_.parameter_spread);
   for (Index d = 0; d < outputs(); ++d) {
     pull(scales + d, prior_.signal_centre[d], prior_.signal_spread);
     const Index noise = scales + outputs() + d;
-    if (x[noise] < std::log(prior_.noise_stddev[d])) pull(noise, std::log(prior_.noise_stddev[d]), prior_.noise_spread);
+    if (x[noise] < std::log(prior_.noise_stddev[d]))
+      pull(noise, std::log(prior_.noise_stddev[d]), prior_.noise_spread);
   }
   const VectorXd centre = blocks_.start();
   const VectorXd spread = blocks_.spread();

@@ -18,22 +18,26 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr Index kRun = 10;       // poses that follow one another and are left out together: they share a drift
+constexpr Index kRun =
+    10;  // poses that follow one another and are left out together: they share a drift
 constexpr Index kThreefold = 3;  // parts of the cross-validation: two thirds still tell the weights
-constexpr Index kTargets = 64;   // at once: the matrices pass through the cache once for all of them
+constexpr Index kTargets = 64;  // at once: the matrices pass through the cache once for all of them
 
-// δ: the covariances that are left out; σ²: the least noise variance. |Δ kᵀM⁻¹k| <= 2 σ_f |δ|/σ + |δ|²/σ², and the
-// standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver σ³/σ_f both stay below the noise.
+// δ: the covariances that are left out; σ²: the least noise variance. |Δ kᵀM⁻¹k| <= 2 σ_f |δ|/σ +
+// |δ|²/σ², and the standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver
+// σ³/σ_f both stay below the noise.
 constexpr double kPassedOver = 1e-3;
 constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
 
-// What few points leave unexplained of any pose, of the noise variance: what they say of the columns is then off by no
-// more of a posterior variance than R A⁻¹ Rᵀ of their errors, which is below it.
+// What few points leave unexplained of any pose, of the noise variance: what they say of the
+// columns is then off by no more of a posterior variance than R A⁻¹ Rᵀ of their errors, which is
+// below it.
 constexpr double kUnexplained = 1e-4;
 constexpr Index kWorthFew = 3;  // few points pay where they are less than one in so many
 
-// R from near points is tried at so many joint vectors between the poses. The variance that follows may be smaller and
-// larger than that from all poses by these shares of the variance of a measurement.
+// R from near points is tried at so many joint vectors between the poses. The variance that follows
+// may be smaller and larger than that from all poses by these shares of the variance of a
+// measurement.
 constexpr Index kTried = 64;
 constexpr double kNearTooSmall = 0.005;
 constexpr double kNearTooLarge = 0.02;
@@ -66,7 +70,8 @@ std::vector<double> minus_triangle(const Matrix& matrix, Index n) {
 }
 
 /// kᵀ M⁻¹ k where only the rows `near` (rising) of k are not 0.
-double quadratic(const std::vector<double>& triangle, const std::vector<Index>& near, const double* k) {
+double quadratic(const std::vector<double>& triangle, const std::vector<Index>& near,
+                 const double* k) {
   double sum = 0;
   for (std::size_t a = 0; a < near.size(); ++a) {
     const double* row = triangle.data() + near[a] * (near[a] + 1) / 2;
@@ -80,8 +85,10 @@ double quadratic(const std::vector<double>& triangle, const std::vector<Index>& 
 }  // namespace
 
 std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<const Kernel> kernel,
-                                                            const LinearBlocks& blocks, const CoupledData& data,
-                                                            const CoupledHyperparameters& at, VarianceForm form) {
+                                                            const LinearBlocks& blocks,
+                                                            const CoupledData& data,
+                                                            const CoupledHyperparameters& at,
+                                                            VarianceForm form) {
   std::optional<CoupledSolution> solution = solve(*kernel, blocks, data, at);
   if (!solution) return std::nullopt;
   const Index n = data.q.rows();
@@ -104,19 +111,23 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
     const VarianceForm kept = is_served                           ? VarianceForm::kServedAsPart
                               : form == VarianceForm::kCompressed ? VarianceForm::kCompressedOnly
                                                                   : form;
-    auto process = GaussianProcess::condition(kernel, data.q, own, data.noise_shape, at.outputs[output], kept);
+    auto process =
+        GaussianProcess::condition(kernel, data.q, own, data.noise_shape, at.outputs[output], kept);
     if (!process) return std::nullopt;
     posterior.outputs_.push_back(std::move(*process));
     VectorXd prior(n);
     kernel->diagonal(at.outputs[output].kernel,
-                     {solution->features[output].data(), n, solution->features[output].rows()}, prior.data());
+                     {solution->features[output].data(), n, solution->features[output].rows()},
+                     prior.data());
     posterior.prior_.col(d) = std::exp(2 * at.outputs[output].log_signal_stddev) * prior;
-    posterior.prior_.col(d).noalias() += data.columns[output].cwiseAbs2() * posterior.column_scale_.cwiseAbs2();
+    posterior.prior_.col(d).noalias() +=
+        data.columns[output].cwiseAbs2() * posterior.column_scale_.cwiseAbs2();
     posterior.inverse_.emplace_back();
     const bool smooth = posterior.outputs_.back().variance_points() < n;
     if (kept == VarianceForm::kCompressedOnly && !smooth)
       posterior.inverse_.back() = minus_triangle(solution->eliminated[output].map(), n);
-    const double noise = std::exp(at.outputs[output].log_noise_stddev) * std::sqrt(data.noise_shape.minCoeff());
+    const double noise =
+        std::exp(at.outputs[output].log_noise_stddev) * std::sqrt(data.noise_shape.minCoeff());
     const double signal = std::exp(at.outputs[output].log_signal_stddev);
     posterior.passed_over_.push_back(kPassedOver * std::pow(noise, 3) / signal);
   }
@@ -134,13 +145,16 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   return posterior;
 }
 
-// The columns of a joint vector between two poses are taken to be those between theirs: what near points miss of
-// kᵀ M⁻¹ H does not depend on them.
-void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& data, const CoupledSolution& solution) {
+// The columns of a joint vector between two poses are taken to be those between theirs: what near
+// points miss of kᵀ M⁻¹ H does not depend on them.
+void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& data,
+                                       const CoupledSolution& solution) {
   if (!outputs_[output].is_near_enough()) return;
   const MatrixXd& H = data.columns[output];
   SeededRandom random(1);
-  const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(points_)); };
+  const auto any = [&] {
+    return static_cast<Index>(random.next() % static_cast<std::uint64_t>(points_));
+  };
   MatrixXd q(kTried, data.q.cols()), columns(kTried, H.cols());
   for (Index i = 0; i < kTried; ++i) {
     const Index a = any(), b = any();
@@ -154,8 +168,10 @@ void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& da
   const VectorXd of_all = variance_of(part_of(q, columns, d));
   rows_[output] = (H * column_scale_.asDiagonal()).eval().sparseView();
   const VectorXd more = variance_of(near_part_of(q, columns, d)) - of_all;
-  const Eigen::ArrayXd measured = of_all.array() + outputs_[output].noise_variance() * data.noise_shape.mean();
-  const bool enough = (more.array() >= -kNearTooSmall * measured && more.array() <= kNearTooLarge * measured).all();
+  const Eigen::ArrayXd measured =
+      of_all.array() + outputs_[output].noise_variance() * data.noise_shape.mean();
+  const bool enough =
+      (more.array() >= -kNearTooSmall * measured && more.array() <= kNearTooLarge * measured).all();
   if (enough) {
     explained_[output].resize(0, 0);
   } else {
@@ -164,7 +180,8 @@ void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& da
 }
 
 Index CoupledPosterior::outputs_from_near_points() const {
-  return std::count_if(rows_.begin(), rows_.end(), [](const auto& rows) { return rows.rows() > 0; });
+  return std::count_if(rows_.begin(), rows_.end(),
+                       [](const auto& rows) { return rows.rows() > 0; });
 }
 
 // With R_xx ≈ R_xu R_uu⁻¹ R_ux.
@@ -172,25 +189,28 @@ void CoupledPosterior::explain_by_few(std::size_t output, const VectorXd& noise)
   const GpHyperparameters& at = hyperparameters_[output];
   const double ratio = std::exp(2 * (at.log_noise_stddev - at.log_signal_stddev));
   const Index most = points_ / kWorthFew;
-  const std::vector<Index> points =
-      spanning_points(*kernel_, at.kernel, features_[output], points_, kUnexplained * ratio * noise.minCoeff(), most);
+  const std::vector<Index> points = spanning_points(*kernel_, at.kernel, features_[output], points_,
+                                                    kUnexplained * ratio * noise.minCoeff(), most);
   if (static_cast<Index>(points.size()) == most) return;
   const auto few = InducingPoints::at(*kernel_, at.kernel, features_[output], points);
   if (!few) return;
   const Index r = few->size();
-  const AlignedMatrix basis = few->basis(*kernel_, at.kernel, rows_of(features_[output], 0, points_));
+  const AlignedMatrix basis =
+      few->basis(*kernel_, at.kernel, rows_of(features_[output], 0, points_));
   const MatrixXd by_basis = explained_[output] * basis.map().topLeftCorner(r, points_).transpose();
   explained_[output] = by_basis * few->root().map().topLeftCorner(r, r);
   few_[output] = {few->features().copy(), r};
 }
 
-// B: the rows and columns of C⁻¹ that belong to the poses left out. Their covariance is B⁻¹, their error B⁻¹ α.
+// B: the rows and columns of C⁻¹ that belong to the poses left out. Their covariance is B⁻¹, their
+// error B⁻¹ α.
 void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledData& data) {
   const Index outputs = data.y.cols();
   leave_one_out_mean_.resize(points_, outputs);
   leave_one_out_variance_.resize(points_, outputs);
   std::vector<MatrixXd> halves;  // L⁻¹ Hᵀ M⁻¹
-  for (const MatrixXd& explained : explained_) halves.emplace_back(solution.root.matrixL().solve(explained));
+  for (const MatrixXd& explained : explained_)
+    halves.emplace_back(solution.root.matrixL().solve(explained));
   // Errors and their variances, output by output.
   const auto left_out = [&](const std::vector<Index>& poses) {
     const auto count = static_cast<Index>(poses.size());
@@ -212,16 +232,19 @@ void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledD
     matrix.map().row(size).head(size) = alpha.transpose();
     AlignedMatrix work(numerics().work_size(size + 1), 1);
     double log_det = 0;
-    const bool positive = numerics().inverse_root(size, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
+    const bool positive =
+        numerics().inverse_root(size, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
     TRAMMEL_CHECK(positive);
     VectorXd variance(size);
-    for (Index i = 0; i < size; ++i) variance[i] = matrix.map().col(i).segment(i, size - i).squaredNorm();
+    for (Index i = 0; i < size; ++i)
+      variance[i] = matrix.map().col(i).segment(i, size - i).squaredNorm();
     return std::pair<VectorXd, VectorXd>(-matrix.map().row(size).head(size).transpose(), variance);
   };
   for (const PoseGroup& pose : pose_groups(data.q)) {
     const auto count = static_cast<Index>(pose.size());
     const auto [error, variance] = left_out(pose);
-    leave_one_out_mean_(pose, Eigen::all) = data.y(pose, Eigen::all) - error.reshaped(count, outputs);
+    leave_one_out_mean_(pose, Eigen::all) =
+        data.y(pose, Eigen::all) - error.reshaped(count, outputs);
     leave_one_out_variance_(pose, Eigen::all) = variance.reshaped(count, outputs);
   }
   double surprise = 0;
@@ -239,12 +262,13 @@ void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledD
 
 MatrixXd CoupledPosterior::own_mean(const MatrixXd& q) const {
   MatrixXd mean(q.rows(), static_cast<Index>(outputs_.size()));
-  for (Index d = 0; d < mean.cols(); ++d) outputs_[static_cast<std::size_t>(d)].mean(q, mean.col(d).data());
+  for (Index d = 0; d < mean.cols(); ++d)
+    outputs_[static_cast<std::size_t>(d)].mean(q, mean.col(d).data());
   return mean;
 }
 
-std::vector<CoupledPrediction> CoupledPosterior::predict(const MatrixXd& q,
-                                                         const std::vector<MatrixXd>& columns) const {
+std::vector<CoupledPrediction> CoupledPosterior::predict(
+    const MatrixXd& q, const std::vector<MatrixXd>& columns) const {
   std::vector<CoupledPrediction> predictions;
   for (Index first = 0; first < q.rows(); first += kTargets) {
     const Index count = std::min(kTargets, q.rows() - first);
@@ -267,8 +291,8 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
     parts.push_back(part_of(q, H, d));
   }
   for (Index i = 0; i < q.rows(); ++i) {
-    CoupledPrediction at{means.row(i).transpose(), own.row(i).transpose(), shared_covariance(parts, i),
-                         VectorXd(outputs)};
+    CoupledPrediction at{means.row(i).transpose(), own.row(i).transpose(),
+                         shared_covariance(parts, i), VectorXd(outputs)};
     for (Index d = 0; d < outputs; ++d) {
       const Part& part = parts[static_cast<std::size_t>(d)];
       at.covariance(d, d) += part.known[i];
@@ -278,9 +302,11 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
   }
 }
 
-CoupledPosterior::Part CoupledPosterior::near_part_of(const MatrixXd& q, const MatrixXd& columns, Index d) const {
+CoupledPosterior::Part CoupledPosterior::near_part_of(const MatrixXd& q, const MatrixXd& columns,
+                                                      Index d) const {
   const auto output = static_cast<std::size_t>(d);
-  Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()), VectorXd(q.rows())};
+  Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()),
+            VectorXd(q.rows())};
   std::vector<NearWeights> near;
   const std::vector<PosteriorVariance> own = outputs_[output].variance(q, &near);
   for (Index i = 0; i < q.rows(); ++i) {
@@ -288,12 +314,14 @@ CoupledPosterior::Part CoupledPosterior::near_part_of(const MatrixXd& q, const M
     part.known[i] = own[at].posterior;
     part.prior[i] = own[at].prior + part.R.col(i).squaredNorm();
     for (std::size_t a = 0; a < near[at].points.size(); ++a)
-      part.R.col(i) -= near[at].weights[static_cast<Index>(a)] * rows_[output].row(near[at].points[a]).transpose();
+      part.R.col(i) -= near[at].weights[static_cast<Index>(a)] *
+                       rows_[output].row(near[at].points[a]).transpose();
   }
   return part;
 }
 
-CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const MatrixXd& columns, Index d) const {
+CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const MatrixXd& columns,
+                                                 Index d) const {
   const auto output = static_cast<std::size_t>(d);
   if (rows_[output].rows() > 0) return near_part_of(q, columns, d);
   const GpHyperparameters& at = hyperparameters_[output];
@@ -303,9 +331,10 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
   const AlignedMatrix& known_of = few_[output] ? few_[output]->features : features_[output];
   const Index points = few_[output] ? few_[output]->size : points_;
   AlignedMatrix cross(padded_rows(points), q.rows());
-  kernel_->tile(at.kernel, rows_of(known_of, 0, points), {targets.data(), q.rows(), q.rows()}, cross.data(),
-                cross.rows());
-  Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()), VectorXd(q.rows())};
+  kernel_->tile(at.kernel, rows_of(known_of, 0, points), {targets.data(), q.rows(), q.rows()},
+                cross.data(), cross.rows());
+  Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()),
+            VectorXd(q.rows())};
   kernel_->diagonal(at.kernel, {targets.data(), q.rows(), q.rows()}, part.prior.data());
   part.prior *= signal;
   part.known = part.prior;
@@ -324,7 +353,8 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
       continue;
     }
     for (const Index pose : near) part.R.col(i) -= k[pose] * explained_[output].col(pose);
-    part.known[i] = std::clamp(part.known[i] - quadratic(inverse_[output], near, k.data()), 0.0, part.known[i]);
+    part.known[i] =
+        std::clamp(part.known[i] - quadratic(inverse_[output], near, k.data()), 0.0, part.known[i]);
   }
   if (far_reaching.empty()) return part;
   const MatrixXd k = cross.map().topRows(points)(Eigen::all, far_reaching);
@@ -376,14 +406,18 @@ MatrixXd CoupledPosterior::shared_covariance(const std::vector<Part>& parts, Ind
     for (std::size_t b = 0; b < count; ++b) {
       const auto [d, e] = pairs[first + b];
       block.row(static_cast<Index>(b)) = parts[static_cast<std::size_t>(d)].R.col(i).transpose();
-      if (e != d) block.row(static_cast<Index>(b)) += parts[static_cast<std::size_t>(e)].R.col(i).transpose();
+      if (e != d)
+        block.row(static_cast<Index>(b)) += parts[static_cast<std::size_t>(e)].R.col(i).transpose();
     }
     double squares[kTargetBlock];
     numerics().square_norms(p, packed_root_.data(), kTargetBlock, block.data(), squares);
-    for (std::size_t b = 0; b < count; ++b) covariance(pairs[first + b].first, pairs[first + b].second) = squares[b];
+    for (std::size_t b = 0; b < count; ++b)
+      covariance(pairs[first + b].first, pairs[first + b].second) = squares[b];
   }
   for (const auto& [d, e] : pairs) {
-    if (e != d) covariance(e, d) = covariance(d, e) = 0.5 * (covariance(d, e) - covariance(d, d) - covariance(e, e));
+    if (e != d)
+      covariance(e, d) = covariance(d, e) =
+          0.5 * (covariance(d, e) - covariance(d, d) - covariance(e, e));
   }
   return covariance;
 }

@@ -29,8 +29,9 @@ CoupledData subset(const CoupledData& data, const std::vector<Index>& order, Ind
 // One search in progress.
 class CoupledSearch {
  public:
-  CoupledSearch(std::shared_ptr<const Kernel> kernel, const CoupledTask& task, const CoupledTask& coarse,
-                const VectorXd& metrology_stddev, bool shared_scales, const SearchOptions& options)
+  CoupledSearch(std::shared_ptr<const Kernel> kernel, const CoupledTask& task,
+                const CoupledTask& coarse, const VectorXd& metrology_stddev, bool shared_scales,
+                const SearchOptions& options)
       : kernel_(std::move(kernel)),
         task_(task),
         coarse_(coarse),
@@ -41,12 +42,13 @@ class CoupledSearch {
         order_(shuffled_rows(task.data.q.rows(), &random_)) {
     prior_.noise_stddev = metrology_stddev;
     prior_.parameter_centre = 0.5 * (box_.low + box_.high);
-    prior_.signal_centre = (task.data.y.colwise().squaredNorm() / static_cast<double>(task.data.q.rows()))
-                               .array()
-                               .sqrt()
-                               .log()
-                               .max(kSmallestLog)
-                               .transpose();
+    prior_.signal_centre =
+        (task.data.y.colwise().squaredNorm() / static_cast<double>(task.data.q.rows()))
+            .array()
+            .sqrt()
+            .log()
+            .max(kSmallestLog)
+            .transpose();
     prior_.signal_centre.array() -= 1.0;  // the blocks explain the larger part
   }
 
@@ -55,17 +57,20 @@ class CoupledSearch {
       result_.starts_at_best = 1;
       last_stage_ = true;
       const Place from = unknown_curvature(*last, all(), shared_scales_);
-      result_.found = improved(from, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0).at;
+      result_.found =
+          improved(from, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0).at;
       return result_;
     }
     std::vector<Place> rivals = from_several_starts();
     if (result_.given_up) return result_;
     if (rivals.empty()) return std::nullopt;
     Place best = best_of(std::move(rivals));
-    if (all() > kMediumPoints) best = improved(best, all(), true, {.max_evaluations = 12, .tolerance = 0.1}, 0.75);
+    if (all() > kMediumPoints)
+      best = improved(best, all(), true, {.max_evaluations = 12, .tolerance = 0.1}, 0.75);
     last_stage_ = true;
     if (!shared_scales_)
-      best = improved(of_each_output(best), all(), false, {.max_evaluations = 14, .tolerance = 0.1}, 0.95);
+      best = improved(of_each_output(best), all(), false, {.max_evaluations = 14, .tolerance = 0.1},
+                      0.95);
     report(1.0);
     result_.found = best.at;
     return result_;
@@ -88,10 +93,12 @@ class CoupledSearch {
     const Index outputs = task_.data.y.cols();
     CoupledHyperparameters start;
     VectorXd scales(box_.low.size());
-    for (Index k = 0; k < scales.size(); ++k) scales[k] = random_.uniform(box_.low[k], box_.high[k]);
+    for (Index k = 0; k < scales.size(); ++k)
+      scales[k] = random_.uniform(box_.low[k], box_.high[k]);
     const double signal = random_.uniform(-3.0, 1.0);
     for (Index d = 0; d < outputs; ++d)
-      start.outputs.push_back({scales, prior_.signal_centre[d] + signal, std::log(1.5 * prior_.noise_stddev[d])});
+      start.outputs.push_back(
+          {scales, prior_.signal_centre[d] + signal, std::log(1.5 * prior_.noise_stddev[d])});
     start.blocks = task_.blocks.start();
     return likelihood(1, true).pack(start);
   }
@@ -109,12 +116,14 @@ class CoupledSearch {
     return {at, MatrixXd::Identity(size, size) / (0.05 * static_cast<double>(points)), points};
   }
 
-  BfgsResult improve(const CoupledLikelihood& function, const Place& from, const BfgsOptions& limits) {
+  BfgsResult improve(const CoupledLikelihood& function, const Place& from,
+                     const BfgsOptions& limits) {
     const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
       return !result_.given_up && function.evaluate(x, out);
     };
     const double grown = static_cast<double>(from.points) / static_cast<double>(function.size());
-    BfgsResult found = minimise(objective, function.pack(from.at), grown * from.inverse_hessian, limits);
+    BfgsResult found =
+        minimise(objective, function.pack(from.at), grown * from.inverse_hessian, limits);
     if (function.size() == all()) result_.evaluations += found.evaluations;
     return found;
   }
@@ -130,7 +139,8 @@ class CoupledSearch {
       if (end.defined) ends.push_back(std::move(end));
       report(0.3 * (s + 1) / starts);
     }
-    std::stable_sort(ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+    std::stable_sort(ends.begin(), ends.end(),
+                     [](const auto& a, const auto& b) { return a.value < b.value; });
     std::vector<Place> best;
     for (const BfgsResult& end : ends) {
       result_.starts_at_best += end.value < ends.front().value + kSameOptimum;
@@ -143,7 +153,8 @@ class CoupledSearch {
   Place best_of(std::vector<Place> rivals) {
     const Index medium = std::min(all(), kMediumPoints);
     if (medium <= kStartPoints) return rivals.front();
-    for (Place& rival : rivals) rival = improved(rival, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
+    for (Place& rival : rivals)
+      rival = improved(rival, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
     return *std::min_element(rivals.begin(), rivals.end(),
                              [](const Place& a, const Place& b) { return a.value < b.value; });
   }
@@ -158,11 +169,13 @@ class CoupledSearch {
     for (Index d = 0; d < outputs; ++d)
       each.inverse_hessian.block(d * scales, d * scales, scales, scales) =
           static_cast<double>(outputs) * shared.inverse_hessian.topLeftCorner(scales, scales);
-    each.inverse_hessian.bottomRightCorner(rest, rest) = shared.inverse_hessian.bottomRightCorner(rest, rest);
+    each.inverse_hessian.bottomRightCorner(rest, rest) =
+        shared.inverse_hessian.bottomRightCorner(rest, rest);
     return each;
   }
 
-  Place improved(const Place& from, Index count, bool shared, const BfgsOptions& limits, double share_done) {
+  Place improved(const Place& from, Index count, bool shared, const BfgsOptions& limits,
+                 double share_done) {
     if (result_.given_up) return from;
     const CoupledLikelihood function = likelihood(count, shared);
     const BfgsResult found = improve(function, from, limits);
@@ -186,8 +199,10 @@ class CoupledSearch {
 
 }  // namespace
 
-std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel, const CoupledTask& task,
-                                                  const CoupledTask& coarse, const VectorXd& metrology_stddev,
+std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel,
+                                                  const CoupledTask& task,
+                                                  const CoupledTask& coarse,
+                                                  const VectorXd& metrology_stddev,
                                                   bool shared_scales, const SearchOptions& options,
                                                   const CoupledHyperparameters* last) {
   return CoupledSearch(kernel, task, coarse, metrology_stddev, shared_scales, options).run(last);

@@ -13,14 +13,16 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Entries (i, j) of the kernels, one for each number of the twist, times the prior variances.
-Vector6 covariance_at(const std::vector<AlignedMatrix>& kernels, const Vector6& variance, Index i, Index j) {
+Vector6 covariance_at(const std::vector<AlignedMatrix>& kernels, const Vector6& variance, Index i,
+                      Index j) {
   Vector6 at;
   for (Index d = 0; d < 6; ++d) at[d] = variance[d] * kernels[kernel_of(d)](i, j);
   return at;
 }
 
 // [C .; zᵀ 0], lower triangle.
-AlignedMatrix assembled(const FlangeViews& views, const VectorXd& z, const std::vector<AlignedMatrix>& kernels,
+AlignedMatrix assembled(const FlangeViews& views, const VectorXd& z,
+                        const std::vector<AlignedMatrix>& kernels,
                         const CoupledHyperparameters& at) {
   AlignedMatrix matrix = factor_storage(views.size + 1);
   auto whole = matrix.map();
@@ -29,9 +31,11 @@ AlignedMatrix assembled(const FlangeViews& views, const VectorXd& z, const std::
     const FlangeView& b = views.views[j];
     for (std::size_t i = j; i < views.views.size(); ++i) {
       const FlangeView& a = views.views[i];
-      const Vector6 k = covariance_at(kernels, variance, static_cast<Index>(i), static_cast<Index>(j));
+      const Vector6 k =
+          covariance_at(kernels, variance, static_cast<Index>(i), static_cast<Index>(j));
       const TwistRows weighed = a.view * k.asDiagonal();
-      whole.block(a.first, b.first, a.view.rows(), b.view.rows()) = weighed.lazyProduct(b.view.transpose());
+      whole.block(a.first, b.first, a.view.rows(), b.view.rows()) =
+          weighed.lazyProduct(b.view.transpose());
     }
   }
   whole.diagonal().head(views.size).array() += std::exp(2 * at.outputs.front().log_noise_stddev);
@@ -39,11 +43,11 @@ AlignedMatrix assembled(const FlangeViews& views, const VectorXd& z, const std::
   return matrix;
 }
 
-double log_likelihood(const FlangeViews& views, const SeenNumbers& seen, double quadratic, double log_det,
-                      double log_noise) {
+double log_likelihood(const FlangeViews& views, const SeenNumbers& seen, double quadratic,
+                      double log_det, double log_noise) {
   const auto numbers = static_cast<double>(views.size + seen.beside_freedom);
-  const double beside =
-      seen.beside * std::exp(-2 * log_noise) + 2 * static_cast<double>(seen.beside_freedom) * log_noise;
+  const double beside = seen.beside * std::exp(-2 * log_noise) +
+                        2 * static_cast<double>(seen.beside_freedom) * log_noise;
   return -0.5 * (quadratic + log_det + beside + seen.log_shape + numbers * kLogTwoPi);
 }
 
@@ -63,8 +67,8 @@ Vector6 twist_variance(const CoupledHyperparameters& at) {
   return variance;
 }
 
-std::optional<FlangeSolution> solve(const Kernel& kernel, const FlangeViews& views, const SeenNumbers& seen,
-                                    const CoupledHyperparameters& at) {
+std::optional<FlangeSolution> solve(const Kernel& kernel, const FlangeViews& views,
+                                    const SeenNumbers& seen, const CoupledHyperparameters& at) {
   const Index count = views.q.rows();
   const Index n = views.size;
   FlangeSolution solution;
@@ -80,15 +84,17 @@ std::optional<FlangeSolution> solve(const Kernel& kernel, const FlangeViews& vie
   solution.eliminated = assembled(views, seen.of_twist, solution.covariance, at);
   AlignedMatrix work(numerics().work_size(n + 1), 1);
   double log_det = 0;
-  if (!numerics().sweep(n, 1, solution.eliminated.data(), solution.eliminated.rows(), work.data(), &log_det))
+  if (!numerics().sweep(n, 1, solution.eliminated.data(), solution.eliminated.rows(), work.data(),
+                        &log_det))
     return std::nullopt;
   solution.alpha = solution.eliminated.map().row(n).head(n).transpose();
-  solution.log_likelihood =
-      log_likelihood(views, seen, -solution.eliminated(n, n), log_det, at.outputs.front().log_noise_stddev);
+  solution.log_likelihood = log_likelihood(views, seen, -solution.eliminated(n, n), log_det,
+                                           at.outputs.front().log_noise_stddev);
   return solution;
 }
 
-FlangeLikelihood::FlangeLikelihood(KernelPtr kernel, FlangeViews views, SeenNumbers seen, FlangePrior prior)
+FlangeLikelihood::FlangeLikelihood(KernelPtr kernel, FlangeViews views, SeenNumbers seen,
+                                   FlangePrior prior)
     : kernel_(std::move(kernel)),
       views_(std::move(views)),
       seen_(std::move(seen)),
@@ -132,7 +138,8 @@ std::vector<AlignedMatrix> FlangeLikelihood::by_covariance(const FlangeSolution&
       g -= solution.alpha.segment(a.first, a.view.rows())
                .lazyProduct(solution.alpha.segment(b.first, b.view.rows()).transpose());
       const TwistRows turned = g.lazyProduct(b.view);
-      const Vector6 each = a.view.cwiseProduct(turned).colwise().sum().transpose().cwiseProduct(variance);
+      const Vector6 each =
+          a.view.cwiseProduct(turned).colwise().sum().transpose().cwiseProduct(variance);
       for (Index d = 0; d < 6; ++d) by[kernel_of(d)](i, j) += (i == j ? 0.5 : 1.0) * each[d];
     }
   }
@@ -153,13 +160,16 @@ bool FlangeLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
     const bool rotation = c + 1 == kTwistKernels;
     const Index first = rotation ? 3 * parameters_ + 4 : static_cast<Index>(c) * parameters_;
     const FeatureBlock all = rows_of(solution->features[c], 0, count);
-    kernel_->tile_gradient(parameters[c], all, all, by[c].data(), by[c].rows(), out->gradient.data() + first);
+    kernel_->tile_gradient(parameters[c], all, all, by[c].data(), by[c].rows(),
+                           out->gradient.data() + first);
     out->gradient[rotation ? x.size() - 1 : 3 * parameters_ + static_cast<Index>(c)] =
-        2 * by[c].map().topRows(count).cwiseProduct(solution->covariance[c].map().topRows(count)).sum();
+        2 *
+        by[c].map().topRows(count).cwiseProduct(solution->covariance[c].map().topRows(count)).sum();
   }
   const double noise = std::exp(2 * x[3 * parameters_ + 3]);
   const double trace = -solution->eliminated.map().diagonal().head(views_.size).sum();
-  out->gradient[3 * parameters_ + 3] = noise * (trace - solution->alpha.squaredNorm()) - seen_.beside / noise +
+  out->gradient[3 * parameters_ + 3] = noise * (trace - solution->alpha.squaredNorm()) -
+                                       seen_.beside / noise +
                                        static_cast<double>(seen_.beside_freedom);
   add_prior(x, out);
   return std::isfinite(out->value) && out->gradient.allFinite();
@@ -172,11 +182,13 @@ void FlangeLikelihood::add_prior(const VectorXd& x, ObjectiveValue* out) const {
     out->gradient[k] += away / spread;
   };
   const Index signals = 3 * parameters_;
-  for (Index k = 0; k < signals; ++k) pull(k, prior_.parameter_centre[k % parameters_], prior_.parameter_spread);
+  for (Index k = 0; k < signals; ++k)
+    pull(k, prior_.parameter_centre[k % parameters_], prior_.parameter_spread);
   for (Index d = 0; d < 3; ++d) pull(signals + d, prior_.signal_centre, prior_.signal_spread);
   const double instrument = std::log(prior_.noise_stddev);
   if (x[signals + 3] < instrument) pull(signals + 3, instrument, prior_.noise_spread);
-  for (Index k = 0; k <= parameters_; ++k) pull(signals + 4 + k, prior_.rotation_centre[k], prior_.rotation_spread);
+  for (Index k = 0; k <= parameters_; ++k)
+    pull(signals + 4 + k, prior_.rotation_centre[k], prior_.rotation_spread);
 }
 
 }  // namespace trammel

@@ -9,9 +9,11 @@
 
 namespace trammel {
 
-/// Hyperparameters of a bias at the flange are CoupledHyperparameters: `outputs` of the three coordinates of the
-/// position, all with the same noise; `blocks` of the rotation: kernel parameters, log σ of one axis (rad).
-inline constexpr std::size_t kTwistKernels = 4;  ///< x, y, z; the three axes of the rotation share the last
+/// Hyperparameters of a bias at the flange are CoupledHyperparameters: `outputs` of the three
+/// coordinates of the position, all with the same noise; `blocks` of the rotation: kernel
+/// parameters, log σ of one axis (rad).
+inline constexpr std::size_t kTwistKernels =
+    4;  ///< x, y, z; the three axes of the rotation share the last
 
 /// The kernel of one number of the twist.
 [[nodiscard]] constexpr std::size_t kernel_of(Eigen::Index number) {
@@ -32,7 +34,8 @@ struct FlangeSolution {
 
 /// Empty when the covariance is not positive definite.
 [[nodiscard]] std::optional<FlangeSolution> solve(const Kernel& kernel, const FlangeViews& views,
-                                                  const SeenNumbers& seen, const CoupledHyperparameters& at);
+                                                  const SeenNumbers& seen,
+                                                  const CoupledHyperparameters& at);
 
 /// Weak priors, as GpPrior of one process.
 struct FlangePrior {
@@ -46,8 +49,8 @@ struct FlangePrior {
   double signal_spread = 5.0;
 };
 
-/// Minus the log of (likelihood x prior), as a function of: kernel parameters of x, y, z; log σ_f of each; log σ_n;
-/// hyperparameters of the rotation.
+/// Minus the log of (likelihood x prior), as a function of: kernel parameters of x, y, z; log σ_f
+/// of each; log σ_n; hyperparameters of the rotation.
 class FlangeLikelihood {
  public:
   FlangeLikelihood(KernelPtr kernel, FlangeViews views, SeenNumbers seen, FlangePrior prior);
@@ -58,8 +61,10 @@ class FlangeLikelihood {
 
  private:
   void add_prior(const Eigen::VectorXd& x, ObjectiveValue* out) const;
-  /// Of each kernel, M x M, lower triangle: the derivative of minus the log likelihood by its entries. And by log σ_n.
-  [[nodiscard]] std::vector<AlignedMatrix> by_covariance(const FlangeSolution& solution, const Vector6& variance) const;
+  /// Of each kernel, M x M, lower triangle: the derivative of minus the log likelihood by its
+  /// entries. And by log σ_n.
+  [[nodiscard]] std::vector<AlignedMatrix> by_covariance(const FlangeSolution& solution,
+                                                         const Vector6& variance) const;
 
   KernelPtr kernel_;
   FlangeViews views_;

@@ -12,21 +12,25 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTypicalArm = 0.5;  // m: what turns the flange stands so far from the tool, between wrist and shoulder
-constexpr Index kStartNumbers = 600;  // of the first searches: a likelihood takes a fiftieth of a second
+constexpr double kTypicalArm =
+    0.5;  // m: what turns the flange stands so far from the tool, between wrist and shoulder
+constexpr Index kStartNumbers =
+    600;  // of the first searches: a likelihood takes a fiftieth of a second
 constexpr Index kFewestStartPoints = 40;
 constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is zero
 
 double mean_log_signal(const std::vector<GpHyperparameters>& outputs) {
   double mean_square = 0;
-  for (const GpHyperparameters& output : outputs) mean_square += std::exp(2 * output.log_signal_stddev);
+  for (const GpHyperparameters& output : outputs)
+    mean_square += std::exp(2 * output.log_signal_stddev);
   return std::max(kSmallestLog, 0.5 * std::log(mean_square / static_cast<double>(outputs.size())));
 }
 
 class FlangeSearch {
  public:
-  FlangeSearch(KernelPtr kernel, const FlangeViews& views, const MatrixXd& y, const CoupledHyperparameters& plain,
-               double metrology_stddev, const SearchOptions& options)
+  FlangeSearch(KernelPtr kernel, const FlangeViews& views, const MatrixXd& y,
+               const CoupledHyperparameters& plain, double metrology_stddev,
+               const SearchOptions& options)
       : kernel_(std::move(kernel)), views_(views), y_(y), options_(options), random_(options.seed) {
     const SearchBox box = kernel_->search_box(views.q);
     prior_.noise_stddev = metrology_stddev;
@@ -72,7 +76,8 @@ class FlangeSearch {
     return MatrixXd::Identity(size, size) / (0.15 * static_cast<double>(count));
   }
 
-  BfgsResult improve(const FlangeLikelihood& function, const Start& from, const BfgsOptions& limits) const {
+  BfgsResult improve(const FlangeLikelihood& function, const Start& from,
+                     const BfgsOptions& limits) const {
     const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
       return !result_.given_up && function.evaluate(x, out);
     };
@@ -81,13 +86,15 @@ class FlangeSearch {
 
   // Rows of several levers taken for one have much noise: one start has the instrument's.
   std::optional<Start> from_few(const CoupledHyperparameters& plain) {
-    const Index count = std::clamp(kStartNumbers * all() / views_.size, std::min(all(), kFewestStartPoints), all());
+    const Index count =
+        std::clamp(kStartNumbers * all() / views_.size, std::min(all(), kFewestStartPoints), all());
     const FlangeLikelihood small = likelihood(count);
     std::optional<BfgsResult> best;
     for (const bool instrument : {false, true}) {
       Start start{plain, unknown_curvature(plain, count)};
       start.at.blocks = prior_.rotation_centre;
-      if (instrument) start.at.outputs.front().log_noise_stddev = std::log(1.5 * prior_.noise_stddev);
+      if (instrument)
+        start.at.outputs.front().log_noise_stddev = std::log(1.5 * prior_.noise_stddev);
       BfgsResult end = improve(small, start, {.max_evaluations = 60, .tolerance = 0.05});
       report(instrument ? 0.4 : 0.2);
       if (!end.defined) continue;
@@ -120,8 +127,10 @@ VectorXd rotation_like(const std::vector<GpHyperparameters>& position) {
   return rotation;
 }
 
-std::optional<CoupledSearchResult> search_flange(const KernelPtr& kernel, const FlangeViews& views, const MatrixXd& y,
-                                                 const CoupledHyperparameters& plain, double metrology_stddev,
+std::optional<CoupledSearchResult> search_flange(const KernelPtr& kernel, const FlangeViews& views,
+                                                 const MatrixXd& y,
+                                                 const CoupledHyperparameters& plain,
+                                                 double metrology_stddev,
                                                  const SearchOptions& options, bool again) {
   return FlangeSearch(kernel, views, y, plain, metrology_stddev, options).run(plain, again);
 }

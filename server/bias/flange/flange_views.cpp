@@ -13,7 +13,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSameLever = 1e-3;  // m: what a calibration moves a tool by teaches no rotation
-constexpr double kLeastSeen = 1e-9;  // singular value over the largest: what is below it is not seen
+constexpr double kLeastSeen =
+    1e-9;  // singular value over the largest: what is below it is not seen
 
 Vector3 mean_lever(const std::vector<BiasFeatures>& features) {
   Vector3 sum = Vector3::Zero();
@@ -61,7 +62,8 @@ bool has_several_levers(const std::vector<BiasFeatures>& features) {
   });
 }
 
-FlangeViews views_of(const MatrixXd& q, const VectorXd& noise_shape, const std::vector<BiasFeatures>& features) {
+FlangeViews views_of(const MatrixXd& q, const VectorXd& noise_shape,
+                     const std::vector<BiasFeatures>& features) {
   FlangeViews all;
   all.noise_shape = noise_shape;
   all.reference_F = mean_lever(features);

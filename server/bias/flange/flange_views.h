@@ -13,8 +13,8 @@ using TwistRows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6
 /// What one coordinate of each row sees of the twist.
 using TwistRow = Eigen::Matrix<double, 3, 6>;
 
-/// All rows of one joint vector, brought to as few numbers as tell the same of the twist: rows / sqrt(noise shape) =
-/// basis (view twist + noise of unit shape) + what no twist explains.
+/// All rows of one joint vector, brought to as few numbers as tell the same of the twist: rows /
+/// sqrt(noise shape) = basis (view twist + noise of unit shape) + what no twist explains.
 struct FlangeView {
   std::vector<Eigen::Index> rows;  ///< of the observations, rising
   TwistRows view;                  ///< r x 6, r <= 6
@@ -23,12 +23,13 @@ struct FlangeView {
 };
 
 struct FlangeViews {
-  Eigen::MatrixXd q;                      ///< M x n: each joint vector once, rad
-  std::vector<FlangeView> views;          ///< M
-  Eigen::Index size = 0;                  ///< numbers of all views
-  Eigen::VectorXd noise_shape;            ///< N, of the observations
-  std::vector<TwistRow> seen;             ///< N
-  Vector3 reference_F = Vector3::Zero();  ///< where the position part of the twist is: the mean lever
+  Eigen::MatrixXd q;              ///< M x n: each joint vector once, rad
+  std::vector<FlangeView> views;  ///< M
+  Eigen::Index size = 0;          ///< numbers of all views
+  Eigen::VectorXd noise_shape;    ///< N, of the observations
+  std::vector<TwistRow> seen;     ///< N
+  Vector3 reference_F =
+      Vector3::Zero();  ///< where the position part of the twist is: the mean lever
 };
 
 /// How an observation sees the twist at `reference_F`: [I  -[R_BF (lever - reference)]x].
@@ -51,6 +52,7 @@ struct SeenNumbers {
 };
 [[nodiscard]] SeenNumbers numbers_of(const FlangeViews& views, const Eigen::MatrixXd& y);
 /// The coordinates of the rows of a view, each over the root of its noise shape.
-[[nodiscard]] Eigen::VectorXd even_rows(const FlangeViews& views, const FlangeView& view, const Eigen::MatrixXd& y);
+[[nodiscard]] Eigen::VectorXd even_rows(const FlangeViews& views, const FlangeView& view,
+                                        const Eigen::MatrixXd& y);
 
 }  // namespace trammel

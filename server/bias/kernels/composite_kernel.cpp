@@ -9,15 +9,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeastAmplitude = 0.05;  // over that of the first part: where a search starts at the least
+constexpr double kLeastAmplitude =
+    0.05;  // over that of the first part: where a search starts at the least
 
 std::string joined(const std::vector<KernelPtr>& parts, std::string_view separator) {
   std::string name = "(";
-  for (const KernelPtr& part : parts) name.append(name.size() == 1 ? "" : separator).append(part->name());
+  for (const KernelPtr& part : parts)
+    name.append(name.size() == 1 ? "" : separator).append(part->name());
   return name + ")";
 }
 
-/// Has the parameters and features of its parts side by side. A part may have a log amplitude before its parameters.
+/// Has the parameters and features of its parts side by side. A part may have a log amplitude
+/// before its parameters.
 class CompositeKernel : public Kernel {
  public:
   CompositeKernel(std::vector<KernelPtr> parts, std::string_view separator)
@@ -27,7 +30,8 @@ class CompositeKernel : public Kernel {
 
   Index parameter_count(Index joints) const override {
     Index count = 0;
-    for (std::size_t i = 0; i < parts_.size(); ++i) count += amplitudes(i) + parts_[i]->parameter_count(joints);
+    for (std::size_t i = 0; i < parts_.size(); ++i)
+      count += amplitudes(i) + parts_[i]->parameter_count(joints);
     return count;
   }
 
@@ -49,7 +53,8 @@ class CompositeKernel : public Kernel {
     return box;
   }
 
-  void features(const VectorXd& parameters, const MatrixXd& q, double* table, Index ld) const override {
+  void features(const VectorXd& parameters, const MatrixXd& q, double* table,
+                Index ld) const override {
     for (const Place& place : places(q.cols()))
       place.kernel->features(place.of(parameters), q, table + place.feature * ld, ld);
   }
@@ -69,7 +74,8 @@ class CompositeKernel : public Kernel {
     auto total = columns_of(k, a.rows, b.rows, ldk).array();
     total = neutral();
     for (const Place& place : places_for(parameters)) {
-      const AlignedMatrix own = tile_of(*place.kernel, place.of(parameters), place.of(a), place.of(b));
+      const AlignedMatrix own =
+          tile_of(*place.kernel, place.of(parameters), place.of(a), place.of(b));
       join(place, parameters, own.map().topRows(a.rows).array(), total);
     }
   }
@@ -83,7 +89,9 @@ class CompositeKernel : public Kernel {
     Index feature;
 
     VectorXd of(const VectorXd& all) const { return all.segment(parameter, parameters); }
-    FeatureBlock of(const FeatureBlock& all) const { return {all.data + feature * all.ld, all.rows, all.ld}; }
+    FeatureBlock of(const FeatureBlock& all) const {
+      return {all.data + feature * all.ld, all.rows, all.ld};
+    }
   };
 
   std::vector<Place> places(Index joints) const {
@@ -111,7 +119,8 @@ class CompositeKernel : public Kernel {
   virtual Index amplitudes(std::size_t part) const = 0;
   // `total` before any part, and with one more part.
   virtual double neutral() const = 0;
-  virtual void join(const Place& place, const VectorXd& parameters, const ConstTable& own, Table total) const = 0;
+  virtual void join(const Place& place, const VectorXd& parameters, const ConstTable& own,
+                    Table total) const = 0;
 
   std::vector<KernelPtr> parts_;
   std::string name_;
@@ -121,8 +130,8 @@ class SumKernel : public CompositeKernel {
  public:
   explicit SumKernel(std::vector<KernelPtr> parts) : CompositeKernel(std::move(parts), " + ") {}
 
-  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Index ldg, double* gradient) const override {
+  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                     const double* g, Index ldg, double* gradient) const override {
     for (const Place& place : places_for(parameters)) {
       const VectorXd own_parameters = place.of(parameters);
       const double v = variance(place, parameters);
@@ -132,17 +141,19 @@ class SumKernel : public CompositeKernel {
       if (is_first(place)) continue;
       const AlignedMatrix k = tile_of(*place.kernel, own_parameters, place.of(a), place.of(b));
       const auto weights = columns_of(g, a.rows, b.rows, ldg);
-      gradient[place.parameter - 1] += 2.0 * v * weights.cwiseProduct(k.map().topRows(a.rows)).sum();
+      gradient[place.parameter - 1] +=
+          2.0 * v * weights.cwiseProduct(k.map().topRows(a.rows)).sum();
     }
   }
 
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     Eigen::Map<VectorXd> total(out, b.rows);
     VectorXd own(b.rows);
     total.setZero();
     for (const Place& place : places_for(parameters)) {
-      place.kernel->weighted_sum(place.of(parameters), place.of(a), place.of(b), weights, own.data());
+      place.kernel->weighted_sum(place.of(parameters), place.of(a), place.of(b), weights,
+                                 own.data());
       total += variance(place, parameters) * own;
     }
   }
@@ -157,7 +168,8 @@ class SumKernel : public CompositeKernel {
 
   Index amplitudes(std::size_t part) const override { return part == 0 ? 0 : 1; }
   double neutral() const override { return 0; }
-  void join(const Place& place, const VectorXd& parameters, const ConstTable& own, Table total) const override {
+  void join(const Place& place, const VectorXd& parameters, const ConstTable& own,
+            Table total) const override {
     total += variance(place, parameters) * own;
   }
 };
@@ -167,8 +179,8 @@ class ProductKernel : public CompositeKernel {
   explicit ProductKernel(std::vector<KernelPtr> parts) : CompositeKernel(std::move(parts), " * ") {}
 
   // Each part's slope is weighted by the tiles of all the others.
-  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Index ldg, double* gradient) const override {
+  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                     const double* g, Index ldg, double* gradient) const override {
     const std::vector<Place> all = places_for(parameters);
     std::vector<AlignedMatrix> tiles;
     for (const Place& place : all)
@@ -180,28 +192,33 @@ class ProductKernel : public CompositeKernel {
       for (std::size_t other = 0; other < all.size(); ++other) {
         if (other != i) inside *= tiles[other].map().topRows(a.rows).array();
       }
-      all[i].kernel->tile_gradient(all[i].of(parameters), all[i].of(a), all[i].of(b), weights.data(), weights.rows(),
-                                   gradient + all[i].parameter);
+      all[i].kernel->tile_gradient(all[i].of(parameters), all[i].of(a), all[i].of(b),
+                                   weights.data(), weights.rows(), gradient + all[i].parameter);
     }
   }
 
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     weighted_sum_by_tiles(*this, parameters, a, b, weights, out);
   }
 
  private:
   Index amplitudes(std::size_t /*part*/) const override { return 0; }
   double neutral() const override { return 1; }
-  void join(const Place& /*place*/, const VectorXd& /*parameters*/, const ConstTable& own, Table total) const override {
+  void join(const Place& /*place*/, const VectorXd& /*parameters*/, const ConstTable& own,
+            Table total) const override {
     total *= own;
   }
 };
 
 }  // namespace
 
-KernelPtr sum_of(std::vector<KernelPtr> parts) { return std::make_shared<SumKernel>(std::move(parts)); }
+KernelPtr sum_of(std::vector<KernelPtr> parts) {
+  return std::make_shared<SumKernel>(std::move(parts));
+}
 
-KernelPtr product_of(std::vector<KernelPtr> parts) { return std::make_shared<ProductKernel>(std::move(parts)); }
+KernelPtr product_of(std::vector<KernelPtr> parts) {
+  return std::make_shared<ProductKernel>(std::move(parts));
+}
 
 }  // namespace trammel

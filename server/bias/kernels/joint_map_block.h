@@ -10,13 +10,14 @@ namespace trammel {
 /// As many as that many observations can tell.
 [[nodiscard]] Eigen::Index harmonics_for(Eigen::Index observations);
 
-/// Of a model with these hyperparameters of blocks, for an arm of that many joints. Empty: a model from before the
-/// power was learned.
+/// Of a model with these hyperparameters of blocks, for an arm of that many joints. Empty: a model
+/// from before the power was learned.
 [[nodiscard]] std::optional<Eigen::Index> harmonics_in(const Eigen::VectorXd& block_hyperparameters,
                                                        Eigen::Index joints);
 
-/// `bias` with so many harmonics in its maps, whose power is learned. `told`: the number that stands among the
-/// hyperparameters, where a search has fewer at first.
-[[nodiscard]] SpelledBias with_harmonics(SpelledBias bias, Eigen::Index harmonics, Eigen::Index told);
+/// `bias` with so many harmonics in its maps, whose power is learned. `told`: the number that
+/// stands among the hyperparameters, where a search has fewer at first.
+[[nodiscard]] SpelledBias with_harmonics(SpelledBias bias, Eigen::Index harmonics,
+                                         Eigen::Index told);
 
 }  // namespace trammel

@@ -11,7 +11,7 @@
 namespace trammel {
 namespace {
 
-constexpr int kMostParentheses = 20;              // inside one another: reading recurses, and nobody means more
+constexpr int kMostParentheses = 20;  // inside one another: reading recurses, and nobody means more
 constexpr std::size_t kMostSpellingBytes = 1000;  // as long as 32 words with room to spare
 constexpr std::size_t kMostShownBytes = 80;       // of a spelling in a message
 constexpr std::size_t kMostWords =
@@ -20,7 +20,8 @@ constexpr std::size_t kMostWords =
 constexpr std::string_view kFlange = "flange";
 
 const std::array<LinearBlockPtr, 2>& known_blocks() {
-  static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
+  static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(),
+                                                      make_parameter_block()};
   return known;
 }
 
@@ -34,7 +35,8 @@ LinearBlockPtr find_block(std::string_view word) {
 bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
 // bias = term {"+" term};  term = block | product;
-// sum = product {"+" product};  product = factor {"*" factor};  factor = "(" sum ")" | word ["(" "sincos" ")"].
+// sum = product {"+" product};  product = factor {"*" factor};  factor = "(" sum ")" | word ["("
+// "sincos" ")"].
 class Reader {
  public:
   explicit Reader(std::string_view spelling)
@@ -75,13 +77,16 @@ class Reader {
     skip_space();
     if (!rest_.empty()) return expected("`+`, `*` or the end");
     if (bias.flange && !bias.blocks.empty())
-      return refused("bias kernel `{}`: `flange` and `{}` do not stand together; the block sees levers by itself",
-                     shown_, bias.blocks.front()->name())
+      return refused(
+                 "bias kernel `{}`: `flange` and `{}` do not stand together; the block sees levers "
+                 "by itself",
+                 shown_, bias.blocks.front()->name())
           .of("bias")
           .with_text(all_);
     if (parts.empty()) {
       const std::string_view block = bias.flange ? kFlange : bias.blocks.front()->name();
-      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", shown_, block, block)
+      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`",
+                     shown_, block, block)
           .of("bias")
           .with_text(all_);
     }
@@ -91,7 +96,8 @@ class Reader {
 
  private:
   template <typename Part>
-  Result<KernelPtr> list(char separator, const Part& part, KernelPtr (*join)(std::vector<KernelPtr>)) {
+  Result<KernelPtr> list(char separator, const Part& part,
+                         KernelPtr (*join)(std::vector<KernelPtr>)) {
     std::vector<KernelPtr> parts;
     do {
       auto next = part();
@@ -129,25 +135,30 @@ class Reader {
       return refused("bias kernel `{}`: `{}` is unknown", shown_, shown_short(name))
           .of("bias")
           .with_text(name)
-          .next(fmt::format("known are none and auto (alone), {}, and to be added joint_map, parameters, flange",
-                            kernel_names()));
+          .next(fmt::format(
+              "known are none and auto (alone), {}, and to be added joint_map, parameters, flange",
+              kernel_names()));
     if (!take('(')) return kernel;
     if (word() != "sincos" || !take(')')) return expected(fmt::format("`{}(sincos)`", name));
     return make_sincos_kernel(std::move(kernel));
   }
 
   Failure twice(std::string_view word) const {
-    return refused("bias kernel `{}`: `{}` is named twice", shown_, word).of("bias").with_text(all_);
+    return refused("bias kernel `{}`: `{}` is named twice", shown_, word)
+        .of("bias")
+        .with_text(all_);
   }
 
   Failure misplaced(std::string_view block) const {
-    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", shown_, block, block)
+    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`",
+                   shown_, block, block)
         .of("bias")
         .with_text(all_);
   }
 
   Failure expected(std::string_view what) const {
-    return refused("bias kernel `{}`, character {}: {} is expected", shown_, all_.size() - rest_.size() + 1, what)
+    return refused("bias kernel `{}`, character {}: {} is expected", shown_,
+                   all_.size() - rest_.size() + 1, what)
         .of("bias")
         .with_text(all_)
         .with_value(all_.size() - rest_.size() + 1);
@@ -183,11 +194,13 @@ namespace {
 /// Asked first: nothing is built from a spelling that is too long.
 Status check_length(std::string_view spelling) {
   if (spelling.size() > kMostSpellingBytes) {
-    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostSpellingBytes)
+    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(),
+                   kMostSpellingBytes)
         .of("bias")
         .beyond(spelling.size(), kMostSpellingBytes);
   }
-  const auto joins = std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
+  const auto joins =
+      std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
   if (const auto words = static_cast<std::size_t>(joins) + 1; words > kMostWords) {
     return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}",
                    shown_short(spelling, kMostShownBytes), words, kMostWords)
@@ -205,7 +218,8 @@ Result<KernelPtr> spelled_kernel(std::string_view spelling) {
 }
 
 bool SpelledBias::has(std::string_view block) const {
-  return std::any_of(blocks.begin(), blocks.end(), [&](const LinearBlockPtr& one) { return one->name() == block; });
+  return std::any_of(blocks.begin(), blocks.end(),
+                     [&](const LinearBlockPtr& one) { return one->name() == block; });
 }
 
 Result<SpelledBias> spelled_bias(std::string_view spelling) {

@@ -10,24 +10,25 @@
 
 namespace trammel {
 
-/// The kernel that is written so: `matern52 + periodic`, `se(sincos) * (linear + white)`. Words are those of
-/// kernel_names(), each also with `(sincos)`; `*` binds before `+`. Refuses unknown words, naming the known ones; what
-/// is no such sum; more than 32 words or 1000 bytes.
+/// The kernel that is written so: `matern52 + periodic`, `se(sincos) * (linear + white)`. Words are
+/// those of kernel_names(), each also with `(sincos)`; `*` binds before `+`. Refuses unknown words,
+/// naming the known ones; what is no such sum; more than 32 words or 1000 bytes.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
 
 /// What a bias is made of.
 struct SpelledBias {
   KernelPtr kernel;                    ///< of each coordinate by itself
   std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share
-  bool flange = false;                 ///< the kernel is of the flange's error, seen through the tool's lever
+  bool flange = false;  ///< the kernel is of the flange's error, seen through the tool's lever
   /// Whether it must be told more of a pose than its joints.
   [[nodiscard]] bool needs_features() const { return flange || !blocks.empty(); }
   [[nodiscard]] bool has(std::string_view block) const;
 };
 
-/// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 + joint_map`; or the
-/// word `flange` (flange/README.md): `se + flange`. Refuses what spelled_kernel() refuses; a block that stands in a
-/// product or in parentheses, comes twice, or has no kernel beside it; and `flange` beside a block.
+/// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 +
+/// joint_map`; or the word `flange` (flange/README.md): `se + flange`. Refuses what
+/// spelled_kernel() refuses; a block that stands in a product or in parentheses, comes twice, or
+/// has no kernel beside it; and `flange` beside a block.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
 
 /// The same without the word `flange`: a rotation is the same at every lever.

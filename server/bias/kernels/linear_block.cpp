@@ -38,7 +38,8 @@ MatrixXd LinearBlocks::columns(const JointVector& q, const BiasFeatures& feature
   return all;
 }
 
-void LinearBlocks::log_variance(const VectorXd& parameters, VectorXd* log_variance, MatrixXd* derivative) const {
+void LinearBlocks::log_variance(const VectorXd& parameters, VectorXd* log_variance,
+                                MatrixXd* derivative) const {
   TRAMMEL_CHECK(parameters.size() == parameters_);
   log_variance->setZero(columns_);
   derivative->setZero(columns_, parameters_);
@@ -47,7 +48,8 @@ void LinearBlocks::log_variance(const VectorXd& parameters, VectorXd* log_varian
   for (const LinearBlockPtr& block : blocks_) {
     const Index columns = block->column_count(shape_);
     const Index count = block->parameter_count(shape_);
-    block->log_variance(shape_, parameters.segment(parameter, count), log_variance->segment(column, columns),
+    block->log_variance(shape_, parameters.segment(parameter, count),
+                        log_variance->segment(column, columns),
                         derivative->block(column, parameter, columns, count));
     column += columns;
     parameter += count;

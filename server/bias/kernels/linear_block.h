@@ -7,21 +7,23 @@
 
 #include "server/robot/pose.h"
 
-/// Blocks of a bias: parts of the residual that are linear in few weights, H(q) w with w ~ N(0, diag(variances)). The
-/// coordinates share the weights.
+/// Blocks of a bias: parts of the residual that are linear in few weights, H(q) w with w ~ N(0,
+/// diag(variances)). The coordinates share the weights.
 namespace trammel {
 
-/// How the tool moves when the arm changes a little. Rows: position (m), rotation vector (rad), both in B.
+/// How the tool moves when the arm changes a little. Rows: position (m), rotation vector (rad),
+/// both in B.
 struct BiasFeatures {
-  Eigen::MatrixXd by_joint;            ///< 6 x n, per rad that the joint gives way; zero for a prismatic joint
+  Eigen::MatrixXd
+      by_joint;  ///< 6 x n, per rad that the joint gives way; zero for a prismatic joint
   Eigen::MatrixXd by_parameter;        ///< 6 x P, per prior standard deviation of the parameter
   Vector3 lever_F = Vector3::Zero();   ///< m: the tool's point, seen from the flange
   Matrix3 R_BF = Matrix3::Identity();  ///< how the flange stands
-  JointVector gears = {};              ///< rad: the angles of the gears; empty where they are the joints' own
+  JointVector gears = {};  ///< rad: the angles of the gears; empty where they are the joints' own
 };
 
-/// One block of columns of H. A value without state: its hyperparameters are passed in as natural logarithms.
-/// Thread-safe.
+/// One block of columns of H. A value without state: its hyperparameters are passed in as natural
+/// logarithms. Thread-safe.
 class LinearBlock {
  public:
   virtual ~LinearBlock() = default;
@@ -36,20 +38,24 @@ class LinearBlock {
   [[nodiscard]] virtual Eigen::VectorXd spread(const BiasFeatures& shape) const = 0;
 
   /// 6 x column_count, at one pose.
-  virtual void columns(const JointVector& q, const BiasFeatures& features, Eigen::Ref<Eigen::MatrixXd> out) const = 0;
-  /// Logarithms of the prior variances of the weights, and their derivative, column_count x parameter_count.
+  virtual void columns(const JointVector& q, const BiasFeatures& features,
+                       Eigen::Ref<Eigen::MatrixXd> out) const = 0;
+  /// Logarithms of the prior variances of the weights, and their derivative, column_count x
+  /// parameter_count.
   virtual void log_variance(const BiasFeatures& shape, const Eigen::VectorXd& parameters,
-                            Eigen::Ref<Eigen::VectorXd> log_variance, Eigen::Ref<Eigen::MatrixXd> derivative) const = 0;
+                            Eigen::Ref<Eigen::VectorXd> log_variance,
+                            Eigen::Ref<Eigen::MatrixXd> derivative) const = 0;
 };
 
 using LinearBlockPtr = std::shared_ptr<const LinearBlock>;
 
-/// An error of each gear that depends on that gear's angle alone: Σ_j J_j(q) k_j(g_j, g_j') J_j(q')ᵀ, g_j the angle of
-/// gear j. k_j is a Matérn 3/2 kernel on the circle in a Fourier basis: periodic and once differentiable.
-/// Hyperparameters of each joint: log amplitude, rad; log of the harmonic from which on the spectrum falls.
+/// An error of each gear that depends on that gear's angle alone: Σ_j J_j(q) k_j(g_j, g_j')
+/// J_j(q')ᵀ, g_j the angle of gear j. k_j is a Matérn 3/2 kernel on the circle in a Fourier basis:
+/// periodic and once differentiable. Hyperparameters of each joint: log amplitude, rad; log of the
+/// harmonic from which on the spectrum falls.
 [[nodiscard]] LinearBlockPtr make_joint_map_block();
-/// What errors of the physical parameters leave, identified or not: H = J_θ(q). No hyperparameters: the weights have
-/// the prior variances of the parameters.
+/// What errors of the physical parameters leave, identified or not: H = J_θ(q). No hyperparameters:
+/// the weights have the prior variances of the parameters.
 [[nodiscard]] LinearBlockPtr make_parameter_block();
 
 /// Several blocks side by side.

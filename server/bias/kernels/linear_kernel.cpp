@@ -13,7 +13,8 @@ class LinearKernel : public Kernel {
   Index feature_count(Index joints) const override { return joints; }
   SearchBox search_box(const Eigen::MatrixXd& q) const override { return length_scale_box(q); }
 
-  void features(const VectorXd& parameters, const Eigen::MatrixXd& q, double* table, Index ld) const override {
+  void features(const VectorXd& parameters, const Eigen::MatrixXd& q, double* table,
+                Index ld) const override {
     scaled_joints(parameters, q, table, ld);
   }
 
@@ -33,19 +34,20 @@ class LinearKernel : public Kernel {
     }
   }
 
-  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Index ldg, double* gradient) const override {
+  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                     const double* g, Index ldg, double* gradient) const override {
     const auto z = columns_of(a, parameters.size());
     const auto other = columns_of(b, parameters.size());
     const auto weight = columns_of(g, a.rows, b.rows, ldg);
     for (Index j = 0; j < b.rows; ++j) {
-      for (Index d = 0; d < z.cols(); ++d) gradient[d] -= 2.0 * other(j, d) * z.col(d).dot(weight.col(j));
+      for (Index d = 0; d < z.cols(); ++d)
+        gradient[d] -= 2.0 * other(j, d) * z.col(d).dot(weight.col(j));
     }
   }
 
   // Σ w (1 + z·z') = Σ w + (Σ w z)·z'.
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     const auto z = columns_of(a, parameters.size());
     const auto other = columns_of(b, parameters.size());
     const Eigen::Map<const VectorXd> w(weights, a.rows);

@@ -20,7 +20,8 @@ class RadialKernel : public Kernel {
     SearchBox box{Eigen::VectorXd(q.cols()), Eigen::VectorXd(q.cols())};
     for (Eigen::Index k = 0; k < q.cols(); ++k) {
       const double spread = std::sqrt((q.col(k).array() - mean[k]).square().mean());
-      const double scale = spread > 1e-6 ? spread : 1.0;  // a joint that never moved has no length scale to find
+      const double scale =
+          spread > 1e-6 ? spread : 1.0;  // a joint that never moved has no length scale to find
       box.low[k] = std::log(0.5 * scale);
       box.high[k] = std::log(10.0 * scale);
     }
@@ -41,23 +42,28 @@ class RadialKernel : public Kernel {
     }
   }
 
-  void diagonal(const Eigen::VectorXd& /*parameters*/, const FeatureBlock& a, double* k) const override {
+  void diagonal(const Eigen::VectorXd& /*parameters*/, const FeatureBlock& a,
+                double* k) const override {
     std::fill_n(k, a.rows, 1.0);
   }
 
-  void tile(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,
-            Eigen::Index ldk) const override {
-    numerics().radial_tile(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data, b.ld, k, ldk);
+  void tile(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+            double* k, Eigen::Index ldk) const override {
+    numerics().radial_tile(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data, b.ld, k,
+                           ldk);
   }
 
-  void tile_gradient(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Eigen::Index ldg, double* gradient) const override {
-    numerics().radial_gradient(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data, b.ld, g, ldg, gradient);
+  void tile_gradient(const Eigen::VectorXd& parameters, const FeatureBlock& a,
+                     const FeatureBlock& b, const double* g, Eigen::Index ldg,
+                     double* gradient) const override {
+    numerics().radial_gradient(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data,
+                               b.ld, g, ldg, gradient);
   }
 
   void weighted_sum(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
                     const double* weights, double* out) const override {
-    numerics().radial_weighted_sum(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data, b.ld, weights, out);
+    numerics().radial_weighted_sum(shape_, parameters.size(), a.rows, a.data, a.ld, b.rows, b.data,
+                                   b.ld, weights, out);
   }
 
  private:

@@ -29,7 +29,8 @@ class RationalQuadraticKernel : public Kernel {
     return box;
   }
 
-  void features(const VectorXd& parameters, const Eigen::MatrixXd& q, double* table, Index ld) const override {
+  void features(const VectorXd& parameters, const Eigen::MatrixXd& q, double* table,
+                Index ld) const override {
     scaled_joints(parameters.head(q.cols()), q, table, ld);
   }
 
@@ -49,8 +50,8 @@ class RationalQuadraticKernel : public Kernel {
   }
 
   // With u = 1 + h/α: dk/dlog l = u^(-α-1) Δz², dk/dlog α = k α (1 - 1/u - log u).
-  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Index ldg, double* gradient) const override {
+  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                     const double* g, Index ldg, double* gradient) const override {
     const Index joints = parameters.size() - 1;
     const double alpha = std::exp(parameters[joints]);
     const auto z = columns_of(a, joints);
@@ -61,13 +62,14 @@ class RationalQuadraticKernel : public Kernel {
       const ArrayXd log_u = excess.log1p();
       const ArrayXd weighted = weight.col(j) * (-alpha * log_u).exp();
       const ArrayXd slope = weighted / (1.0 + excess);
-      for (Index d = 0; d < joints; ++d) gradient[d] += (slope * (z.col(d).array() - other(j, d)).square()).sum();
+      for (Index d = 0; d < joints; ++d)
+        gradient[d] += (slope * (z.col(d).array() - other(j, d)).square()).sum();
       gradient[joints] += alpha * (slope * excess - weighted * log_u).sum();
     }
   }
 
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     weighted_sum_by_tiles(*this, parameters, a, b, weights, out);
   }
 };

@@ -17,7 +17,8 @@ MatrixXd sincos(const MatrixXd& q) {
 
 class SincosKernel : public Kernel {
  public:
-  explicit SincosKernel(KernelPtr inner) : inner_(std::move(inner)), name_(std::string(inner_->name()) + "(sincos)") {}
+  explicit SincosKernel(KernelPtr inner)
+      : inner_(std::move(inner)), name_(std::string(inner_->name()) + "(sincos)") {}
 
   std::string_view name() const override { return name_; }
   Index parameter_count(Index joints) const override { return inner_->parameter_count(joints); }
@@ -36,7 +37,8 @@ class SincosKernel : public Kernel {
     return box;
   }
 
-  void features(const VectorXd& parameters, const MatrixXd& q, double* table, Index ld) const override {
+  void features(const VectorXd& parameters, const MatrixXd& q, double* table,
+                Index ld) const override {
     inner_->features(of_both(parameters), sincos(q), table, ld);
   }
 
@@ -49,8 +51,8 @@ class SincosKernel : public Kernel {
     inner_->tile(of_both(parameters), a, b, k, ldk);
   }
 
-  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
-                     Index ldg, double* gradient) const override {
+  void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                     const double* g, Index ldg, double* gradient) const override {
     const Index joints = joints_of(*this, parameters.size());
     const VectorXd expanded = of_both(parameters);
     VectorXd both = VectorXd::Zero(expanded.size());
@@ -58,8 +60,8 @@ class SincosKernel : public Kernel {
     for (Index p = 0; p < both.size(); ++p) gradient[own_parameter(p, joints)] += both[p];
   }
 
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     inner_->weighted_sum(of_both(parameters), a, b, weights, out);
   }
 
@@ -83,6 +85,8 @@ class SincosKernel : public Kernel {
 
 }  // namespace
 
-KernelPtr make_sincos_kernel(KernelPtr inner) { return std::make_shared<SincosKernel>(std::move(inner)); }
+KernelPtr make_sincos_kernel(KernelPtr inner) {
+  return std::make_shared<SincosKernel>(std::move(inner));
+}
 
 }  // namespace trammel

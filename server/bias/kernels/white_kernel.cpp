@@ -9,8 +9,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// 53 bits made from all joints, which a double holds exactly. Two of 50,000 different poses share them in one of 10
-// million such sets. Mixed as in SplitMix64. Adding 0 makes -0 and 0 equal.
+// 53 bits made from all joints, which a double holds exactly. Two of 50,000 different poses share
+// them in one of 10 million such sets. Mixed as in SplitMix64. Adding 0 makes -0 and 0 equal.
 double fingerprint(const Eigen::RowVectorXd& q) {
   std::uint64_t state = 0;
   for (Index k = 0; k < q.size(); ++k) {
@@ -27,9 +27,12 @@ class WhiteKernel : public Kernel {
   std::string_view name() const override { return "white"; }
   Index parameter_count(Index /*joints*/) const override { return 0; }
   Index feature_count(Index /*joints*/) const override { return 1; }
-  SearchBox search_box(const Eigen::MatrixXd& /*q*/) const override { return {VectorXd(0), VectorXd(0)}; }
+  SearchBox search_box(const Eigen::MatrixXd& /*q*/) const override {
+    return {VectorXd(0), VectorXd(0)};
+  }
 
-  void features(const VectorXd& /*parameters*/, const Eigen::MatrixXd& q, double* table, Index /*ld*/) const override {
+  void features(const VectorXd& /*parameters*/, const Eigen::MatrixXd& q, double* table,
+                Index /*ld*/) const override {
     for (Index i = 0; i < q.rows(); ++i) table[i] = fingerprint(q.row(i));
   }
 
@@ -44,11 +47,12 @@ class WhiteKernel : public Kernel {
     }
   }
 
-  void tile_gradient(const VectorXd& /*parameters*/, const FeatureBlock& /*a*/, const FeatureBlock& /*b*/,
-                     const double* /*g*/, Index /*ldg*/, double* /*gradient*/) const override {}
+  void tile_gradient(const VectorXd& /*parameters*/, const FeatureBlock& /*a*/,
+                     const FeatureBlock& /*b*/, const double* /*g*/, Index /*ldg*/,
+                     double* /*gradient*/) const override {}
 
-  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* weights,
-                    double* out) const override {
+  void weighted_sum(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b,
+                    const double* weights, double* out) const override {
     weighted_sum_by_tiles(*this, parameters, a, b, weights, out);
   }
 };

@@ -8,7 +8,8 @@
 #include "server/bias/coupled/coupled_search.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// What a BiasModel predicts with: D outputs that are silent, independent, coupled by blocks, or seen at the flange.
+/// What a BiasModel predicts with: D outputs that are silent, independent, coupled by blocks, or
+/// seen at the flange.
 namespace trammel {
 
 /// Outputs that share a unit: the coordinates of a position, or of a rotation.
@@ -24,14 +25,15 @@ struct OutputData {
 
 /// At one joint vector.
 struct OutputPrediction {
-  Eigen::VectorXd mean;         ///< D
-  Eigen::MatrixXd covariance;   ///< D x D, of the functions themselves
-  double prior_share = 0;       ///< of the first three outputs, as in BiasPrediction
-  Eigen::VectorXd nearby = {};  ///< D: the part of the mean that the kernel predicts; empty without blocks
+  Eigen::VectorXd mean;        ///< D
+  Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
+  double prior_share = 0;      ///< of the first three outputs, as in BiasPrediction
+  Eigen::VectorXd nearby =
+      {};  ///< D: the part of the mean that the kernel predicts; empty without blocks
 };
 
-/// D outputs conditioned on their data. Immutable, thread-safe. `features`: one for each joint vector; empty without
-/// blocks.
+/// D outputs conditioned on their data. Immutable, thread-safe. `features`: one for each joint
+/// vector; empty without blocks.
 class BiasOutputs {
  public:
   virtual ~BiasOutputs() = default;
@@ -39,32 +41,38 @@ class BiasOutputs {
   /// M x D.
   [[nodiscard]] virtual Eigen::MatrixXd mean(const Eigen::MatrixXd& q,
                                              const std::vector<BiasFeatures>& features) const = 0;
-  [[nodiscard]] virtual std::vector<OutputPrediction> predict(const Eigen::MatrixXd& q,
-                                                              const std::vector<BiasFeatures>& features) const = 0;
+  [[nodiscard]] virtual std::vector<OutputPrediction> predict(
+      const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& features) const = 0;
   /// M x D: the part of the mean that the kernel predicts; all of it without blocks.
-  [[nodiscard]] virtual Eigen::MatrixXd nearby_mean(const Eigen::MatrixXd& q) const { return mean(q, {}); }
+  [[nodiscard]] virtual Eigen::MatrixXd nearby_mean(const Eigen::MatrixXd& q) const {
+    return mean(q, {});
+  }
   /// P: weights of the block `parameters`; empty without that block.
   [[nodiscard]] virtual Eigen::VectorXd parameter_weights() const { return {}; }
   /// D, of one measurement.
   [[nodiscard]] virtual Eigen::VectorXd noise_variance() const = 0;
   /// Nat: of each output, or one number for coupled outputs.
   [[nodiscard]] virtual Eigen::VectorXd log_likelihood() const = 0;
-  /// Every training pose predicted from all the others. N x D: mean, and variance of the measurement. N: prior share,
-  /// as in BiasModel.
+  /// Every training pose predicted from all the others. N x D: mean, and variance of the
+  /// measurement. N: prior share, as in BiasModel.
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_mean() const = 0;
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_variance() const = 0;
   [[nodiscard]] virtual Eigen::VectorXd leave_one_out_share() const = 0;
 
-  /// What of `y` (N x D, instead of the observations) these points miss by when they are predicted from all others;
-  /// empty where only conditioning anew says it.
+  /// What of `y` (N x D, instead of the observations) these points miss by when they are predicted
+  /// from all others; empty where only conditioning anew says it.
   [[nodiscard]] virtual std::optional<Eigen::MatrixXd> left_out_error(
       const Eigen::MatrixXd& /*y*/, const std::vector<Eigen::Index>& /*points*/) const {
     return std::nullopt;
   }
 
-  /// With more points, or without some (rising indices); null where the outputs must be conditioned anew.
-  [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const { return nullptr; }
-  [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> without(const std::vector<Eigen::Index>& /*points*/) const {
+  /// With more points, or without some (rising indices); null where the outputs must be conditioned
+  /// anew.
+  [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const {
+    return nullptr;
+  }
+  [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> without(
+      const std::vector<Eigen::Index>& /*points*/) const {
     return nullptr;
   }
 };
@@ -76,30 +84,28 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 
 /// Independent outputs. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
-                                                   const std::vector<GpHyperparameters>& at, VarianceForm form);
-/// The most probable hyperparameters of independent outputs; those of another unit (from the fourth on) are searched
-/// apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there are no other starts. Empty when no
-/// start gave a positive definite covariance.
-[[nodiscard]] std::optional<CoupledSearchResult> search_independent(const KernelPtr& kernel, const OutputData& data,
-                                                                    const Eigen::VectorXd& metrology_stddev,
-                                                                    const SearchOptions& options,
-                                                                    const CoupledHyperparameters* last);
+                                                   const std::vector<GpHyperparameters>& at,
+                                                   VarianceForm form);
+/// The most probable hyperparameters of independent outputs; those of another unit (from the fourth
+/// on) are searched apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there
+/// are no other starts. Empty when no start gave a positive definite covariance.
+[[nodiscard]] std::optional<CoupledSearchResult> search_independent(
+    const KernelPtr& kernel, const OutputData& data, const Eigen::VectorXd& metrology_stddev,
+    const SearchOptions& options, const CoupledHyperparameters* last);
 
 /// Outputs that share the weights of blocks. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data,
                                                const CoupledHyperparameters& at, VarianceForm form);
-[[nodiscard]] std::optional<CoupledSearchResult> search_coupled_outputs(const SpelledBias& bias, const OutputData& data,
-                                                                        const Eigen::VectorXd& metrology_stddev,
-                                                                        const SearchOptions& options,
-                                                                        const CoupledHyperparameters* last);
+[[nodiscard]] std::optional<CoupledSearchResult> search_coupled_outputs(
+    const SpelledBias& bias, const OutputData& data, const Eigen::VectorXd& metrology_stddev,
+    const SearchOptions& options, const CoupledHyperparameters* last);
 
-/// Outputs that are the error of the flange, seen through the levers of `features`. Of the kernel alone. Null when the
-/// covariance is not positive definite.
+/// Outputs that are the error of the flange, seen through the levers of `features`. Of the kernel
+/// alone. Null when the covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_flange(const KernelPtr& kernel, const OutputData& data,
                                               const CoupledHyperparameters& at);
-[[nodiscard]] std::optional<CoupledSearchResult> search_flange_outputs(const KernelPtr& kernel, const OutputData& data,
-                                                                       const Eigen::VectorXd& metrology_stddev,
-                                                                       const SearchOptions& options,
-                                                                       const CoupledHyperparameters* last);
+[[nodiscard]] std::optional<CoupledSearchResult> search_flange_outputs(
+    const KernelPtr& kernel, const OutputData& data, const Eigen::VectorXd& metrology_stddev,
+    const SearchOptions& options, const CoupledHyperparameters* last);
 
 }  // namespace trammel

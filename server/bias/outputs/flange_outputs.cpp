@@ -38,11 +38,13 @@ class FlangeOutputs final : public BiasOutputs {
     TRAMMEL_CHECK(static_cast<Index>(features.size()) == q.rows());
     const MatrixXd twist = twist_mean(q);
     MatrixXd mean(q.rows(), kOfOneUnit);
-    for (Index i = 0; i < q.rows(); ++i) mean.row(i) = (seen(features, i) * twist.col(i)).transpose();
+    for (Index i = 0; i < q.rows(); ++i)
+      mean.row(i) = (seen(features, i) * twist.col(i)).transpose();
     return mean;
   }
 
-  std::vector<OutputPrediction> predict(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
+  std::vector<OutputPrediction> predict(const MatrixXd& q,
+                                        const std::vector<BiasFeatures>& features) const override {
     const MatrixXd means = mean(q, features);
     std::vector<OutputPrediction> predictions;
     for (Index first = 0; first < q.rows(); first += kTargetsAtATime) {
@@ -51,10 +53,13 @@ class FlangeOutputs final : public BiasOutputs {
       const MatrixXd explained = precision_.selfadjointView<Eigen::Lower>() * cross;
       for (Index i = 0; i < many; ++i) {
         const Matrix3 prior = prior_at(seen(features, first + i));
-        Matrix3 covariance = prior - cross.middleCols<3>(3 * i).transpose() * explained.middleCols<3>(3 * i);
-        covariance.diagonal() = covariance.diagonal().cwiseMax(kLeastVariance * prior.diagonal()).eval();
+        Matrix3 covariance =
+            prior - cross.middleCols<3>(3 * i).transpose() * explained.middleCols<3>(3 * i);
+        covariance.diagonal() =
+            covariance.diagonal().cwiseMax(kLeastVariance * prior.diagonal()).eval();
         const VectorXd mean = means.row(first + i).transpose();
-        predictions.push_back({mean, covariance, share_of(covariance.diagonal(), prior.diagonal()), mean});
+        predictions.push_back(
+            {mean, covariance, share_of(covariance.diagonal(), prior.diagonal()), mean});
       }
     }
     return predictions;
@@ -67,7 +72,8 @@ class FlangeOutputs final : public BiasOutputs {
   VectorXd leave_one_out_share() const override { return leave_one_out_share_; }
 
   // All of a joint vector is left out where one of its rows is.
-  std::optional<MatrixXd> left_out_error(const MatrixXd& y, const std::vector<Index>& points) const override {
+  std::optional<MatrixXd> left_out_error(const MatrixXd& y,
+                                         const std::vector<Index>& points) const override {
     const std::vector<std::size_t> gone = views_with(points);
     std::vector<Index> numbers;
     for (const std::size_t v : gone) add_numbers_of(views_.views[v], &numbers);
@@ -103,13 +109,17 @@ class FlangeOutputs final : public BiasOutputs {
   TwistRow seen(const std::vector<BiasFeatures>& features, Index i) const {
     return seen_through(features[static_cast<std::size_t>(i)], views_.reference_F);
   }
-  Matrix3 prior_at(const TwistRow& seen) const { return seen * variance_.asDiagonal() * seen.transpose(); }
+  Matrix3 prior_at(const TwistRow& seen) const {
+    return seen * variance_.asDiagonal() * seen.transpose();
+  }
 
   std::vector<std::size_t> views_with(const std::vector<Index>& points) const {
     std::vector<std::size_t> found;
     for (std::size_t v = 0; v < views_.views.size(); ++v) {
       const std::vector<Index>& rows = views_.views[v].rows;
-      const auto asked = [&](Index row) { return std::binary_search(points.begin(), points.end(), row); };
+      const auto asked = [&](Index row) {
+        return std::binary_search(points.begin(), points.end(), row);
+      };
       if (std::any_of(rows.begin(), rows.end(), asked)) found.push_back(v);
     }
     return found;
@@ -118,8 +128,8 @@ class FlangeOutputs final : public BiasOutputs {
   /// Puts the even rows of a view where they belong in `out` (N x 3), in m again.
   void spread(const FlangeView& view, const VectorXd& even, MatrixXd* out) const {
     for (std::size_t k = 0; k < view.rows.size(); ++k)
-      out->row(view.rows[k]) =
-          std::sqrt(views_.noise_shape[view.rows[k]]) * even.segment<3>(3 * static_cast<Index>(k)).transpose();
+      out->row(view.rows[k]) = std::sqrt(views_.noise_shape[view.rows[k]]) *
+                               even.segment<3>(3 * static_cast<Index>(k)).transpose();
   }
 
   AlignedMatrix features_at(const MatrixXd& q, std::size_t kernel) const {
@@ -148,8 +158,9 @@ class FlangeOutputs final : public BiasOutputs {
       const AlignedMatrix targets = features_at(q, c);
       for (Index d = 0; d < 6; ++d) {
         if (kernel_of(d) != c) continue;
-        kernel_->weighted_sum(parameters_[c], rows_of(features_[c], 0, count), rows_of(targets, 0, q.rows()),
-                              weights_.data() + d * weights_.rows(), mean.data());
+        kernel_->weighted_sum(parameters_[c], rows_of(features_[c], 0, count),
+                              rows_of(targets, 0, q.rows()), weights_.data() + d * weights_.rows(),
+                              mean.data());
         twist.row(d) = mean.transpose();
       }
     }
@@ -157,14 +168,15 @@ class FlangeOutputs final : public BiasOutputs {
   }
 
   /// Of the three coordinates of each target (rows of `q`) with all numbers: size x 3 M.
-  MatrixXd cross_covariance(const MatrixXd& q, const std::vector<BiasFeatures>& features, Index first) const {
+  MatrixXd cross_covariance(const MatrixXd& q, const std::vector<BiasFeatures>& features,
+                            Index first) const {
     const Index count = views_.q.rows();
     std::vector<AlignedMatrix> k;
     for (std::size_t c = 0; c < kTwistKernels; ++c) {
       const AlignedMatrix targets = features_at(q, c);
       k.emplace_back(padded_rows(count), q.rows());
-      kernel_->tile(parameters_[c], rows_of(features_[c], 0, count), rows_of(targets, 0, q.rows()), k.back().data(),
-                    k.back().rows());
+      kernel_->tile(parameters_[c], rows_of(features_[c], 0, count), rows_of(targets, 0, q.rows()),
+                    k.back().data(), k.back().rows());
     }
     MatrixXd cross(views_.size, 3 * q.rows());
     for (Index t = 0; t < q.rows(); ++t) {
@@ -180,7 +192,8 @@ class FlangeOutputs final : public BiasOutputs {
     return cross;
   }
 
-  // Rows: each without all of its joint vector, as every other bias leaves them out. A target has none of them.
+  // Rows: each without all of its joint vector, as every other bias leaves them out. A target has
+  // none of them.
   void leave_out(const VectorXd& z, const VectorXd& alpha, Index rows) {
     leave_one_out_mean_ = leave_one_out_variance_ = MatrixXd::Zero(rows, kOfOneUnit);
     leave_one_out_share_.resize(rows);
@@ -188,15 +201,20 @@ class FlangeOutputs final : public BiasOutputs {
       const Index r = view.view.rows();
       std::vector<Index> numbers;
       add_numbers_of(view, &numbers);
-      const MatrixXd unknown = precision_of(numbers).llt().solve(MatrixXd::Identity(r, r));  // noise included
+      const MatrixXd unknown =
+          precision_of(numbers).llt().solve(MatrixXd::Identity(r, r));  // noise included
       const VectorXd mean = z.segment(view.first, r) - unknown * alpha.segment(view.first, r);
-      const MatrixXd known = view.basis * (unknown - noise_ * MatrixXd::Identity(r, r)) * view.basis.transpose();
+      const MatrixXd known =
+          view.basis * (unknown - noise_ * MatrixXd::Identity(r, r)) * view.basis.transpose();
       spread(view, view.basis * mean, &leave_one_out_mean_);
       for (std::size_t k = 0; k < view.rows.size(); ++k) {
         const Index row = view.rows[k];
-        const Vector3 of_row = views_.noise_shape[row] * known.diagonal().segment<3>(3 * static_cast<Index>(k));
-        leave_one_out_variance_.row(row).array() = of_row.transpose().array() + views_.noise_shape[row] * noise_;
-        leave_one_out_share_[row] = share_of(of_row, prior_at(views_.seen[static_cast<std::size_t>(row)]).diagonal());
+        const Vector3 of_row =
+            views_.noise_shape[row] * known.diagonal().segment<3>(3 * static_cast<Index>(k));
+        leave_one_out_variance_.row(row).array() =
+            of_row.transpose().array() + views_.noise_shape[row] * noise_;
+        leave_one_out_share_[row] =
+            share_of(of_row, prior_at(views_.seen[static_cast<std::size_t>(row)]).diagonal());
       }
     }
   }
@@ -232,24 +250,32 @@ OutputData without_levers(const FlangeViews& views, const OutputData& data) {
 
 }  // namespace
 
-BiasOutputsPtr condition_flange(const KernelPtr& kernel, const OutputData& data, const CoupledHyperparameters& at) {
+BiasOutputsPtr condition_flange(const KernelPtr& kernel, const OutputData& data,
+                                const CoupledHyperparameters& at) {
   FlangeViews views = views_of(data.q, data.noise_shape, data.features);
   auto solution = solve(*kernel, views, numbers_of(views, data.y), at);
   if (!solution) return nullptr;
-  return std::make_shared<FlangeOutputs>(kernel, std::move(views), data.y, *std::move(solution), at);
+  return std::make_shared<FlangeOutputs>(kernel, std::move(views), data.y, *std::move(solution),
+                                         at);
 }
 
-std::optional<CoupledSearchResult> search_flange_outputs(const KernelPtr& kernel, const OutputData& data,
-                                                         const VectorXd& metrology_stddev, const SearchOptions& options,
+std::optional<CoupledSearchResult> search_flange_outputs(const KernelPtr& kernel,
+                                                         const OutputData& data,
+                                                         const VectorXd& metrology_stddev,
+                                                         const SearchOptions& options,
                                                          const CoupledHyperparameters* last) {
   const FlangeViews views = views_of(data.q, data.noise_shape, data.features);
-  if (last != nullptr) return search_flange(kernel, views, data.y, *last, metrology_stddev[0], options, true);
+  if (last != nullptr)
+    return search_flange(kernel, views, data.y, *last, metrology_stddev[0], options, true);
   SearchOptions plain = options;
-  if (options.progress) plain.progress = [&](double share) { return options.progress(0.3 * share); };
-  auto found = search_independent(kernel, without_levers(views, data), metrology_stddev, plain, nullptr);
+  if (options.progress)
+    plain.progress = [&](double share) { return options.progress(0.3 * share); };
+  auto found =
+      search_independent(kernel, without_levers(views, data), metrology_stddev, plain, nullptr);
   if (!found || found->given_up) return found;
   SearchOptions rest = options;
-  if (options.progress) rest.progress = [&](double share) { return options.progress(0.3 + 0.7 * share); };
+  if (options.progress)
+    rest.progress = [&](double share) { return options.progress(0.3 + 0.7 * share); };
   return search_flange(kernel, views, data.y, found->found, metrology_stddev[0], rest, false);
 }
 

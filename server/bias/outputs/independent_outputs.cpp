@@ -12,7 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSilence = 1e-9;  // m rms: an output below it has nothing to learn, and no scale to search with
+constexpr double kSilence =
+    1e-9;  // m rms: an output below it has nothing to learn, and no scale to search with
 
 // An output that is constant: no signal, the instrument's noise.
 GpHyperparameters silent(const VectorXd& kernel, double metrology_stddev) {
@@ -37,11 +38,12 @@ class IndependentOutputs final : public BiasOutputs {
     return mean;
   }
 
-  std::vector<OutputPrediction> predict(const MatrixXd& q,
-                                        const std::vector<BiasFeatures>& /*features*/) const override {
+  std::vector<OutputPrediction> predict(
+      const MatrixXd& q, const std::vector<BiasFeatures>& /*features*/) const override {
     VectorXd means(q.rows());
-    std::vector<OutputPrediction> predictions(static_cast<std::size_t>(q.rows()),
-                                              {VectorXd(count()), MatrixXd::Zero(count(), count()), 0.0});
+    std::vector<OutputPrediction> predictions(
+        static_cast<std::size_t>(q.rows()),
+        {VectorXd(count()), MatrixXd::Zero(count(), count()), 0.0});
     for (Index d = 0; d < count(); ++d) {
       const std::vector<PosteriorVariance> variance = at(d).variance(q, means.data());
       for (std::size_t i = 0; i < predictions.size(); ++i) {
@@ -49,7 +51,8 @@ class IndependentOutputs final : public BiasOutputs {
         prediction.mean[d] = means[static_cast<Index>(i)];
         prediction.covariance(d, d) = variance[i].posterior;
         if (d < kOfOneUnit)
-          prediction.prior_share = std::max(prediction.prior_share, variance[i].posterior / variance[i].prior);
+          prediction.prior_share =
+              std::max(prediction.prior_share, variance[i].posterior / variance[i].prior);
       }
     }
     return predictions;
@@ -73,11 +76,13 @@ class IndependentOutputs final : public BiasOutputs {
   }
   VectorXd leave_one_out_share() const override {
     VectorXd share = VectorXd::Zero(at(0).size());
-    for (Index d = 0; d < std::min(count(), kOfOneUnit); ++d) share = share.cwiseMax(at(d).leave_one_out_share());
+    for (Index d = 0; d < std::min(count(), kOfOneUnit); ++d)
+      share = share.cwiseMax(at(d).leave_one_out_share());
     return share;
   }
 
-  std::optional<MatrixXd> left_out_error(const MatrixXd& y, const std::vector<Index>& points) const override {
+  std::optional<MatrixXd> left_out_error(const MatrixXd& y,
+                                         const std::vector<Index>& points) const override {
     MatrixXd error(static_cast<Index>(points.size()), count());
     for (Index d = 0; d < count(); ++d) {
       const std::optional<VectorXd> output = at(d).left_out_error(y.col(d), points);
@@ -121,16 +126,18 @@ BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& 
                                      const std::vector<GpHyperparameters>& at, VarianceForm form) {
   std::vector<LocalExperts> outputs;
   for (std::size_t d = 0; d < at.size(); ++d) {
-    auto output =
-        LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)), data.noise_shape, at[d], form);
+    auto output = LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)),
+                                          data.noise_shape, at[d], form);
     if (!output) return nullptr;
     outputs.push_back(*std::move(output));
   }
   return std::make_shared<IndependentOutputs>(std::move(outputs));
 }
 
-std::optional<CoupledSearchResult> search_independent(const KernelPtr& kernel, const OutputData& data,
-                                                      const VectorXd& metrology_stddev, const SearchOptions& options,
+std::optional<CoupledSearchResult> search_independent(const KernelPtr& kernel,
+                                                      const OutputData& data,
+                                                      const VectorXd& metrology_stddev,
+                                                      const SearchOptions& options,
                                                       const CoupledHyperparameters* last) {
   const SearchBox box = kernel->search_box(data.q);
   CoupledSearchResult result;
@@ -143,13 +150,17 @@ std::optional<CoupledSearchResult> search_independent(const KernelPtr& kernel, c
     SearchOptions search = options;
     if (options.progress) {
       const double done = static_cast<double>(first / kOfOneUnit) / units;
-      search.progress = [&options, done, units](double share) { return options.progress(done + share / units); };
+      search.progress = [&options, done, units](double share) {
+        return options.progress(done + share / units);
+      };
     }
     if (last != nullptr) {
-      for (const Index d : speaking) search.last.push_back(last->outputs[static_cast<std::size_t>(d)]);
+      for (const Index d : speaking)
+        search.last.push_back(last->outputs[static_cast<std::size_t>(d)]);
     }
-    auto found = search_hyperparameters(kernel, {data.q, data.y(Eigen::all, speaking), data.noise_shape},
-                                        metrology_stddev[first], search);
+    auto found =
+        search_hyperparameters(kernel, {data.q, data.y(Eigen::all, speaking), data.noise_shape},
+                               metrology_stddev[first], search);
     if (!found) return std::nullopt;
     for (std::size_t i = 0; i < found->outputs.size(); ++i)
       result.found.outputs[static_cast<std::size_t>(speaking[i])] = found->outputs[i];

@@ -18,37 +18,45 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
-constexpr double kLeastLogRatio = -20.0;  // of η: with less noise thousands of smooth points are not positive definite
+constexpr double kSmallestSignal =
+    1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
+constexpr double kLeastLogRatio =
+    -20.0;  // of η: with less noise thousands of smooth points are not positive definite
 
 // The compressed variance.
-constexpr double kUnexplained = 1e-3;     // of the noise variance, at any training point: far below what anybody sees
+constexpr double kUnexplained =
+    1e-3;  // of the noise variance, at any training point: far below what anybody sees
 constexpr double kMostKept = 0.75;        // of the points: with more, little time would be saved
 constexpr Index kMostKeptPoints = 2000;   // finding them takes time with the square of their number
 constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
 
 // The variance that is served.
-constexpr Index kMostServedPoints = 400;  // with more, all points in single precision are nearly as fast
-constexpr double kFewTell = 0.02;         // of the variance: what few points may leave out
-constexpr Index kLeftOutPoints = 128;     // of the points, that near ones are tried at
-constexpr Index kAsked = 64;              // joint vectors between the points, that few points are tried at
-// What few points may be too small by beside the places that were tried: measured 0.2 % of a standard deviation, and
-// 1e-5 of the noise variance.
+constexpr Index kMostServedPoints =
+    400;                           // with more, all points in single precision are nearly as fast
+constexpr double kFewTell = 0.02;  // of the variance: what few points may leave out
+constexpr Index kLeftOutPoints = 128;  // of the points, that near ones are tried at
+constexpr Index kAsked = 64;  // joint vectors between the points, that few points are tried at
+// What few points may be too small by beside the places that were tried: measured 0.2 % of a
+// standard deviation, and 1e-5 of the noise variance.
 constexpr double kFewSlack = 1.004;
 constexpr double kFewSlackOfNoise = 1e-4;
-// Of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to single precision (6e-8) makes of
-// t.
+// Of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to single
+// precision (6e-8) makes of t.
 constexpr double kRounded = 3.5e-7;
 constexpr double kMostRounding = 1e-3;  // of the variance of a measurement
 
 bool is_served(VarianceForm form) {
-  return form == VarianceForm::kServed || form == VarianceForm::kServedAsPart || form == VarianceForm::kLearned;
+  return form == VarianceForm::kServed || form == VarianceForm::kServedAsPart ||
+         form == VarianceForm::kLearned;
 }
 
-// Joint vectors as they may be asked for: on the way from a training pose to another, and anywhere in their range.
+// Joint vectors as they may be asked for: on the way from a training pose to another, and anywhere
+// in their range.
 MatrixXd asked_for(const MatrixXd& q) {
   SeededRandom random(1);
-  const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(q.rows())); };
+  const auto any = [&] {
+    return static_cast<Index>(random.next() % static_cast<std::uint64_t>(q.rows()));
+  };
   const Eigen::RowVectorXd low = q.colwise().minCoeff();
   const Eigen::RowVectorXd high = q.colwise().maxCoeff();
   MatrixXd asked(kAsked, q.cols());
@@ -64,15 +72,16 @@ MatrixXd asked_for(const MatrixXd& q) {
 }
 
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
-void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
-                        const VectorXd& noise_shape, const MatrixXd& y, AlignedMatrix* matrix) {
+void assemble_augmented(const Kernel& kernel, const VectorXd& parameters,
+                        const AlignedMatrix& features, double ratio, const VectorXd& noise_shape,
+                        const MatrixXd& y, AlignedMatrix* matrix) {
   const Index n = noise_shape.size();
   const Index ld = matrix->rows();
   for (Index j = 0; j < n; j += kTile) {
     const Index cols = std::min(kTile, n - j);
     for (Index i = j; i < n; i += 4 * kTile) {
-      kernel.tile(parameters, rows_of(features, i, std::min(4 * kTile, n - i)), rows_of(features, j, cols),
-                  matrix->data() + i + j * ld, ld);
+      kernel.tile(parameters, rows_of(features, i, std::min(4 * kTile, n - i)),
+                  rows_of(features, j, cols), matrix->data() + i + j * ld, ld);
     }
   }
   for (Index j = 0; j < n; ++j) {
@@ -98,8 +107,12 @@ MatrixXd target_features(const Kernel& kernel, const VectorXd& parameters, const
 
 }  // namespace
 
-ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior)
-    : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)), poses_(pose_groups(data_.q)) {
+ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data,
+                                       GpPrior prior)
+    : kernel_(std::move(kernel)),
+      data_(std::move(data)),
+      prior_(std::move(prior)),
+      poses_(pose_groups(data_.q)) {
   TRAMMEL_CHECK(data_.y.rows() == size() && data_.noise_shape.size() == size());
   matrix_ = augmented_storage(size(), data_.y.cols());
   features_ = feature_table(*kernel_, data_.q);
@@ -118,9 +131,11 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
 
   const VectorXd kernel_parameters = parameters.head(count);
   kernel_->features(kernel_parameters, data_.q, features_.data(), features_.rows());
-  assemble_augmented(*kernel_, kernel_parameters, features_, ratio, data_.noise_shape, data_.y, &matrix_);
+  assemble_augmented(*kernel_, kernel_parameters, features_, ratio, data_.noise_shape, data_.y,
+                     &matrix_);
   double log_det = 0;
-  if (!numerics().sweep(n, outputs, matrix_.data(), matrix_.rows(), work_.data(), &log_det)) return false;
+  if (!numerics().sweep(n, outputs, matrix_.data(), matrix_.rows(), work_.data(), &log_det))
+    return false;
 
   alpha_.map().topRows(n) = matrix_.map().block(n, 0, outputs, n).transpose();
   const auto points = static_cast<double>(n);
@@ -133,8 +148,10 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
     const double variance = std::max(quadratic, 0.0) / points + kSmallestSignal * kSmallestSignal;
     signal_variance_[d] = variance;
     out->value += 0.5 * points * (std::log(variance) + 1.0 + kLogTwoPi);
-    // The prior of the noise is one of log σ_n = ½ (log η + log σ_f²), and σ_f² depends on the parameters, too.
-    const double below = std::min(0.5 * (log_ratio + std::log(variance)) - std::log(prior_.noise_stddev), 0.0);
+    // The prior of the noise is one of log σ_n = ½ (log η + log σ_f²), and σ_f² depends on the
+    // parameters, too.
+    const double below =
+        std::min(0.5 * (log_ratio + std::log(variance)) - std::log(prior_.noise_stddev), 0.0);
     out->value += 0.5 * std::pow(below / prior_.noise_spread, 2);
     const double slope = below / (prior_.noise_spread * prior_.noise_spread);
     noise_slope += 0.5 * slope;
@@ -153,9 +170,10 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
   return std::isfinite(out->value) && out->gradient.allFinite();
 }
 
-// ½ tr(G dM) with G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, from the lower triangle: elements off the diagonal count
-// once, those on it half.
-VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, const VectorXd& output_weights) {
+// ½ tr(G dM) with G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, from the lower triangle: elements off
+// the diagonal count once, those on it half.
+VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio,
+                                      const VectorXd& output_weights) {
   const Index n = size();
   const Index ld = matrix_.rows();
   const auto outputs = static_cast<double>(data_.y.cols());
@@ -169,16 +187,17 @@ VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, 
       const Index rows = std::min(kTile, n - i);
       for (Index c = 0; c < cols; ++c) {
         column_weights = output_weights.cwiseProduct(alpha_.map().row(j + c).transpose());
-        numerics().weight_column(rows, -outputs, matrix_.data() + i + (j + c) * ld, column_weights.size(),
-                                 alpha_.data() + i, alpha_.rows(), column_weights.data(), g.col(c).data());
+        numerics().weight_column(rows, -outputs, matrix_.data() + i + (j + c) * ld,
+                                 column_weights.size(), alpha_.data() + i, alpha_.rows(),
+                                 column_weights.data(), g.col(c).data());
         g.col(c).tail(kTile - rows).setZero();
         if (i > j) continue;
         g.col(c).head(c).setZero();
         g(c, c) *= 0.5;
         gradient[parameters.size()] += ratio * data_.noise_shape[j + c] * g(c, c);
       }
-      kernel_->tile_gradient(parameters, rows_of(features_, i, rows), rows_of(features_, j, cols), g.data(), kTile,
-                             gradient.data());
+      kernel_->tile_gradient(parameters, rows_of(features_, i, rows), rows_of(features_, j, cols),
+                             g.data(), kTile, gradient.data());
     }
   }
   return gradient;
@@ -199,9 +218,11 @@ double ProfiledLikelihood::leave_one_out_rms() const {
   return std::sqrt(total / static_cast<double>(size()));
 }
 
-std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const Kernel> kernel, const MatrixXd& q,
-                                                          const VectorXd& y, const VectorXd& noise_shape,
-                                                          const GpHyperparameters& hyperparameters, VarianceForm form) {
+std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const Kernel> kernel,
+                                                          const MatrixXd& q, const VectorXd& y,
+                                                          const VectorXd& noise_shape,
+                                                          const GpHyperparameters& hyperparameters,
+                                                          VarianceForm form) {
   const Index n = q.rows();
   GaussianProcess gp;
   gp.kernel_ = std::move(kernel);
@@ -219,16 +240,19 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   AlignedMatrix matrix = augmented_storage(n, 1);
   AlignedMatrix work(numerics().work_size(n + 1), 1);
   assemble_augmented(*gp.kernel_, gp.parameters_, *gp.features_, ratio, noise_shape, y, &matrix);
-  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &gp.log_det_)) return std::nullopt;
+  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &gp.log_det_))
+    return std::nullopt;
 
   gp.weights_ = {padded_rows(n), 1};
   gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
   gp.inverse_diagonal_.resize(n);  // of M⁻¹ = L⁻ᵀ L⁻¹
-  for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
+  for (Index i = 0; i < n; ++i)
+    gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
   gp.exact_ = VarianceTable(gp.features_, n, std::move(matrix));
   gp.finish(form);
   if (is_served(form)) gp.make_served(asked_for(q), form == VarianceForm::kServedAsPart);
-  if (form != VarianceForm::kLearned && is_served(form) && (gp.near_ > 0 || gp.compressed_)) gp.exact_ = {};
+  if (form != VarianceForm::kLearned && is_served(form) && (gp.near_ > 0 || gp.compressed_))
+    gp.exact_ = {};
   return gp;
 }
 
@@ -241,8 +265,10 @@ void GaussianProcess::finish(VarianceForm form) {
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
   left_out_variance_ = inverse_diagonal_.cwiseInverse();
   leave_poses_out();
-  leave_one_out_share_ = (left_out_variance_ - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
-  if (form == VarianceForm::kCompressed || form == VarianceForm::kCompressedOnly) compress(kMostKeptPoints);
+  leave_one_out_share_ =
+      (left_out_variance_ - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
+  if (form == VarianceForm::kCompressed || form == VarianceForm::kCompressedOnly)
+    compress(kMostKeptPoints);
   if (form == VarianceForm::kCompressedOnly && compressed_) exact_ = {};
 }
 
@@ -275,7 +301,8 @@ std::vector<double> GaussianProcess::root_rows(Index more) const {
   AlignedMatrix work(numerics().work_size(size_ + 1), 1);
   assemble_augmented(*kernel_, parameters_, *features_, 1.0, noise_, y_, &matrix);
   double log_det = 0;
-  const bool positive = numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
+  const bool positive =
+      numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
   TRAMMEL_CHECK(positive);  // it was before
   return VarianceTable(features_, size_, std::move(matrix)).rows(more);
 }
@@ -284,7 +311,8 @@ void GaussianProcess::compress(Index at_most) {
   if (size_ < kFewestToCompress) return;
   const Index most = std::min(at_most, static_cast<Index>(kMostKept * static_cast<double>(size_)));
   const double tolerance = kUnexplained * noise_.minCoeff();
-  const std::vector<Index> points = spanning_points(*kernel_, parameters_, *features_, size_, tolerance, most);
+  const std::vector<Index> points =
+      spanning_points(*kernel_, parameters_, *features_, size_, tolerance, most);
   if (static_cast<Index>(points.size()) == most) return;
   auto few = InducingPoints::at(*kernel_, parameters_, *features_, points);
   if (!few) return;
@@ -316,8 +344,8 @@ VectorXd GaussianProcess::at_most(const VectorXd& left, bool as_part) const {
   return most;
 }
 
-bool GaussianProcess::near_is_enough(Index count, const VectorXd& most_of_points, const FeatureBlock& asked,
-                                     const VectorXd& most) const {
+bool GaussianProcess::near_is_enough(Index count, const VectorXd& most_of_points,
+                                     const FeatureBlock& asked, const VectorXd& most) const {
   const NearPoints near = near_points(count);
   double prior = 0;
   for (Index i = 0; i < size_; i += (size_ + kLeftOutPoints - 1) / kLeftOutPoints) {
@@ -362,16 +390,18 @@ void GaussianProcess::make_served(const MatrixXd& q, bool as_part) {
     compressed_.reset();
   }
   const double rounding = kRounded * prior.maxCoeff() / std::sqrt(noise_.minCoeff());
-  if (rounding <= kMostRounding * (left.minCoeff() + noise_.mean())) compressed_ = exact_.in_single_precision(rounding);
+  if (rounding <= kMostRounding * (left.minCoeff() + noise_.mean()))
+    compressed_ = exact_.in_single_precision(rounding);
 }
 
 void GaussianProcess::mean(const MatrixXd& q, double* out) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
-  kernel_->weighted_sum(parameters_, rows_of(*features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(),
-                        out);
+  kernel_->weighted_sum(parameters_, rows_of(*features_, 0, size_), rows_of(targets, 0, q.rows()),
+                        weights_.data(), out);
 }
 
-std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std::vector<NearWeights>* near,
+std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q,
+                                                         std::vector<NearWeights>* near,
                                                          double* mean) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
   VectorXd posterior(q.rows());
@@ -387,7 +417,8 @@ std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std:
       posterior[i] = points.left_of(covariance, prior[i], weights);
       // Fused: a product of its own would be denormal for far points, and slow.
       if (mean != nullptr)
-        numerics().transposed_product(size_, 1, covariance.data(), size_, 1, weights_.data(), size_, mean + i, 1);
+        numerics().transposed_product(size_, 1, covariance.data(), size_, 1, weights_.data(), size_,
+                                      mean + i, 1);
     }
   } else {
     if (mean != nullptr) this->mean(q, mean);
@@ -396,7 +427,8 @@ std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std:
   }
   std::vector<PosteriorVariance> variances(static_cast<std::size_t>(q.rows()));
   for (Index i = 0; i < q.rows(); ++i)
-    variances[static_cast<std::size_t>(i)] = {signal_variance_ * posterior[i], signal_variance_ * prior[i]};
+    variances[static_cast<std::size_t>(i)] = {signal_variance_ * posterior[i],
+                                              signal_variance_ * prior[i]};
   return variances;
 }
 

@@ -14,11 +14,13 @@
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/bfgs.h"
 
-/// Exact Gaussian processes (source eqs. 3.15-3.26): K = σ_f² R(parameters) + σ_n² diag(w) = σ_f² M, M = R + η diag(w).
+/// Exact Gaussian processes (source eqs. 3.15-3.26): K = σ_f² R(parameters) + σ_n² diag(w) = σ_f²
+/// M, M = R + η diag(w).
 namespace trammel {
 
 inline const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
-/// Natural logarithms of hyperparameters beyond this are refused: their squares would be no numbers to compute with.
+/// Natural logarithms of hyperparameters beyond this are refused: their squares would be no numbers
+/// to compute with.
 inline constexpr double kMostLogParameter = 40.0;
 
 /// What a process learns from. All outputs share the joint vectors.
@@ -30,17 +32,20 @@ struct GpData {
 
 /// Weak log-normal priors; they decide only what the data leave open.
 struct GpPrior {
-  double noise_stddev =
-      1e-5;  ///< m, the instrument's; noise below it costs ½ (log ratio / spread)², noise above it nothing
-  double noise_spread = 0.1;  ///< in logs: the instrument's noise is known to 10 %; less noise would mean learning it
+  double noise_stddev = 1e-5;  ///< m, the instrument's; noise below it costs ½ (log ratio /
+                               ///< spread)², noise above it nothing
+  double noise_spread =
+      0.1;  ///< in logs: the instrument's noise is known to 10 %; less noise would mean learning it
   Eigen::VectorXd parameter_centre;  ///< of the kernel's log parameters
-  double parameter_spread = 3.0;     ///< in logs: holds the length scale of a joint that has no influence
-  double log_ratio_centre = -4.6;    ///< of log η: noise a tenth of the signal
+  double parameter_spread =
+      3.0;  ///< in logs: holds the length scale of a joint that has no influence
+  double log_ratio_centre = -4.6;  ///< of log η: noise a tenth of the signal
   double log_ratio_spread = 5.0;
 };
 
-/// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over the outputs. σ_f² of
-/// each output is at its best value y'M⁻¹y / N. Keeps its matrix between calls: for one thread at a time.
+/// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over
+/// the outputs. σ_f² of each output is at its best value y'M⁻¹y / N. Keeps its matrix between
+/// calls: for one thread at a time.
 class ProfiledLikelihood {
  public:
   ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior);
@@ -48,8 +53,8 @@ class ProfiledLikelihood {
   /// False where M is not positive definite, or a parameter is beyond kMostLogParameter.
   [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, ObjectiveValue* out);
 
-  /// Both of the last evaluation that succeeded: σ_f² of each output, m²; rms of the Euclidean error of each point
-  /// predicted from all other joint vectors, m.
+  /// Both of the last evaluation that succeeded: σ_f² of each output, m²; rms of the Euclidean
+  /// error of each point predicted from all other joint vectors, m.
   [[nodiscard]] const Eigen::VectorXd& signal_variance() const { return signal_variance_; }
   [[nodiscard]] double leave_one_out_rms() const;
 
@@ -80,23 +85,31 @@ struct GpHyperparameters {
 
 /// How a process computes its variance.
 enum class VarianceForm {
-  /// From a few of its points, where few are enough: several times faster. At the data it is never below the exact
-  /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to be at most 0.2 %
+  /// From a few of its points, where few are enough: several times faster. At the data it is never
+  /// below the exact
+  /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to
+  /// be at most 0.2 %
   /// too small (bound: decision 25). Exact where many points would be needed.
   kCompressed,
-  /// What a model is served with. From the 24 or 48 points nearest to a target, where these say as much as all: mostly
-  /// of a signal below the noise. Else from at most 400 points that stand for all. Else from all points, in single
-  /// precision where the noise allows it. Never below the exact variance; above it by less than 2 % at every training
-  /// point when it is left out, mostly by far less. Nothing else is kept: what is for with(), without() and
+  /// What a model is served with. From the 24 or 48 points nearest to a target, where these say as
+  /// much as all: mostly
+  /// of a signal below the noise. Else from at most 400 points that stand for all. Else from all
+  /// points, in single
+  /// precision where the noise allows it. Never below the exact variance; above it by less than 2 %
+  /// at every training
+  /// point when it is left out, mostly by far less. Nothing else is kept: what is for with(),
+  /// without() and
   /// left_out_error() alone is computed anew when one of them is called.
   kServed,
   /// The same variances, and all is kept.
   kLearned,
-  /// As kServed, and less than 2 % is of the variance of a measurement: where what the process leaves is one part of
+  /// As kServed, and less than 2 % is of the variance of a measurement: where what the process
+  /// leaves is one part of
   /// what is uncertain.
   kServedAsPart,
   kExact,
-  /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of the points and is
+  /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of
+  /// the points and is
   /// for with(), without() and left_out_error() alone is computed anew when one of them is called.
   kCompressedOnly,
 };
@@ -105,30 +118,34 @@ enum class VarianceForm {
 class GaussianProcess {
  public:
   /// Empty when the covariance is not positive definite.
-  [[nodiscard]] static std::optional<GaussianProcess> condition(std::shared_ptr<const Kernel> kernel,
-                                                                const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
-                                                                const Eigen::VectorXd& noise_shape,
-                                                                const GpHyperparameters& hyperparameters,
-                                                                VarianceForm form = VarianceForm::kCompressed);
+  [[nodiscard]] static std::optional<GaussianProcess> condition(
+      std::shared_ptr<const Kernel> kernel, const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
+      const Eigen::VectorXd& noise_shape, const GpHyperparameters& hyperparameters,
+      VarianceForm form = VarianceForm::kCompressed);
 
-  /// Conditioned on more points, with the same hyperparameters, in N² operations for each point. Equal to condition()
-  /// on all points, to rounding. Empty when the covariance is no longer positive definite.
-  [[nodiscard]] std::optional<GaussianProcess> with(const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
+  /// Conditioned on more points, with the same hyperparameters, in N² operations for each point.
+  /// Equal to condition() on all points, to rounding. Empty when the covariance is no longer
+  /// positive definite.
+  [[nodiscard]] std::optional<GaussianProcess> with(const Eigen::MatrixXd& q,
+                                                    const Eigen::VectorXd& y,
                                                     const Eigen::VectorXd& noise_shape,
                                                     VarianceForm form = VarianceForm::kExact) const;
-  /// Conditioned on all points but these (rising indices), in N² operations for each; equal to rounding, too.
+  /// Conditioned on all points but these (rising indices), in N² operations for each; equal to
+  /// rounding, too.
   [[nodiscard]] GaussianProcess without(const std::vector<Eigen::Index>& points,
                                         VarianceForm form = VarianceForm::kExact) const;
 
-  /// Errors of these points when they are predicted from all others, in N operations for each pair of them; `y` (N, m)
-  /// takes the place of the observations.
-  [[nodiscard]] Eigen::VectorXd left_out_error(const Eigen::VectorXd& y, const std::vector<Eigen::Index>& points) const;
+  /// Errors of these points when they are predicted from all others, in N operations for each pair
+  /// of them; `y` (N, m) takes the place of the observations.
+  [[nodiscard]] Eigen::VectorXd left_out_error(const Eigen::VectorXd& y,
+                                               const std::vector<Eigen::Index>& points) const;
 
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
   void mean(const Eigen::MatrixXd& q, double* out) const;
 
-  /// `near`: the points that each variance was computed from, where near ones are enough; else it becomes empty. `mean`
-  /// takes the posterior mean, too, equal to mean() but for rounding: cheaper than asking for both.
+  /// `near`: the points that each variance was computed from, where near ones are enough; else it
+  /// becomes empty. `mean` takes the posterior mean, too, equal to mean() but for rounding: cheaper
+  /// than asking for both.
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
                                                         std::vector<NearWeights>* near = nullptr,
                                                         double* mean = nullptr) const;
@@ -143,13 +160,17 @@ class GaussianProcess {
   [[nodiscard]] double noise_variance() const { return noise_variance_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// Every training point predicted from those at all other joint vectors: mean, m, and posterior over prior variance
-  /// of the function. For the points p of one joint vector, Rasmussen & Williams, eqs. 5.10-5.12, with a block of K⁻¹
-  /// instead of its diagonal: μ_p = y_p - [K⁻¹]_pp⁻¹ [K⁻¹ y]_p, Σ_p = [K⁻¹]_pp⁻¹ (noise included).
+  /// Every training point predicted from those at all other joint vectors: mean, m, and posterior
+  /// over prior variance of the function. For the points p of one joint vector, Rasmussen &
+  /// Williams, eqs. 5.10-5.12, with a block of K⁻¹ instead of its diagonal: μ_p = y_p - [K⁻¹]_pp⁻¹
+  /// [K⁻¹ y]_p, Σ_p = [K⁻¹]_pp⁻¹ (noise included).
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
-  /// Variance of the measurement of every training point given those at all other joint vectors, m².
-  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const { return signal_variance_ * left_out_variance_; }
+  /// Variance of the measurement of every training point given those at all other joint vectors,
+  /// m².
+  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const {
+    return signal_variance_ * left_out_variance_;
+  }
 
  private:
   GaussianProcess() = default;
@@ -160,12 +181,14 @@ class GaussianProcess {
   // Leaves out the points of each joint vector together.
   void leave_poses_out();
   void compress(Eigen::Index at_most);
-  // Chooses what variances are served from, by what it makes of the points left out and at the rows of `q`.
+  // Chooses what variances are served from, by what it makes of the points left out and at the rows
+  // of `q`.
   void make_served(const Eigen::MatrixXd& q, bool as_part);
   [[nodiscard]] NearPoints near_points(Eigen::Index count) const;
   // The most that few points may leave where all leave `left`.
   [[nodiscard]] Eigen::VectorXd at_most(const Eigen::VectorXd& left, bool as_part) const;
-  // Whether so many near points leave at most this at the points when they are left out, and at the rows of `asked`.
+  // Whether so many near points leave at most this at the points when they are left out, and at the
+  // rows of `asked`.
   [[nodiscard]] bool near_is_enough(Eigen::Index count, const Eigen::VectorXd& most_of_points,
                                     const FeatureBlock& asked, const Eigen::VectorXd& most) const;
   // Of the exact variance table; VarianceTable::rows().
@@ -181,9 +204,10 @@ class GaussianProcess {
   AlignedMatrix weights_;             // M⁻¹ y
   Eigen::VectorXd inverse_diagonal_;  // of M⁻¹
   double log_det_ = 0;                // of M
-  VarianceTable exact_;               // of all points; empty where only what variances are computed from is kept
+  VarianceTable exact_;  // of all points; empty where only what variances are computed from is kept
   std::optional<VarianceTable> compressed_;
-  Eigen::Index near_ = 0;  // points that a target's variance is computed from; 0: not from near ones
+  Eigen::Index near_ =
+      0;  // points that a target's variance is computed from; 0: not from near ones
   double signal_variance_ = 0;
   double noise_variance_ = 0;
   double log_likelihood_ = 0;

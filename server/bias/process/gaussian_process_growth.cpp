@@ -29,7 +29,8 @@ GaussianProcess GaussianProcess::like(Index size) const {
   return gp;
 }
 
-std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const VectorXd& y, const VectorXd& noise_shape,
+std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const VectorXd& y,
+                                                     const VectorXd& noise_shape,
                                                      VarianceForm form) const {
   TRAMMEL_CHECK(y.size() == q.rows() && noise_shape.size() == q.rows());
   const Index size = size_ + q.rows();
@@ -62,8 +63,10 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   return gp;
 }
 
-// (M⁻¹)_pp⁻¹ (M⁻¹ y)_p with M⁻¹ = Gᵀ G, G = L⁻¹: Rasmussen & Williams, eqs. 5.10-5.12, for several points at once.
-VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<Index>& points) const {
+// (M⁻¹)_pp⁻¹ (M⁻¹ y)_p with M⁻¹ = Gᵀ G, G = L⁻¹: Rasmussen & Williams, eqs. 5.10-5.12, for several
+// points at once.
+VectorXd GaussianProcess::left_out_error(const VectorXd& y,
+                                         const std::vector<Index>& points) const {
   TRAMMEL_CHECK(y.size() == size_);
   const std::vector<double> rows = root_rows(0);
   const auto count = static_cast<Index>(points.size());
@@ -82,7 +85,8 @@ VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<In
   return Eigen::LLT<MatrixXd>(inverse).solve(columns.transpose() * whitened);
 }
 
-GaussianProcess GaussianProcess::without(const std::vector<Index>& points, VarianceForm form) const {
+GaussianProcess GaussianProcess::without(const std::vector<Index>& points,
+                                         VarianceForm form) const {
   InverseRoot root(root_rows(0), size_);
   VectorXd weights = weights_.map().col(0).head(size_);
   VectorXd inverse_diagonal = inverse_diagonal_;

@@ -11,7 +11,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-void halve(const MatrixXd& table, std::size_t most, std::vector<Index> part, std::vector<std::vector<Index>>* parts) {
+void halve(const MatrixXd& table, std::size_t most, std::vector<Index> part,
+           std::vector<std::vector<Index>>* parts) {
   if (part.size() <= most) {
     std::sort(part.begin(), part.end());
     parts->push_back(std::move(part));
@@ -44,7 +45,8 @@ std::vector<std::vector<Index>> halved(const MatrixXd& table, Index most) {
   return parts;
 }
 
-std::vector<std::vector<Index>> halved(const MatrixXd& table, const std::vector<PoseGroup>& poses, Index most) {
+std::vector<std::vector<Index>> halved(const MatrixXd& table, const std::vector<PoseGroup>& poses,
+                                       Index most) {
   std::vector<Index> first;
   for (const PoseGroup& pose : poses) first.push_back(pose.front());
   std::vector<std::vector<Index>> parts;
@@ -59,7 +61,8 @@ std::vector<std::vector<Index>> halved(const MatrixXd& table, const std::vector<
   return parts;
 }
 
-MatrixXd joints_as_seen_by(const Kernel& kernel, const Eigen::VectorXd& parameters, const MatrixXd& q) {
+MatrixXd joints_as_seen_by(const Kernel& kernel, const Eigen::VectorXd& parameters,
+                           const MatrixXd& q) {
   MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
   if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
   kernel.features(parameters, q, features.data(), features.rows());

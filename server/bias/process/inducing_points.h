@@ -8,24 +8,31 @@
 #include "server/bias/process/variance_table.h"
 #include "server/numerics/aligned_matrix.h"
 
-/// A Gaussian process approximated by a few of its points, u. What they do not explain of the rest counts as unknown
-/// and independent of the data (deterministic training conditional; Quiñonero-Candela & Rasmussen, JMLR 6, 2005).
+/// A Gaussian process approximated by a few of its points, u. What they do not explain of the rest
+/// counts as unknown and independent of the data (deterministic training conditional;
+/// Quiñonero-Candela & Rasmussen, JMLR 6, 2005).
 namespace trammel {
 
-/// Points that leave at most `tolerance` of the prior variance of any point unexplained, the most telling first, `most`
-/// at most. Chosen among the `count` rows of `features` by pivoted Cholesky (Harbrecht, Peters, Schneider 2012).
-[[nodiscard]] std::vector<Eigen::Index> spanning_points(const Kernel& kernel, const Eigen::VectorXd& parameters,
-                                                        const AlignedMatrix& features, Eigen::Index count,
-                                                        double tolerance, Eigen::Index most);
+/// Points that leave at most `tolerance` of the prior variance of any point unexplained, the most
+/// telling first, `most` at most. Chosen among the `count` rows of `features` by pivoted Cholesky
+/// (Harbrecht, Peters, Schneider 2012).
+[[nodiscard]] std::vector<Eigen::Index> spanning_points(const Kernel& kernel,
+                                                        const Eigen::VectorXd& parameters,
+                                                        const AlignedMatrix& features,
+                                                        Eigen::Index count, double tolerance,
+                                                        Eigen::Index most);
 
-/// With W = chol(R_uu)⁻¹, φ(x) = W k(u, x), D the noise relative to σ_f²: B = I + Σ_i φ_i φ_iᵀ / D_i,
+/// With W = chol(R_uu)⁻¹, φ(x) = W k(u, x), D the noise relative to σ_f²: B = I + Σ_i φ_i φ_iᵀ /
+/// D_i,
 ///   mean(x) = φᵀ B⁻¹ Σ_i φ_i y_i / D_i,
 ///   share(x) = k(x, x) - φᵀφ + φᵀ B⁻¹ φ = k(x, x) - |G k(u, x)|².
-/// Learns in blocks of any size: its memory is that of B, however many points there are. For one thread at a time.
+/// Learns in blocks of any size: its memory is that of B, however many points there are. For one
+/// thread at a time.
 class InducingPoints {
  public:
   /// Empty where points are so close to each other that R_uu is not positive definite.
-  [[nodiscard]] static std::optional<InducingPoints> at(const Kernel& kernel, const Eigen::VectorXd& parameters,
+  [[nodiscard]] static std::optional<InducingPoints> at(const Kernel& kernel,
+                                                        const Eigen::VectorXd& parameters,
                                                         const AlignedMatrix& features,
                                                         const std::vector<Eigen::Index>& rows);
 

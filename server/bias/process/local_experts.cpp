@@ -15,20 +15,23 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostExact =
-    5000;  // an exact process of so many takes 100 MB for each output, of twice as many four times that
+constexpr Index kMostExact = 5000;  // an exact process of so many takes 100 MB for each output, of
+                                    // twice as many four times that
 constexpr Index kMostOfAnExpert =
     1200;  // neighbours: twice as many take twice the time and leave a tenth less (decision 28)
-constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
+constexpr double kKnownExactly =
+    1e-12;  // of the prior variance; keeps the precision at a training point finite
 
 VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
   if (experts == 1) return wanted;
-  if (wanted == VarianceForm::kServed || wanted == VarianceForm::kServedAsPart) return VarianceForm::kCompressedOnly;
+  if (wanted == VarianceForm::kServed || wanted == VarianceForm::kServedAsPart)
+    return VarianceForm::kCompressedOnly;
   return wanted == VarianceForm::kLearned ? VarianceForm::kCompressed : wanted;
 }
 
 /// What stands at one joint vector belongs to one expert, so that it is left out together.
-std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
+std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters,
+                                               const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());
   const std::vector<PoseGroup> poses = pose_groups(q);
   return halved(joints_as_seen_by(kernel, parameters, q), poses,
@@ -37,15 +40,18 @@ std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const Vecto
 
 }  // namespace
 
-std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const Kernel>& kernel, const MatrixXd& q,
-                                                    const VectorXd& y, const VectorXd& noise_shape,
-                                                    const GpHyperparameters& hyperparameters, VarianceForm form) {
+std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const Kernel>& kernel,
+                                                    const MatrixXd& q, const VectorXd& y,
+                                                    const VectorXd& noise_shape,
+                                                    const GpHyperparameters& hyperparameters,
+                                                    VarianceForm form) {
   LocalExperts local;
   local.size_ = q.rows();
   local.members_ = neighbourhoods(*kernel, hyperparameters.kernel, q);
   for (const std::vector<Index>& points : local.members_) {
-    auto expert = GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points),
-                                             hyperparameters, form_of(form, local.members_.size()));
+    auto expert =
+        GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points),
+                                   hyperparameters, form_of(form, local.members_.size()));
     if (!expert) return std::nullopt;
     local.experts_.push_back(*std::move(expert));
   }
@@ -78,7 +84,8 @@ std::optional<LocalExperts> LocalExperts::with(const MatrixXd& q, const VectorXd
 }
 
 LocalExperts LocalExperts::without(const std::vector<Index>& points) const {
-  std::vector<Index> place(static_cast<std::size_t>(size_));  // of every point when these are gone; -1: gone
+  std::vector<Index> place(
+      static_cast<std::size_t>(size_));  // of every point when these are gone; -1: gone
   std::iota(place.begin(), place.end(), Index{0});
   for (const Index point : points) place[static_cast<std::size_t>(point)] = -1;
   Index next = 0;
@@ -150,19 +157,22 @@ double LocalExperts::log_likelihood() const {
 
 VectorXd LocalExperts::leave_one_out_mean() const {
   VectorXd mean(size_);
-  for (std::size_t k = 0; k < experts_.size(); ++k) mean(members_[k]) = experts_[k].leave_one_out_mean();
+  for (std::size_t k = 0; k < experts_.size(); ++k)
+    mean(members_[k]) = experts_[k].leave_one_out_mean();
   return mean;
 }
 
 VectorXd LocalExperts::leave_one_out_variance() const {
   VectorXd variance(size_);
-  for (std::size_t k = 0; k < experts_.size(); ++k) variance(members_[k]) = experts_[k].leave_one_out_variance();
+  for (std::size_t k = 0; k < experts_.size(); ++k)
+    variance(members_[k]) = experts_[k].leave_one_out_variance();
   return variance;
 }
 
 VectorXd LocalExperts::leave_one_out_share() const {
   VectorXd share(size_);
-  for (std::size_t k = 0; k < experts_.size(); ++k) share(members_[k]) = experts_[k].leave_one_out_share();
+  for (std::size_t k = 0; k < experts_.size(); ++k)
+    share(members_[k]) = experts_[k].leave_one_out_share();
   return share;
 }
 

@@ -7,37 +7,39 @@
 
 namespace trammel {
 
-/// One output with any number of points. Up to 5000 it is one exact process. Beyond, it is several exact processes of
-/// neighbouring points with the same hyperparameters, the experts, joined by the robust Bayesian committee machine
-/// (Deisenroth & Ng, ICML 2015): with β_k = ½ log(prior variance / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior.
-/// All experts predict everywhere, so the prediction is as smooth as theirs; where none knows anything it is the prior.
-/// Immutable, thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
+/// One output with any number of points. Up to 5000 it is one exact process. Beyond, it is several
+/// exact processes of neighbouring points with the same hyperparameters, the experts, joined by the
+/// robust Bayesian committee machine (Deisenroth & Ng, ICML 2015): with β_k = ½ log(prior variance
+/// / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior. All experts predict everywhere, so the
+/// prediction is as smooth as theirs; where none knows anything it is the prior. Immutable,
+/// thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
 class LocalExperts {
  public:
-  /// Empty when a covariance is not positive definite. `form`: of a single process; that of several is kCompressed, for
-  /// their variances decide the mean.
-  [[nodiscard]] static std::optional<LocalExperts> condition(const std::shared_ptr<const Kernel>& kernel,
-                                                             const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
-                                                             const Eigen::VectorXd& noise_shape,
-                                                             const GpHyperparameters& hyperparameters,
-                                                             VarianceForm form = VarianceForm::kLearned);
+  /// Empty when a covariance is not positive definite. `form`: of a single process; that of several
+  /// is kCompressed, for their variances decide the mean.
+  [[nodiscard]] static std::optional<LocalExperts> condition(
+      const std::shared_ptr<const Kernel>& kernel, const Eigen::MatrixXd& q,
+      const Eigen::VectorXd& y, const Eigen::VectorXd& noise_shape,
+      const GpHyperparameters& hyperparameters, VarianceForm form = VarianceForm::kLearned);
 
-  /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the expert that knows it
-  /// best. without() takes points out of their experts, and drops an expert without points.
+  /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the
+  /// expert that knows it best. without() takes points out of their experts, and drops an expert
+  /// without points.
   [[nodiscard]] std::optional<LocalExperts> with(const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                  const Eigen::VectorXd& noise_shape) const;
   [[nodiscard]] LocalExperts without(const std::vector<Eigen::Index>& points) const;
 
   /// As GaussianProcess has it; empty with more than one expert.
-  [[nodiscard]] std::optional<Eigen::VectorXd> left_out_error(const Eigen::VectorXd& y,
-                                                              const std::vector<Eigen::Index>& points) const {
+  [[nodiscard]] std::optional<Eigen::VectorXd> left_out_error(
+      const Eigen::VectorXd& y, const std::vector<Eigen::Index>& points) const {
     if (experts_.size() > 1) return std::nullopt;
     return experts_.front().left_out_error(y, points);
   }
 
   void mean(const Eigen::MatrixXd& q, double* out) const;
   /// `mean` takes the mean, too, which is cheaper than asking for both.
-  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q, double* mean = nullptr) const;
+  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
+                                                        double* mean = nullptr) const;
 
   [[nodiscard]] double signal_variance() const { return experts_.front().signal_variance(); }
   [[nodiscard]] double noise_variance() const { return experts_.front().noise_variance(); }

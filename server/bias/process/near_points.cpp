@@ -12,12 +12,14 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, NearPoints::kMost, NearPoints::kMost>;
+using Covariance =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, NearPoints::kMost, NearPoints::kMost>;
 using Few = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, NearPoints::kMost, 1>;
 
 constexpr Index kLanesOfEach = 4;
 
-/// The largest of each lane: lane c of `lanes` holds k[c], k[c + lanes], ... They are compared side by side.
+/// The largest of each lane: lane c of `lanes` holds k[c], k[c + lanes], ... They are compared side
+/// by side.
 Eigen::ArrayXd largest_of_lanes(const Eigen::Map<const Eigen::ArrayXd>& k, Index lanes) {
   Eigen::ArrayXd most = k.head(lanes);
   Index first = lanes;
@@ -27,13 +29,15 @@ Eigen::ArrayXd largest_of_lanes(const Eigen::Map<const Eigen::ArrayXd>& k, Index
   return most;
 }
 
-/// The places of the `count` largest of `k`, rising; of equal ones the first. At least `count` are as large as the
-/// `count`-th largest of the lanes, and only lanes with a large one are looked into.
+/// The places of the `count` largest of `k`, rising; of equal ones the first. At least `count` are
+/// as large as the `count`-th largest of the lanes, and only lanes with a large one are looked
+/// into.
 std::vector<Index> largest(const Eigen::Map<const Eigen::ArrayXd>& k, Index count) {
   const Index lanes = std::min(k.size(), kLanesOfEach * count);
   const Eigen::ArrayXd most = largest_of_lanes(k, lanes);
   Eigen::ArrayXd sorted = most;
-  std::nth_element(sorted.data(), sorted.data() + (count - 1), sorted.data() + lanes, std::greater<>());
+  std::nth_element(sorted.data(), sorted.data() + (count - 1), sorted.data() + lanes,
+                   std::greater<>());
   const double least = sorted[count - 1];
   std::vector<Index> found;
   found.reserve(static_cast<std::size_t>(3 * count));
@@ -54,12 +58,15 @@ std::vector<Index> largest(const Eigen::Map<const Eigen::ArrayXd>& k, Index coun
 
 AlignedMatrix NearPoints::covariance_with(const FeatureBlock& target) const {
   AlignedMatrix covariance(features.rows(), 1);
-  kernel.tile(parameters, rows_of(features, 0, noise.size()), target, covariance.data(), covariance.rows());
+  kernel.tile(parameters, rows_of(features, 0, noise.size()), target, covariance.data(),
+              covariance.rows());
   return covariance;
 }
 
-double NearPoints::left_of(const AlignedMatrix& covariance, double prior, NearWeights* weights) const {
-  std::vector<Index> found = largest(Eigen::Map<const Eigen::ArrayXd>(covariance.data(), noise.size()), count);
+double NearPoints::left_of(const AlignedMatrix& covariance, double prior,
+                           NearWeights* weights) const {
+  std::vector<Index> found =
+      largest(Eigen::Map<const Eigen::ArrayXd>(covariance.data(), noise.size()), count);
 
   AlignedMatrix near(padded_rows(count), features.cols());
   Few known(count);
@@ -69,7 +76,8 @@ double NearPoints::left_of(const AlignedMatrix& covariance, double prior, NearWe
     near.map().row(i) = features.map().row(point);
   }
   AlignedMatrix between(near.rows(), count);
-  kernel.tile(parameters, rows_of(near, 0, count), rows_of(near, 0, count), between.data(), between.rows());
+  kernel.tile(parameters, rows_of(near, 0, count), rows_of(near, 0, count), between.data(),
+              between.rows());
   Covariance matrix = between.map().topRows(count);
   for (Index i = 0; i < count; ++i) matrix(i, i) += noise[found[static_cast<std::size_t>(i)]];
   const Eigen::LLT<Covariance> root(matrix);

@@ -10,12 +10,13 @@ namespace trammel {
 
 using Eigen::Index;
 
-// The last rows first. Columns to the right of a row are not needed for the rows above, and their memory is given back:
-// there is never more than one matrix and one triangle.
+// The last rows first. Columns to the right of a row are not needed for the rows above, and their
+// memory is given back: there is never more than one matrix and one triangle.
 VarianceTable::VarianceTable(PointFeatures features, Index size, AlignedMatrix root)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
   const Numerics& n = numerics();
-  for (Index first = (size - 1) / n.packed_rows * n.packed_rows; first >= 0; first -= n.packed_rows) {
+  for (Index first = (size - 1) / n.packed_rows * n.packed_rows; first >= 0;
+       first -= n.packed_rows) {
     n.pack_lower(size, first, root.data(), root.rows(), packed_root_.data() + n.packed_size(first));
     root.forget_columns_from(first);
   }
@@ -52,14 +53,15 @@ std::vector<double> VarianceTable::rows(Index more) const {
 
 void VarianceTable::square_norms(Index count, const double* k, double* out) const {
   if (is_single_) {
-    numerics().square_norms_single(size_, reinterpret_cast<const float*>(packed_root_.data()), count, k, out);
+    numerics().square_norms_single(size_, reinterpret_cast<const float*>(packed_root_.data()),
+                                   count, k, out);
   } else {
     numerics().square_norms(size_, packed_root_.data(), count, k, out);
   }
 }
 
-void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets,
-                           double* posterior, double* prior) const {
+void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& parameters,
+                           const FeatureBlock& targets, double* posterior, double* prior) const {
   const Index block = targets.rows == 1 ? 1 : kTargetBlock;
   const Index ld = padded_rows(size_);
   AlignedMatrix cross(ld, block);
@@ -67,7 +69,8 @@ void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& paramete
   kernel.diagonal(parameters, targets, prior);
   for (Index first = 0; first < targets.rows; first += block) {
     const Index count = std::min(block, targets.rows - first);
-    kernel.tile(parameters, rows_of(*features_, 0, size_), {targets.data + first, count, targets.ld}, cross.data(), ld);
+    kernel.tile(parameters, rows_of(*features_, 0, size_),
+                {targets.data + first, count, targets.ld}, cross.data(), ld);
     interleaved = cross.map().topRows(size_);
     double explained[kTargetBlock];
     square_norms(block, interleaved.data(), explained);

@@ -26,19 +26,20 @@ class VarianceTable {
   VarianceTable(PointFeatures features, Eigen::Index size, AlignedMatrix root);
   /// The same, G row after row, row i of i + 1 entries.
   VarianceTable(PointFeatures features, Eigen::Index size, const std::vector<double>& rows);
-  /// The same with G rounded to single precision: half the memory, and half the time. Each variance is larger by
-  /// `rounding` (in units of σ_f²), so that it is not below the exact one.
+  /// The same with G rounded to single precision: half the memory, and half the time. Each variance
+  /// is larger by `rounding` (in units of σ_f²), so that it is not below the exact one.
   [[nodiscard]] VarianceTable in_single_precision(double rounding) const;
 
-  /// For each row of `targets` (features) the variance left and the prior k(x, x), both in units of σ_f² and
-  /// targets.rows long.
-  void shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets, double* posterior,
-              double* prior) const;
+  /// For each row of `targets` (features) the variance left and the prior k(x, x), both in units of
+  /// σ_f² and targets.rows long.
+  void shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets,
+              double* posterior, double* prior) const;
 
   [[nodiscard]] Eigen::Index size() const { return size_; }
   /// G row after row, with room for `more` rows; not of a table in single precision.
   [[nodiscard]] std::vector<double> rows(Eigen::Index more) const;
-  /// Multiplies every posterior variance by `factor` and adds `more` (in units of σ_f²), up to the prior.
+  /// Multiplies every posterior variance by `factor` and adds `more` (in units of σ_f²), up to the
+  /// prior.
   void widen(double factor, double more = 0.0) {
     factor_ *= factor;
     added_ = factor * added_ + more;

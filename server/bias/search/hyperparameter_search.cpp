@@ -15,31 +15,42 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Points of each stage. Cheap stages do most of the work, so that few evaluations on all points are enough.
-constexpr double kStartShare = 0.125;     // of all points, for the first searches; kStartPoints at least
-constexpr Index kCarryPoints = 300;       // to which the first optima are carried: they judge them by leave-one-out
-constexpr double kCarryShare = 0.45;      // of all points, for the stage before the last
-constexpr Index kCurvaturePoints = 1000;  // at most, to difference the curvature on: more points show the same
-constexpr Index kMostSearched = 2500;     // more points would take longer than the last nats are worth
-constexpr Index kFinerPoints = 400;       // at least, to look for finer length scales: fewer cannot show them
-constexpr Index kAroundPoints = 2000;     // at most, to look around on: each try costs as much as a start
+// Points of each stage. Cheap stages do most of the work, so that few evaluations on all points are
+// enough.
+constexpr double kStartShare =
+    0.125;  // of all points, for the first searches; kStartPoints at least
+constexpr Index kCarryPoints =
+    300;  // to which the first optima are carried: they judge them by leave-one-out
+constexpr double kCarryShare = 0.45;  // of all points, for the stage before the last
+constexpr Index kCurvaturePoints =
+    1000;  // at most, to difference the curvature on: more points show the same
+constexpr Index kMostSearched = 2500;  // more points would take longer than the last nats are worth
+constexpr Index kFinerPoints =
+    400;  // at least, to look for finer length scales: fewer cannot show them
+constexpr Index kAroundPoints =
+    2000;  // at most, to look around on: each try costs as much as a start
 // How many optima are kept.
 constexpr std::size_t kCarried = 5;  // from the first searches: each is carried at full cost
 constexpr std::size_t kRivals = 3;   // of one output before the last stage
 // In natural logarithms.
-constexpr double kLeastLogRatio = -14.0;   // of η: with less noise a start is badly conditioned
-constexpr double kUnexplainedNoise = 1.4;  // four times the instrument's noise: something is left to explain
-constexpr double kLessNoise = 1.4;      // of the variance: half the noise, as finer length scales may explain the rest
+constexpr double kLeastLogRatio = -14.0;  // of η: with less noise a start is badly conditioned
+constexpr double kUnexplainedNoise =
+    1.4;  // four times the instrument's noise: something is left to explain
+constexpr double kLessNoise =
+    1.4;  // of the variance: half the noise, as finer length scales may explain the rest
 constexpr double kFineLogRatio = -4.0;  // of η: noise a seventh of the signal
 constexpr double kBeyondBox = 1.0;      // length scales finer or longer than those of any start
-constexpr double kWeak = 0.5;           // below the box: longer length scales have no strong influence
-constexpr double kWideSpread = 10.0;    // of the prior on kernel parameters, which on all points must not matter
+constexpr double kWeak = 0.5;  // below the box: longer length scales have no strong influence
+constexpr double kWideSpread =
+    10.0;  // of the prior on kernel parameters, which on all points must not matter
 // Others.
-constexpr double kGain = 0.5;              // nat: an optimum worth moving to
-constexpr double kWorseLeaveOneOut = 1.1;  // over the least error: a likelier optimum that predicts worse won by luck
-constexpr double kRefined = 0.4;           // of the progress of one output: before looking around
+constexpr double kGain = 0.5;  // nat: an optimum worth moving to
+constexpr double kWorseLeaveOneOut =
+    1.1;  // over the least error: a likelier optimum that predicts worse won by luck
+constexpr double kRefined = 0.4;  // of the progress of one output: before looking around
 
-GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output, Index outputs) {
+GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output,
+              Index outputs) {
   GpData part{MatrixXd(count, data.q.cols()), MatrixXd(count, outputs), VectorXd(count)};
   for (Index i = 0; i < count; ++i) {
     const Index row = order[static_cast<std::size_t>(i)];
@@ -79,8 +90,8 @@ class Search {
   }
 
  private:
-  // On few points the fine influence of a joint looks like noise, and no start finds it. Where more noise is left than
-  // the instrument has, one search on more points tries shorter length scales.
+  // On few points the fine influence of a joint looks like noise, and no start finds it. Where more
+  // noise is left than the instrument has, one search on more points tries shorter length scales.
   void look_finer(ProfiledLikelihood* likelihood, std::vector<Optimum>* rivals) {
     const Optimum& best = rivals->front();
     const double unexplained = unexplained_noise(best);
@@ -92,26 +103,34 @@ class Search {
     const Index count = box_.low.size();
     start.head(count) = start.head(count).cwiseMin((box_.low.array() + std::log(2.0)).matrix());
     start[count] = std::max(start[count] - unexplained, kLeastLogRatio);
-    Optimum finer = counted(searched(likelihood, start, {.max_evaluations = 40, .tolerance = 0.02}), *likelihood);
+    Optimum finer = counted(searched(likelihood, start, {.max_evaluations = 40, .tolerance = 0.02}),
+                            *likelihood);
     if (finer.defined) rivals->push_back(std::move(finer));
   }
 
   // In logs, above the instrument's.
-  double unexplained_noise(const Optimum& optimum) const { return log_noise(optimum) - std::log(prior_.noise_stddev); }
+  double unexplained_noise(const Optimum& optimum) const {
+    return log_noise(optimum) - std::log(prior_.noise_stddev);
+  }
 
-  // A function that is finer than the spacing of few points shows on many points only, and joints of weak influence
-  // hide each other. Where much noise is left, this tries all joints fine at once. Then, until nothing gains, it tries
-  // all weak joints without influence at once, and each joint without influence with a fine one.
+  // A function that is finer than the spacing of few points shows on many points only, and joints
+  // of weak influence hide each other. Where much noise is left, this tries all joints fine at
+  // once. Then, until nothing gains, it tries all weak joints without influence at once, and each
+  // joint without influence with a fine one.
   Optimum looked_around(Index d, const Optimum& from, double share_before, double share_after) {
     ProfiledLikelihood many = likelihood(std::min(all(), kAroundPoints), d, 1);
     Optimum best = counted(searched(&many, from.x, {.max_evaluations = 1}), many);
     double left =
-        share_after - share_before;  // how many tries there will be is unknown: each takes a tenth of the rest
-    const auto worthwhile = [&] { return !result_.given_up && unexplained_noise(best) >= kUnexplainedNoise; };
+        share_after -
+        share_before;  // how many tries there will be is unknown: each takes a tenth of the rest
+    const auto worthwhile = [&] {
+      return !result_.given_up && unexplained_noise(best) >= kUnexplainedNoise;
+    };
     const auto gains = [&](const VectorXd& kernel, double log_ratio) {
       VectorXd start(kernel.size() + 1);
       start << kernel, std::max(log_ratio, kLeastLogRatio);
-      Optimum end = counted(searched(&many, start, {.max_evaluations = 25, .tolerance = 1.0}), many);
+      Optimum end =
+          counted(searched(&many, start, {.max_evaluations = 25, .tolerance = 1.0}), many);
       report(share_after - (left *= 0.9));
       const bool better = end.defined && end.value < best.value - kGain;
       if (better) best = std::move(end);
@@ -147,7 +166,8 @@ class Search {
     if (!now.defined) return now;
     use_curvature(&middle, 1.0 / std::pow(prior_.parameter_spread, 2), &now);
     const double grown = static_cast<double>(middle.size()) / static_cast<double>(whole.size());
-    return counted(improved(&whole, start, grown * now.inverse_hessian, {.max_evaluations = 12, .tolerance = 0.02}),
+    return counted(improved(&whole, start, grown * now.inverse_hessian,
+                            {.max_evaluations = 12, .tolerance = 0.02}),
                    whole);
   }
 
@@ -178,8 +198,8 @@ class Search {
   std::vector<Optimum> from_many_starts() {
     ProfiledLikelihood small = likelihood(start_points(), 0, data_.y.cols());
     const Index count = box_.low.size();
-    const double least_log_ratio =
-        std::max(std::log(std::pow(prior_.noise_stddev, 2) / data_.y.cwiseAbs2().mean()), kLeastLogRatio);
+    const double least_log_ratio = std::max(
+        std::log(std::pow(prior_.noise_stddev, 2) / data_.y.cwiseAbs2().mean()), kLeastLogRatio);
     std::vector<Optimum> found;
     double best = HUGE_VAL;
     for (int s = 0; s < std::max(1, options_.starts) && !result_.given_up; ++s) {
@@ -191,7 +211,8 @@ class Search {
       report(0.3 * (s + 1) / options_.starts);
     }
     for (const Optimum& end : found) best = std::min(best, end.value);
-    for (const Optimum& end : found) result_.starts_at_best += end.value < best + kSameOptimum ? 1 : 0;
+    for (const Optimum& end : found)
+      result_.starts_at_best += end.value < best + kSameOptimum ? 1 : 0;
     return different(std::move(found), kCarried);
   }
 
@@ -201,12 +222,13 @@ class Search {
     std::vector<double> leave_one_out;
     for (Optimum& candidate : candidates) {
       const double grown = static_cast<double>(start_points()) / static_cast<double>(medium.size());
-      Optimum better = counted(
-          improved(&medium, candidate.x, grown * candidate.inverse_hessian, {.max_evaluations = 20, .tolerance = 0.02}),
-          medium);
+      Optimum better = counted(improved(&medium, candidate.x, grown * candidate.inverse_hessian,
+                                        {.max_evaluations = 20, .tolerance = 0.02}),
+                               medium);
       if (better.defined) candidate = std::move(better);
       ObjectiveValue unused;
-      leave_one_out.push_back(medium.evaluate(candidate.x, &unused) ? medium.leave_one_out_rms() : HUGE_VAL);
+      leave_one_out.push_back(medium.evaluate(candidate.x, &unused) ? medium.leave_one_out_rms()
+                                                                    : HUGE_VAL);
     }
     const double least = *std::min_element(leave_one_out.begin(), leave_one_out.end());
     std::vector<Optimum> honest;
@@ -243,21 +265,26 @@ class Search {
   std::vector<Stage> stages() const {
     const Index share = static_cast<Index>(kCarryShare * static_cast<double>(all()));
     const Index middle = std::clamp(share, kCarryPoints, kCurvaturePoints);
-    std::vector<Stage> stages = {{std::min(all(), kCarryPoints),
-                                  {.max_evaluations = 40, .tolerance = all() > kCarryPoints ? 0.02 : 0.002},
-                                  kCarried,
-                                  false}};
+    std::vector<Stage> stages = {
+        {std::min(all(), kCarryPoints),
+         {.max_evaluations = 40, .tolerance = all() > kCarryPoints ? 0.02 : 0.002},
+         kCarried,
+         false}};
     if (all() > kCarryPoints) {
       const std::size_t rivals = all() < kMostSearched ? kRivals : 1;
-      stages.push_back({std::min(all(), middle), {.max_evaluations = 15, .tolerance = 0.02}, rivals, true});
+      stages.push_back(
+          {std::min(all(), middle), {.max_evaluations = 15, .tolerance = 0.02}, rivals, true});
     }
     if (all() > middle)
-      stages.push_back({all(), {.max_evaluations = all() < kMostSearched ? 12 : 4, .tolerance = 0.02}, 1, false});
+      stages.push_back({all(),
+                        {.max_evaluations = all() < kMostSearched ? 12 : 4, .tolerance = 0.02},
+                        1,
+                        false});
     return stages;
   }
 
-  // Output d alone, from the shared optima, over growing subsets. All optima that may still win are carried on, since
-  // the last nats decide between them.
+  // Output d alone, from the shared optima, over growing subsets. All optima that may still win are
+  // carried on, since the last nats decide between them.
   void refine(Index d, const std::vector<Optimum>& shared) {
     const auto outputs = static_cast<double>(data_.y.cols());
     std::vector<Optimum> rivals = shared;
@@ -273,22 +300,26 @@ class Search {
       const double grown = static_cast<double>(previous) / static_cast<double>(stage.points);
       previous = stage.points;
       for (Optimum& rival : rivals) {
-        Optimum found = counted(improved(&part, rival.x, grown * rival.inverse_hessian, stage.options), part);
+        Optimum found =
+            counted(improved(&part, rival.x, grown * rival.inverse_hessian, stage.options), part);
         if (found.defined) rival = std::move(found);
       }
       if (stage.points <= kCurvaturePoints) look_finer(&part, &rivals);
       rivals = different(std::move(rivals), stage.rivals);
       if (stage.curvature) {
-        for (Optimum& rival : rivals) use_curvature(&part, 1.0 / std::pow(prior_.parameter_spread, 2), &rival);
+        for (Optimum& rival : rivals)
+          use_curvature(&part, 1.0 / std::pow(prior_.parameter_spread, 2), &rival);
       }
       report(0.4 + 0.6 *
-                       (static_cast<double>(d) +
-                        kRefined * static_cast<double>(s + 1) / static_cast<double>(all_stages.size())) /
+                       (static_cast<double>(d) + kRefined * static_cast<double>(s + 1) /
+                                                     static_cast<double>(all_stages.size())) /
                        outputs);
     }
     Optimum best = rivals.front();
     if (all() > kCurvaturePoints && !result_.given_up) {
-      const auto share = [&](double of_output) { return 0.4 + 0.6 * (static_cast<double>(d) + of_output) / outputs; };
+      const auto share = [&](double of_output) {
+        return 0.4 + 0.6 * (static_cast<double>(d) + of_output) / outputs;
+      };
       best = looked_around(d, best, share(kRefined), share(1));
     }
     report(0.4 + 0.6 * static_cast<double>(d + 1) / outputs);
@@ -307,8 +338,9 @@ class Search {
 
 }  // namespace
 
-std::optional<SearchResult> search_hyperparameters(const std::shared_ptr<const Kernel>& kernel, const GpData& data,
-                                                   double metrology_stddev, const SearchOptions& options) {
+std::optional<SearchResult> search_hyperparameters(const std::shared_ptr<const Kernel>& kernel,
+                                                   const GpData& data, double metrology_stddev,
+                                                   const SearchOptions& options) {
   return Search(kernel, data, metrology_stddev, options).run();
 }
 

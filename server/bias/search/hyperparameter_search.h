@@ -10,8 +10,10 @@ namespace trammel {
 struct SearchOptions {
   int starts = 20;
   std::uint64_t seed = 1;
-  std::function<bool(double)> progress;  ///< told the share done, in [0, 1]; returns false to give up
-  std::vector<GpHyperparameters> last;   ///< where given, one for each output: refined, and there are no other starts
+  std::function<bool(double)>
+      progress;  ///< told the share done, in [0, 1]; returns false to give up
+  std::vector<GpHyperparameters>
+      last;  ///< where given, one for each output: refined, and there are no other starts
 };
 
 struct SearchResult {
@@ -24,12 +26,15 @@ struct SearchResult {
 /// The most probable hyperparameters.
 /// - Many starts on a small subset, with the same length scales for all outputs.
 /// - The different optima are carried to more points and checked there by leave-one-out.
-/// - They are refined for each output on growing subsets, at last on all points up to 2500. The most likely one wins.
-/// - Where much more noise is left than the instrument has, shorter length scales are tried on more points. With more
+/// - They are refined for each output on growing subsets, at last on all points up to 2500. The
+/// most likely one wins.
+/// - Where much more noise is left than the instrument has, shorter length scales are tried on more
+/// points. With more
 ///   than 1000 points, shorter and longer ones are tried on up to 2000 of them.
-/// The same seed gives the same answer, bit for bit. Empty when no start gave a positive definite covariance.
-[[nodiscard]] std::optional<SearchResult> search_hyperparameters(const std::shared_ptr<const Kernel>& kernel,
-                                                                 const GpData& data, double metrology_stddev,
-                                                                 const SearchOptions& options);
+/// The same seed gives the same answer, bit for bit. Empty when no start gave a positive definite
+/// covariance.
+[[nodiscard]] std::optional<SearchResult> search_hyperparameters(
+    const std::shared_ptr<const Kernel>& kernel, const GpData& data, double metrology_stddev,
+    const SearchOptions& options);
 
 }  // namespace trammel

@@ -18,8 +18,9 @@ struct Optimum : BfgsResult {
 [[nodiscard]] Optimum searched(ProfiledLikelihood* likelihood, const Eigen::VectorXd& start,
                                const BfgsOptions& options);
 
-/// Sets the inverse Hessian of `now` from differences of the gradient, no curvature below `least`. BFGS knows it along
-/// its steps only, and it hardly steps along the length scale of a joint without influence.
+/// Sets the inverse Hessian of `now` from differences of the gradient, no curvature below `least`.
+/// BFGS knows it along its steps only, and it hardly steps along the length scale of a joint
+/// without influence.
 void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now);
 
 /// log σ_n (m), mean over the outputs.
@@ -27,8 +28,8 @@ void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now);
 /// Whether one takes clearly more of the data for noise than the other.
 [[nodiscard]] bool other_kind(const Optimum& a, const Optimum& b);
 
-/// The different ones, best first, `most` at most, without those that cannot win any more. One more where the best of
-/// the other kind (other_kind()) would be missing.
+/// The different ones, best first, `most` at most, without those that cannot win any more. One more
+/// where the best of the other kind (other_kind()) would be missing.
 [[nodiscard]] std::vector<Optimum> different(std::vector<Optimum> optima, std::size_t most);
 
 }  // namespace trammel

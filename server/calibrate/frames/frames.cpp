@@ -16,16 +16,19 @@ namespace trammel {
 namespace {
 
 constexpr double kClearlyBetter = 0.5;  // of the misfit
-constexpr double kTurnUntold = 0.2;     // of the spread of the nominal points: a turn that follows what does not fit
+constexpr double kTurnUntold =
+    0.2;  // of the spread of the nominal points: a turn that follows what does not fit
 
 }  // namespace
 
 bool has_unknown_tool(const Cell& cell) {
-  return std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
+  return std::any_of(cell.tools.begin(), cell.tools.end(),
+                     [](const auto& tool) { return !tool.second; });
 }
 
 std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell) {
-  if (has_unknown_tool(cell) && corrects(sources, causes::Part::kLinks) && !corrects(sources, causes::Part::kTool))
+  if (has_unknown_tool(cell) && corrects(sources, causes::Part::kLinks) &&
+      !corrects(sources, causes::Part::kTool))
     sources.emplace_back(cause_correcting(causes::Part::kTool).spelling);
   return sources;
 }
@@ -39,10 +42,13 @@ struct ToolPoses {
   std::vector<Pose> oriented_X_WT, oriented_X_BF;  ///< of the poses that have an orientation
 
   [[nodiscard]] Eigen::Matrix3Xd p_W() const {
-    return Eigen::Map<const Eigen::Matrix3Xd>(points_W.front().data(), 3, static_cast<Eigen::Index>(points_W.size()));
+    return Eigen::Map<const Eigen::Matrix3Xd>(points_W.front().data(), 3,
+                                              static_cast<Eigen::Index>(points_W.size()));
   }
   /// Whether orientations are used: three at least, and of half the poses.
-  [[nodiscard]] bool full() const { return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points_W.size(); }
+  [[nodiscard]] bool full() const {
+    return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points_W.size();
+  }
 };
 
 ToolPoses poses_of(const std::string& tool, const MeasurementBatch& batch, const Chain& robot) {
@@ -67,7 +73,8 @@ std::vector<Pose> in_world(const Pose& X_WB, const std::vector<Pose>& X_BF) {
 /// The base from a tool that is known.
 Status locate_base(const ToolPoses& poses, const Pose& X_FT, PhysicalModel& model) {
   Eigen::Matrix3Xd p_B(3, static_cast<Eigen::Index>(poses.X_BF.size()));
-  for (std::size_t i = 0; i < poses.X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = poses.X_BF[i] * X_FT.translation();
+  for (std::size_t i = 0; i < poses.X_BF.size(); ++i)
+    p_B.col(static_cast<int>(i)) = poses.X_BF[i] * X_FT.translation();
   const Pose X_WB = TRY(fit_transform(poses.p_W(), p_B));
   model.X_WB = X_WB;
   return {};
@@ -76,7 +83,8 @@ Status locate_base(const ToolPoses& poses, const Pose& X_FT, PhysicalModel& mode
 /// The tool from a base that is known.
 Status locate_tool_at(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
   if (poses.full()) {
-    const Pose found = TRY(locate_tool(poses.oriented_X_WT, in_world(model.X_WB, poses.oriented_X_BF)));
+    const Pose found =
+        TRY(locate_tool(poses.oriented_X_WT, in_world(model.X_WB, poses.oriented_X_BF)));
     X_FT = found;
     return {};
   }
@@ -87,12 +95,14 @@ Status locate_tool_at(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& m
 
 /// Both at once. Where the orientations turn about too few axes, the positions still tell the base.
 Result<BaseAndTool> locate_both(const ToolPoses& poses) {
-  Result<BaseAndTool> found = poses.full() ? locate_base_and_tool(poses.oriented_X_WT, poses.oriented_X_BF)
-                                           : locate_base_and_tool_point(poses.p_W(), poses.X_BF);
+  Result<BaseAndTool> found = poses.full()
+                                  ? locate_base_and_tool(poses.oriented_X_WT, poses.oriented_X_BF)
+                                  : locate_base_and_tool_point(poses.p_W(), poses.X_BF);
   if (found || !poses.full()) return found;
   found = locate_base_and_tool_point(poses.p_W(), poses.X_BF);
   if (found)
-    found->X_FT.linear() = locate_tool(poses.oriented_X_WT, in_world(found->X_WB, poses.oriented_X_BF))->linear();
+    found->X_FT.linear() =
+        locate_tool(poses.oriented_X_WT, in_world(found->X_WB, poses.oriented_X_BF))->linear();
   return found;
 }
 
@@ -105,12 +115,14 @@ double misfit(const ToolPoses& poses, const Pose& X_FT) {
   const Result<Pose> X_WB = fit_transform(p_W, p_B);
   if (!X_WB) return 0;
   double square = 0;
-  for (Eigen::Index i = 0; i < p_W.cols(); ++i) square += (p_W.col(i) - *X_WB * p_B.col(i)).squaredNorm();
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i)
+    square += (p_W.col(i) - *X_WB * p_B.col(i)).squaredNorm();
   return std::sqrt(square / static_cast<double>(p_W.cols()));
 }
 
-/// The tool from a base that the cell knows, and that is to be identified: the instrument may stand elsewhere by more
-/// than a tool that is found there can make up for. Then both are found at once, of which the tool is taken.
+/// The tool from a base that the cell knows, and that is to be identified: the instrument may stand
+/// elsewhere by more than a tool that is found there can make up for. Then both are found at once,
+/// of which the tool is taken.
 Status locate_tool_near(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
   const Status located = locate_tool_at(poses, X_FT, model);
   const Result<BaseAndTool> both = locate_both(poses);
@@ -122,8 +134,9 @@ Status locate_tool_near(const ToolPoses& poses, Pose& X_FT, const PhysicalModel&
 }
 
 bool has_base(const PhysicalModel& model) {
-  return std::any_of(model.sources.begin(), model.sources.end(),
-                     [](const ErrorSourcePtr& source) { return source->cause().part == causes::Part::kBase; });
+  return std::any_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
+    return source->cause().part == causes::Part::kBase;
+  });
 }
 
 }  // namespace
@@ -157,19 +170,25 @@ Vector6 motion_values(const Pose& X) {
 
 namespace {
 
-Eigen::Matrix3Xd beside_centroid(const Eigen::Matrix3Xd& points) { return points.colwise() - points.rowwise().mean(); }
+Eigen::Matrix3Xd beside_centroid(const Eigen::Matrix3Xd& points) {
+  return points.colwise() - points.rowwise().mean();
+}
 
 Eigen::Matrix3Xd measured_points(const MeasurementBatch& batch) {
   const MeasurementBatch placed = positions_of(batch);
   Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(placed.measurements.size()));
-  for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = placed.measurements[static_cast<std::size_t>(i)].p_W;
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i)
+    p_W.col(i) = placed.measurements[static_cast<std::size_t>(i)].p_W;
   return p_W;
 }
 
-/// The motion that takes `nominal` onto `measured`; a shift where what does not fit is as large as the points' spread.
+/// The motion that takes `nominal` onto `measured`; a shift where what does not fit is as large as
+/// the points' spread.
 Result<Pose> motion_between(const Eigen::Matrix3Xd& measured, const Eigen::Matrix3Xd& nominal) {
   Result<Pose> motion = fit_transform(measured, nominal);
-  if (!motion || (measured - *motion * nominal).norm() < kTurnUntold * beside_centroid(nominal).norm()) return motion;
+  if (!motion ||
+      (measured - *motion * nominal).norm() < kTurnUntold * beside_centroid(nominal).norm())
+    return motion;
   return make_pose(Matrix3::Identity(), measured.rowwise().mean() - nominal.rowwise().mean());
 }
 
@@ -179,7 +198,8 @@ std::vector<Pose> likely_bases(const PhysicalModel& model, const MeasurementBatc
   const Eigen::Matrix3Xd p_W = measured_points(batch);
   if (model.cell->X_WB || !are_at_one_place(p_W)) return {model.X_WB};
   std::vector<Pose> bases;
-  for (const Matrix3& turn : cube_turns()) bases.push_back(turned_about(p_W.rowwise().mean(), turn, model.X_WB));
+  for (const Matrix3& turn : cube_turns())
+    bases.push_back(turned_about(p_W.rowwise().mean(), turn, model.X_WB));
   return bases;
 }
 
@@ -187,9 +207,9 @@ std::string untold_turn(const Cell& cell, const MeasurementBatch& batch) {
   const Eigen::Matrix3Xd p_W = measured_points(batch);
   if (cell.X_WB || !are_at_one_place(p_W)) return "";
   return fmt::format(
-      "the positions lie within {:.2f} mm rms of one place, and hardly tell how the base is turned: an error of the "
-      "arm "
-      "of 0.1 mm turns it by {:.2g} deg; give the base in the cell file, or measure at other places, too",
+      "the positions lie within {:.2f} mm rms of one place, and hardly tell how the base is "
+      "turned: an error of the arm of 0.1 mm turns it by {:.2g} deg; give the base in the cell "
+      "file, or measure at other places, too",
       to_mm(spread_of(p_W)), to_deg(1e-4 / std::max(spread_of(p_W), 1e-4)));
 }
 

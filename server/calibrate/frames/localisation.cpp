@@ -9,20 +9,22 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLeastTurning = 1e-4;    // rad²: the nominal chain is itself some 10 mrad off
-constexpr int kMostAlternations = 10000;  // nearly flat valleys take thousands; each costs microseconds
-constexpr double kLastStep = 1e-9;        // m
-constexpr double kOnePoint = 1e-7;        // m: positions that are told to be the same, not measured to be
+constexpr double kLeastTurning = 1e-4;  // rad²: the nominal chain is itself some 10 mrad off
+constexpr int kMostAlternations =
+    10000;                          // nearly flat valleys take thousands; each costs microseconds
+constexpr double kLastStep = 1e-9;  // m
+constexpr double kOnePoint = 1e-7;  // m: positions that are told to be the same, not measured to be
 
 /// The point t with R_i t ~ difference_i for all poses: the mean of R_iᵀ difference_i.
 Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
   Vector3 sum = Vector3::Zero();
-  for (std::size_t i = 0; i < X_WF.size(); ++i) sum += X_WF[i].inverse() * Vector3(p_W.col(static_cast<int>(i)));
+  for (std::size_t i = 0; i < X_WF.size(); ++i)
+    sum += X_WF[i].inverse() * Vector3(p_W.col(static_cast<int>(i)));
   return sum / static_cast<double>(X_WF.size());
 }
 
-/// The rotations of base and tool; translations zero. R_WT R_FTᵀ = R_WB R_BF, so vec(R_WB) and vec(R_FTᵀ) are the
-/// singular pair of K = Σ kron(R_BF, R_WT) with the largest singular value.
+/// The rotations of base and tool; translations zero. R_WT R_FTᵀ = R_WB R_BF, so vec(R_WB) and
+/// vec(R_FTᵀ) are the singular pair of K = Σ kron(R_BF, R_WT) with the largest singular value.
 Result<BaseAndTool> locate_rotations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
   Eigen::Matrix<double, 9, 9> K = Eigen::Matrix<double, 9, 9>::Zero();
   for (std::size_t i = 0; i < X_WT.size(); ++i) {
@@ -32,11 +34,13 @@ Result<BaseAndTool> locate_rotations(const std::vector<Pose>& X_WT, const std::v
       for (int c = 0; c < 3; ++c) K.block<3, 3>(3 * r, 3 * c) += F(r, c) * T;
     }
   }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 9, 9>> svd(K, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Eigen::Matrix<double, 9, 9>> svd(
+      K, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double count = static_cast<double>(X_WT.size());
   if (!(svd.singularValues()(0) - svd.singularValues()(1) > kLeastTurning * count)) {
-    return refused("base and tool: the poses turn too little about different axes to find both ({} poses)",
-                   X_WT.size());
+    return refused(
+        "base and tool: the poses turn too little about different axes to find both ({} poses)",
+        X_WT.size());
   }
   // K vec(A) = N vec(B) with B F = T A, i.e. A = R_FTᵀ, B = R_WB; both up to one common sign.
   Matrix3 B = Eigen::Map<const Matrix3>(svd.matrixU().col(0).data());
@@ -52,18 +56,22 @@ Result<BaseAndTool> locate_rotations(const std::vector<Pose>& X_WT, const std::v
 }
 
 /// Both translations, the rotations known. p_WT = p_WB + R_WB (p_BF + R_BF p_FT) is linear in them.
-Status add_translations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF, BaseAndTool& found) {
+Status add_translations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF,
+                        BaseAndTool& found) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 right = Vector6::Zero();
   for (std::size_t i = 0; i < X_WT.size(); ++i) {
     Eigen::Matrix<double, 3, 6> row;
     row << Matrix3::Identity(), found.X_WB.linear() * X_BF[i].linear();
     normal += row.transpose() * row;
-    right += row.transpose() * (X_WT[i].translation() - found.X_WB.linear() * X_BF[i].translation());
+    right +=
+        row.transpose() * (X_WT[i].translation() - found.X_WB.linear() * X_BF[i].translation());
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(normal);
   if (!(eigen.eigenvalues()(0) > kLeastTurning * eigen.eigenvalues()(5))) {
-    return refused("base and tool: the poses turn too little to tell the tool from the base ({} poses)", X_WT.size());
+    return refused(
+        "base and tool: the poses turn too little to tell the tool from the base ({} poses)",
+        X_WT.size());
   }
   const Vector6 solution = normal.ldlt().solve(right);
   found.X_WB.translation() = solution.head<3>();
@@ -73,10 +81,12 @@ Status add_translations(const std::vector<Pose>& X_WT, const std::vector<Pose>& 
 
 }  // namespace
 
-Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
+Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT,
+                                         const std::vector<Pose>& X_BF) {
   TRAMMEL_CHECK(X_WT.size() == X_BF.size());
   if (X_WT.size() < 3)
-    return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size()).beyond(X_WT.size(), 3);
+    return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size())
+        .beyond(X_WT.size(), 3);
   Result<BaseAndTool> found = locate_rotations(X_WT, X_BF);
   if (!found) return found;
   TRY(add_translations(X_WT, X_BF, *found));
@@ -91,10 +101,11 @@ Matrix3 mean_rotation(const std::vector<Pose>& X_BF) {
   return mean_R / static_cast<double>(X_BF.size());
 }
 
-/// The tool point and the base's translation, given the base's rotation in `found`. Where the flange turns about one
-/// axis only, a shift along it is left open: it stays at its smallest. Returns the step of the tool point, m.
-double solve_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF, const Matrix3& mean_R,
-                   BaseAndTool& found) {
+/// The tool point and the base's translation, given the base's rotation in `found`. Where the
+/// flange turns about one axis only, a shift along it is left open: it stays at its smallest.
+/// Returns the step of the tool point, m.
+double solve_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF,
+                   const Matrix3& mean_R, BaseAndTool& found) {
   const Matrix3 R_WB = found.X_WB.linear();
   Matrix3 normal = Matrix3::Zero();
   Vector3 right = Vector3::Zero();
@@ -117,26 +128,31 @@ double solve_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF, c
 
 }  // namespace
 
-Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF) {
+Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W,
+                                               const std::vector<Pose>& X_BF) {
   TRAMMEL_CHECK(p_W.cols() == static_cast<int>(X_BF.size()));
   if (X_BF.size() < 6)
-    return refused("base and tool: {} positions, at least 6 are needed", X_BF.size()).beyond(X_BF.size(), 6);
+    return refused("base and tool: {} positions, at least 6 are needed", X_BF.size())
+        .beyond(X_BF.size(), 6);
   const Matrix3 mean_R = mean_rotation(X_BF);
   const double turning = 1 - Eigen::JacobiSVD<Matrix3>(mean_R).singularValues()(1);
   if (!(turning > kLeastTurning))
     return refused("base and tool: the flange turns too little to tell the tool from the base");
   BaseAndTool found;
   if ((p_W.colwise() - p_W.rowwise().mean()).colwise().norm().maxCoeff() < kOnePoint) {
-    solve_point(p_W, X_BF, mean_R, found);  // any turn of the base about the point fits alike: none is taken
+    solve_point(p_W, X_BF, mean_R,
+                found);  // any turn of the base about the point fits alike: none is taken
     return found;
   }
   Eigen::Matrix3Xd p_B(3, p_W.cols());
   for (int round = 0; round < kMostAlternations; ++round) {
-    for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * found.X_FT.translation();
+    for (std::size_t i = 0; i < X_BF.size(); ++i)
+      p_B.col(static_cast<int>(i)) = X_BF[i] * found.X_FT.translation();
     const Pose X_WB = TRY(fit_transform(p_W, p_B));
     found.X_WB = X_WB;
     const double step = solve_point(p_W, X_BF, mean_R, found);
-    if (!std::isfinite(step)) return refused("base and tool: the positions do not determine the tool point");
+    if (!std::isfinite(step))
+      return refused("base and tool: the positions do not determine the tool point");
     if (step < kLastStep) break;
   }
   return found;

@@ -17,12 +17,16 @@ struct ToolPoses {
   Pose X_FT = Pose::Identity();  ///< where the tool is believed to be
 
   [[nodiscard]] Eigen::Matrix3Xd p_W() const {
-    return Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3, static_cast<Eigen::Index>(points.size()));
+    return Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3,
+                                              static_cast<Eigen::Index>(points.size()));
   }
-  [[nodiscard]] bool full() const { return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points.size(); }
+  [[nodiscard]] bool full() const {
+    return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points.size();
+  }
 };
 
-std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before, const MeasurementBatch& batch) {
+std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before,
+                                               const MeasurementBatch& batch) {
   std::map<std::string, ToolPoses> tools;
   for (const Measurement& m : batch.measurements) {
     const ArmState arm = before.state(m.context);
@@ -37,7 +41,8 @@ std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before, cons
   return tools;
 }
 
-/// The base from tools that are known: by positions or, where they do not span a plane, by orientations.
+/// The base from tools that are known: by positions or, where they do not span a plane, by
+/// orientations.
 Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
   std::vector<Vector3> measured, expected;
   Matrix3 turn = Matrix3::Zero();
@@ -47,11 +52,13 @@ Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
       expected.push_back(tool->X_BF[i] * tool->X_FT.translation());
     }
     for (std::size_t i = 0; i < tool->oriented_X_WT.size(); ++i) {
-      turn += tool->oriented_X_WT[i].linear() * (tool->oriented_X_BF[i] * tool->X_FT).linear().transpose();
+      turn += tool->oriented_X_WT[i].linear() *
+              (tool->oriented_X_BF[i] * tool->X_FT).linear().transpose();
     }
   }
   const auto n = static_cast<Eigen::Index>(measured.size());
-  const Eigen::Map<const Eigen::Matrix3Xd> p_W(measured.front().data(), 3, n), p_B(expected.front().data(), 3, n);
+  const Eigen::Map<const Eigen::Matrix3Xd> p_W(measured.front().data(), 3, n),
+      p_B(expected.front().data(), 3, n);
   Result<Pose> fitted = fit_transform(p_W, p_B);
   if (fitted || turn.isZero()) return fitted;
   const Matrix3 R_WB = nearest_rotation(turn);
@@ -60,8 +67,9 @@ Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
 
 /// Base and tool at once, from the poses of one unknown tool.
 Result<BaseAndTool> base_and_tool(const ToolPoses& tool) {
-  Result<BaseAndTool> found = tool.full() ? locate_base_and_tool(tool.oriented_X_WT, tool.oriented_X_BF)
-                                          : locate_base_and_tool_point(tool.p_W(), tool.X_BF);
+  Result<BaseAndTool> found = tool.full()
+                                  ? locate_base_and_tool(tool.oriented_X_WT, tool.oriented_X_BF)
+                                  : locate_base_and_tool_point(tool.p_W(), tool.X_BF);
   if (found || !tool.full()) return found;
   // Too few axes of rotation for the orientations alone; the positions still tell the base.
   found = locate_base_and_tool_point(tool.p_W(), tool.X_BF);
@@ -82,7 +90,8 @@ Result<Pose> tool_on(const Pose& X_WB, const ToolPoses& tool) {
   });
 }
 
-/// Puts the model's base at `X_WB`: by the nominal frame where the cell calls the base unknown, else by the source.
+/// Puts the model's base at `X_WB`: by the nominal frame where the cell calls the base unknown,
+/// else by the source.
 void place_base(PhysicalModel& model, const Pose& X_WB) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
@@ -94,14 +103,15 @@ void place_base(PhysicalModel& model, const Pose& X_WB) {
 }
 
 Error with_advice(Error error) {
-  error.message += "; base and tool are both to be found: name the base alone where the tool is as it was";
+  error.message +=
+      "; base and tool are both to be found: name the base alone where the tool is as it was";
   return error;
 }
 
 }  // namespace
 
-Status locate_refitted_frames(const PhysicalModel& before, const MeasurementBatch& batch, bool base, bool tool,
-                              PhysicalModel& model) {
+Status locate_refitted_frames(const PhysicalModel& before, const MeasurementBatch& batch, bool base,
+                              bool tool, PhysicalModel& model) {
   if (!base && !tool) return {};
   std::map<std::string, ToolPoses> tools = poses_by_tool(before, batch);
   const Cell& cell = *model.cell;

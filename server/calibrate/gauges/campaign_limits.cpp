@@ -51,7 +51,8 @@ bool is_of_base_or_instruments(const std::string& name, const PhysicalModel& mod
   for (const ErrorSourcePtr& source : model.sources) {
     if (source->cause().part != causes::Part::kBase && !is_of_instruments(*source)) continue;
     const auto& own = source->parameters();
-    if (std::any_of(own.begin(), own.end(), [&](const Parameter& one) { return one.name == name; })) return true;
+    if (std::any_of(own.begin(), own.end(), [&](const Parameter& one) { return one.name == name; }))
+      return true;
   }
   return false;
 }
@@ -59,18 +60,21 @@ bool is_of_base_or_instruments(const std::string& name, const PhysicalModel& mod
 std::string untold_sentence(int untold) {
   switch (untold) {
     case 6:
-      return "no anchor's place is known, so distances and touches do not tell where the base stands and how it is "
-             "turned: these six numbers stay as the cell file has them, and anchors are told in that frame; positions, "
-             "or three known anchors that are not on one line, would tell; where the base's own frame is all that "
-             "counts, train without base (--level geometry,compliance)";
+      return "no anchor's place is known, so distances and touches do not tell where the base "
+             "stands and how it is turned: these six numbers stay as the cell file has them, and "
+             "anchors are told in that frame; positions, or three known anchors that are not on "
+             "one line, would tell; where the base's own frame is all that counts, train without "
+             "base (--level geometry,compliance)";
     case 3:
-      return "one known anchor does not tell how the base is turned about it; two more known anchors would";
+      return "one known anchor does not tell how the base is turned about it; two more known "
+             "anchors would";
     case 1:
-      return "the known anchors do not tell how the base is turned about the line through them; a third one beside it "
-             "would";
+      return "the known anchors do not tell how the base is turned about the line through them; a "
+             "third one beside it would";
     default:
-      return fmt::format("the known anchors leave {} of the 6 numbers of the base open; more of them would tell",
-                         untold);
+      return fmt::format(
+          "the known anchors leave {} of the 6 numbers of the base open; more of them would tell",
+          untold);
   }
 }
 
@@ -81,17 +85,20 @@ void add_untold_base(const MeasurementBatch& batch, CalibrationResult& found) {
   UnidentifiableCombination base{0, {}, untold_sentence(untold)};
   for (const ErrorSourcePtr& source : found.model.sources) {
     if (source->cause().part != causes::Part::kBase) continue;
-    for (const Parameter& parameter : source->parameters()) base.parameters.push_back(parameter.name);
+    for (const Parameter& parameter : source->parameters())
+      base.parameters.push_back(parameter.name);
   }
   if (base.parameters.empty()) return;  // it is where the cell file has it by definition
   std::erase_if(found.unidentifiable, [&](const UnidentifiableCombination& one) {
-    return std::all_of(one.parameters.begin(), one.parameters.end(),
-                       [&](const std::string& name) { return is_of_base_or_instruments(name, found.model); });
+    return std::all_of(one.parameters.begin(), one.parameters.end(), [&](const std::string& name) {
+      return is_of_base_or_instruments(name, found.model);
+    });
   });
   found.unidentifiable.insert(found.unidentifiable.begin(), std::move(base));
 }
 
-/// How well the lengths of all links together are known, as a share of themselves; nothing where the model has none.
+/// How well the lengths of all links together are known, as a share of themselves; nothing where
+/// the model has none.
 std::optional<double> stddev_of_size(const CalibrationResult& found) {
   const Chain& robot = found.model.cell->robot;
   std::map<std::string, double> lengths;
@@ -131,22 +138,26 @@ std::map<std::string, Stroke> strokes_of(const MeasurementBatch& batch) {
 /// m: as far as the links go, one after the other.
 double reach_of(const Chain& robot) {
   double reach = 0;
-  for (int j = 0; j < robot.size(); ++j) reach += std::hypot(robot.joint(j).link.a, robot.joint(j).link.d);
+  for (int j = 0; j < robot.size(); ++j)
+    reach += std::hypot(robot.joint(j).link.a, robot.joint(j).link.d);
   return reach;
 }
 
 std::string size_text(const CalibrationResult& found, const PlacedAnchor& anchor) {
   if (anchor.zero < 0)
-    return "so the robot's size (all lengths alike) is known as well as the instrument's length is, which is taken as "
-           "exact; zero_mm: null in the cell file says that it is not";
+    return "so the robot's size (all lengths alike) is known as well as the instrument's length "
+           "is, which is taken as exact; zero_mm: null in the cell file says that it is not";
   const std::string alike =
-      "so the instrument's zero and the robot's size (all lengths alike) change the distances nearly alike";
-  const std::string advice = "a calibrated length (zero_mm), or distances of other lengths, would tell";
+      "so the instrument's zero and the robot's size (all lengths alike) change the distances "
+      "nearly alike";
+  const std::string advice =
+      "a calibrated length (zero_mm), or distances of other lengths, would tell";
   const std::optional<double> stddev = stddev_of_size(found);
   if (!stddev) return fmt::format("{}; {}", alike, advice);
-  return fmt::format("{}: the size is known to {:.0f} ppm (U, k=2), {:.2g} mm over the links' {:.1f} m; {}", alike,
-                     2e6 * *stddev, to_mm(2 * *stddev * reach_of(found.model.cell->robot)),
-                     reach_of(found.model.cell->robot), advice);
+  return fmt::format(
+      "{}: the size is known to {:.0f} ppm (U, k=2), {:.2g} mm over the links' {:.1f} m; {}", alike,
+      2e6 * *stddev, to_mm(2 * *stddev * reach_of(found.model.cell->robot)),
+      reach_of(found.model.cell->robot), advice);
 }
 
 void add_short_strokes(const MeasurementBatch& batch, CalibrationResult& found) {
@@ -164,8 +175,8 @@ void add_short_strokes(const MeasurementBatch& batch, CalibrationResult& found) 
     UnidentifiableCombination size{0, {}, ""};
     if (anchor.zero >= 0) size.parameters.push_back(fmt::format("zero[{}]", id));
     size.sentence = fmt::format(
-        "anchor {}: all {} distances are between {:.2f} and {:.2f} mm, {}; poses farther from it than that were not "
-        "measured, and nothing shows what the robot does there",
+        "anchor {}: all {} distances are between {:.2f} and {:.2f} mm, {}; poses farther from it "
+        "than that were not measured, and nothing shows what the robot does there",
         id, stroke.count, to_mm(stroke.shortest), to_mm(stroke.longest), size_text(found, anchor));
     found.unidentifiable.push_back(std::move(size));
   }

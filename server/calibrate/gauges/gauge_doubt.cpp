@@ -21,13 +21,16 @@ namespace {
 using CellPtr = std::shared_ptr<const Cell>;
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
-constexpr double kFarRow = 0.1;      // m: no drawing is so far off at a single row
-constexpr double kAsked = 3;         // times the stated sigma, of touches: what is left where a reading is asked for
-constexpr double kMuchBetter = 0.2;  // of what is left as given, beside how the values spread: surely meant so
+constexpr double kFarRow = 0.1;  // m: no drawing is so far off at a single row
+constexpr double kAsked =
+    3;  // times the stated sigma, of touches: what is left where a reading is asked for
+constexpr double kMuchBetter =
+    0.2;  // of what is left as given, beside how the values spread: surely meant so
 
 /// The rows of one kind, their values times `factor`.
 MeasurementBatch read_as(MeasurementBatch batch, Gauge::Kind kind, double factor) {
-  std::erase_if(batch.measurements, [kind](const Measurement& m) { return !m.gauge || m.gauge->kind != kind; });
+  std::erase_if(batch.measurements,
+                [kind](const Measurement& m) { return !m.gauge || m.gauge->kind != kind; });
   for (Measurement& m : batch.measurements) m.gauge->value *= factor;
   return batch;
 }
@@ -40,9 +43,11 @@ double median_size(const Eigen::VectorXd& values) {
   return *middle;
 }
 
-/// m, by what each distance is off that of the arm as drawn, its base where they put it; empty where it leads to none.
+/// m, by what each distance is off that of the arm as drawn, its base where they put it; empty
+/// where it leads to none.
 std::optional<Eigen::VectorXd> off_drawing(const CellPtr& cell, const MeasurementBatch& distances) {
-  const auto found = calibrate(cell, {std::string(cause_correcting(causes::Part::kBase).spelling)}, distances, {});
+  const auto found =
+      calibrate(cell, {std::string(cause_correcting(causes::Part::kBase).spelling)}, distances, {});
   if (!found) return std::nullopt;
   return residuals_of(found->model, distances, found->model.values).gauge;
 }
@@ -61,9 +66,11 @@ std::optional<Error> doubt_of_rows(const MeasurementBatch& distances, const Eige
     }
     if (rows.empty()) continue;
     const bool one = rows.size() == 1;
-    return refused("{} of {} distances {} not follow the joints, by up to {:.0f} mm: {} {}; read in {} {} would fit",
-                   rows.size(), off.size(), one ? "does" : "do", to_mm(worst), one ? "row" : "rows",
-                   fmt::format("{}", fmt::join(rows, ", ")), unit.name, one ? "it" : "they")
+    return refused(
+               "{} of {} distances {} not follow the joints, by up to {:.0f} mm: {} {}; read in {} "
+               "{} would fit",
+               rows.size(), off.size(), one ? "does" : "do", to_mm(worst), one ? "row" : "rows",
+               fmt::format("{}", fmt::join(rows, ", ")), unit.name, one ? "it" : "they")
         .of("distance_mm")
         .at_row(rows.front())
         .beyond(to_mm(worst), to_mm(kFarRow))
@@ -83,8 +90,10 @@ std::optional<Error> doubt_of_distances(const CellPtr& cell, const MeasurementBa
   for (const UnitOfLength& unit : kUnitsOfLength) {
     const auto then = off_drawing(cell, read_as(batch, Gauge::Kind::kDistance, unit.factor));
     if (!then || median_size(*then) > std::min(kNoModelError, kMuchBetter * as_given)) continue;
-    return refused("the distances do not follow the joints; read in {} they would, to {:.1f} mm of the drawing",
-                   unit.name, to_mm(median_size(*then)))
+    return refused(
+               "the distances do not follow the joints; read in {} they would, to {:.1f} mm of the "
+               "drawing",
+               unit.name, to_mm(median_size(*then)))
         .of("distance_mm")
         .beyond(given ? to_mm(as_given) : kNowhere, to_mm(kNoModelError))
         .with_text(fmt::format("in {}", unit.name))
@@ -111,8 +120,10 @@ std::vector<TouchReading> touch_readings() {
 
 /// m, what the arm that the touches show leaves of one of them.
 double left_of_touches(const CellPtr& cell, const MeasurementBatch& touches) {
-  const auto found = calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), touches, {});
-  return found ? std::hypot(position_sigma(touches.measurements.front(), *cell), found->discrepancy) : kNowhere;
+  const auto found =
+      calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), touches, {});
+  return found ? std::hypot(position_sigma(touches.measurements.front(), *cell), found->discrepancy)
+               : kNowhere;
 }
 
 std::optional<Error> doubt_of_touches(const CellPtr& cell, const MeasurementBatch& batch) {
@@ -125,15 +136,17 @@ std::optional<Error> doubt_of_touches(const CellPtr& cell, const MeasurementBatc
   const std::vector<TouchReading> readings = touch_readings();
   for (const TouchReading& reading : readings) {
     const double shrinks = std::max(1.0, 1 / std::abs(reading.factor));
-    const double then = shrinks * left_of_touches(cell, read_as(batch, Gauge::Kind::kTouch, reading.factor));
+    const double then =
+        shrinks * left_of_touches(cell, read_as(batch, Gauge::Kind::kTouch, reading.factor));
     if (then >= least) continue;
     least = then;
     best = &reading;
   }
-  if (best == nullptr || !(least < std::min(kNoModelError, kMuchBetter * as_given))) return std::nullopt;
+  if (best == nullptr || !(least < std::min(kNoModelError, kMuchBetter * as_given)))
+    return std::nullopt;
   return refused("the touches do not follow the joints{}; read {} they would fit to {:.2f} mm",
-                 std::isfinite(as_given) ? fmt::format(": {:.2f} mm off", to_mm(as_given)) : "", best->name,
-                 to_mm(least))
+                 std::isfinite(as_given) ? fmt::format(": {:.2f} mm off", to_mm(as_given)) : "",
+                 best->name, to_mm(least))
       .of("touch_mm")
       .beyond(to_mm(as_given), to_mm(kMuchBetter * as_given))
       .with_text(best->name)

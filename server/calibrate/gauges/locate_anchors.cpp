@@ -16,8 +16,9 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kFewest = 4;     // values that tell the three numbers of a place, and one beside
-constexpr double kLeastBeside = 1e-2;  // m rms: tool points nearer to one line do not tell what is around it
+constexpr std::size_t kFewest = 4;  // values that tell the three numbers of a place, and one beside
+constexpr double kLeastBeside =
+    1e-2;  // m rms: tool points nearer to one line do not tell what is around it
 constexpr int kRefinements = 50;
 constexpr double kLastStep = 1e-9;  // m
 
@@ -27,7 +28,8 @@ struct Lengths {
   std::vector<double> lengths;  ///< m, from the anchor's point
 };
 
-std::map<std::string, Lengths> lengths_of(const PhysicalModel& model, const MeasurementBatch& batch) {
+std::map<std::string, Lengths> lengths_of(const PhysicalModel& model,
+                                          const MeasurementBatch& batch) {
   std::map<std::string, Lengths> all;
   for (const Measurement& m : batch.measurements) {
     if (!m.gauge) continue;
@@ -114,7 +116,8 @@ Refined refined_from(Vector3 a, const Lengths& of) {
   return {a, square};
 }
 
-/// From the linear solution and from its mirror image behind the points: nearly in a plane, they fit both alike.
+/// From the linear solution and from its mirror image behind the points: nearly in a plane, they
+/// fit both alike.
 Vector3 place_of(const Lengths& of, const Spread& spread) {
   const Vector3 linear = linear_place(of, spread.mean);
   const Vector3 n = spread.axes.col(2);
@@ -123,8 +126,9 @@ Vector3 place_of(const Lengths& of, const Spread& spread) {
                 static_cast<double>(of.lengths.size()));
   const Vector3 within = linear - n.dot(linear - spread.mean) * n;
   Refined best;
-  for (const Vector3& start : {linear, Vector3(linear - 2 * n.dot(linear - spread.mean) * n),
-                               Vector3(within + mean_length * n), Vector3(within - mean_length * n)}) {
+  for (const Vector3& start :
+       {linear, Vector3(linear - 2 * n.dot(linear - spread.mean) * n),
+        Vector3(within + mean_length * n), Vector3(within - mean_length * n)}) {
     const Refined found = refined_from(start, of);
     if (found.square < best.square) best = found;
   }
@@ -137,32 +141,38 @@ constexpr double kAtThePoint = 1e-3;
 /// Whether the tool's point stands at one and the same anchor in all rows, wherever that is.
 bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batch) {
   return !batch.measurements.empty() &&
-         std::all_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-           if (!m.gauge || m.gauge->kind != Gauge::Kind::kTouch || m.gauge->minus) return false;
-           const Anchor* said = placed_anchor(model, m.gauge->anchor).said;
-           const bool is_point = said->shape == Anchor::Shape::kPoint || said->shape == Anchor::Shape::kSphere;
-           return is_point && m.gauge->anchor == batch.measurements.front().gauge->anchor &&
-                  std::abs(m.gauge->value + said->radius) < kAtThePoint;
-         });
+         std::all_of(
+             batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+               if (!m.gauge || m.gauge->kind != Gauge::Kind::kTouch || m.gauge->minus) return false;
+               const Anchor* said = placed_anchor(model, m.gauge->anchor).said;
+               const bool is_point =
+                   said->shape == Anchor::Shape::kPoint || said->shape == Anchor::Shape::kSphere;
+               return is_point && m.gauge->anchor == batch.measurements.front().gauge->anchor &&
+                      std::abs(m.gauge->value + said->radius) < kAtThePoint;
+             });
 }
 
 /// What tells an unknown tool in place of gauges.
 std::string way_to_the_tool(const PhysicalModel& model, const MeasurementBatch& batch) {
   constexpr const char* kHow =
-      "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and anchor_id (the point "
-      "is then the origin of the batch's frame), and base: null in the cell file: the tool is found from how the "
-      "flange turns about the point (trammel export-robot writes it); how the base is turned about it stays unknown";
-  if (is_about_one_point(model, batch)) return fmt::format("the tool's point is at one place in all rows: {}", kHow);
+      "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and "
+      "anchor_id (the point is then the origin of the batch's frame), and base: null in the cell "
+      "file: the tool is found from how the flange turns about the point (trammel export-robot "
+      "writes it); how the base is turned about it stays unknown";
+  if (is_about_one_point(model, batch))
+    return fmt::format("the tool's point is at one place in all rows: {}", kHow);
   return fmt::format(
-      "write where it sits to some mm, or measure some positions; or let its point touch one point in ten orientations "
-      "or more: {}",
+      "write where it sits to some mm, or measure some positions; or let its point touch one point "
+      "in ten orientations or more: {}",
       kHow);
 }
 
 Status check_told(const std::string& id, const Lengths& of) {
   if (of.lengths.size() < kFewest) {
-    return refused("anchor '{}': {} values told of themselves, at least {} are needed to find where it is", id,
-                   of.lengths.size(), kFewest)
+    return refused(
+               "anchor '{}': {} values told of themselves, at least {} are needed to find where it "
+               "is",
+               id, of.lengths.size(), kFewest)
         .of("anchor_id")
         .beyond(of.lengths.size(), kFewest)
         .with_text(id)
@@ -171,8 +181,8 @@ Status check_told(const std::string& id, const Lengths& of) {
   const double beside = spread_of(of.points_W).rms(1);
   if (beside >= kLeastBeside) return {};
   return refused(
-             "anchor '{}': the tool points lie on one line within {:.1f} mm, limit {:g} mm: they do not tell where "
-             "it is",
+             "anchor '{}': the tool points lie on one line within {:.1f} mm, limit {:g} mm: they "
+             "do not tell where it is",
              id, to_mm(beside), to_mm(kLeastBeside))
       .of("anchor_id")
       .with_text(id)
@@ -186,10 +196,11 @@ Result<std::vector<std::string>> with_instruments(std::vector<std::string> specs
                                                   const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return specs;
   const Anchors anchors = TRY(anchors_of(cell));
-  const bool open = std::any_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-    const auto anchor = m.gauge ? anchors.find(m.gauge->anchor) : anchors.end();
-    return anchor != anchors.end() && anchor->second.zero_open;
-  });
+  const bool open =
+      std::any_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+        const auto anchor = m.gauge ? anchors.find(m.gauge->anchor) : anchors.end();
+        return anchor != anchors.end() && anchor->second.zero_open;
+      });
   const auto add = [&](std::string_view spec) {
     if (std::find(specs.begin(), specs.end(), spec) == specs.end()) specs.emplace_back(spec);
   };
@@ -201,14 +212,17 @@ Result<std::vector<std::string>> with_instruments(std::vector<std::string> specs
 Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return {};
   if (has_sessions(batch)) {
-    return refused("distances or touches in a batch of {} set-ups of the instrument", batch.sessions.size())
+    return refused("distances or touches in a batch of {} set-ups of the instrument",
+                   batch.sessions.size())
         .in("batch " + batch.id)
         .of("session_id")
         .next("give each set-up that has them to a training of its own");
   }
   for (const Measurement& m : batch.measurements) {
     if (m.gauge && placed_anchor(model, m.gauge->anchor).said == nullptr)
-      return refused("no anchor '{}' in the cell file", m.gauge->anchor).in("batch " + batch.id).at_row(m.row);
+      return refused("no anchor '{}' in the cell file", m.gauge->anchor)
+          .in("batch " + batch.id)
+          .at_row(m.row);
   }
   const Cell& cell = *model.cell;
   if (has_positions(batch) || (cell.X_WB && !has_unknown_tool(cell))) return {};
@@ -216,13 +230,15 @@ Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
                  !cell.X_WB ? "the base" : "a tool", cell.name)
       .in("batch " + batch.id)
       .of(!cell.X_WB ? "base" : "tools")
-      .next(!cell.X_WB ? "write base: {xyz_mm: [0, 0, 0]}, and give anchors' places in the base's frame or as null"
+      .next(!cell.X_WB ? "write base: {xyz_mm: [0, 0, 0]}, and give anchors' places in the base's "
+                         "frame or as null"
                        : way_to_the_tool(model, batch));
 }
 
 Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch) {
   for (const auto& [id, of] : lengths_of(model, batch)) {
-    if (const Status told = check_told(id, of); !told) return Failure(told.error()).in("batch " + batch.id);
+    if (const Status told = check_told(id, of); !told)
+      return Failure(told.error()).in("batch " + batch.id);
     model.values.segment<3>(placed_anchor(model, id).place) = place_of(of, spread_of(of.points_W));
   }
   return {};

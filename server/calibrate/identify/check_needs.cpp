@@ -31,16 +31,17 @@ std::vector<Need> needs_of(const ErrorSource& source, const Cell& cell) {
     return !c.direction.empty() && c.direction[static_cast<std::size_t>(joint)] != 0;
   };
   return {{needs.time, [](const PoseContext& c) { return c.time.has_value(); }, "a time", "time_s"},
-          {needs.temperature, [](const PoseContext& c) { return c.temperature.has_value(); }, "a temperature",
-           "temperature_c"},
+          {needs.temperature, [](const PoseContext& c) { return c.temperature.has_value(); },
+           "a temperature", "temperature_c"},
           {needs.direction, directed, "an approach direction", fmt::format("dir{}", joint + 1)},
-          {needs.velocity, [](const PoseContext& c) { return c.velocity.has_value(); }, "a continuous path with times",
-           "time_s"},
-          {needs.before, [](const PoseContext& c) { return c.before.has_value(); }, "the order of the poses in time",
-           "time_s"},
-          {needs.history, [](const PoseContext& c) { return !c.lagged.empty(); }, "temperature and time of every pose",
-           "temperature_c"},
-          {needs.payload, [&cell](const PoseContext& c) { return has_mass(c, cell); }, "a payload with a mass", ""}};
+          {needs.velocity, [](const PoseContext& c) { return c.velocity.has_value(); },
+           "a continuous path with times", "time_s"},
+          {needs.before, [](const PoseContext& c) { return c.before.has_value(); },
+           "the order of the poses in time", "time_s"},
+          {needs.history, [](const PoseContext& c) { return !c.lagged.empty(); },
+           "temperature and time of every pose", "temperature_c"},
+          {needs.payload, [&cell](const PoseContext& c) { return has_mass(c, cell); },
+           "a payload with a mass", ""}};
 }
 
 }  // namespace

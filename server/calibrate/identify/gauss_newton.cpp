@@ -12,10 +12,13 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSettledStep = 0.05;       // standard deviations: a smaller step changes nothing anybody sees
-constexpr double kFirstSettledStep = 1;     // the same as long as residuals only serve to find the discrepancy
-constexpr double kNoRise = 1e-6;            // of the cost, which has thousands of terms: rounding
-constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together: they stay in the cache
+constexpr double kSettledStep =
+    0.05;  // standard deviations: a smaller step changes nothing anybody sees
+constexpr double kFirstSettledStep =
+    1;  // the same as long as residuals only serve to find the discrepancy
+constexpr double kNoRise = 1e-6;  // of the cost, which has thousands of terms: rounding
+constexpr Eigen::Index kPosesAtATime =
+    64;  // whose Jacobians are multiplied together: they stay in the cache
 
 constexpr Eigen::Index kManyParameters = 300;  // from here on the product takes most of the time
 
@@ -23,16 +26,19 @@ constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step lea
 constexpr double kMostDamping = 1e9;
 constexpr double kNoDamping = 1e-6;
 
-// Of numbers of which the poses show the product alone, damped steps follow a bent valley for a hundred steps, and all
-// that falls is how well the priors like it.
-constexpr double kIdleFall = 0.05;        // nat a step
-constexpr double kFirstIdleShare = 1e-3;  // of the cost, as long as residuals only serve to find the discrepancy
+// Of numbers of which the poses show the product alone, damped steps follow a bent valley for a
+// hundred steps, and all that falls is how well the priors like it.
+constexpr double kIdleFall = 0.05;  // nat a step
+constexpr double kFirstIdleShare =
+    1e-3;  // of the cost, as long as residuals only serve to find the discrepancy
 constexpr int kIdleSteps = 3;
 // A full step along such a valley leaves it, and the next ones come back, farther down.
 constexpr int kMostUphill = 5;  // steps
 
-/// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it stay.
-Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
+/// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it
+/// stay.
+Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x,
+                             const Eigen::VectorXd& lower) {
   Eigen::VectorXd downhill = -at.gradient;
   Eigen::MatrixXd curvature = at.information;
   curvature.diagonal().array() += 1;
@@ -57,7 +63,8 @@ class Normals {
         newest_(static_cast<int>(sessions) - 1) {
     if (sessions < 2) return;
     at_.sessions.resize(sessions - 1);
-    for (SessionBlock& block : at_.sessions) block.cross = Eigen::MatrixXd::Zero(kOfSession, at.gradient.size());
+    for (SessionBlock& block : at_.sessions)
+      block.cross = Eigen::MatrixXd::Zero(kOfSession, at.gradient.size());
   }
   /// Where the next pose of that session writes its residuals and their derivatives.
   void begin(int session) {
@@ -68,7 +75,9 @@ class Normals {
   [[nodiscard]] double* jacobian() { return jacobians_.col(filled_).data(); }
   [[nodiscard]] auto residuals(Eigen::Index count) { return residuals_.segment(filled_, count); }
   [[nodiscard]] bool moves() const { return session_ < newest_; }
-  void set_motion(const SessionColumns& columns) { motions_.middleCols(filled_, columns.cols()) = columns; }
+  void set_motion(const SessionColumns& columns) {
+    motions_.middleCols(filled_, columns.cols()) = columns;
+  }
   void weigh(Eigen::Index count, double root_weight) {
     residuals_.segment(filled_, count) *= root_weight;
     jacobians_.middleCols(filled_, count) *= root_weight;
@@ -106,8 +115,8 @@ class Normals {
 
 }  // namespace
 
-Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights, bool robust,
-                 const Eigen::VectorXd& x) {
+Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s,
+                 const Weights& weights, bool robust, const Eigen::VectorXd& x) {
   const Eigen::Index P = s.scale.size();
   const Eigen::VectorXd from_prior = x - s.prior;
   Expansion at{0.5 * from_prior.squaredNorm(), from_prior, Eigen::MatrixXd::Zero(P, P)};
@@ -118,7 +127,8 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
     const WeightedPose pose(problem.model, s, m, weights, row);
     normals.begin(sessions > 1 ? m.session : 0);
     const bool finite = pose.evaluate(x.data(), normals.residuals(), normals.jacobian());
-    const double norm = finite ? normals.residuals(pose.size()).norm() : std::numeric_limits<double>::infinity();
+    const double norm =
+        finite ? normals.residuals(pose.size()).norm() : std::numeric_limits<double>::infinity();
     const double limit = pose.huber_limit();
     if (normals.moves()) {
       normals.set_motion(motion_columns(m, problem.model.X_WB.translation(), pose.inverse_sigma(),
@@ -137,18 +147,23 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
   return at;
 }
 
-bool is_robust(const CalibrateOptions& options, const Weights& weights) { return options.robust && weights.estimated; }
+bool is_robust(const CalibrateOptions& options, const Weights& weights) {
+  return options.robust && weights.estimated;
+}
 
-std::optional<Minimum> full_steps(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
-                                  const CalibrateOptions& options, const Eigen::VectorXd& start) {
+std::optional<Minimum> full_steps(const CalibrationProblem& problem, const ScaledParameters& s,
+                                  const Weights& weights, const CalibrateOptions& options,
+                                  const Eigen::VectorXd& start) {
   const Eigen::VectorXd lower = s.lower();
   Minimum now{start.cwiseMax(lower), {}, {}, false, "too many steps"};
   for (int k = 0; k < std::max(1, options.max_iterations) && !now.converged; ++k) {
     Expansion at = expand(problem, s, weights, is_robust(options, weights), now.x);
-    if (!std::isfinite(at.cost) || (k > 0 && at.cost > now.costs.back() + kNoRise)) return std::nullopt;
+    if (!std::isfinite(at.cost) || (k > 0 && at.cost > now.costs.back() + kNoRise))
+      return std::nullopt;
     now.costs.push_back(at.cost);
     const Eigen::VectorXd step = bounded_step(at, now.x, lower);
-    const double in_standard_deviations = std::sqrt(step.dot(at.information * step) + step.squaredNorm());
+    const double in_standard_deviations =
+        std::sqrt(step.dot(at.information * step) + step.squaredNorm());
     now.x += step;
     now.information = std::move(at.information);
     if (in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep)) {
@@ -161,7 +176,8 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
 
 namespace {
 
-/// Where the search stands: the parameters, and the measurements as the instruments are believed to have stood.
+/// Where the search stands: the parameters, and the measurements as the instruments are believed to
+/// have stood.
 struct Standing {
   Eigen::VectorXd x;
   CalibrationProblem problem;
@@ -195,7 +211,8 @@ JointStep joint_step(const Standing& from, const Eigen::VectorXd& lower, double 
   reduced.information.diagonal() *= 1 + damping;
   eliminate(from.at.sessions, reduced.information, reduced.gradient, damping);
   JointStep step{bounded_step(reduced, from.x, lower), {}, 0};
-  double square = step.parameters.dot(from.at.information * step.parameters) + step.parameters.squaredNorm();
+  double square =
+      step.parameters.dot(from.at.information * step.parameters) + step.parameters.squaredNorm();
   for (const SessionBlock& block : from.at.sessions) {
     const SessionMotion motion = block.motion(step.parameters, damping);
     square += motion.dot(block.curvature * motion) + 2 * motion.dot(block.cross * step.parameters);
@@ -206,13 +223,15 @@ JointStep joint_step(const Standing& from, const Eigen::VectorXd& lower, double 
 }
 
 Minimum minimum_at(const Standing& standing, std::vector<double> costs) {
-  Minimum found{standing.x, standing.at.information, std::move(costs), false, "too many steps", standing.moved};
+  Minimum found{standing.x, standing.at.information, std::move(costs),
+                false,      "too many steps",        standing.moved};
   Eigen::VectorXd gradient = standing.at.gradient;
   eliminate(standing.at.sessions, found.information, gradient);
   return found;
 }
 
-/// A search downhill. A full step may lead uphill for a while; then it goes back to the best point, and is damped.
+/// A search downhill. A full step may lead uphill for a while; then it goes back to the best point,
+/// and is damped.
 struct Descent {
   Standing now, best;
   double damping = 0;
@@ -225,7 +244,8 @@ struct Descent {
   }
   /// After a step to a higher point that was not the last one. False: nothing leads downhill.
   bool go_on_or_back(bool settled) {
-    if (damping == 0 && !settled && std::isfinite(now.at.cost) && ++uphill < kMostUphill) return true;
+    if (damping == 0 && !settled && std::isfinite(now.at.cost) && ++uphill < kMostUphill)
+      return true;
     now = best;
     uphill = 0;
     damping = std::max(10 * damping, kFirstDamping);
@@ -243,19 +263,25 @@ struct Descent {
 
 }  // namespace
 
-Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
-                              const CalibrateOptions& options, const Eigen::VectorXd& start) {
+Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s,
+                              const Weights& weights, const CalibrateOptions& options,
+                              const Eigen::VectorXd& start) {
   const Eigen::VectorXd lower = s.lower();
   const bool robust = is_robust(options, weights);
-  const auto expand_now = [&](Standing& here) { here.at = expand(here.problem, s, weights, robust, here.x); };
-  Standing first{start.cwiseMax(lower), problem, std::vector<Similarity>(problem.batch.sessions.size()), {}};
+  const auto expand_now = [&](Standing& here) {
+    here.at = expand(here.problem, s, weights, robust, here.x);
+  };
+  Standing first{
+      start.cwiseMax(lower), problem, std::vector<Similarity>(problem.batch.sessions.size()), {}};
   expand_now(first);
   Descent search(std::move(first));
   std::vector<double> costs = {search.now.at.cost};
-  for (int k = 0; k < std::max(1, options.max_iterations) && std::isfinite(search.best.at.cost); ++k) {
+  for (int k = 0; k < std::max(1, options.max_iterations) && std::isfinite(search.best.at.cost);
+       ++k) {
     const JointStep step = joint_step(search.now, lower, search.damping);
     const bool settled =
-        search.damping == 0 && step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
+        search.damping == 0 &&
+        step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
     search.now.x += step.parameters;
     move_sessions(search.now, step.motions);
     expand_now(search.now);
@@ -263,12 +289,14 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
       if (!search.go_on_or_back(settled)) break;
       continue;
     }
-    search.accept(weights.estimated ? kIdleFall : std::max(kIdleFall, kFirstIdleShare * search.best.at.cost));
+    search.accept(weights.estimated ? kIdleFall
+                                    : std::max(kIdleFall, kFirstIdleShare * search.best.at.cost));
     costs.push_back(search.best.at.cost);
     if (!settled && search.idle < kIdleSteps) continue;
     Minimum found = minimum_at(search.best, std::move(costs));
     found.converged = true;
-    found.message = fmt::format("last step {:.1e} standard deviations", step.in_standard_deviations);
+    found.message =
+        fmt::format("last step {:.1e} standard deviations", step.in_standard_deviations);
     return found;
   }
   if (!std::isfinite(search.best.at.cost))

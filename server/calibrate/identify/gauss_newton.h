@@ -12,17 +12,19 @@
 /// The most probable parameters in few steps. All vectors are of size P, in units of the priors.
 namespace trammel {
 
-/// Half the weighted sum of squares about one point, to second order without the second derivatives of the residuals.
+/// Half the weighted sum of squares about one point, to second order without the second derivatives
+/// of the residuals.
 struct Expansion {
   double cost = 0;
   Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;              ///< P x P, second derivative without that of the priors
-  std::vector<SessionBlock> sessions = {};  ///< of several: of all but the newest, in whose world all stand
+  Eigen::MatrixXd information;  ///< P x P, second derivative without that of the priors
+  std::vector<SessionBlock> sessions =
+      {};  ///< of several: of all but the newest, in whose world all stand
 };
 
 /// About `x`; `robust`: with Huber's loss on every pose.
-[[nodiscard]] Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
-                               bool robust, const Eigen::VectorXd& x);
+[[nodiscard]] Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s,
+                               const Weights& weights, bool robust, const Eigen::VectorXd& x);
 
 /// Where minimising ended.
 struct Minimum {
@@ -31,22 +33,27 @@ struct Minimum {
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;
-  std::vector<Similarity> moved = {};  ///< of several sessions: what moves the measurements of each into W
+  std::vector<Similarity> moved =
+      {};  ///< of several sessions: what moves the measurements of each into W
 };
 
-/// Whether Huber's loss is used: not before the discrepancy is known, since nothing can be called an outlier then.
+/// Whether Huber's loss is used: not before the discrepancy is known, since nothing can be called
+/// an outlier then.
 [[nodiscard]] bool is_robust(const CalibrateOptions& options, const Weights& weights);
 
-/// Full Gauss-Newton steps, which are enough where the start is near; nothing where one leads uphill.
-[[nodiscard]] std::optional<Minimum> full_steps(const CalibrationProblem& problem, const ScaledParameters& s,
-                                                const Weights& weights, const CalibrateOptions& options,
+/// Full Gauss-Newton steps, which are enough where the start is near; nothing where one leads
+/// uphill.
+[[nodiscard]] std::optional<Minimum> full_steps(const CalibrationProblem& problem,
+                                                const ScaledParameters& s, const Weights& weights,
+                                                const CalibrateOptions& options,
                                                 const Eigen::VectorXd& start);
 
-/// Steps of the parameters and, of a batch of several sessions, of what belongs to each, damped where a full one
-/// leads uphill. The information is that of the parameters with the sessions eliminated. Refuses where nothing leads
-/// downhill and it is not the minimum.
-[[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s,
-                                            const Weights& weights, const CalibrateOptions& options,
+/// Steps of the parameters and, of a batch of several sessions, of what belongs to each, damped
+/// where a full one leads uphill. The information is that of the parameters with the sessions
+/// eliminated. Refuses where nothing leads downhill and it is not the minimum.
+[[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem,
+                                            const ScaledParameters& s, const Weights& weights,
+                                            const CalibrateOptions& options,
                                             const Eigen::VectorXd& start);
 
 }  // namespace trammel

@@ -8,23 +8,25 @@
 
 namespace trammel {
 
-/// What the data tell of the parameters: singular values and right singular vectors of the Jacobian in units of sigma
-/// and of the priors, smallest first.
+/// What the data tell of the parameters: singular values and right singular vectors of the Jacobian
+/// in units of sigma and of the priors, smallest first.
 struct Information {
   Eigen::VectorXd singular_values;
   Eigen::MatrixXd directions;  ///< columns
 };
 
-/// A direction in parameter space that the data do not show (singular value below 1 in prior units).
+/// A direction in parameter space that the data do not show (singular value below 1 in prior
+/// units).
 struct UnidentifiableCombination {
   double singular_value = 0;
   std::vector<std::string> parameters;  ///< those with a large part in it, largest first
   std::string sentence;                 ///< for people
 };
 
-/// All directions that the data do not show, each with as few parameters as possible, in words. `to_typical` converts
-/// prior units into units in which parameters of one kind can be compared.
+/// All directions that the data do not show, each with as few parameters as possible, in words.
+/// `to_typical` converts prior units into units in which parameters of one kind can be compared.
 [[nodiscard]] std::vector<UnidentifiableCombination> unidentifiable_combinations(
-    const Information& seen, const std::vector<Parameter>& parameters, const Eigen::VectorXd& to_typical);
+    const Information& seen, const std::vector<Parameter>& parameters,
+    const Eigen::VectorXd& to_typical);
 
 }  // namespace trammel

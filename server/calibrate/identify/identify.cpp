@@ -18,14 +18,18 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostReweightings = 12;     // three or four are enough; more only where outliers come and go
-constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation: the data say more than the prior did
-constexpr double kFewFitted = 0.05;       // of the equations: who decided them changes no discrepancy by more
+constexpr int kMostReweightings =
+    12;  // three or four are enough; more only where outliers come and go
+constexpr double kIdentifiedShare =
+    0.5;  // of the prior's standard deviation: the data say more than the prior did
+constexpr double kFewFitted =
+    0.05;  // of the equations: who decided them changes no discrepancy by more
 
 /// (N + 1)^-1 = Lᵀ L, N the information: L, lower triangular.
 Eigen::MatrixXd root_of_posterior(const Eigen::MatrixXd& information) {
   const Eigen::Index P = information.rows();
-  return inverse_factor(information + Eigen::MatrixXd::Identity(P, P)).value_or(Eigen::MatrixXd::Identity(P, P));
+  return inverse_factor(information + Eigen::MatrixXd::Identity(P, P))
+      .value_or(Eigen::MatrixXd::Identity(P, P));
 }
 
 /// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1.
@@ -45,31 +49,34 @@ Information decomposed(const Eigen::MatrixXd& information) {
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
-/// m: how far positions or gauges are off (`square`, m²) but for the tenth that is farthest: single wrong rows make no
-/// batch wrong, and are suspects.
+/// m: how far positions or gauges are off (`square`, m²) but for the tenth that is farthest: single
+/// wrong rows make no batch wrong, and are suspects.
 double rms_of_most(Eigen::VectorXd square) {
   std::sort(square.begin(), square.end());
   const Eigen::Index most = square.size() - square.size() / 10;
   return std::sqrt(square.head(most).mean());
 }
 
-/// Refuses joints and positions that are not of one robot: `rms` (m), what identification leaves, is then a good part
-/// of the way that the tool went.
+/// Refuses joints and positions that are not of one robot: `rms` (m), what identification leaves,
+/// is then a good part of the way that the tool went.
 Status check_positions_belong(const MeasurementBatch& batch, double rms) {
   Vector3 mean = Vector3::Zero();
-  for (const Measurement& m : batch.measurements) mean += m.p_W / static_cast<double>(batch.measurements.size());
+  for (const Measurement& m : batch.measurements)
+    mean += m.p_W / static_cast<double>(batch.measurements.size());
   double square = 0;
   for (const Measurement& m : batch.measurements) square += (m.p_W - mean).squaredNorm();
   const double spread = std::sqrt(square / static_cast<double>(batch.measurements.size()));
   if (rms < std::max(kNoModelError, kNoModelShare * spread)) return {};
   return refused(
-             "{:.0f} mm rms are left after identification, of positions that spread over {:.0f} mm: these joints do "
-             "not lead to these positions",
+             "{:.0f} mm rms are left after identification, of positions that spread over {:.0f} "
+             "mm: these joints do not lead to these positions",
              to_mm(rms), to_mm(spread))
       .in("batch " + batch.id)
       .of("x_mm")
       .beyond(to_mm(rms), to_mm(std::max(kNoModelError, kNoModelShare * spread)))
-      .next("look at the order of the joints, their signs and zeros, and which row belongs to which position");
+      .next(
+          "look at the order of the joints, their signs and zeros, and which row belongs to which "
+          "position");
 }
 
 /// The same of gauges.
@@ -83,15 +90,15 @@ Status check_gauges_belong(const MeasurementBatch& batch, double rms) {
   const double limit = std::max(kNoModelError, kNoModelShare * (high - low));
   if (rms < limit) return {};
   return refused(
-             "{:.0f} mm rms are left after identification, of values between {:.0f} and {:.0f} mm: these joints do not "
-             "lead to these distances",
+             "{:.0f} mm rms are left after identification, of values between {:.0f} and {:.0f} mm: "
+             "these joints do not lead to these distances",
              to_mm(rms), to_mm(low), to_mm(high))
       .in("batch " + batch.id)
       .of("distance_mm")
       .beyond(to_mm(rms), to_mm(limit))
       .next(
-          "look at the base and tool of the cell file, the joints' order, signs and zeros, and which row belongs to "
-          "which anchor");
+          "look at the base and tool of the cell file, the joints' order, signs and zeros, and "
+          "which row belongs to which anchor");
 }
 
 Status check_belongs(const MeasurementBatch& batch, const Residuals& r) {
@@ -103,7 +110,8 @@ Status check_belongs(const MeasurementBatch& batch, const Residuals& r) {
                                 rms_of_most(r.position.colwise().squaredNorm().transpose()));
 }
 
-/// How well the directions are seen: their number, and the least and geometric mean of their singular values.
+/// How well the directions are seen: their number, and the least and geometric mean of their
+/// singular values.
 void add_observability(const Information& seen, std::size_t poses, CalibrationResult& result) {
   double least = std::numeric_limits<double>::infinity();
   double log_sum = 0;
@@ -115,24 +123,30 @@ void add_observability(const Information& seen, std::size_t poses, CalibrationRe
     log_sum += std::log(value);
   }
   if (result.rank == 0) return;
-  result.observability_index = std::exp(log_sum / result.rank) / std::sqrt(static_cast<double>(poses));
+  result.observability_index =
+      std::exp(log_sum / result.rank) / std::sqrt(static_cast<double>(poses));
   result.condition_number = seen.singular_values(seen.singular_values.size() - 1) / least;
 }
 
-/// Adds covariance, rank and what is not identifiable: from the information that `poses` poses give of the parameters
-/// that are not held. Those that are held are exact.
+/// Adds covariance, rank and what is not identifiable: from the information that `poses` poses give
+/// of the parameters that are not held. Those that are held are exact.
 void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s, std::size_t poses,
                    CalibrationResult& result) {
   const Information seen = decomposed(information);
   const Eigen::VectorXd variance = (seen.singular_values.array().square() + 1).inverse();
-  const Eigen::MatrixXd scaled_covariance = seen.directions * variance.asDiagonal() * seen.directions.transpose();
-  result.covariance(s.free, s.free) = s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
+  const Eigen::MatrixXd scaled_covariance =
+      seen.directions * variance.asDiagonal() * seen.directions.transpose();
+  result.covariance(s.free, s.free) =
+      s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
   add_observability(seen, poses, result);
   const Eigen::VectorXd from_prior = result.model.values(s.free).cwiseQuotient(s.scale) - s.prior;
-  result.log_evidence = result.log_likelihood - 0.5 * from_prior.squaredNorm() + 0.5 * variance.array().log().sum();
-  result.unidentifiable = unidentifiable_combinations(seen, s.parameters, s.scale.cwiseQuotient(s.typical));
+  result.log_evidence =
+      result.log_likelihood - 0.5 * from_prior.squaredNorm() + 0.5 * variance.array().log().sum();
+  result.unidentifiable =
+      unidentifiable_combinations(seen, s.parameters, s.scale.cwiseQuotient(s.typical));
   for (Parameter& parameter : result.model.parameters())
-    result.parameters.push_back({.parameter = std::move(parameter), .value = 0, .stddev = 0, .identified = true});
+    result.parameters.push_back(
+        {.parameter = std::move(parameter), .value = 0, .stddev = 0, .identified = true});
   for (Eigen::Index i = 0; i < s.values.size(); ++i) {
     IdentifiedParameter& one = result.parameters[static_cast<std::size_t>(i)];
     one.value = result.model.values(i);
@@ -169,9 +183,11 @@ double freedom_of_sessions(const CalibrationProblem& problem) {
   return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
-/// What the means of the positions at one joint vector tell of the parameters, each mean as sure as one of them.
+/// What the means of the positions at one joint vector tell of the parameters, each mean as sure as
+/// one of them.
 Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const ScaledParameters& s,
-                                     const Weights& weights, const Residuals& r, const Eigen::VectorXd& x) {
+                                     const Weights& weights, const Residuals& r,
+                                     const Eigen::VectorXd& x) {
   const Eigen::Index P = s.scale.size();
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(P, P), J(P, 6);
   Eigen::VectorXd residual(6);
@@ -188,11 +204,11 @@ Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const Sc
   return sum;
 }
 
-/// How many parameters were fitted to either kind at the minimum under `weights`. Few parameters beside many equations,
-/// and several sessions, are shared out by number; else positions may have decided most of them, and are fitted much
-/// closer than orientations.
-Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights, bool robust,
-               const Minimum& at) {
+/// How many parameters were fitted to either kind at the minimum under `weights`. Few parameters
+/// beside many equations, and several sessions, are shared out by number; else positions may have
+/// decided most of them, and are fitted much closer than orientations.
+Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
+               bool robust, const Minimum& at) {
   double turns = 0, equations = 0;
   for (const Measurement& m : problem.batch.measurements) {
     turns += !m.gauge && m.R_WT ? 3 : 0;
@@ -200,23 +216,27 @@ Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, con
   }
   const double all = freedom_of(at.information) + freedom_of_sessions(problem);
   const double by_number = all * turns / equations;
-  if (turns == 0 || has_sessions(problem.batch) || all < kFewFitted * equations) return {all - by_number, by_number};
+  if (turns == 0 || has_sessions(problem.batch) || all < kFewFitted * equations)
+    return {all - by_number, by_number};
   Weights turns_alone = weights;
   turns_alone.discrepancy = std::numeric_limits<double>::infinity();
-  const double decided = freedom_of(expand(problem, s, turns_alone, robust, at.x).information, at.information);
+  const double decided =
+      freedom_of(expand(problem, s, turns_alone, robust, at.x).information, at.information);
   return {all - decided, decided};
 }
 
 /// How many parameters were fitted to the means of the positions at one joint vector.
-double fitted_to_means(const CalibrationProblem& problem, const ScaledParameters& s, const Identified& now) {
-  const Eigen::MatrixXd means = information_of_means(problem, s, now.weights, now.residuals, now.minimum.x);
+double fitted_to_means(const CalibrationProblem& problem, const ScaledParameters& s,
+                       const Identified& now) {
+  const Eigen::MatrixXd means =
+      information_of_means(problem, s, now.weights, now.residuals, now.minimum.x);
   return freedom_of(means, now.minimum.information) + freedom_of_sessions(problem);
 }
 
-/// Gives each session the noise that it has beyond the others, and the residuals the sigmas that follow. False where
-/// that has changed.
-bool estimate_own_noise(Identified& now, const Freedom& freedom, const MeasurementBatch& given, MeasurementBatch& batch,
-                        const Tracker& tracker) {
+/// Gives each session the noise that it has beyond the others, and the residuals the sigmas that
+/// follow. False where that has changed.
+bool estimate_own_noise(Identified& now, const Freedom& freedom, const MeasurementBatch& given,
+                        MeasurementBatch& batch, const Tracker& tracker) {
   std::vector<SessionSetting> sessions = now.sessions;
   set_own_noise(now.residuals, freedom, now.weights, batch, sessions);
   const bool same = are_as_noisy(sessions, now.sessions, tracker);
@@ -226,9 +246,10 @@ bool estimate_own_noise(Identified& now, const Freedom& freedom, const Measureme
   return same;
 }
 
-/// Minimises and estimates the discrepancy in turns until neither changes; adds the iterations to `result`.
-Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOptions& options, const ScaledParameters& s,
-                          CalibrationResult& result) {
+/// Minimises and estimates the discrepancy in turns until neither changes; adds the iterations to
+/// `result`.
+Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOptions& options,
+                          const ScaledParameters& s, CalibrationResult& result) {
   const Tracker& tracker = problem.model.cell->tracker;
   CalibrationProblem working = problem;
   Identified now;
@@ -243,20 +264,24 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
       Minimum found = TRY(minimise(working, s, now.weights, options, now.minimum.x));
       now.minimum = std::move(found);
       result.iterations += static_cast<int>(now.minimum.costs.size());
-      result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(), now.minimum.costs.end());
+      result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(),
+                                now.minimum.costs.end());
       freedom = fitted(working, s, now.weights, is_robust(options, now.weights), now.minimum);
       take_over_sessions(problem.batch, now, working.batch, tracker);
     }
     now.residuals = residuals_of(problem.model, working.batch, s.values_at(now.minimum.x));
-    if (!now.weights.together.empty()) now.residuals.together = columns_together(working.batch, now.residuals);
-    if (s.scale.size() > 0 && !now.residuals.together.empty()) freedom.means = fitted_to_means(working, s, now);
-    const bool same_noise =
-        now.sessions.empty() || estimate_own_noise(now, freedom, problem.batch, working.batch, tracker);
+    if (!now.weights.together.empty())
+      now.residuals.together = columns_together(working.batch, now.residuals);
+    if (s.scale.size() > 0 && !now.residuals.together.empty())
+      freedom.means = fitted_to_means(working, s, now);
+    const bool same_noise = now.sessions.empty() ||
+                            estimate_own_noise(now, freedom, problem.batch, working.batch, tracker);
     const Weights before = now.weights;
     now.weights = estimated_weights(now.residuals, freedom, before, is_robust(options, before));
     if (same_noise && are_settled(now.weights, before, tracker)) break;
   }
-  // The last step is short, but not beside numbers of which only a product is seen: there the derivatives change.
+  // The last step is short, but not beside numbers of which only a product is seen: there the
+  // derivatives change.
   if (now.sessions.empty() && s.scale.size() > 0)
     now.minimum.information =
         expand(problem, s, now.weights, is_robust(options, now.weights), now.minimum.x).information;
@@ -265,7 +290,8 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
 
 }  // namespace
 
-Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
+Result<CalibrationResult> identify(const CalibrationProblem& problem,
+                                   const CalibrateOptions& options) {
   const ScaledParameters s = scaled_parameters(problem.model, options.held);
   const Eigen::Index P = s.values.size();
   CalibrationResult result;

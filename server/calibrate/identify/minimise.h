@@ -5,8 +5,9 @@
 
 namespace trammel {
 
-/// The most probable parameters under `weights`, from `start` (P, in units of the priors). Takes full Gauss-Newton
-/// steps where they lead downhill, else the guarded steps of Ceres. Refuses where the solver fails.
+/// The most probable parameters under `weights`, from `start` (P, in units of the priors). Takes
+/// full Gauss-Newton steps where they lead downhill, else the guarded steps of Ceres. Refuses where
+/// the solver fails.
 [[nodiscard]] Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParameters& s,
                                        const Weights& weights, const CalibrateOptions& options,
                                        const Eigen::VectorXd& start);

@@ -19,10 +19,10 @@ struct FoundOrder {
   double gain = 0;   // weighted sum of squares explained
 };
 
-/// `q`: joint angles, rad; `along`: weighted residual along the joint's Jacobian column; `square`: weighted square of
-/// that column. All of size N.
-FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
-                     double order) {
+/// `q`: joint angles, rad; `along`: weighted residual along the joint's Jacobian column; `square`:
+/// weighted square of that column. All of size N.
+FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along,
+                     const Eigen::VectorXd& square, double order) {
   const Eigen::ArrayXd sine = (order * q.array()).sin();
   const Eigen::ArrayXd cosine = (order * q.array()).cos();
   Eigen::Matrix2d normal;
@@ -36,9 +36,10 @@ FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, con
   return {order, amplitude.dot(right)};
 }
 
-/// Periodogram in joint space with unequal weights: over `search`, then refined to a hundredth of its step.
-FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
-                        const ErrorSource::Search& search) {
+/// Periodogram in joint space with unequal weights: over `search`, then refined to a hundredth of
+/// its step.
+FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along,
+                        const Eigen::VectorXd& square, const ErrorSource::Search& search) {
   FoundOrder best;
   const auto consider = [&](double order) {
     const FoundOrder candidate = fit_order(q, along, square, std::max(order, search.from));
@@ -76,42 +77,49 @@ PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>
       values.push_back(model.values(first[k] + static_cast<Eigen::Index>(i)));
     }
   }
-  less.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  less.values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   return less;
 }
 
-/// What a joint does to what was measured: weighted residual along its column, and weighted square of the column.
+/// What a joint does to what was measured: weighted residual along its column, and weighted square
+/// of the column.
 struct AlongJoint {
   double q = 0, along = 0, square = 0;
 };
 
 Vector3 joint_column(const PhysicalModel& model, const PoseContext& context, int joint) {
   const Pose X_FT = model.tools.at(context.tool);
-  return model.X_WB.linear() * model.cell->robot.gear_jacobian(context.q, X_FT.translation()).col(joint).head<3>();
+  return model.X_WB.linear() *
+         model.cell->robot.gear_jacobian(context.q, X_FT.translation()).col(joint).head<3>();
 }
 
 double gear_angle(const PhysicalModel& model, const PoseContext& context, int joint) {
   return model.cell->robot.gear_angles(context.q)(joint);
 }
 
-AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joint, const Vector3& residual,
-                       double variance) {
+AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joint,
+                       const Vector3& residual, double variance) {
   const Vector3 column = joint_column(model, m.context, joint);
-  return {gear_angle(model, m.context, joint), column.dot(residual) / variance, column.squaredNorm() / variance};
+  return {gear_angle(model, m.context, joint), column.dot(residual) / variance,
+          column.squaredNorm() / variance};
 }
 
-/// Of a gauge that is told against another pose, as if the joint did nothing there: enough to find an order.
-AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint, double residual, double variance) {
+/// Of a gauge that is told against another pose, as if the joint did nothing there: enough to find
+/// an order.
+AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint, double residual,
+                    double variance) {
   const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
-  const GaugedLength length =
-      gauged_length(m.gauge->kind, *anchor.said, anchor.p_W(model.values), model.pose_W(m.context).translation());
+  const GaugedLength length = gauged_length(m.gauge->kind, *anchor.said, anchor.p_W(model.values),
+                                            model.pose_W(m.context).translation());
   const double column = length.by_point_W.dot(joint_column(model, m.context, joint));
-  return {gear_angle(model, m.context, joint), column * residual / variance, column * column / variance};
+  return {gear_angle(model, m.context, joint), column * residual / variance,
+          column * column / variance};
 }
 
 /// The order of `source` that explains most of the residuals through its joint's Jacobian column.
-FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, const MeasurementBatch& batch,
-                      const Residuals& r, const Weights& weights) {
+FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model,
+                      const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
   const Eigen::Index positions = r.position.cols();
   const Eigen::Index n = positions + r.gauge.size();
   const double own = weights.discrepancy * weights.discrepancy;
@@ -122,12 +130,12 @@ FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, con
   for (Eigen::Index i = 0; i < n; ++i) {
     AlongJoint one;
     if (i < positions) {
-      one = of_position(model, measurement(r.positions[static_cast<std::size_t>(i)]), source.joint(), r.position.col(i),
-                        r.sigma(i) * r.sigma(i) + own);
+      one = of_position(model, measurement(r.positions[static_cast<std::size_t>(i)]),
+                        source.joint(), r.position.col(i), r.sigma(i) * r.sigma(i) + own);
     } else {
       const Eigen::Index k = i - positions;
-      one = of_gauge(model, measurement(r.gauges[static_cast<std::size_t>(k)]), source.joint(), r.gauge(k),
-                     r.sigma_gauge(k) * r.sigma_gauge(k) + r.poses_of_gauge(k) * own);
+      one = of_gauge(model, measurement(r.gauges[static_cast<std::size_t>(k)]), source.joint(),
+                     r.gauge(k), r.sigma_gauge(k) * r.sigma_gauge(k) + r.poses_of_gauge(k) * own);
     }
     q(i) = one.q;
     along(i) = one.along;
@@ -170,7 +178,8 @@ std::map<std::string, std::string> found_orders(const PhysicalModel& model) {
   const std::vector<Eigen::Index> first = first_values(model);
   for (std::size_t k = 0; k < model.sources.size(); ++k) {
     const ErrorSource& source = *model.sources[k];
-    if (source.search()) found[source.name()] = fmt::format("{}@{:.4f}", source.name(), model.values(first[k]));
+    if (source.search())
+      found[source.name()] = fmt::format("{}@{:.4f}", source.name(), model.values(first[k]));
   }
   return found;
 }

@@ -9,8 +9,9 @@
 /// Finds the orders of periodic sources where nobody gave them.
 namespace trammel {
 
-/// Finds the orders one source after the other, the strongest first, each by a periodogram of what the model leaves
-/// over. The values in the model become start and centre of the priors; amplitudes stay free.
+/// Finds the orders one source after the other, the strongest first, each by a periodogram of what
+/// the model leaves over. The values in the model become start and centre of the priors; amplitudes
+/// stay free.
 [[nodiscard]] Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options);
 
 /// `name@order` of the sources that were searched, by name: specs with which no search is needed.

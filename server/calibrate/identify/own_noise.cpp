@@ -13,20 +13,23 @@ constexpr double kBeyondChance = 4;           // standard deviations
 constexpr std::size_t kFewestPoses = 8;       // that tell how noisy a session is
 constexpr double kSettled = 0.02;             // relative
 
-/// The middle value; of two in the middle the lower one, so that of two sessions the quieter one is the usual one.
+/// The middle value; of two in the middle the lower one, so that of two sessions the quieter one is
+/// the usual one.
 double lower_median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-/// Squared residuals of one kind in units of their variance, and that variance itself, session by session.
+/// Squared residuals of one kind in units of their variance, and that variance itself, session by
+/// session.
 struct Squares {
   std::vector<std::vector<double>> ratio;
   std::vector<double> variance;  // sums
   std::vector<double> poses;     // joint vectors
 
-  explicit Squares(std::size_t sessions) : ratio(sessions), variance(sessions, 0.0), poses(sessions, 0.0) {}
+  explicit Squares(std::size_t sessions)
+      : ratio(sessions), variance(sessions, 0.0), poses(sessions, 0.0) {}
   /// One of so many of its joint vector.
   void add(int session, double square, double of, int together) {
     const auto s = static_cast<std::size_t>(session);
@@ -43,13 +46,15 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
   for (std::size_t s = 0; s < S; ++s) {
     if (squares.ratio[s].size() < kFewestPoses) continue;
     level[s] = lower_median(squares.ratio[s]) / (kMedianOfChiSquare * share);
-    all.insert(all.end(), squares.ratio[s].size(), level[s]);  // a large session tells more of what is usual
+    all.insert(all.end(), squares.ratio[s].size(),
+               level[s]);  // a large session tells more of what is usual
   }
   if (all.empty()) return beyond;
   const double usual = lower_median(all);
   for (std::size_t s = 0; s < S; ++s) {
     const auto n = static_cast<double>(squares.ratio[s].size());
-    if (level[s] <= usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, squares.poses[s]))))
+    if (level[s] <=
+        usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, squares.poses[s]))))
       continue;
     beyond[s] = (level[s] - usual) * squares.variance[s] / n;
   }
@@ -58,8 +63,8 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
 
 }  // namespace
 
-void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights, const MeasurementBatch& batch,
-                   std::vector<SessionSetting>& sessions) {
+void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights,
+                   const MeasurementBatch& batch, std::vector<SessionSetting>& sessions) {
   Squares positions(sessions.size()), rotations(sessions.size());
   Eigen::Index turned = 0;
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
@@ -68,19 +73,23 @@ void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& we
     const SessionSetting& session = sessions[static_cast<std::size_t>(m.session)];
     const int together = i < weights.together.size() ? weights.together[i] : 1;
     const double own = std::pow(session.own_noise, 2);
-    const double rest = std::max(0.0, r.sigma(at) * r.sigma(at) - own) + std::pow(weights.discrepancy, 2);
+    const double rest =
+        std::max(0.0, r.sigma(at) * r.sigma(at) - own) + std::pow(weights.discrepancy, 2);
     positions.add(m.session, r.position.col(at).squaredNorm(), rest, together);
     if (!m.R_WT) continue;
     const double own_turn = std::pow(session.own_noise_rotation, 2);
-    const double rest_turn =
-        std::max(0.0, std::pow(r.sigma_rotation(turned), 2) - own_turn) + std::pow(weights.discrepancy_rotation, 2);
+    const double rest_turn = std::max(0.0, std::pow(r.sigma_rotation(turned), 2) - own_turn) +
+                             std::pow(weights.discrepancy_rotation, 2);
     rotations.add(m.session, r.rotation.col(turned++).squaredNorm(), rest_turn, together);
   }
   const auto share_left = [](double fitted, Eigen::Index vectors) {
-    return std::max(0.1, 1 - fitted / (3.0 * static_cast<double>(std::max<Eigen::Index>(1, vectors))));
+    return std::max(0.1,
+                    1 - fitted / (3.0 * static_cast<double>(std::max<Eigen::Index>(1, vectors))));
   };
-  const std::vector<double> beyond = beyond_others(positions, share_left(freedom.positions, r.position.cols()));
-  const std::vector<double> turns_beyond = beyond_others(rotations, share_left(freedom.turns, turned));
+  const std::vector<double> beyond =
+      beyond_others(positions, share_left(freedom.positions, r.position.cols()));
+  const std::vector<double> turns_beyond =
+      beyond_others(rotations, share_left(freedom.turns, turned));
   for (std::size_t s = 0; s < sessions.size(); ++s) {
     sessions[s].own_noise = std::sqrt(beyond[s]);
     sessions[s].own_noise_rotation = std::sqrt(turns_beyond[s]);
@@ -95,7 +104,8 @@ bool are_as_noisy(const std::vector<SessionSetting>& now, const std::vector<Sess
   return std::equal(now.begin(), now.end(), before.begin(), before.end(),
                     [&](const SessionSetting& a, const SessionSetting& b) {
                       return same(tracker.sigma, a.own_noise, b.own_noise) &&
-                             same(tracker.sigma_rotation, a.own_noise_rotation, b.own_noise_rotation);
+                             same(tracker.sigma_rotation, a.own_noise_rotation,
+                                  b.own_noise_rotation);
                     });
 }
 

@@ -14,7 +14,8 @@ constexpr double kUnknownWidening =
 
 Eigen::VectorXd ScaledParameters::lower() const {
   Eigen::VectorXd bounds(scale.size());
-  for (Eigen::Index i = 0; i < bounds.size(); ++i) bounds(i) = parameters[static_cast<std::size_t>(i)].lower / scale(i);
+  for (Eigen::Index i = 0; i < bounds.size(); ++i)
+    bounds(i) = parameters[static_cast<std::size_t>(i)].lower / scale(i);
   return bounds;
 }
 
@@ -30,9 +31,10 @@ ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector
   s.values = model.values;
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    const bool unknown = (source->cause().part == causes::Part::kBase && (!model.cell->X_WB || !held.empty())) ||
-                         (source->cause().part == causes::Part::kTool && has_unknown_tool(*model.cell)) ||
-                         is_of_instruments(*source);
+    const bool unknown =
+        (source->cause().part == causes::Part::kBase && (!model.cell->X_WB || !held.empty())) ||
+        (source->cause().part == causes::Part::kTool && has_unknown_tool(*model.cell)) ||
+        is_of_instruments(*source);
     for (Parameter parameter : source->parameters()) {
       const Eigen::Index place = k++;
       if (!held.empty() && held[static_cast<std::size_t>(place)]) continue;

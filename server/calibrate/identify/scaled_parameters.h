@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// The F parameters of a model that are to be found, and the priors under which they are; solvers see them in units of
-/// the priors. Those that are held have no part in it, however many they are.
+/// The F parameters of a model that are to be found, and the priors under which they are; solvers
+/// see them in units of the priors. Those that are held have no part in it, however many they are.
 struct ScaledParameters {
   std::vector<Parameter> parameters;
   Eigen::VectorXd scale;           ///< F, SI: standard deviations of the priors
@@ -24,9 +24,11 @@ struct ScaledParameters {
   [[nodiscard]] Eigen::VectorXd values_at(const Eigen::Ref<const Eigen::VectorXd>& x) const;
 };
 
-/// The priors are centred at the model's values. They are wide for a frame that the cell calls unknown, which was found
-/// with a chain that was still wrong, for what is unknown of the instruments, and for a base beside `held` parameters,
-/// which was just located. `held`: a flag for each parameter, or empty.
-[[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held);
+/// The priors are centred at the model's values. They are wide for a frame that the cell calls
+/// unknown, which was found with a chain that was still wrong, for what is unknown of the
+/// instruments, and for a base beside `held` parameters, which was just located. `held`: a flag for
+/// each parameter, or empty.
+[[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model,
+                                                 const std::vector<bool>& held);
 
 }  // namespace trammel

@@ -12,30 +12,35 @@ namespace {
 constexpr double kHuberGauge = 3.29;     // 1 axis
 constexpr double kHuberPosition = 4.03;  // 3 axes
 constexpr double kHuberPose = 4.74;      // 6 axes
-constexpr double kSmallAngle = 1e-4;     // rad: below it the closed form loses digits, and its limit is exact enough
+constexpr double kSmallAngle =
+    1e-4;  // rad: below it the closed form loses digits, and its limit is exact enough
 
 Matrix3 right_jacobian_inverse(const Vector3& w) {
   const double angle = w.norm();
   const Matrix3 W = skew(w);
-  const double c =
-      angle < kSmallAngle ? 1.0 / 12 : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
+  const double c = angle < kSmallAngle ? 1.0 / 12
+                                       : 1 / (angle * angle) -
+                                             (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
   return Matrix3::Identity() + 0.5 * W + c * W * W;
 }
 
 }  // namespace
 
-WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
-                           const Weights& weights, std::size_t row)
+WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s,
+                           const Measurement& measurement, const Weights& weights, std::size_t row)
     : model_(model),
       s_(s),
       measurement_(measurement),
-      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.beside(measurement, row))),
-      inverse_rotation_sigma_(1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
+      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell),
+                                    weights.beside(measurement, row))),
+      inverse_rotation_sigma_(
+          1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
 
-bool WeightedPose::evaluate_gauge(const Eigen::VectorXd& values, double* residuals, double* jacobian) const {
+bool WeightedPose::evaluate_gauge(const Eigen::VectorXd& values, double* residuals,
+                                  double* jacobian) const {
   Eigen::RowVectorXd J;
-  const double told =
-      predicted_gauge(model_, measurement_.context, *measurement_.gauge, values, jacobian != nullptr ? &J : nullptr);
+  const double told = predicted_gauge(model_, measurement_.context, *measurement_.gauge, values,
+                                      jacobian != nullptr ? &J : nullptr);
   *residuals = inverse_sigma_ * (measurement_.gauge->value - told);
   for (Eigen::Index k = 0; jacobian != nullptr && k < s_.scale.size(); ++k)
     jacobian[k] = -inverse_sigma_ * s_.scale(k) * J(s_.free[static_cast<std::size_t>(k)]);
@@ -56,7 +61,8 @@ bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian
     r.tail<3>() = inverse_rotation_sigma_ * turn;
   }
   if (jacobian != nullptr) {
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(jacobian, size(), F);
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
+        jacobian, size(), F);
     // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
     const Matrix3 by_turn = -inverse_rotation_sigma_ * right_jacobian_inverse(turn);
     for (Eigen::Index k = 0; k < F; ++k) {

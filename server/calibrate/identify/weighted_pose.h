@@ -7,20 +7,23 @@
 
 namespace trammel {
 
-/// One measurement: its residual in units of sigma, as a function of the F parameters that are to be found, in units of
-/// their scale. Keeps references to its arguments.
+/// One measurement: its residual in units of sigma, as a function of the F parameters that are to
+/// be found, in units of their scale. Keeps references to its arguments.
 class WeightedPose {
  public:
   /// `row`: its place in the batch that the weights are of.
-  WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
-               const Weights& weights, std::size_t row = 0);
+  WeightedPose(const PhysicalModel& model, const ScaledParameters& s,
+               const Measurement& measurement, const Weights& weights, std::size_t row = 0);
 
   /// How many equations: 6, 3 without an orientation, 1 of a gauge.
   [[nodiscard]] int size() const { return measurement_.gauge ? 1 : measurement_.R_WT ? 6 : 3; }
-  /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null. False: not finite.
+  /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null.
+  /// False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;
-  [[nodiscard]] double inverse_sigma() const { return inverse_sigma_; }                    ///< 1/m
-  [[nodiscard]] double inverse_rotation_sigma() const { return inverse_rotation_sigma_; }  ///< 1/rad
+  [[nodiscard]] double inverse_sigma() const { return inverse_sigma_; }  ///< 1/m
+  [[nodiscard]] double inverse_rotation_sigma() const {
+    return inverse_rotation_sigma_;
+  }  ///< 1/rad
   /// The norm of the residuals that 1 in 1000 good poses exceeds.
   [[nodiscard]] double huber_limit() const;
 

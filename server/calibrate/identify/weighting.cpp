@@ -18,9 +18,11 @@ constexpr double kSuspectGauge = 4.89;  // the same of 1 axis
 constexpr double kSettledSigma = 2e-3;  // relative: a sigma that changes by less weighs the same
 constexpr int kBisections = 100;        // more than a double has bits
 constexpr double kLeastOwn = 0.25;      // of the stated variance, that no other position shares
-constexpr double kLeastShare = 0.05;    // of the axes of few poses, that no parameter is taken to be fitted to
+constexpr double kLeastShare =
+    0.05;  // of the axes of few poses, that no parameter is taken to be fitted to
 
-/// Squared residuals, each of so many axes, with their variances and how often the model's own enters them.
+/// Squared residuals, each of so many axes, with their variances and how often the model's own
+/// enters them.
 struct Squares {
   std::vector<double> square, variance, times;
   double axes = 0;
@@ -33,12 +35,13 @@ struct Squares {
   }
 };
 
-/// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory variance); 0 where
-/// the residuals are no larger than their sigmas.
+/// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory
+/// variance); 0 where the residuals are no larger than their sigmas.
 double surplus(const Squares& r, double freedom) {
   const auto chi2 = [&](double s) {
     double sum = 0;
-    for (std::size_t i = 0; i < r.square.size(); ++i) sum += r.square[i] / (r.variance[i] + r.times[i] * s * s);
+    for (std::size_t i = 0; i < r.square.size(); ++i)
+      sum += r.square[i] / (r.variance[i] + r.times[i] * s * s);
     return sum;
   };
   if (r.square.empty() || freedom <= 0 || chi2(0) <= freedom) return 0;
@@ -63,8 +66,8 @@ double sigmas_of_gauge(const Residuals& r, Eigen::Index i, const Weights& weight
   return std::abs(r.gauge(i)) / std::sqrt(variance_of_gauge(r, i, weights));
 }
 
-/// Positions and gauges: the model's own error is the same in any direction. With `weights` without what is a suspect
-/// under them.
+/// Positions and gauges: the model's own error is the same in any direction. With `weights` without
+/// what is a suspect under them.
 Squares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
   Squares lengths;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
@@ -104,10 +107,10 @@ SeenTogether seen_together(const Residuals& r, const std::vector<Eigen::Index>& 
   return seen;
 }
 
-/// m per axis: what the means of positions at one joint vector are off by beyond their sigmas, no more than each of
-/// them is with the `discrepancy`. 0 where none are together.
-double shared_by_poses(const Residuals& r, const Freedom& freedom, double discrepancy, const Weights& before,
-                       bool drop_suspects) {
+/// m per axis: what the means of positions at one joint vector are off by beyond their sigmas, no
+/// more than each of them is with the `discrepancy`. 0 where none are together.
+double shared_by_poses(const Residuals& r, const Freedom& freedom, double discrepancy,
+                       const Weights& before, bool drop_suspects) {
   if (r.together.empty()) return 0;
   Squares means;
   double most = std::pow(discrepancy, 2);
@@ -119,12 +122,14 @@ double shared_by_poses(const Residuals& r, const Freedom& freedom, double discre
     means.add(seen.mean.squaredNorm(), sigma, 1, 3);
   }
   const double axes = 3.0 * static_cast<double>(r.together.size());
-  return std::min(std::sqrt(most), surplus(means, means.axes * std::max(kLeastShare, 1 - freedom.means / axes)));
+  return std::min(std::sqrt(most),
+                  surplus(means, means.axes * std::max(kLeastShare, 1 - freedom.means / axes)));
 }
 
-/// Nat, of positions that share an error at one joint vector (compound symmetry): of their mean, and of what sets them
-/// apart.
-double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Index>& columns, const Weights& weights) {
+/// Nat, of positions that share an error at one joint vector (compound symmetry): of their mean,
+/// and of what sets them apart.
+double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Index>& columns,
+                               const Weights& weights) {
   const SeenTogether seen = seen_together(r, columns);
   const double all = seen.variance + std::pow(weights.discrepancy, 2);
   const double own = std::max(kLeastOwn * seen.variance, all - std::pow(weights.of_pose, 2));
@@ -132,15 +137,20 @@ double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Inde
   const double limit = kSuspect * kSuspect;
   const double square = std::min(seen.count * seen.mean.squaredNorm() / of_sum, limit) +
                         std::min(seen.apart / own, (seen.count - 1) * limit);
-  return -0.5 * square - 1.5 * (std::log(2 * kPi * of_sum) + (seen.count - 1) * std::log(2 * kPi * own));
+  return -0.5 * square -
+         1.5 * (std::log(2 * kPi * of_sum) + (seen.count - 1) * std::log(2 * kPi * own));
 }
 
 /// Of so many axes, the part that no parameter was fitted to.
-double share_left(double freedom, double axes) { return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0; }
+double share_left(double freedom, double axes) {
+  return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0;
+}
 
 }  // namespace
 
-double position_sigma(const Measurement& m, const Cell& cell) { return m.sigma.value_or(cell.tracker.sigma); }
+double position_sigma(const Measurement& m, const Cell& cell) {
+  return m.sigma.value_or(cell.tracker.sigma);
+}
 
 double rotation_sigma(const Measurement& m, const Cell& cell) {
   return m.sigma_rotation.value_or(cell.tracker.sigma_rotation);
@@ -153,10 +163,12 @@ double Weights::beside(const Measurement& m, std::size_t row) const {
 }
 
 Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch) {
-  return {found.discrepancy, found.discrepancy_rotation, true, found.discrepancy_of_pose, counted_together(batch)};
+  return {found.discrepancy, found.discrepancy_rotation, true, found.discrepancy_of_pose,
+          counted_together(batch)};
 }
 
-std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch, const Residuals& r) {
+std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch,
+                                                        const Residuals& r) {
   std::vector<Eigen::Index> column_of(batch.measurements.size(), -1);
   for (Eigen::Index column = 0; column < r.position.cols(); ++column)
     column_of[static_cast<std::size_t>(r.positions[static_cast<std::size_t>(column)])] = column;
@@ -171,11 +183,13 @@ std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& 
 double gauged_poses(const Measurement& m) { return m.gauge && m.gauge->minus != nullptr ? 2 : 1; }
 
 double Residuals::rms() const {
-  if (position.cols() > 0) return std::sqrt(position.squaredNorm() / static_cast<double>(position.cols()));
+  if (position.cols() > 0)
+    return std::sqrt(position.squaredNorm() / static_cast<double>(position.cols()));
   return gauge.size() == 0 ? 0 : std::sqrt(gauge.squaredNorm() / static_cast<double>(gauge.size()));
 }
 
-Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch, const Eigen::VectorXd& values) {
+Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch,
+                       const Eigen::VectorXd& values) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
   Residuals r{Eigen::Matrix3Xd(3, n),
               Eigen::Matrix3Xd(3, n),
@@ -215,25 +229,30 @@ Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch
   return r;
 }
 
-Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before, bool drop_suspects) {
+Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before,
+                          bool drop_suspects) {
   const Squares turns = turns_of(r);
-  const double lengths = 3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size());
+  const double lengths =
+      3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size());
   const Squares trusted = lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
-  const double discrepancy = surplus(trusted, trusted.axes * share_left(freedom.positions, lengths));
+  const double discrepancy =
+      surplus(trusted, trusted.axes * share_left(freedom.positions, lengths));
   return {discrepancy, surplus(turns, turns.axes * share_left(freedom.turns, turns.axes)), true,
           shared_by_poses(r, freedom, discrepancy, before, drop_suspects), before.together};
 }
 
 bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker) {
   const auto settled = [](double sigma, double a, double b) {
-    return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <= kSettledSigma * std::hypot(sigma, a);
+    return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <=
+           kSettledSigma * std::hypot(sigma, a);
   };
   return before.estimated && settled(tracker.sigma, now.discrepancy, before.discrepancy) &&
          settled(tracker.sigma, now.of_pose, before.of_pose) &&
          settled(tracker.sigma_rotation, now.discrepancy_rotation, before.discrepancy_rotation);
 }
 
-Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r,
+                           const Weights& weights) {
   Eigen::VectorXd farness(static_cast<Eigen::Index>(batch.measurements.size()));
   for (Eigen::Index i = 0; i < r.position.cols(); ++i)
     farness(r.positions[static_cast<std::size_t>(i)]) = sigmas_of(r, i, weights) / kSuspect;
@@ -242,26 +261,31 @@ Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r, co
   return farness;
 }
 
-std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r,
+                                const Weights& weights) {
   std::vector<SuspectPose> all;
   const auto add = [&](Eigen::Index measurement, double distance, double sigmas) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(measurement)];
     all.push_back({m.pose_id, m.row, distance, sigmas});
   };
   for (Eigen::Index i = 0; i < r.position.cols(); ++i)
-    add(r.positions[static_cast<std::size_t>(i)], r.position.col(i).norm(), sigmas_of(r, i, weights));
+    add(r.positions[static_cast<std::size_t>(i)], r.position.col(i).norm(),
+        sigmas_of(r, i, weights));
   for (Eigen::Index i = 0; i < r.gauge.size(); ++i)
-    add(r.gauges[static_cast<std::size_t>(i)], std::abs(r.gauge(i)), sigmas_of_gauge(r, i, weights));
+    add(r.gauges[static_cast<std::size_t>(i)], std::abs(r.gauge(i)),
+        sigmas_of_gauge(r, i, weights));
   return all;
 }
 
-std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,
+                                     const Weights& weights) {
   const std::vector<SuspectPose> all = off_by(batch, r, weights);
   const auto positions = static_cast<std::size_t>(r.position.cols());
   std::vector<SuspectPose> suspects;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (all[i].sigmas > (i < positions ? kSuspect : kSuspectGauge)) suspects.push_back(all[i]);
-  std::sort(suspects.begin(), suspects.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  std::sort(suspects.begin(), suspects.end(),
+            [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   return suspects;
 }
 
@@ -272,7 +296,8 @@ double log_likelihood(const Residuals& r, const Weights& weights) {
     const double square = std::min(residual.squaredNorm() / variance, kSuspect * kSuspect);
     sum -= 0.5 * square + 1.5 * std::log(2 * kPi * variance);
   };
-  for (const std::vector<Eigen::Index>& columns : r.together) sum += log_likelihood_together(r, columns, weights);
+  for (const std::vector<Eigen::Index>& columns : r.together)
+    sum += log_likelihood_together(r, columns, weights);
   for (Eigen::Index i = 0; r.together.empty() && i < r.position.cols(); ++i)
     add(r.position.col(i), r.sigma(i), weights.discrepancy);
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {

@@ -13,38 +13,40 @@ struct Weights {
   double discrepancy = 0;           ///< m per axis
   double discrepancy_rotation = 0;  ///< rad per axis
   bool estimated = false;           ///< false: not yet, the measurement's sigma counts alone
-  double of_pose = 0;               ///< m per axis: what positions at one joint vector share of the discrepancy
+  double of_pose = 0;  ///< m per axis: what positions at one joint vector share of the discrepancy
 
   std::vector<int> together = {};  ///< of each row of the batch: counted_together()
 
-  /// m per axis: what `m`, that `row` of the batch, is weighed with beside its own sigma. A gauge that is told against
-  /// another pose has twice the variance; positions at one joint vector weigh together as one pose as far as they share
-  /// the error.
+  /// m per axis: what `m`, that `row` of the batch, is weighed with beside its own sigma. A gauge
+  /// that is told against another pose has twice the variance; positions at one joint vector weigh
+  /// together as one pose as far as they share the error.
   [[nodiscard]] double beside(const Measurement& m, std::size_t row) const;
 };
 /// Those under which `found` was found, for the rows of `batch`.
 [[nodiscard]] Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch);
 
-/// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's own, else the
-/// tracker's.
+/// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's
+/// own, else the tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
 /// The same of the measured orientation, rad.
 [[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
-/// At how many poses the model's own error enters: 1, or 2 of a gauge that is told against another pose.
+/// At how many poses the model's own error enters: 1, or 2 of a gauge that is told against another
+/// pose.
 [[nodiscard]] double gauged_poses(const Measurement& m);
 
 /// Measured - predicted in W, SI. Without gauges column i is of measurement i.
 struct Residuals {
-  Eigen::Matrix3Xd position;                    ///< 3 x N, of the measurements that have a position
-  Eigen::Matrix3Xd rotation;                    ///< 3 x M, rotation vectors of the poses that have an orientation
-  Eigen::VectorXd sigma;                        ///< N, of the measured positions
-  Eigen::VectorXd sigma_rotation;               ///< M, of the measured orientations
-  std::vector<Eigen::Index> positions, gauges;  ///< which measurement each is of; empty gauges: all have positions
-  Eigen::VectorXd gauge;                        ///< G, m
+  Eigen::Matrix3Xd position;  ///< 3 x N, of the measurements that have a position
+  Eigen::Matrix3Xd rotation;  ///< 3 x M, rotation vectors of the poses that have an orientation
+  Eigen::VectorXd sigma;      ///< N, of the measured positions
+  Eigen::VectorXd sigma_rotation;  ///< M, of the measured orientations
+  std::vector<Eigen::Index> positions,
+      gauges;             ///< which measurement each is of; empty gauges: all have positions
+  Eigen::VectorXd gauge;  ///< G, m
   Eigen::VectorXd sigma_gauge, poses_of_gauge;  ///< G: standard deviations; gauged_poses()
-  /// Columns of `position` that stand at one joint vector; empty where none are together, or nobody asked
-  /// (columns_together()).
+  /// Columns of `position` that stand at one joint vector; empty where none are together, or nobody
+  /// asked (columns_together()).
   std::vector<std::vector<Eigen::Index>> together;
 
   /// m: rms of the Euclidean residuals of the positions; where there are none, of the gauges.
@@ -59,28 +61,30 @@ struct Residuals {
 [[nodiscard]] std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch,
                                                                       const Residuals& r);
 
-/// How many parameters were fitted to the residuals of either kind: what each kind decides, not the priors.
+/// How many parameters were fitted to the residuals of either kind: what each kind decides, not the
+/// priors.
 struct Freedom {
   double positions = 0;  ///< and gauges
   double turns = 0;
   double means = 0;  ///< to the means of the positions at one joint vector
 };
 
-/// The discrepancies under which the residuals are as large as expected after these parameters were fitted to them.
-/// `drop_suspects`: positions that are suspects under `before` do not count.
-[[nodiscard]] Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before,
-                                        bool drop_suspects);
+/// The discrepancies under which the residuals are as large as expected after these parameters were
+/// fitted to them. `drop_suspects`: positions that are suspects under `before` do not count.
+[[nodiscard]] Weights estimated_weights(const Residuals& r, const Freedom& freedom,
+                                        const Weights& before, bool drop_suspects);
 /// Whether measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
 /// How far each measurement is off: 1 as far as 1 in 10^6 good ones.
-[[nodiscard]] Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights);
+[[nodiscard]] Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r,
+                                         const Weights& weights);
 /// How far each measurement is off, those with a position first.
 [[nodiscard]] std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r,
                                               const Weights& weights);
 /// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.
-[[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,
-                                                   const Weights& weights);
+[[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch,
+                                                   const Residuals& r, const Weights& weights);
 
 /// Nat. A suspect counts as if it were just at the limit: one bad pose is no proof against a model.
 [[nodiscard]] double log_likelihood(const Residuals& r, const Weights& weights);

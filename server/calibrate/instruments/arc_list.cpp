@@ -21,7 +21,8 @@ Status check_robot(const Chain& robot, const ArcList& arcs) {
   for (int j = 0; j < robot.size(); ++j) {
     for (int before = 0; before < j; ++before) {
       if (robot.transmission()(before, j) == 0) continue;
-      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1)
+      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(),
+                     before + 1, j + 1)
           .of(fmt::format("joint {}", before + 1));
     }
   }
@@ -35,7 +36,8 @@ Status check_robot(const Chain& robot, const ArcList& arcs) {
   return {};
 }
 
-/// Refuses an arc of a joint that slides, and one that slides while arcs are drawn: no arc shows where its axis is.
+/// Refuses an arc of a joint that slides, and one that slides while arcs are drawn: no arc shows
+/// where its axis is.
 Status check_slides(const Chain& robot, const ArcList& arcs) {
   for (const ArcPoint& point : arcs.points) {
     for (int j = 0; j < robot.size(); ++j) {
@@ -50,13 +52,15 @@ Status check_slides(const Chain& robot, const ArcList& arcs) {
       }
       const double place = point.q(j), before = arcs.points.front().q(j);
       if (std::abs(place - before) < kSameAngle) continue;
-      return refused("joint {} slides, and is at {:.3f} mm here, at {:.3f} mm before", j + 1, to_mm(place),
-                     to_mm(before))
+      return refused("joint {} slides, and is at {:.3f} mm here, at {:.3f} mm before", j + 1,
+                     to_mm(place), to_mm(before))
           .in(arcs.where)
           .at_row(point.row)
           .of(joint_column(j, JointType::kPrismatic))
           .beyond(to_mm(place), to_mm(before))
-          .next("hold it at one place while all arcs are drawn: no arc shows along which line it slides");
+          .next(
+              "hold it at one place while all arcs are drawn: no arc shows along which line it "
+              "slides");
     }
   }
   return {};
@@ -70,7 +74,8 @@ struct ArcColumns {
   PoseColumns posture;  ///< of the joints that are held; without columns they are at zero
 };
 
-Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where, const Chain& robot) {
+Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where,
+                                const Chain& robot) {
   PoseColumns posture = TRY(PoseColumns::find(table));
   const std::size_t held = posture.joint_types().size();
   if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
@@ -90,7 +95,8 @@ Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where,
                     .posture = std::move(posture)};
 }
 
-Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcColumns& columns, const Chain& robot) {
+Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcColumns& columns,
+                            const Chain& robot) {
   const int joint = TRY(table.integer(row, columns.joint, 1, robot.size()));
   ArcPoint point;
   point.joint = joint - 1;
@@ -112,7 +118,8 @@ Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcCol
 
 }  // namespace
 
-Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot) {
+Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where,
+                               const Chain& robot) {
   const CsvTable table = TRY(CsvTable::parse(text, where));
   const ArcColumns columns = TRY(find_columns(table, where, robot));
   ArcList arcs{where, {}};
@@ -124,7 +131,8 @@ Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where
 }
 
 Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_arcs_csv(text, path, robot); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_arcs_csv(text, path, robot); });
 }
 
 namespace {
@@ -132,27 +140,31 @@ namespace {
 constexpr std::size_t kFewestOfArc = 3;        // points that a circle in space goes through
 constexpr std::size_t kFewestToTellSigma = 5;  // points that leave two equations over
 
-Status check_size(const std::vector<const ArcPoint*>& points, const ArcList& arcs, bool sigma_stated) {
+Status check_size(const std::vector<const ArcPoint*>& points, const ArcList& arcs,
+                  bool sigma_stated) {
   const std::size_t least = sigma_stated ? kFewestOfArc : kFewestToTellSigma;
   if (points.size() >= least) return {};
-  return refused("the arc of joint {} has {} points, at least {} are needed{}", points.front()->joint + 1,
-                 points.size(), least, sigma_stated ? "" : " where sigma is not stated")
+  return refused("the arc of joint {} has {} points, at least {} are needed{}",
+                 points.front()->joint + 1, points.size(), least,
+                 sigma_stated ? "" : " where sigma is not stated")
       .in(arcs.where)
       .at_row(points.front()->row)
       .of("joint")
       .beyond(points.size(), least);
 }
 
-/// Refuses an arc during which a held joint moves. Joints before the turning one must be where they were for the
-/// joint's other arcs, too: another reflector may be read with the joints beyond it elsewhere.
-Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& group, const ArcList& arcs) {
+/// Refuses an arc during which a held joint moves. Joints before the turning one must be where they
+/// were for the joint's other arcs, too: another reflector may be read with the joints beyond it
+/// elsewhere.
+Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& group,
+                  const ArcList& arcs) {
   const int turning = points.front()->joint;
   for (const ArcPoint* point : points) {
     for (int j = 0; j < static_cast<int>(point->q.size()); ++j) {
       const double from = j < turning ? group.posture(j) : points.front()->q(j);
       if (j == turning || std::abs(point->q(j) - from) < kSameAngle) continue;
-      return refused("joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", j + 1, to_deg(point->q(j)),
-                     to_deg(from), turning + 1)
+      return refused("joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", j + 1,
+                     to_deg(point->q(j)), to_deg(from), turning + 1)
           .in(arcs.where)
           .at_row(point->row)
           .of(fmt::format("q{}_deg", j + 1))
@@ -164,11 +176,13 @@ Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& g
 
 }  // namespace
 
-Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs, bool sigma_stated) {
+Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs,
+                                               bool sigma_stated) {
   TRY(check_robot(robot, arcs));
   TRY(check_slides(robot, arcs));
   std::map<std::pair<int, std::string>, std::vector<const ArcPoint*>> by_arc;
-  for (const ArcPoint& point : arcs.points) by_arc[{point.joint, point.reflector}].push_back(&point);
+  for (const ArcPoint& point : arcs.points)
+    by_arc[{point.joint, point.reflector}].push_back(&point);
   std::vector<JointArcs> joints(static_cast<std::size_t>(robot.size()));
   for (const auto& [key, points] : by_arc) {
     JointArcs& group = joints[static_cast<std::size_t>(key.first)];

@@ -23,11 +23,12 @@ struct ArcList {
   std::vector<ArcPoint> points;
 };
 
-/// Reads `joint,q_deg,x_mm,y_mm,z_mm`: number of the joint from 1, its angle, the reflector in W. Optional:
-/// `reflector`, and `q1_deg` ... `qn_deg`, where the other joints are held; without these columns they are at zero.
-/// Refuses a missing column, what is no number, a joint that the robot has not, and postures with another number of
-/// joints.
-[[nodiscard]] Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot);
+/// Reads `joint,q_deg,x_mm,y_mm,z_mm`: number of the joint from 1, its angle, the reflector in W.
+/// Optional: `reflector`, and `q1_deg` ... `qn_deg`, where the other joints are held; without these
+/// columns they are at zero. Refuses a missing column, what is no number, a joint that the robot
+/// has not, and postures with another number of joints.
+[[nodiscard]] Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where,
+                                             const Chain& robot);
 [[nodiscard]] Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot);
 
 /// The points of one joint, arc by arc. Points into the list it was made from.
@@ -37,10 +38,12 @@ struct JointArcs {
   std::vector<std::vector<const ArcPoint*>> arcs;
 };
 
-/// An entry for each joint; one that slides has no arcs. Refuses joints that follow another, whose axis moves; a
-/// turning joint without arc; arcs of a sliding one, and one that is not at the same place throughout; an arc of fewer
-/// than 3 points, or 5 where sigma is not stated; held joints that move.
-[[nodiscard]] Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs,
+/// An entry for each joint; one that slides has no arcs. Refuses joints that follow another, whose
+/// axis moves; a turning joint without arc; arcs of a sliding one, and one that is not at the same
+/// place throughout; an arc of fewer than 3 points, or 5 where sigma is not stated; held joints
+/// that move.
+[[nodiscard]] Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot,
+                                                             const ArcList& arcs,
                                                              bool sigma_stated);
 
 }  // namespace trammel

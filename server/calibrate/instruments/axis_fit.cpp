@@ -10,12 +10,15 @@ namespace trammel {
 
 namespace {
 
-constexpr double kMostAngleOff = from_deg(1);  // turned against commanded: ten times what gears of an arm are off
-constexpr double kLine = 1e-8;                 // ratio of variances across and along: below it points are on a line
-constexpr int kMostSteps = 50;                 // arcs are so nearly circles that a few are enough
-constexpr double kLastStep = 1e-12;            // m, rad: rounding
+constexpr double kMostAngleOff =
+    from_deg(1);  // turned against commanded: ten times what gears of an arm are off
+constexpr double kLine =
+    1e-8;  // ratio of variances across and along: below it points are on a line
+constexpr int kMostSteps = 50;       // arcs are so nearly circles that a few are enough
+constexpr double kLastStep = 1e-12;  // m, rad: rounding
 
-/// Plane by the smallest singular vector of the centred points, circle in it by the linear (algebraic) form.
+/// Plane by the smallest singular vector of the centred points, circle in it by the linear
+/// (algebraic) form.
 std::size_t points_of(const JointArcs& group) {
   std::size_t points = 0;
   for (const auto& arc : group.arcs) points += arc.size();
@@ -28,13 +31,14 @@ Matrix3 scatter_of(const JointArcs& group) {
   for (const auto& arc : group.arcs) {
     Vector3 mean = Vector3::Zero();
     for (const ArcPoint* point : arc) mean += point->p_W / static_cast<double>(arc.size());
-    for (const ArcPoint* point : arc) scatter += (point->p_W - mean) * (point->p_W - mean).transpose();
+    for (const ArcPoint* point : arc)
+      scatter += (point->p_W - mean) * (point->p_W - mean).transpose();
   }
   return scatter;
 }
 
-/// The common centre across the axis, by |p|^2 = 2 x u + 2 y v + w with one centre (u, v) and one w an arc; nothing
-/// where the points do not tell it.
+/// The common centre across the axis, by |p|^2 = 2 x u + 2 y v + w with one centre (u, v) and one w
+/// an arc; nothing where the points do not tell it.
 std::optional<Vector3> rough_centre(const JointArcs& group, const Eigen::Matrix<double, 3, 2>& uv) {
   const auto arcs = static_cast<Eigen::Index>(group.arcs.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(points_of(group)), 2 + arcs);
@@ -55,7 +59,8 @@ std::optional<Vector3> rough_centre(const JointArcs& group, const Eigen::Matrix<
   return origin + uv * solution.head<2>();
 }
 
-/// Plane by the smallest singular vector of the centred points, circle in it by the linear (algebraic) form.
+/// Plane by the smallest singular vector of the centred points, circle in it by the linear
+/// (algebraic) form.
 Result<AxisFit> rough_fit(const JointArcs& group, const std::string& where) {
   const Eigen::SelfAdjointEigenSolver<Matrix3> spread(scatter_of(group));
   AxisFit fit;
@@ -156,15 +161,17 @@ Result<AxisFit> axis_fit(const JointArcs& group, const std::string& where) {
   const Linearised last = linearised(fit, group);
   fit.cost = last.residual.squaredNorm();
   fit.freedom = static_cast<int>(last.jacobian.rows() - last.jacobian.cols());
-  fit.normal_inverse = (last.jacobian.transpose() * last.jacobian)
-                           .ldlt()
-                           .solve(Eigen::MatrixXd::Identity(last.jacobian.cols(), last.jacobian.cols()));
+  fit.normal_inverse =
+      (last.jacobian.transpose() * last.jacobian)
+          .ldlt()
+          .solve(Eigen::MatrixXd::Identity(last.jacobian.cols(), last.jacobian.cols()));
   return fit;
 }
 
 namespace {
 
-/// Angles turned against angles commanded, in one sense of turning; the mean difference of each arc is left out.
+/// Angles turned against angles commanded, in one sense of turning; the mean difference of each arc
+/// is left out.
 struct Disagreement {
   double sum = 0;    // of squares, rad²
   double worst = 0;  // rad
@@ -206,9 +213,11 @@ Disagreement disagreement(const AxisFit& fit, const JointArcs& group, int sense)
 AxisFit reversed(const AxisFit& fit) {
   AxisFit turned = fit;
   turned.n = -fit.n;
-  // The columns of across(-n) differ from those of across(n): the covariance of the changes turns with them.
+  // The columns of across(-n) differ from those of across(n): the covariance of the changes turns
+  // with them.
   const Eigen::Matrix2d change = across(turned.n).transpose() * across(fit.n);
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(fit.normal_inverse.rows(), fit.normal_inverse.cols());
+  Eigen::MatrixXd basis =
+      Eigen::MatrixXd::Identity(fit.normal_inverse.rows(), fit.normal_inverse.cols());
   basis.topLeftCorner<2, 2>() = -change;
   basis.block<2, 2>(2, 2) = change;
   for (std::size_t k = 0; k < fit.height.size(); ++k) {
@@ -228,8 +237,8 @@ Result<double> orient(AxisFit& fit, const JointArcs& group, const std::string& w
   if (against.sum < with.sum) fit = reversed(fit);
   const Disagreement& least = against.worst < with.worst ? against : with;
   if (least.worst > kMostAngleOff) {
-    return refused("joint {} turned {:.3f} deg away from its commanded angle, limit {:.0f} deg", group.joint + 1,
-                   to_deg(least.worst), to_deg(kMostAngleOff))
+    return refused("joint {} turned {:.3f} deg away from its commanded angle, limit {:.0f} deg",
+                   group.joint + 1, to_deg(least.worst), to_deg(kMostAngleOff))
         .in(where)
         .at_row(least.worst_row)
         .of("q_deg")

@@ -42,8 +42,10 @@ std::vector<NamedMember> members_of(const Chain& robot) {
 std::string why_not_measured(const NamedMember& member, const TurningJoints& turning) {
   if (member.joint >= turning.last) return "the last link: nothing marks the flange";
   if (member.joint != turning.first) return {};
-  if (member.member == &LinkGeometry::theta) return "nothing marks the base's azimuth: x0 is conventional";
-  if (member.member == &LinkGeometry::d) return "nothing marks the base's height: the origin on axis 1 is conventional";
+  if (member.member == &LinkGeometry::theta)
+    return "nothing marks the base's azimuth: x0 is conventional";
+  if (member.member == &LinkGeometry::d)
+    return "nothing marks the base's height: the origin on axis 1 is conventional";
   return {};
 }
 
@@ -77,14 +79,16 @@ std::vector<AxisLine> lines_of(const Fits& fits) {
   return lines;
 }
 
-Result<Links> links_by(const Fits& fits, const std::vector<JointArcs>& groups, const std::vector<AxisLine>& measured) {
+Result<Links> links_by(const Fits& fits, const std::vector<JointArcs>& groups,
+                       const std::vector<AxisLine>& measured) {
   return links_of(fits.robot, at_zero(fits.robot, groups, measured), fits.held);
 }
 
-/// Deviations with axis `i` changed by `step` in one of its four small changes: two turns, two shifts.
+/// Deviations with axis `i` changed by `step` in one of its four small changes: two turns, two
+/// shifts.
 Result<Eigen::VectorXd> changed_deviations(const std::vector<JointArcs>& groups, const Fits& fits,
-                                           const std::vector<NamedMember>& members, std::size_t i, int change,
-                                           double step) {
+                                           const std::vector<NamedMember>& members, std::size_t i,
+                                           int change, double step) {
   const AxisFit& fit = fits.axes[i];
   std::vector<AxisLine> lines = lines_of(fits);
   AxisLine& line = lines[static_cast<std::size_t>(fits.joints[i])];
@@ -98,14 +102,16 @@ Result<Eigen::VectorXd> changed_deviations(const std::vector<JointArcs>& groups,
   return deviations(fits.robot, members, links.links);
 }
 
-/// Covariance of the deviations: first derivatives by central differences, a step of one standard deviation each way.
+/// Covariance of the deviations: first derivatives by central differences, a step of one standard
+/// deviation each way.
 Result<Eigen::MatrixXd> propagated(const std::vector<JointArcs>& groups, const Fits& fits,
                                    const std::vector<NamedMember>& members) {
   const auto size = static_cast<Eigen::Index>(members.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
   for (std::size_t i = 0; i < fits.axes.size(); ++i) {
     const AxisFit& fit = fits.axes[i];
-    const Eigen::Matrix4d small = fit.normal_inverse.topLeftCorner<4, 4>() * (fits.variance[i] * fits.widening[i]);
+    const Eigen::Matrix4d small =
+        fit.normal_inverse.topLeftCorner<4, 4>() * (fits.variance[i] * fits.widening[i]);
     Eigen::MatrixXd J(size, 4);
     for (int k = 0; k < 4; ++k) {
       const double step = std::max(std::sqrt(small(k, k)), kLeastStep);
@@ -122,10 +128,13 @@ Result<Eigen::MatrixXd> propagated(const std::vector<JointArcs>& groups, const F
 /// Worst direction's U(k=2) of a symmetric covariance.
 double worst_u(const Eigen::MatrixXd& covariance) {
   return kExpanded *
-         std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().maxCoeff()));
+         std::sqrt(std::max(
+             0.0,
+             Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().maxCoeff()));
 }
 
-void describe_circles(const JointArcs& group, const AxisFit& fit, double variance, std::vector<CircleFit>& circles) {
+void describe_circles(const JointArcs& group, const AxisFit& fit, double variance,
+                      std::vector<CircleFit>& circles) {
   const Linearised last = linearised(fit, group);
   const auto uv = across(fit.n);
   Eigen::Index row = 0;
@@ -137,7 +146,9 @@ void describe_circles(const JointArcs& group, const AxisFit& fit, double varianc
     circle.points = static_cast<int>(arc.size());
     circle.centre_W = fit.centre(k);
     circle.radius = fit.radius[k];
-    const auto by_angle = [&](const ArcPoint* a, const ArcPoint* b) { return a->q(group.joint) < b->q(group.joint); };
+    const auto by_angle = [&](const ArcPoint* a, const ArcPoint* b) {
+      return a->q(group.joint) < b->q(group.joint);
+    };
     const auto [low, high] = std::minmax_element(arc.begin(), arc.end(), by_angle);
     circle.span = (*high)->q(group.joint) - (*low)->q(group.joint);
     for (std::size_t p = 0; p < arc.size(); ++p, row += 2) {
@@ -146,7 +157,8 @@ void describe_circles(const JointArcs& group, const AxisFit& fit, double varianc
     }
     circle.plane_rms = std::sqrt(circle.plane_rms / circle.points);
     circle.circle_rms = std::sqrt(circle.circle_rms / circle.points);
-    Eigen::MatrixXd to_centre = Eigen::MatrixXd::Zero(3, fit.normal_inverse.cols());  // c + height n
+    Eigen::MatrixXd to_centre =
+        Eigen::MatrixXd::Zero(3, fit.normal_inverse.cols());  // c + height n
     to_centre.leftCols<2>() = fit.height[k] * uv;
     to_centre.middleCols<2>(2) = uv;
     to_centre.col(4 + 2 * static_cast<Eigen::Index>(k)) = fit.n;
@@ -196,8 +208,9 @@ Status add_joint(const JointArcs& group, const ArcList& arcs, double stated_sigm
 }
 
 /// One number of the kinematic table; `variance` of its deviation.
-Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Fits& fits, double deviation,
-                                             double variance, const std::string& where) {
+Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Fits& fits,
+                                             double deviation, double variance,
+                                             const std::string& where) {
   MeasuredParameter parameter;
   parameter.name = fmt::format("{}{}", member.symbol, member.joint + 1);
   parameter.length = member.length;
@@ -210,8 +223,8 @@ Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Fi
   const double limit = member.length ? kMostLengthDeviation : kMostAngleDeviation;
   if (std::abs(deviation) < limit) return parameter;
   const auto shown = [&](double si) { return member.length ? to_mm(si) : to_deg(si); };
-  return refused("{} is {:.3f} {} from that of robot {}, limit {:.0f}", parameter.name, shown(deviation),
-                 member.length ? "mm" : "deg", fits.robot.name(), shown(limit))
+  return refused("{} is {:.3f} {} from that of robot {}, limit {:.0f}", parameter.name,
+                 shown(deviation), member.length ? "mm" : "deg", fits.robot.name(), shown(limit))
       .in(where)
       .of(parameter.name)
       .beyond(shown(deviation), shown(limit))
@@ -233,8 +246,8 @@ Status add_links(const ArcList& arcs, const std::vector<JointArcs>& groups, cons
   result.covariance = TRY(propagated(groups, fits, members));
   for (std::size_t k = 0; k < members.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    result.parameters.push_back(
-        TRY(measured_parameter(members[k], fits, deviation(at), result.covariance(at, at), arcs.where)));
+    result.parameters.push_back(TRY(measured_parameter(members[k], fits, deviation(at),
+                                                       result.covariance(at, at), arcs.where)));
   }
   result.X_WB = links.X_WB;
   result.robot = TRY(with_links(fits.robot, links.links));
@@ -249,7 +262,8 @@ void add_slides(const Chain& robot, const ArcList& arcs, Fits& fits, CirclePoint
     if (!arcs.points.empty()) fits.held(j) = arcs.points.front().q(j);
     result.notes.push_back(
         {"joint_slides", Note::Severity::kInfo,
-         fmt::format("joint {} slides and draws no arc: its row stays as the robot file has it", j + 1)});
+         fmt::format("joint {} slides and draws no arc: its row stays as the robot file has it",
+                     j + 1)});
   }
 }
 
@@ -257,7 +271,8 @@ void add_slides(const Chain& robot, const ArcList& arcs, Fits& fits, CirclePoint
 
 Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
                                                 const CirclePointOptions& options) {
-  const std::vector<JointArcs> groups = TRY(sorted_by_joint(robot, arcs, options.sigma.has_value()));
+  const std::vector<JointArcs> groups =
+      TRY(sorted_by_joint(robot, arcs, options.sigma.has_value()));
   CirclePointResult result;
   result.axes.resize(groups.size());
   Fits fits;

@@ -7,8 +7,9 @@
 #include "server/base/note.h"
 #include "server/calibrate/instruments/arc_list.h"
 
-/// Circle-point analysis, source section 4.1: a reflector on the arm while one joint turns and all others are held
-/// draws an arc; the arcs give the joints' axes, and the axes the link parameters by the DH procedure.
+/// Circle-point analysis, source section 4.1: a reflector on the arm while one joint turns and all
+/// others are held draws an arc; the arcs give the joints' axes, and the axes the link parameters
+/// by the DH procedure.
 namespace trammel {
 
 /// One arc: the circle that fits its points best in space.
@@ -24,14 +25,16 @@ struct CircleFit {
   double circle_rms = 0;  ///< m, distance from the circle within the plane
 };
 
-/// The axis of one joint, from all its arcs together: circles on one axis, each with its own plane and radius.
+/// The axis of one joint, from all its arcs together: circles on one axis, each with its own plane
+/// and radius.
 struct JointAxis {
-  Vector3 direction_W = Vector3::Zero();  ///< unit vector in the kinematic sense, the joints before it at zero
-  Vector3 point_W = Vector3::Zero();      ///< on the axis, the joints before it at zero
-  double direction_u = 0;                 ///< rad, U(k=2) in its worst direction
-  double sigma = 0;                       ///< m, of one coordinate of a point: stated or from the residuals
-  int freedom = 0;                        ///< equations beyond unknowns
-  double angle_rms = 0;                   ///< rad, turned angle against commanded angle, offset removed
+  Vector3 direction_W =
+      Vector3::Zero();  ///< unit vector in the kinematic sense, the joints before it at zero
+  Vector3 point_W = Vector3::Zero();  ///< on the axis, the joints before it at zero
+  double direction_u = 0;             ///< rad, U(k=2) in its worst direction
+  double sigma = 0;      ///< m, of one coordinate of a point: stated or from the residuals
+  int freedom = 0;       ///< equations beyond unknowns
+  double angle_rms = 0;  ///< rad, turned angle against commanded angle, offset removed
 };
 
 /// One number of the robot file, measured.
@@ -46,30 +49,36 @@ struct MeasuredParameter {
 };
 
 struct CirclePointOptions {
-  std::optional<double> sigma;  ///< m, of one coordinate; the residuals can only raise it. Empty: from the residuals
+  std::optional<double>
+      sigma;  ///< m, of one coordinate; the residuals can only raise it. Empty: from the residuals
 };
 
 struct CirclePointResult {
   std::vector<CircleFit> circles;  ///< in the order of joints
   std::vector<JointAxis> axes;     ///< one a joint; of a joint that slides without direction
   std::vector<MeasuredParameter> parameters;
-  Eigen::MatrixXd covariance;    ///< of the deviations in the order of `parameters`, SI; zero where not measured
-  std::vector<Note> notes;       ///< rows that arcs do not show, and rows that are told in another form
-  Chain robot;                   ///< the nominal robot with what was measured
-  Pose X_WB = Pose::Identity();  ///< base on axis 1: z0 is measured, height and azimuth are conventional
+  Eigen::MatrixXd
+      covariance;  ///< of the deviations in the order of `parameters`, SI; zero where not measured
+  std::vector<Note> notes;  ///< rows that arcs do not show, and rows that are told in another form
+  Chain robot;              ///< the nominal robot with what was measured
+  Pose X_WB =
+      Pose::Identity();  ///< base on axis 1: z0 is measured, height and azimuth are conventional
 };
 
-/// Fits the arcs and works out the links. Each arc is fitted in space by least squares on the distances from its plane
-/// and its circle (normal, axis, radius together); postures that joints are held at are undone with the axes already
-/// found; the links follow from row to row: common normal, eq. (3.3), or, in a Hayati row, the point where the next
-/// axis meets the plane across the present one, eq. (3.4). Uncertainties are those of the fits carried through by first
-/// derivatives; where sigma comes from few residuals they are as wide as Student's t makes them. Not measured: d1 and
-/// q1 (nothing marks the base but axis 1), the last link (nothing marks the flange), and the row of a joint that
-/// slides, which is passed over: along a SCARA's last axis, on a rail before the arm, or behind it. A row with parallel
-/// axes is told as a Hayati row, whatever the robot file has. Refuses: what sorted_by_joint() and turning_joints()
-/// refuse; points that lie on a line; turned angles that differ from commanded ones by more than 1 degree; links more
-/// than 100 mm or 10 degrees from nominal.
-[[nodiscard]] Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
+/// Fits the arcs and works out the links. Each arc is fitted in space by least squares on the
+/// distances from its plane and its circle (normal, axis, radius together); postures that joints
+/// are held at are undone with the axes already found; the links follow from row to row: common
+/// normal, eq. (3.3), or, in a Hayati row, the point where the next axis meets the plane across the
+/// present one, eq. (3.4). Uncertainties are those of the fits carried through by first
+/// derivatives; where sigma comes from few residuals they are as wide as Student's t makes them.
+/// Not measured: d1 and q1 (nothing marks the base but axis 1), the last link (nothing marks the
+/// flange), and the row of a joint that slides, which is passed over: along a SCARA's last axis, on
+/// a rail before the arm, or behind it. A row with parallel axes is told as a Hayati row, whatever
+/// the robot file has. Refuses: what sorted_by_joint() and turning_joints() refuse; points that lie
+/// on a line; turned angles that differ from commanded ones by more than 1 degree; links more than
+/// 100 mm or 10 degrees from nominal.
+[[nodiscard]] Result<CirclePointResult> analyse_circle_points(const Chain& robot,
+                                                              const ArcList& arcs,
                                                               const CirclePointOptions& options);
 
 }  // namespace trammel

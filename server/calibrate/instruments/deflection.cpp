@@ -12,12 +12,16 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSignificant = 0.01;        // p-value: a beam is claimed wrongly in one of a hundred cases
+constexpr double kSignificant =
+    0.01;  // p-value: a beam is claimed wrongly in one of a hundred cases
 constexpr double kSameLoad = 0.5e-3 + 1e-6;  // N: half the last of three decimals, and rounding
-constexpr double kSeen = 3;                  // standard deviations: a bend at the link's end that would have been seen
-constexpr double kLeastPivot = 1e-9;         // of the largest: parameters below it are not separated
-constexpr std::size_t kFewestLoads = 4;      // of which some can be held out, with the least and the largest to train
-constexpr std::size_t kHeldOut = 3;          // every third load is held out: Table 4.7 has the second and fifth of six
+constexpr double kSeen =
+    3;  // standard deviations: a bend at the link's end that would have been seen
+constexpr double kLeastPivot = 1e-9;  // of the largest: parameters below it are not separated
+constexpr std::size_t kFewestLoads =
+    4;  // of which some can be held out, with the least and the largest to train
+constexpr std::size_t kHeldOut =
+    3;  // every third load is held out: Table 4.7 has the second and fifth of six
 
 /// Force and moments of a load on an element, Figure 4.8.
 struct Moments {
@@ -40,8 +44,11 @@ double beam_slope(const DeflectionElement& element, const Moments& load, double 
   return load.w * (element.length * x - x * x / 2) + load.end * x;
 }
 
-Eigen::Vector2d along(const DeflectionElement& element) { return {std::cos(element.theta), std::sin(element.theta)}; }
-/// Where a point at `r` goes per radian that its joint gives way, downward for a link that points outward.
+Eigen::Vector2d along(const DeflectionElement& element) {
+  return {std::cos(element.theta), std::sin(element.theta)};
+}
+/// Where a point at `r` goes per radian that its joint gives way, downward for a link that points
+/// outward.
 Eigen::Vector2d swung(const Eigen::Vector2d& r) { return {r.y(), -r.x()}; }
 
 /// Which columns the linear model has; where each element's begin.
@@ -53,7 +60,8 @@ struct Layout {
   int size = 0;
 };
 
-Layout layout_of(const DeflectionData& data, const std::set<int>& beams, const std::set<int>& load_biases) {
+Layout layout_of(const DeflectionData& data, const std::set<int>& beams,
+                 const std::set<int>& load_biases) {
   Layout layout;
   for (const DeflectionElement& element : data.elements) {
     Layout::Columns columns;
@@ -71,8 +79,8 @@ Layout layout_of(const DeflectionData& data, const std::set<int>& beams, const s
 }
 
 /// 2 x parameters: dx, dz of one reading per unit of each parameter.
-Eigen::MatrixXd rows_of(const DeflectionReading& reading, const DeflectionData& data, const Layout& layout,
-                        bool chained) {
+Eigen::MatrixXd rows_of(const DeflectionReading& reading, const DeflectionData& data,
+                        const Layout& layout, bool chained) {
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(2, layout.size);
   std::size_t own = 0;
   while (data.elements[own].element != reading.element) ++own;
@@ -123,27 +131,32 @@ struct Equations {
   Eigen::VectorXd b;
 };
 
-Equations equations_of(const DeflectionData& data, const std::vector<const DeflectionReading*>& readings,
+Equations equations_of(const DeflectionData& data,
+                       const std::vector<const DeflectionReading*>& readings,
                        const DeflectionOptions& options, const Layout& layout) {
   const auto rows = 2 * static_cast<Eigen::Index>(readings.size());
   Equations equations{Eigen::MatrixXd(rows, layout.size), Eigen::VectorXd(rows)};
   for (std::size_t k = 0; k < readings.size(); ++k) {
     const auto row = 2 * static_cast<Eigen::Index>(k);
     const double inverse_sigma = 1 / sigma_of(*readings[k], options);
-    equations.A.middleRows<2>(row) = inverse_sigma * rows_of(*readings[k], data, layout, options.chained);
+    equations.A.middleRows<2>(row) =
+        inverse_sigma * rows_of(*readings[k], data, layout, options.chained);
     equations.b.segment<2>(row) = inverse_sigma * readings[k]->moved;
   }
   return equations;
 }
 
-Result<Solved> solve(const DeflectionData& data, const std::vector<const DeflectionReading*>& readings,
-                     const DeflectionOptions& options, const std::set<int>& beams, const std::set<int>& load_biases) {
+Result<Solved> solve(const DeflectionData& data,
+                     const std::vector<const DeflectionReading*>& readings,
+                     const DeflectionOptions& options, const std::set<int>& beams,
+                     const std::set<int>& load_biases) {
   Solved solved;
   solved.layout = layout_of(data, beams, load_biases);
   solved.equations = 2 * static_cast<int>(readings.size());
   const int size = solved.layout.size;
   if (solved.freedom() < 1) {
-    return refused("{} training readings, {} parameters need at least {}", readings.size(), size, size / 2 + 1)
+    return refused("{} training readings, {} parameters need at least {}", readings.size(), size,
+                   size / 2 + 1)
         .in(data.where)
         .beyond(readings.size(), size / 2 + 1);
   }
@@ -161,7 +174,8 @@ Result<Solved> solve(const DeflectionData& data, const std::vector<const Deflect
   }
   solved.values = qr.solve(b).cwiseQuotient(scale);
   solved.cost = (A * solved.values - b).squaredNorm();
-  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::MatrixXd inverse =
+      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
   solved.unscaled = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
   return solved;
 }
@@ -190,7 +204,8 @@ struct Split {
 };
 
 /// The loads that are held out for validation; nothing where the file says it of each reading.
-Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& data, const DeflectionOptions& options) {
+Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& data,
+                                                       const DeflectionOptions& options) {
   std::set<double> all;
   bool stated = false;
   for (const DeflectionReading& reading : data.readings) {
@@ -200,10 +215,14 @@ Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& dat
   const std::vector<double> loads(all.begin(), all.end());
   std::set<double> held_out;
   for (const double wanted : options.validation_loads) {
-    const auto found =
-        std::find_if(loads.begin(), loads.end(), [&](double load) { return std::abs(load - wanted) < kSameLoad; });
+    const auto found = std::find_if(loads.begin(), loads.end(), [&](double load) {
+      return std::abs(load - wanted) < kSameLoad;
+    });
     if (found == loads.end())
-      return refused("no readings under the validation load {} N", wanted).in(data.where).of("load").with_value(wanted);
+      return refused("no readings under the validation load {} N", wanted)
+          .in(data.where)
+          .of("load")
+          .with_value(wanted);
     held_out.insert(*found);
   }
   if (!options.validation_loads.empty()) return held_out;
@@ -223,7 +242,8 @@ Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& opti
     (out ? validation : training).insert(reading.load);
   }
   if (training.size() < 2) {
-    return refused("{} training loads, at least 2 are needed to tell a joint from an offset", training.size())
+    return refused("{} training loads, at least 2 are needed to tell a joint from an offset",
+                   training.size())
         .in(data.where)
         .of("load")
         .beyond(training.size(), 2);
@@ -234,22 +254,23 @@ Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& opti
 }
 
 /// rms of |dp| of `element`'s readings (0: of all). Nothing predicted when `solved` is null.
-double rms_of(const std::vector<const DeflectionReading*>& readings, const DeflectionData& data, const Solved* solved,
-              bool chained, int element) {
+double rms_of(const std::vector<const DeflectionReading*>& readings, const DeflectionData& data,
+              const Solved* solved, bool chained, int element) {
   double sum = 0;
   int count = 0;
   for (const DeflectionReading* reading : readings) {
     if (element != 0 && reading->element != element) continue;
     Eigen::Vector2d left = reading->moved;
-    if (solved != nullptr) left -= rows_of(*reading, data, solved->layout, chained) * solved->values;
+    if (solved != nullptr)
+      left -= rows_of(*reading, data, solved->layout, chained) * solved->values;
     sum += left.squaredNorm();
     ++count;
   }
   return count == 0 ? 0 : std::sqrt(sum / count);
 }
 
-DeflectionFit fit_of(const Solved& solved, std::size_t e, const DeflectionData& data, const Split& split,
-                     bool chained) {
+DeflectionFit fit_of(const Solved& solved, std::size_t e, const DeflectionData& data,
+                     const Split& split, bool chained) {
   const Layout::Columns& columns = solved.layout.elements[e];
   const int element = data.elements[e].element;
   DeflectionFit fit;
@@ -271,14 +292,14 @@ DeflectionFit fit_of(const Solved& solved, std::size_t e, const DeflectionData& 
 }
 
 /// The beam term's tests and what they let one say.
-void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data, double largest_load, double sigma,
-                ElementResult& result) {
+void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
+                double largest_load, double sigma, ElementResult& result) {
   const int column = solved.layout.elements[e].flexibility;
   const DeflectionElement& element = data.elements[e];
   if (column < 0) {
     result.sentence = fmt::format(
-        "element {}: reflectors at one distance only; they cannot tell a bent link from a "
-        "joint that gives way",
+        "element {}: reflectors at one distance only; they cannot tell a bent link from a joint "
+        "that gives way",
         element.element);
     return;
   }
@@ -292,29 +313,35 @@ void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
   const double unseen = std::abs(result.end_bending) + result.end_bending_u;
   if (result.p_value < kSignificant && result.aic_gain > 0 && value > 0) {
     result.verdict = LinkVerdict::kBends;
-    result.sentence =
-        fmt::format("element {}: the link bends, {:.3f} mm at its end under {:.0f} N (U {:.3f} mm)", element.element,
-                    to_mm(result.end_bending), largest_load, to_mm(result.end_bending_u));
+    result.sentence = fmt::format(
+        "element {}: the link bends, {:.3f} mm at its end under {:.0f} N (U {:.3f} mm)",
+        element.element, to_mm(result.end_bending), largest_load, to_mm(result.end_bending_u));
   } else if (unseen < kSeen * sigma) {
     result.verdict = LinkVerdict::kRigid;
-    result.sentence = fmt::format("element {}: rigid link; more than {:.3f} mm at its end would have been seen",
-                                  element.element, to_mm(unseen));
+    result.sentence =
+        fmt::format("element {}: rigid link; more than {:.3f} mm at its end would have been seen",
+                    element.element, to_mm(unseen));
   } else {
     result.sentence = fmt::format(
-        "element {}: cannot tell; a link that bends up to {:.3f} mm at its end fits as well "
-        "as a softer joint",
+        "element {}: cannot tell; a link that bends up to {:.3f} mm at its end fits as well as a "
+        "softer joint",
         element.element, to_mm(unseen));
   }
 }
 
-/// Elements whose reflectors stand at several distances, so that they may show a beam; checks those asked for a load
-/// bias.
-Result<std::set<int>> beams_of(const DeflectionData& data, const Split& split, const std::set<int>& load_biases) {
+/// Elements whose reflectors stand at several distances, so that they may show a beam; checks those
+/// asked for a load bias.
+Result<std::set<int>> beams_of(const DeflectionData& data, const Split& split,
+                               const std::set<int>& load_biases) {
   std::map<int, std::set<double>> distances;
-  for (const DeflectionReading* reading : split.train) distances[reading->element].insert(reading->x);
+  for (const DeflectionReading* reading : split.train)
+    distances[reading->element].insert(reading->x);
   for (const int element : load_biases) {
     if (!distances.contains(element))
-      return refused("no training readings of element {}", element).in(data.where).of("element").with_value(element);
+      return refused("no training readings of element {}", element)
+          .in(data.where)
+          .of("element")
+          .with_value(element);
   }
   std::set<int> beams;
   for (const DeflectionElement& element : data.elements) {
@@ -332,7 +359,8 @@ struct BothModels {
   Solved beam, rigid;
 
   [[nodiscard]] double largest_load() const {
-    return std::max(split.training_loads.back(), split.validation_loads.empty() ? 0.0 : split.validation_loads.back());
+    return std::max(split.training_loads.back(),
+                    split.validation_loads.empty() ? 0.0 : split.validation_loads.back());
   }
   /// The largest sigma of an element's readings, as large as the residuals say.
   [[nodiscard]] double sigma_of_element(int element) const {
@@ -346,16 +374,19 @@ struct BothModels {
 
 /// Whether the foot of the element moves with the load, where nobody asked for a load bias.
 void judge_load_bias(const BothModels& models, ElementResult& element) {
-  if (!models.beams.contains(element.element) || models.load_biases.contains(element.element)) return;
+  if (!models.beams.contains(element.element) || models.load_biases.contains(element.element))
+    return;
   std::set<int> more = models.load_biases;
   more.insert(element.element);
-  const Result<Solved> moved = solve(models.data, models.split.train, models.options, models.beams, more);
+  const Result<Solved> moved =
+      solve(models.data, models.split.train, models.options, models.beams, more);
   if (!moved) return;
   const double f = (models.beam.cost - moved->cost) / 2 / moved->factor();
   element.load_bias_p_value = p_of_f2(std::max(0.0, f), moved->freedom());
   if (element.load_bias_p_value >= kSignificant) return;
   element.sentence +=
-      fmt::format("; its foot moves with the load (p = {:.1g}): fit again with a load bias", element.load_bias_p_value);
+      fmt::format("; its foot moves with the load (p = {:.1g}): fit again with a load bias",
+                  element.load_bias_p_value);
 }
 
 ElementResult element_result(const BothModels& models, std::size_t e) {
@@ -363,15 +394,18 @@ ElementResult element_result(const BothModels& models, std::size_t e) {
   ElementResult element;
   element.element = models.data.elements[e].element;
   element.rigid = fit_of(models.rigid, e, models.data, models.split, chained);
-  if (models.beams.contains(element.element)) element.beam = fit_of(models.beam, e, models.data, models.split, chained);
-  judge_beam(models.beam, e, models.data, models.largest_load(), models.sigma_of_element(element.element), element);
+  if (models.beams.contains(element.element))
+    element.beam = fit_of(models.beam, e, models.data, models.split, chained);
+  judge_beam(models.beam, e, models.data, models.largest_load(),
+             models.sigma_of_element(element.element), element);
   judge_load_bias(models, element);
   return element;
 }
 
 }  // namespace
 
-Result<DeflectionResult> fit_deflection(const DeflectionData& data, const DeflectionOptions& options) {
+Result<DeflectionResult> fit_deflection(const DeflectionData& data,
+                                        const DeflectionOptions& options) {
   const Split split = TRY(split_of(data, options));
   const std::set<int> load_biases(options.load_bias.begin(), options.load_bias.end());
   const std::set<int> beams = TRY(beams_of(data, split, load_biases));
@@ -384,7 +418,8 @@ Result<DeflectionResult> fit_deflection(const DeflectionData& data, const Deflec
   result.validation_loads = split.validation_loads;
   result.freedom = with.freedom();
   result.variance_factor = with.factor();
-  for (std::size_t e = 0; e < data.elements.size(); ++e) result.elements.push_back(element_result(models, e));
+  for (std::size_t e = 0; e < data.elements.size(); ++e)
+    result.elements.push_back(element_result(models, e));
   const auto& shown = split.validation.empty() ? split.train : split.validation;
   result.rms_still = rms_of(shown, data, nullptr, options.chained, 0);
   result.rms_beam = rms_of(shown, data, &with, options.chained, 0);

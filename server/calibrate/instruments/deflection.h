@@ -8,18 +8,19 @@
 #include "server/base/result.h"
 #include "server/calibrate/instruments/deflection_list.h"
 
-/// Stiffness by direct deflection, source section 4.2: weights hung from the flange bend the arm in its vertical plane;
-/// reflectors along its elements (a joint and the link behind it) show how much each joint gives way and whether the
-/// link bends too.
+/// Stiffness by direct deflection, source section 4.2: weights hung from the flange bend the arm in
+/// its vertical plane; reflectors along its elements (a joint and the link behind it) show how much
+/// each joint gives way and whether the link bends too.
 namespace trammel {
 
 struct DeflectionOptions {
   double sigma = 13e-6;  ///< m, of one coordinate, where the file has none
-  /// Readings are against the ground, so that what elements further in do is part of them; all are solved together.
-  /// Else each element's readings are already free of the others'.
+  /// Readings are against the ground, so that what elements further in do is part of them; all are
+  /// solved together. Else each element's readings are already free of the others'.
   bool chained = false;
-  std::vector<int> load_bias = {};            ///< elements whose foot moves with the load: the B of eq. (4.4)
-  std::vector<double> validation_loads = {};  ///< N; empty: as the file says, else every third load from the second on
+  std::vector<int> load_bias = {};  ///< elements whose foot moves with the load: the B of eq. (4.4)
+  std::vector<double> validation_loads =
+      {};  ///< N; empty: as the file says, else every third load from the second on
 };
 
 /// One element under one model; intervals are U(k=2).
@@ -40,34 +41,39 @@ enum class LinkVerdict { kBends, kRigid, kCannotTell };
 
 struct ElementResult {
   int element = 0;
-  std::optional<DeflectionFit> beam;  ///< model 1, eq. (4.2); empty where the reflectors cannot show a beam
-  DeflectionFit rigid;                ///< model 2, eq. (4.3)
+  std::optional<DeflectionFit>
+      beam;             ///< model 1, eq. (4.2); empty where the reflectors cannot show a beam
+  DeflectionFit rigid;  ///< model 2, eq. (4.3)
   LinkVerdict verdict = LinkVerdict::kCannotTell;
   double f = 0;  ///< F of the beam term, 1 against `freedom` degrees of freedom
   double p_value = 1;
   double aic_gain = 0;     ///< AIC of the rigid link minus that of the beam
   double end_bending = 0;  ///< m, the beam's share at the link's end under the largest load
   double end_bending_u = 0;
-  double load_bias_p_value = 1;  ///< that the foot moving with the load explains nothing more; 1 where not asked
-  std::string sentence;          ///< for people
+  double load_bias_p_value =
+      1;  ///< that the foot moving with the load explains nothing more; 1 where not asked
+  std::string sentence;  ///< for people
 };
 
 struct DeflectionResult {
   std::vector<ElementResult> elements;
   std::vector<double> training_loads, validation_loads;  ///< N
   int freedom = 0;                                       ///< of the beam model
-  double variance_factor = 1;                            ///< residuals over stated sigma, squared, of the beam model
+  double variance_factor = 1;  ///< residuals over stated sigma, squared, of the beam model
   double rms_still = 0;  ///< m, validation (or training) |dp| when nothing is predicted, Table 4.14
   double rms_beam = 0;   ///< m, of model 1
   double rms_rigid = 0;  ///< m, of model 2
 };
 
-/// Fits eqs. (4.2) to (4.6): weighted linear least squares, for C, 1/EI, A and B enter linearly. The load L makes, at
-/// the link's far end, the force w = L cos(theta) across it and the moment M = L lever, and M_R = M + w length at the
-/// joint. A beam is claimed where its term is positive, its F test gives p < 0.01 and AIC agrees; a link is called
-/// rigid where a bend of three sigma at its end would have been seen; else the data cannot tell. Uncertainties are
-/// scaled by the residuals where these exceed the stated sigma. Refuses: fewer than two training loads, or too few
-/// readings; parameters that the readings do not separate; a validation load or an element that is not in the data.
-[[nodiscard]] Result<DeflectionResult> fit_deflection(const DeflectionData& data, const DeflectionOptions& options);
+/// Fits eqs. (4.2) to (4.6): weighted linear least squares, for C, 1/EI, A and B enter linearly.
+/// The load L makes, at the link's far end, the force w = L cos(theta) across it and the moment M =
+/// L lever, and M_R = M + w length at the joint. A beam is claimed where its term is positive, its
+/// F test gives p < 0.01 and AIC agrees; a link is called rigid where a bend of three sigma at its
+/// end would have been seen; else the data cannot tell. Uncertainties are scaled by the residuals
+/// where these exceed the stated sigma. Refuses: fewer than two training loads, or too few
+/// readings; parameters that the readings do not separate; a validation load or an element that is
+/// not in the data.
+[[nodiscard]] Result<DeflectionResult> fit_deflection(const DeflectionData& data,
+                                                      const DeflectionOptions& options);
 
 }  // namespace trammel

@@ -19,8 +19,10 @@ struct DeflectionColumns {
 };
 
 Result<DeflectionColumns> find_columns(const CsvTable& table) {
-  DeflectionColumns columns{.required = {}, .sigma = table.find("sigma_mm"), .set = table.find("set")};
-  for (const char* name : {"element", "load_n", "x_mm", "dx_mm", "dz_mm", "theta_deg", "length_mm", "lever_mm"}) {
+  DeflectionColumns columns{
+      .required = {}, .sigma = table.find("sigma_mm"), .set = table.find("set")};
+  for (const char* name :
+       {"element", "load_n", "x_mm", "dx_mm", "dz_mm", "theta_deg", "length_mm", "lever_mm"}) {
     const std::size_t column = TRY(table.require(name));
     columns.required[name] = column;
   }
@@ -33,7 +35,8 @@ struct DeflectionRow {
   std::map<std::string, double> value;
 };
 
-Result<DeflectionRow> read_row(const CsvTable& table, std::size_t row, const DeflectionColumns& columns) {
+Result<DeflectionRow> read_row(const CsvTable& table, std::size_t row,
+                               const DeflectionColumns& columns) {
   DeflectionRow read;
   for (const auto& [name, column] : columns.required) {
     const double number = TRY(table.number(row, column));
@@ -48,25 +51,31 @@ Result<DeflectionRow> read_row(const CsvTable& table, std::size_t row, const Def
   return read;
 }
 
-Result<std::optional<double>> read_sigma(const CsvTable& table, std::size_t row, std::optional<std::size_t> column) {
+Result<std::optional<double>> read_sigma(const CsvTable& table, std::size_t row,
+                                         std::optional<std::size_t> column) {
   if (!column || table.field(row, *column).empty()) return std::nullopt;
   const double number = TRY(table.number(row, *column));
   if (!(number > 0))
-    return table.refuse(row, "sigma_mm is {}, must be above 0", number).of("sigma_mm").beyond(number, 0);
+    return table.refuse(row, "sigma_mm is {}, must be above 0", number)
+        .of("sigma_mm")
+        .beyond(number, 0);
   return from_mm(number);
 }
 
 /// Whether the row is one of validation; empty where nothing says it.
-Result<std::optional<bool>> read_set(const CsvTable& table, std::size_t row, std::optional<std::size_t> column) {
+Result<std::optional<bool>> read_set(const CsvTable& table, std::size_t row,
+                                     std::optional<std::size_t> column) {
   if (!column || table.field(row, *column).empty()) return std::nullopt;
   const std::string& name = table.field(row, *column);
   if (name != "train" && name != "validation")
-    return table.refuse(row, "set is '{}', expected train or validation", name).of("set").with_text(name);
+    return table.refuse(row, "set is '{}', expected train or validation", name)
+        .of("set")
+        .with_text(name);
   return name == "validation";
 }
 
-Result<DeflectionReading> read_reading(const CsvTable& table, std::size_t row, const DeflectionColumns& columns,
-                                       DeflectionRow& read) {
+Result<DeflectionReading> read_reading(const CsvTable& table, std::size_t row,
+                                       const DeflectionColumns& columns, DeflectionRow& read) {
   const std::optional<double> sigma = TRY(read_sigma(table, row, columns.sigma));
   const std::optional<bool> validation = TRY(read_set(table, row, columns.set));
   return DeflectionReading{.element = read.element,
@@ -87,11 +96,14 @@ Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::
   DeflectionData data{where, {}, {}};
   for (std::size_t row = 0; row < table.size(); ++row) {
     DeflectionRow read = TRY(read_row(table, row, columns));
-    const DeflectionElement stands{read.element, from_deg(read.value["theta_deg"]), from_mm(read.value["length_mm"]),
+    const DeflectionElement stands{read.element, from_deg(read.value["theta_deg"]),
+                                   from_mm(read.value["length_mm"]),
                                    from_mm(read.value["lever_mm"])};
     const DeflectionElement& first = elements.emplace(read.element, stands).first->second;
-    if (first.theta != stands.theta || first.length != stands.length || first.lever != stands.lever) {
-      return table.refuse(row, "element {} stands or hangs otherwise than in its first row", read.element)
+    if (first.theta != stands.theta || first.length != stands.length ||
+        first.lever != stands.lever) {
+      return table
+          .refuse(row, "element {} stands or hangs otherwise than in its first row", read.element)
           .of("element")
           .with_value(read.element);
     }
@@ -103,7 +115,8 @@ Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::
 }
 
 Result<DeflectionData> read_deflection_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_deflection_csv(text, path); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_deflection_csv(text, path); });
 }
 
 }  // namespace trammel

@@ -10,7 +10,8 @@
 /// What reflectors along an arm did while weights hung from its flange, as measured.
 namespace trammel {
 
-/// What one reflector did under one load, against the arm without load. x horizontal and outward, z up.
+/// What one reflector did under one load, against the arm without load. x horizontal and outward, z
+/// up.
 struct DeflectionReading {
   int element = 0;                                  ///< number of the joint, from 1
   double load = 0;                                  ///< N, straight down
@@ -35,10 +36,12 @@ struct DeflectionData {
   std::vector<DeflectionReading> readings;
 };
 
-/// Reads `element,load_n,x_mm,dx_mm,dz_mm,theta_deg,length_mm,lever_mm` with, where recorded, `sigma_mm` and `set`
-/// (train, validation). Refuses, naming file, row, value and limit: a missing column, numbers that are none, an element
-/// whose angle, length or lever changes, a sigma or length that is not positive.
-[[nodiscard]] Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::string& where);
+/// Reads `element,load_n,x_mm,dx_mm,dz_mm,theta_deg,length_mm,lever_mm` with, where recorded,
+/// `sigma_mm` and `set` (train, validation). Refuses, naming file, row, value and limit: a missing
+/// column, numbers that are none, an element whose angle, length or lever changes, a sigma or
+/// length that is not positive.
+[[nodiscard]] Result<DeflectionData> parse_deflection_csv(const std::string& text,
+                                                          const std::string& where);
 [[nodiscard]] Result<DeflectionData> read_deflection_csv(const std::string& path);
 
 }  // namespace trammel

@@ -10,13 +10,18 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAsDrawn = 1e-6;   // sine, and m: a row that is drawn with parallel axes, or on the next axis
-constexpr double kParallel = 0.02;  // sine of two axes' angle, below which their common normal is nowhere
+constexpr double kAsDrawn =
+    1e-6;  // sine, and m: a row that is drawn with parallel axes, or on the next axis
+constexpr double kParallel =
+    0.02;  // sine of two axes' angle, below which their common normal is nowhere
 
-double near(double angle, double nominal) { return nominal + std::remainder(angle - nominal, 2 * kPi); }
+double near(double angle, double nominal) {
+  return nominal + std::remainder(angle - nominal, 2 * kPi);
+}
 
 /// The row that leads from a frame to the next axis `line`, seen in that frame.
-Result<LinkGeometry> row_to(const AxisLine& line, const Joint& nominal, int joint, const std::string& robot) {
+Result<LinkGeometry> row_to(const AxisLine& line, const Joint& nominal, int joint,
+                            const std::string& robot) {
   LinkGeometry link = nominal.link;
   const Vector3& n = line.n;
   if (nominal.hayati) {
@@ -31,8 +36,8 @@ Result<LinkGeometry> row_to(const AxisLine& line, const Joint& nominal, int join
   }
   const double sine = n.head<2>().norm();
   if (sine < kParallel) {
-    return refused("robot {} link {}: axes {} and {} are parallel to {:.3f} deg", robot, joint + 1, joint + 1,
-                   joint + 2, to_deg(std::asin(sine)))
+    return refused("robot {} link {}: axes {} and {} are parallel to {:.3f} deg", robot, joint + 1,
+                   joint + 1, joint + 2, to_deg(std::asin(sine)))
         .of(fmt::format("joints {}: hayati", joint + 1))
         .next("the row must be a Hayati one");
   }
@@ -64,7 +69,9 @@ AxisLine seen_from(const Pose& X, const AxisLine& line) {
 
 }  // namespace
 
-bool slides(const Chain& robot, int joint) { return robot.joint(joint).type == JointType::kPrismatic; }
+bool slides(const Chain& robot, int joint) {
+  return robot.joint(joint).type == JointType::kPrismatic;
+}
 
 Result<TurningJoints> turning_joints(const Chain& robot) {
   TurningJoints turning{robot.size(), -1};
@@ -78,28 +85,32 @@ Result<TurningJoints> turning_joints(const Chain& robot) {
     const LinkGeometry& link = robot.joint(j).link;
     const bool along = std::abs(std::sin(link.alpha)) < kAsDrawn && std::abs(link.a) < kAsDrawn;
     if (!slides(robot, j) || (along && !slides(robot, j + 1))) continue;
-    return refused("robot {} joint {} slides, and not along the axis of joint {}: arcs do not tell how it leads there",
-                   robot.name(), j + 1, j + 2)
+    return refused(
+               "robot {} joint {} slides, and not along the axis of joint {}: arcs do not tell how "
+               "it leads there",
+               robot.name(), j + 1, j + 2)
         .of(fmt::format("joint {}", j + 1))
         .next("measure poses, and train with the error source geometry");
   }
   return turning;
 }
 
-Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning, std::vector<Note>& notes) {
+Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
+                               std::vector<Note>& notes) {
   std::vector<Joint> joints;
   double carried = 0;  // m, along the axis
   for (int j = 0; j < robot.size(); ++j) {
     Joint joint = robot.joint(j);
     const double cosine = std::cos(joint.link.alpha);
-    const bool is_parallel = joint.type == JointType::kRevolute && std::abs(std::sin(joint.link.alpha)) < kAsDrawn;
+    const bool is_parallel =
+        joint.type == JointType::kRevolute && std::abs(std::sin(joint.link.alpha)) < kAsDrawn;
     const bool becomes = is_parallel && !joint.hayati && j >= turning.first && j < turning.last;
     if (becomes) {
-      notes.push_back(
-          {"hayati_row", Note::Severity::kInfo,
-           fmt::format("the axes of joint {} and the next one are parallel, and row {} is no Hayati row: it is told as "
-                       "one (`hayati: true`: a, alpha and beta, no d; what it has as d stands in the row behind it)",
-                       j + 1, j + 1)});
+      notes.push_back({"hayati_row", Note::Severity::kInfo,
+                       fmt::format("the axes of joint {} and the next one are parallel, and row {} "
+                                   "is no Hayati row: it is told as one (`hayati: true`: a, alpha "
+                                   "and beta, no d; what it has as d stands in the row behind it)",
+                                   j + 1, j + 1)});
     }
     if (becomes || (joint.hayati && carried != 0)) {
       carried = cosine * (carried + joint.link.d);
@@ -143,18 +154,21 @@ std::vector<AxisLine> at_zero(const Chain& robot, const std::vector<JointArcs>& 
   return lines;
 }
 
-Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines, const JointVector& held) {
+Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines,
+                       const JointVector& held) {
   const TurningJoints turning = TRY(turning_joints(robot));
   const auto first = static_cast<std::size_t>(turning.first);
   Links out;
-  // Any frame on the first axis; then it is turned and shifted along it until q and d of the first row are nominal.
+  // Any frame on the first axis; then it is turned and shifted along it until q and d of the first
+  // row are nominal.
   Pose X = Pose::Identity();
   X.linear().col(2) = lines[first].n;
   X.linear().leftCols<2>() = across(lines[first].n);
   X.translation() = lines[first].c;
   if (turning.last > turning.first) {
     const Joint& nominal = robot.joint(turning.first);
-    const LinkGeometry row = TRY(row_to(seen_from(X, lines[first + 1]), nominal, turning.first, robot.name()));
+    const LinkGeometry row =
+        TRY(row_to(seen_from(X, lines[first + 1]), nominal, turning.first, robot.name()));
     X.translate((nominal.hayati ? 0 : row.d - nominal.link.d) * Vector3::UnitZ());
     X.rotate(Eigen::AngleAxisd(row.theta - nominal.link.theta, Vector3::UnitZ()));
   }
@@ -168,10 +182,12 @@ Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines, c
     const bool is_measured = i >= turning.first && i < turning.last && !slides(robot, i);
     if (!is_measured) {
       out.links.push_back(nominal.link);
-      if (i >= turning.first) X = X * row_pose(as_held[static_cast<std::size_t>(i)], nominal.hayati);
+      if (i >= turning.first)
+        X = X * row_pose(as_held[static_cast<std::size_t>(i)], nominal.hayati);
       continue;
     }
-    out.links.push_back(TRY(row_to(seen_from(X, lines[static_cast<std::size_t>(i) + 1]), nominal, i, robot.name())));
+    out.links.push_back(TRY(
+        row_to(seen_from(X, lines[static_cast<std::size_t>(i) + 1]), nominal, i, robot.name())));
     X = X * row_pose(out.links.back(), nominal.hayati);
   }
   return out;

@@ -21,18 +21,20 @@ struct AxisLine {
 struct TurningJoints {
   int first = 0, last = 0;
 };
-/// Refuses a robot without any, and a joint that slides between turning ones in another line than the next axis: arcs
-/// do not tell how it leads from the one axis to the other.
+/// Refuses a robot without any, and a joint that slides between turning ones in another line than
+/// the next axis: arcs do not tell how it leads from the one axis to the other.
 [[nodiscard]] Result<TurningJoints> turning_joints(const Chain& robot);
 
-/// The same robot with a Hayati row wherever an axis is parallel to the next one and both are measured; what such a row
-/// had as d stands in the row behind it. `notes`: which rows those are.
+/// The same robot with a Hayati row wherever an axis is parallel to the next one and both are
+/// measured; what such a row had as d stands in the row behind it. `notes`: which rows those are.
 [[nodiscard]] Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
                                              std::vector<Note>& notes);
 
-/// Axes as measured at the postures of `groups` -> with the joints before them at zero, in their kinematic sense. A
-/// joint that slides along the next axis has that axis; else the line of a joint that slides is none.
-[[nodiscard]] std::vector<AxisLine> at_zero(const Chain& robot, const std::vector<JointArcs>& groups,
+/// Axes as measured at the postures of `groups` -> with the joints before them at zero, in their
+/// kinematic sense. A joint that slides along the next axis has that axis; else the line of a joint
+/// that slides is none.
+[[nodiscard]] std::vector<AxisLine> at_zero(const Chain& robot,
+                                            const std::vector<JointArcs>& groups,
                                             const std::vector<AxisLine>& measured);
 
 struct Links {
@@ -40,9 +42,11 @@ struct Links {
   Pose X_WB = Pose::Identity();
 };
 
-/// The DH procedure on axes at zero, source section 4.1.1 and Figure 4.1: the links that come nearest to those of the
-/// nominal `robot`. `held`: of each joint, where it slides: the place at which it stood, m; else 0. Links that no arc
-/// shows are the nominal ones. Refuses parallel axes in a row that is not a Hayati one.
-[[nodiscard]] Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines, const JointVector& held);
+/// The DH procedure on axes at zero, source section 4.1.1 and Figure 4.1: the links that come
+/// nearest to those of the nominal `robot`. `held`: of each joint, where it slides: the place at
+/// which it stood, m; else 0. Links that no arc shows are the nominal ones. Refuses parallel axes
+/// in a row that is not a Hayati one.
+[[nodiscard]] Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines,
+                                     const JointVector& held);
 
 }  // namespace trammel

@@ -17,7 +17,8 @@ using Eigen::VectorXd;
 constexpr double kSameAngle = 1e-4;  // rad: nearer ones tell nothing of finer harmonics
 constexpr int kMostHarmonics = 150;  // of a joint: waves of 2.4 degrees
 constexpr int kFewestHarmonics = 4;  // of a joint without a map: that it has none is learned
-constexpr int kMostOfAll = 580;      // harmonics of all joints: what a model has room for, and a calibration time
+constexpr int kMostOfAll =
+    580;  // harmonics of all joints: what a model has room for, and a calibration time
 constexpr double kNoLoss = 0.5;      // nat: by which fewer harmonics may be less likely
 constexpr double kMoreLoss = 1.5;    // times as much, as long as there are too many
 constexpr double kFirstStep = 0.02;  // the inverse curvature, before anything is known of it
@@ -32,7 +33,8 @@ constexpr Pass kPasses[] = {{48, 50}, {kMostHarmonics, 30}};
 /// As many harmonics as there are different angles for, in the range that they have.
 int most_harmonics(const Chain& robot, const MeasurementBatch& batch, int joint) {
   std::vector<double> angles;
-  for (const Measurement& m : batch.measurements) angles.push_back(robot.gear_angles(m.context.q)(joint));
+  for (const Measurement& m : batch.measurements)
+    angles.push_back(robot.gear_angles(m.context.q)(joint));
   std::sort(angles.begin(), angles.end());
   const double range = angles.back() - angles.front();
   const auto same = [](double a, double b) { return b - a < kSameAngle; };
@@ -42,7 +44,8 @@ int most_harmonics(const Chain& robot, const MeasurementBatch& batch, int joint)
 }
 
 /// Where the maps of these joints are among the parameters, joint by joint.
-std::vector<MapColumns> columns_of(const PhysicalModel& model, const std::map<int, std::string>& spelling) {
+std::vector<MapColumns> columns_of(const PhysicalModel& model,
+                                   const std::map<int, std::string>& spelling) {
   std::vector<MapColumns> maps;
   for (const auto& [joint, name] : spelling) {
     Index first = 0;
@@ -59,7 +62,8 @@ std::vector<MapColumns> columns_of(const PhysicalModel& model, const std::map<in
 VectorXd taken_out(PhysicalModel& model, const std::string& name) {
   Index first = 0;
   auto source = model.sources.begin();
-  for (; (*source)->name() != name; ++source) first += static_cast<Index>((*source)->parameters().size());
+  for (; (*source)->name() != name; ++source)
+    first += static_cast<Index>((*source)->parameters().size());
   const auto count = static_cast<Index>((*source)->parameters().size());
   const VectorXd values = model.values.segment(first, count);
   const VectorXd after = model.values.tail(model.values.size() - first - count);
@@ -69,12 +73,16 @@ VectorXd taken_out(PhysicalModel& model, const std::string& name) {
   return values;
 }
 
-/// log evidence(all harmonics) - log evidence(the first n), for n = 0, 1, ...: the posterior and the prior of the rest
-/// at 0 (Savage and Dickey).
-VectorXd loss_without(const MapEvidence::Posterior& found, const VectorXd& prior_variance, const MapColumns& map) {
+/// log evidence(all harmonics) - log evidence(the first n), for n = 0, 1, ...: the posterior and
+/// the prior of the rest at 0 (Savage and Dickey).
+VectorXd loss_without(const MapEvidence::Posterior& found, const VectorXd& prior_variance,
+                      const MapColumns& map) {
   const Index count = 2 * map.harmonics;
-  const MatrixXd finest_first =
-      found.covariance.block(map.first, map.first, count, count).colwise().reverse().rowwise().reverse();
+  const MatrixXd finest_first = found.covariance.block(map.first, map.first, count, count)
+                                    .colwise()
+                                    .reverse()
+                                    .rowwise()
+                                    .reverse();
   const VectorXd value = found.x.segment(map.first, count).reverse();
   const Eigen::LLT<MatrixXd> factor(finest_first);
   const MatrixXd L = factor.matrixL();
@@ -82,13 +90,15 @@ VectorXd loss_without(const MapEvidence::Posterior& found, const VectorXd& prior
   VectorXd loss = VectorXd::Zero(map.harmonics + 1);
   double sum = 0;
   for (Index k = 0; k < count; ++k) {
-    sum += std::log(L(k, k)) - 0.5 * std::log(prior_variance(count - 1 - k)) + 0.5 * whitened(k) * whitened(k);
+    sum += std::log(L(k, k)) - 0.5 * std::log(prior_variance(count - 1 - k)) +
+           0.5 * whitened(k) * whitened(k);
     if (k % 2 == 1) loss(map.harmonics - 1 - k / 2) = sum;
   }
   return loss;
 }
 
-/// The fewest harmonics that are less likely by no more than `allowed`, whatever more of them would be.
+/// The fewest harmonics that are less likely by no more than `allowed`, whatever more of them would
+/// be.
 int fewest(const VectorXd& loss, double allowed) {
   Index n = loss.size() - 1;
   while (n > kFewestHarmonics && !(loss(n - 1) > allowed)) --n;
@@ -106,7 +116,8 @@ std::vector<int> orders(const std::vector<VectorXd>& losses) {
 
 /// The discrepancy with which a sigma is `factor` times as large.
 double discrepancy_for(double factor, double sigma, double discrepancy) {
-  const double square = factor * factor * (sigma * sigma + discrepancy * discrepancy) - sigma * sigma;
+  const double square =
+      factor * factor * (sigma * sigma + discrepancy * discrepancy) - sigma * sigma;
   return std::sqrt(std::max(0.0, square));
 }
 
@@ -120,10 +131,12 @@ VectorXd variances(const MapSpectrum& spectrum, const VectorXd& scale) {
 /// Learns from the equations about where the last pass ended, at first with few harmonics.
 class MapSearch {
  public:
-  MapSearch(const CalibrationResult& without, const MeasurementBatch& batch, const std::vector<int>& joints)
+  MapSearch(const CalibrationResult& without, const MeasurementBatch& batch,
+            const std::vector<int>& joints)
       : problem_{without.model, aligned(batch, without.sessions, without.model.cell->tracker)},
         weights_(weights_of(without, batch)) {
-    for (const int joint : joints) most_[joint] = most_harmonics(without.model.cell->robot, batch, joint);
+    for (const int joint : joints)
+      most_[joint] = most_harmonics(without.model.cell->robot, batch, joint);
   }
 
   std::map<int, MapSpectrum> run() {
@@ -142,7 +155,8 @@ class MapSearch {
     for (auto& [joint, name] : spelling_) before[joint] = taken_out(model, name);
     for (const auto& [joint, told] : most_) {
       spelling_[joint] = spelled_map(joint, {.harmonics = std::min(most, told)});
-      const Index first = add_source(model, make_error_source(spelling_[joint], *model.cell).value());
+      const Index first =
+          add_source(model, make_error_source(spelling_[joint], *model.cell).value());
       model.values.segment(first, before[joint].size()) = before[joint];
     }
     maps_ = columns_of(model, spelling_);
@@ -160,23 +174,29 @@ class MapSearch {
     const Tracker& tracker = problem_.model.cell->tracker;
     const auto [places, turns] = evidence.noise(logs_);
     weights_.discrepancy = discrepancy_for(places, tracker.sigma, weights_.discrepancy);
-    if (weights_.of_pose > 0) weights_.of_pose = discrepancy_for(places, tracker.sigma, weights_.of_pose);
-    weights_.discrepancy_rotation = discrepancy_for(turns, tracker.sigma_rotation, weights_.discrepancy_rotation);
+    if (weights_.of_pose > 0)
+      weights_.of_pose = discrepancy_for(places, tracker.sigma, weights_.of_pose);
+    weights_.discrepancy_rotation =
+        discrepancy_for(turns, tracker.sigma_rotation, weights_.discrepancy_rotation);
   }
 
   [[nodiscard]] VectorXd most_probable(const MapEvidence& evidence, int evaluations) const {
-    const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) { return evidence(x, out); };
+    const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
+      return evidence(x, out);
+    };
     const MatrixXd inverse_curvature = kFirstStep * MatrixXd::Identity(logs_.size(), logs_.size());
-    const BfgsResult best =
-        minimise(objective, logs_, inverse_curvature, {.max_evaluations = evaluations, .tolerance = kSettled});
+    const BfgsResult best = minimise(objective, logs_, inverse_curvature,
+                                     {.max_evaluations = evaluations, .tolerance = kSettled});
     return best.defined ? best.x : logs_;
   }
 
-  void take_spectra(const MapEvidence& evidence, const MapEvidence::Posterior& found, const VectorXd& scale) {
+  void take_spectra(const MapEvidence& evidence, const MapEvidence::Posterior& found,
+                    const VectorXd& scale) {
     std::vector<VectorXd> losses;
     for (std::size_t k = 0; k < maps_.size(); ++k) {
       const VectorXd own_scale = scale.segment(maps_[k].first, 2 * maps_[k].harmonics);
-      losses.push_back(loss_without(found, variances(evidence.spectrum(logs_, k), own_scale), maps_[k]));
+      losses.push_back(
+          loss_without(found, variances(evidence.spectrum(logs_, k), own_scale), maps_[k]));
     }
     const std::vector<int> order = orders(losses);
     std::size_t k = 0;
@@ -197,7 +217,8 @@ class MapSearch {
 
 }  // namespace
 
-std::map<int, MapSpectrum> learned_maps(const CalibrationResult& without, const MeasurementBatch& batch,
+std::map<int, MapSpectrum> learned_maps(const CalibrationResult& without,
+                                        const MeasurementBatch& batch,
                                         const std::vector<int>& joints) {
   return MapSearch(without, batch, joints).run();
 }

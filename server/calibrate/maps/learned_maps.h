@@ -7,10 +7,11 @@
 
 namespace trammel {
 
-/// The most probable spectra of maps of these joints (0-based) beside what was identified `without` them, from the same
-/// batch; each map with as many harmonics as the poses can tell and the data gain by. Together they leave room for the
-/// other parameters in a model.
-[[nodiscard]] std::map<int, MapSpectrum> learned_maps(const CalibrationResult& without, const MeasurementBatch& batch,
+/// The most probable spectra of maps of these joints (0-based) beside what was identified `without`
+/// them, from the same batch; each map with as many harmonics as the poses can tell and the data
+/// gain by. Together they leave room for the other parameters in a model.
+[[nodiscard]] std::map<int, MapSpectrum> learned_maps(const CalibrationResult& without,
+                                                      const MeasurementBatch& batch,
                                                       const std::vector<int>& joints);
 
 }  // namespace trammel

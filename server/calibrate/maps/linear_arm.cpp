@@ -16,7 +16,8 @@ constexpr Index kRowsAtATime = 768;  // multiplied together: their factors stay 
 /// Equations of one kind, filled row by row.
 class Rows {
  public:
-  Rows(LinearEquations& into, Index parameters) : into_(into), J_(kRowsAtATime, parameters), r_(kRowsAtATime) {
+  Rows(LinearEquations& into, Index parameters)
+      : into_(into), J_(kRowsAtATime, parameters), r_(kRowsAtATime) {
     into_.information = Eigen::MatrixXd::Zero(parameters, parameters);
     into_.downhill = Eigen::VectorXd::Zero(parameters);
   }
@@ -54,7 +55,8 @@ LinearArm linear_arm(const CalibrationProblem& problem, const Weights& weights) 
   Eigen::VectorXd r(6);
   Eigen::MatrixXd J(P, 6);
   for (std::size_t row = 0; row < problem.batch.measurements.size(); ++row) {
-    const WeightedPose pose(problem.model, arm.scaled, problem.batch.measurements[row], weights, row);
+    const WeightedPose pose(problem.model, arm.scaled, problem.batch.measurements[row], weights,
+                            row);
     if (!pose.evaluate(x.data(), r.data(), J.data())) continue;
     const Index size = pose.size();
     const Index of_place = std::min<Index>(size, 3);

@@ -8,7 +8,8 @@
 
 namespace trammel {
 
-/// Equations of one kind about a model's present values, each in units of its sigma: r + J d = noise.
+/// Equations of one kind about a model's present values, each in units of its sigma: r + J d =
+/// noise.
 struct LinearEquations {
   Eigen::MatrixXd information;  ///< P x P, JᵀJ
   Eigen::VectorXd downhill;     ///< P, -Jᵀr
@@ -16,8 +17,8 @@ struct LinearEquations {
   double count = 0;
 };
 
-/// What a batch says of small changes of all parameters, in units of `scaled.scale`. Poses far off count for less, as
-/// in identification.
+/// What a batch says of small changes of all parameters, in units of `scaled.scale`. Poses far off
+/// count for less, as in identification.
 struct LinearArm {
   ScaledParameters scaled;
   std::array<LinearEquations, 2> kinds;  ///< of positions and gauges; of orientations

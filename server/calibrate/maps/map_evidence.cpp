@@ -38,12 +38,13 @@ VectorXd spreads(std::size_t maps) {
   return spread;
 }
 
-/// The share of a map's variance that each harmonic has, and how the log of that share changes with log knee and log
-/// power.
+/// The share of a map's variance that each harmonic has, and how the log of that share changes with
+/// log knee and log power.
 struct Shares {
   VectorXd share, by_knee, by_power;
 
-  Shares(int harmonics, double knee, double power) : share(harmonics), by_knee(harmonics), by_power(harmonics) {
+  Shares(int harmonics, double knee, double power)
+      : share(harmonics), by_knee(harmonics), by_power(harmonics) {
     for (Index k = 0; k < harmonics; ++k) {
       const double ratio = std::pow(static_cast<double>(k + 1) / knee, 2);
       share(k) = std::pow(1 + ratio, -power);
@@ -75,7 +76,8 @@ struct MapEvidence::Solved {
 MapEvidence::MapEvidence(const LinearArm& arm, std::vector<MapColumns> maps)
     : arm_(arm), maps_(std::move(maps)), from_prior_(VectorXd::Zero(arm.scaled.scale.size())) {
   for (const MapColumns& map : maps_)
-    from_prior_.segment(map.first, 2 * map.harmonics) = -arm.scaled.prior.segment(map.first, 2 * map.harmonics);
+    from_prior_.segment(map.first, 2 * map.harmonics) =
+        -arm.scaled.prior.segment(map.first, 2 * map.harmonics);
 }
 
 VectorXd MapEvidence::start() const { return typical_logs(maps_.size()); }
@@ -98,22 +100,27 @@ std::optional<MapEvidence::Solved> MapEvidence::solved(const VectorXd& logs) con
   now.root = prior_variance(logs).cwiseSqrt();
   now.before = from_prior_.cwiseQuotient(now.root);
   now.at = {std::exp(logs(logs.size() - 2)), std::exp(logs(logs.size() - 1))};
-  MatrixXd curvature = now.at[0] * arm_.kinds[0].information + now.at[1] * arm_.kinds[1].information;
+  MatrixXd curvature =
+      now.at[0] * arm_.kinds[0].information + now.at[1] * arm_.kinds[1].information;
   curvature = (now.root.asDiagonal() * curvature * now.root.asDiagonal()).eval();
   curvature.diagonal().array() += 1;
   const std::optional<MatrixXd> factor = inverse_factor(curvature);
   if (!factor) return std::nullopt;
   now.inverse = gram(*factor);
-  const VectorXd downhill =
-      now.root.cwiseProduct(now.at[0] * arm_.kinds[0].downhill + now.at[1] * arm_.kinds[1].downhill) + now.before;
+  const VectorXd downhill = now.root.cwiseProduct(now.at[0] * arm_.kinds[0].downhill +
+                                                  now.at[1] * arm_.kinds[1].downhill) +
+                            now.before;
   now.change = now.inverse * downhill;
-  now.cost = 0.5 * (now.before.squaredNorm() - downhill.dot(now.change)) - factor->diagonal().array().log().sum();
+  now.cost = 0.5 * (now.before.squaredNorm() - downhill.dot(now.change)) -
+             factor->diagonal().array().log().sum();
   for (std::size_t k = 0; k < 2; ++k)
-    now.cost += 0.5 * (now.at[k] * arm_.kinds[k].square - arm_.kinds[k].count * std::log(now.at[k]));
+    now.cost +=
+        0.5 * (now.at[k] * arm_.kinds[k].square - arm_.kinds[k].count * std::log(now.at[k]));
   return now;
 }
 
-void MapEvidence::add_slopes_of_maps(const VectorXd& logs, const Solved& at, VectorXd& gradient) const {
+void MapEvidence::add_slopes_of_maps(const VectorXd& logs, const Solved& at,
+                                     VectorXd& gradient) const {
   // Half of: 1 less the mean square of the parameter over its prior variance.
   const VectorXd by_variance =
       0.5 * (1 - at.inverse.diagonal().array() - (at.change - at.before).array().square()).matrix();
@@ -122,7 +129,8 @@ void MapEvidence::add_slopes_of_maps(const VectorXd& logs, const Solved& at, Vec
     const Shares shares = shares_of(map, logs, first);
     for (Index k = 0; k < 2 * map.harmonics; ++k) {
       const double slope = by_variance(map.first + k);
-      gradient.segment<3>(first) += slope * Vector3(2, shares.by_knee(k / 2), shares.by_power(k / 2));
+      gradient.segment<3>(first) +=
+          slope * Vector3(2, shares.by_knee(k / 2), shares.by_power(k / 2));
     }
     first += kLogsOfMap;
   }
@@ -139,7 +147,8 @@ bool MapEvidence::operator()(const VectorXd& logs, ObjectiveValue* out) const {
   const MatrixXd covariance = at->root.asDiagonal() * at->inverse * at->root.asDiagonal();
   for (std::size_t k = 0; k < 2; ++k) {
     const LinearEquations& kind = arm_.kinds[k];
-    const double left = kind.square - 2 * kind.downhill.dot(change) + change.dot(kind.information * change) +
+    const double left = kind.square - 2 * kind.downhill.dot(change) +
+                        change.dot(kind.information * change) +
                         kind.information.cwiseProduct(covariance).sum();
     out->gradient(logs.size() - 2 + static_cast<Index>(k)) += 0.5 * (at->at[k] * left - kind.count);
   }

@@ -7,7 +7,8 @@
 #include "server/error_sources/joint_map.h"
 #include "server/numerics/bfgs.h"
 
-/// How likely a batch is under spectra of the joints' maps, with all parameters integrated out to first order.
+/// How likely a batch is under spectra of the joints' maps, with all parameters integrated out to
+/// first order.
 namespace trammel {
 
 /// A map among the parameters of a model: sine and cosine of harmonic 1, 2, ... from `first` on.
@@ -16,11 +17,13 @@ struct MapColumns {
   int harmonics = 0;
 };
 
-/// The logarithms, three a map: rms of the map (rad), knee, power; then, of each kind of equation, the factor by which
-/// its squared residuals are divided less than their sigmas say. All have wide normal priors.
+/// The logarithms, three a map: rms of the map (rad), knee, power; then, of each kind of equation,
+/// the factor by which its squared residuals are divided less than their sigmas say. All have wide
+/// normal priors.
 class MapEvidence {
  public:
-  /// The arm has the maps at any values; all other parameters are held to their priors about their present values.
+  /// The arm has the maps at any values; all other parameters are held to their priors about their
+  /// present values.
   MapEvidence(const LinearArm& arm, std::vector<MapColumns> maps);
 
   [[nodiscard]] Eigen::VectorXd start() const;
@@ -41,7 +44,8 @@ class MapEvidence {
   struct Solved;
   [[nodiscard]] std::optional<Solved> solved(const Eigen::VectorXd& logs) const;
   [[nodiscard]] Eigen::VectorXd prior_variance(const Eigen::VectorXd& logs) const;
-  void add_slopes_of_maps(const Eigen::VectorXd& logs, const Solved& at, Eigen::VectorXd& gradient) const;
+  void add_slopes_of_maps(const Eigen::VectorXd& logs, const Solved& at,
+                          Eigen::VectorXd& gradient) const;
 
   const LinearArm& arm_;
   std::vector<MapColumns> maps_;

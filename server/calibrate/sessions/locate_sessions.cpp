@@ -11,8 +11,10 @@ namespace trammel {
 
 namespace {
 
-/// The base from orientations, where the positions do not span a plane. Tools that are unknown do not count.
-Result<Pose> base_by_orientations(const PhysicalModel& model, const MeasurementBatch& session, const Error& why) {
+/// The base from orientations, where the positions do not span a plane. Tools that are unknown do
+/// not count.
+Result<Pose> base_by_orientations(const PhysicalModel& model, const MeasurementBatch& session,
+                                  const Error& why) {
   Matrix3 turn = Matrix3::Zero();
   Vector3 p_W = Vector3::Zero(), p_B = Vector3::Zero();
   double count = 0;
@@ -30,7 +32,8 @@ Result<Pose> base_by_orientations(const PhysicalModel& model, const MeasurementB
   return make_pose(R_WB, (p_W - R_WB * p_B) / count);
 }
 
-/// X_WB of the session; tools of `model` that are unknown are found with it and taken into its cell.
+/// X_WB of the session; tools of `model` that are unknown are found with it and taken into its
+/// cell.
 Result<Pose> base_of(PhysicalModel& model, const MeasurementBatch& session) {
   PhysicalModel here = model;
   const Status located = locate_unknown_frames(here, session);
@@ -46,7 +49,8 @@ Result<Pose> base_of(PhysicalModel& model, const MeasurementBatch& session) {
 
 }  // namespace
 
-Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model, const MeasurementBatch& batch) {
+Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model,
+                                                    const MeasurementBatch& batch) {
   PhysicalModel anywhere = model;
   auto cell = std::make_shared<Cell>(*model.cell);
   cell->X_WB.reset();
@@ -61,7 +65,9 @@ Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model, 
   });
   for (const std::size_t s : order) {
     const Result<Pose> X_WB = base_of(anywhere, sessions[s]);
-    if (!X_WB) return Failure(X_WB.error()).in(fmt::format("batch {}, session {}", batch.id, settings[s].id));
+    if (!X_WB)
+      return Failure(X_WB.error())
+          .in(fmt::format("batch {}, session {}", batch.id, settings[s].id));
     settings[s].X_WS = *X_WB;
   }
   const Pose X_WB = settings.back().X_WS;

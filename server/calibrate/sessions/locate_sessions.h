@@ -5,8 +5,9 @@
 
 namespace trammel {
 
-/// Where the instrument of each session stood, by the nominal chain and the tools that the cell or another session
-/// tells: within millimetres, enough to start from. Refuses a session whose rows do not tell it.
+/// Where the instrument of each session stood, by the nominal chain and the tools that the cell or
+/// another session tells: within millimetres, enough to start from. Refuses a session whose rows do
+/// not tell it.
 [[nodiscard]] Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model,
                                                                   const MeasurementBatch& batch);
 

@@ -4,7 +4,8 @@ namespace trammel {
 
 namespace {
 
-// Standard deviations of where an instrument may stand from where it was located: so wide that they do not matter.
+// Standard deviations of where an instrument may stand from where it was located: so wide that they
+// do not matter.
 constexpr double kShift = 1;   // m
 constexpr double kTurn = 2.5;  // rad
 constexpr double kStretch = 1;
@@ -36,8 +37,8 @@ SessionMotion SessionBlock::motion(const Eigen::VectorXd& step, double damping) 
   return -solve(gradient + cross * step, damping);
 }
 
-void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information, Eigen::VectorXd& gradient,
-               double damping) {
+void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information,
+               Eigen::VectorXd& gradient, double damping) {
   for (const SessionBlock& block : blocks) {
     const Eigen::MatrixXd across = block.solve(block.cross, damping);
     information.noalias() -= block.cross.transpose() * across;

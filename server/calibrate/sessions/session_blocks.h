@@ -6,24 +6,28 @@
 #include "server/calibrate/sessions/session_setting.h"
 #include "server/measurement/measurement.h"
 
-/// The part of the normal equations that belongs to sessions: where the instrument of each stood, and its scale. Each
-/// session has seven unknowns of its own that no other one shares, so they are eliminated session by session (Schur
-/// complement), and the cost is linear in the sessions.
+/// The part of the normal equations that belongs to sessions: where the instrument of each stood,
+/// and its scale. Each session has seven unknowns of its own that no other one shares, so they are
+/// eliminated session by session (Schur complement), and the cost is linear in the sessions.
 namespace trammel {
 
 inline constexpr int kOfSession = 7;
-/// A small motion of the prediction in W: a shift (m), a turn (rad) and a stretch (of itself) about `centre_W`.
+/// A small motion of the prediction in W: a shift (m), a turn (rad) and a stretch (of itself) about
+/// `centre_W`.
 using SessionMotion = Eigen::Matrix<double, kOfSession, 1>;
 using SessionColumns = Eigen::Matrix<double, kOfSession, Eigen::Dynamic>;
 
-/// Derivative of the weighted residuals (6, or 3 without an orientation) by the motion, transposed: one column an
-/// equation. That by the stretch is 0 where the session is not `stretched`: it is then found to be 0.
-[[nodiscard]] SessionColumns motion_columns(const Measurement& m, const Vector3& centre_W, double inverse_sigma,
-                                            double inverse_rotation_sigma, bool stretched);
+/// Derivative of the weighted residuals (6, or 3 without an orientation) by the motion, transposed:
+/// one column an equation. That by the stretch is 0 where the session is not `stretched`: it is
+/// then found to be 0.
+[[nodiscard]] SessionColumns motion_columns(const Measurement& m, const Vector3& centre_W,
+                                            double inverse_sigma, double inverse_rotation_sigma,
+                                            bool stretched);
 
 /// The normal equations of one session's motion.
 struct SessionBlock {
-  Eigen::Matrix<double, kOfSession, kOfSession> curvature = Eigen::Matrix<double, kOfSession, kOfSession>::Zero();
+  Eigen::Matrix<double, kOfSession, kOfSession> curvature =
+      Eigen::Matrix<double, kOfSession, kOfSession>::Zero();
   SessionMotion gradient = SessionMotion::Zero();
   SessionColumns cross;  ///< 7 x P: with the shared parameters
 
@@ -34,8 +38,8 @@ struct SessionBlock {
 };
 
 /// What is left of the shared parameters' normal equations once the sessions are eliminated.
-void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information, Eigen::VectorXd& gradient,
-               double damping = 0);
+void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information,
+               Eigen::VectorXd& gradient, double damping = 0);
 
 /// What is to be done to what was measured, to equal this motion of what is predicted.
 [[nodiscard]] Similarity measured_by(const SessionMotion& motion, const Vector3& centre_W);

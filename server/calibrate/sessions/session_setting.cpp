@@ -16,7 +16,8 @@ constexpr double kLeastBeside = 1e-3;  // m rms beside the best line
 }  // namespace
 
 Similarity Similarity::operator*(const Similarity& first) const {
-  return {make_pose(X.linear() * first.X.linear(), *this * first.X.translation()), (1 + scale) * (1 + first.scale) - 1};
+  return {make_pose(X.linear() * first.X.linear(), *this * first.X.translation()),
+          (1 + scale) * (1 + first.scale) - 1};
 }
 
 bool operator==(const SessionSetting& a, const SessionSetting& b) {
@@ -45,20 +46,22 @@ std::vector<SessionSetting> settings_of(const MeasurementBatch& batch) {
   return settings;
 }
 
-MeasurementBatch moved(MeasurementBatch batch, const std::vector<SessionSetting>& settings, double sigma,
-                       double sigma_rotation) {
+MeasurementBatch moved(MeasurementBatch batch, const std::vector<SessionSetting>& settings,
+                       double sigma, double sigma_rotation) {
   for (Measurement& m : batch.measurements) {
     const SessionSetting& setting = settings[static_cast<std::size_t>(m.session)];
     m.p_W = setting.into_W() * m.p_W;
     if (m.R_WT) m.R_WT = (setting.X_WS.linear() * *m.R_WT).eval();
     if (setting.own_noise > 0) m.sigma = std::hypot(m.sigma.value_or(sigma), setting.own_noise);
     if (setting.own_noise_rotation > 0)
-      m.sigma_rotation = std::hypot(m.sigma_rotation.value_or(sigma_rotation), setting.own_noise_rotation);
+      m.sigma_rotation =
+          std::hypot(m.sigma_rotation.value_or(sigma_rotation), setting.own_noise_rotation);
   }
   return batch;
 }
 
-MeasurementBatch aligned(MeasurementBatch batch, const std::vector<SessionSetting>& settings, const Tracker& tracker) {
+MeasurementBatch aligned(MeasurementBatch batch, const std::vector<SessionSetting>& settings,
+                         const Tracker& tracker) {
   if (settings.empty()) return batch;
   batch = moved(std::move(batch), settings, tracker.sigma, tracker.sigma_rotation);
   batch.sessions.clear();
@@ -73,15 +76,17 @@ std::string why_not_placed(const MeasurementBatch& session) {
     const Measurement& m = session.measurements[static_cast<std::size_t>(i)];
     if (m.R_WT) return "";
     p.col(i) = m.p_W;
-    const bool known = std::any_of(places.begin(), places.end(),
-                                   [&](const Vector3& place) { return (place - m.p_W).norm() < kSamePlace; });
+    const bool known = std::any_of(places.begin(), places.end(), [&](const Vector3& place) {
+      return (place - m.p_W).norm() < kSamePlace;
+    });
     if (!known && places.size() < 3) places.push_back(m.p_W);
   }
   if (places.size() < 3)
-    return fmt::format("{} positions do not tell where its instrument stood, at least 3 are needed", places.size());
+    return fmt::format("{} positions do not tell where its instrument stood, at least 3 are needed",
+                       places.size());
   const Eigen::Matrix3Xd from_mean = p.colwise() - p.rowwise().mean();
-  const Vector3 spread =
-      Eigen::JacobiSVD<Eigen::Matrix3Xd>(from_mean).singularValues() / std::sqrt(static_cast<double>(n));
+  const Vector3 spread = Eigen::JacobiSVD<Eigen::Matrix3Xd>(from_mean).singularValues() /
+                         std::sqrt(static_cast<double>(n));
   if (spread(1) > kLeastBeside) return "";
   return fmt::format(
       "its positions lie on one line within {:.2f} mm, limit {:g} mm: they do not tell where its "

@@ -15,7 +15,8 @@ bool has(const PhysicalModel& model, const std::string& source) {
                      [&](const ErrorSourcePtr& one) { return one->name() == source; });
 }
 
-/// Of each parameter of `model` its place in `all`, which has the same sources and more; -1: not there.
+/// Of each parameter of `model` its place in `all`, which has the same sources and more; -1: not
+/// there.
 std::vector<Eigen::Index> places_in(const PhysicalModel& all, const PhysicalModel& model) {
   std::vector<Eigen::Index> places;
   for (const ErrorSourcePtr& source : model.sources) {
@@ -36,7 +37,8 @@ void add(const ModelParts& parts, double sign, CalibrationResult& between) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     double& value = between.model.values(places[i]);
     const double own = parts.physics.values(static_cast<Eigen::Index>(i));
-    // The order of a ripple says where it is: a difference of two ripples has the order of the newer one.
+    // The order of a ripple says where it is: a difference of two ripples has the order of the
+    // newer one.
     if (!parameters[i].is_place) value += sign * own;
     if (parameters[i].is_place && value == 0) value = own;
     for (std::size_t k = 0; k < places.size(); ++k)
@@ -67,19 +69,23 @@ CalibrationResult between(const ModelParts& before, const ModelParts& now) {
 Eigen::VectorXd values_in(const PhysicalModel& all, const PhysicalModel& physics) {
   Eigen::VectorXd values = Eigen::VectorXd::Zero(all.parameter_count());
   const std::vector<Eigen::Index> places = places_in(all, physics);
-  for (std::size_t i = 0; i < places.size(); ++i) values(places[i]) = physics.values(static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < places.size(); ++i)
+    values(places[i]) = physics.values(static_cast<Eigen::Index>(i));
   return values;
 }
 
-std::vector<ParameterDifference> parameters_of(const CalibrationResult& found, const PhysicalModel& before,
+std::vector<ParameterDifference> parameters_of(const CalibrationResult& found,
+                                               const PhysicalModel& before,
                                                const PhysicalModel& now) {
-  const Eigen::VectorXd old_values = values_in(found.model, before), new_values = values_in(found.model, now);
+  const Eigen::VectorXd old_values = values_in(found.model, before),
+                        new_values = values_in(found.model, now);
   std::vector<ParameterDifference> all;
   for (std::size_t k = 0; k < found.parameters.size(); ++k) {
     const auto place = static_cast<Eigen::Index>(k);
     const Parameter& parameter = found.parameters[k].parameter;
     all.push_back({parameter.name, parameter.unit, parameter.scale * old_values(place),
-                   parameter.scale * new_values(place), 2 * parameter.scale * found.parameters[k].stddev});
+                   parameter.scale * new_values(place),
+                   2 * parameter.scale * found.parameters[k].stddev});
   }
   return all;
 }
@@ -93,11 +99,15 @@ ModelDifference difference_between(const CompensatedModel& before, const Compens
   const CalibrationResult found = between(before.parts(), now.parts());
   ModelDifference difference;
   difference.parameters = parameters_of(found, before.parts().physics, now.parts().physics);
-  const std::vector<ErrorPrediction> old_poses = before.predict_all(poses), new_poses = now.predict_all(poses);
-  PredictedDifference predicted{poses, Eigen::Matrix3Xd(3, std::ssize(poses)), Eigen::Matrix3Xd(3, std::ssize(poses))};
-  const Pose X_BW_old = before.parts().physics.X_WB.inverse(), X_BW_new = now.parts().physics.X_WB.inverse();
+  const std::vector<ErrorPrediction> old_poses = before.predict_all(poses),
+                                     new_poses = now.predict_all(poses);
+  PredictedDifference predicted{poses, Eigen::Matrix3Xd(3, std::ssize(poses)),
+                                Eigen::Matrix3Xd(3, std::ssize(poses))};
+  const Pose X_BW_old = before.parts().physics.X_WB.inverse(),
+             X_BW_new = now.parts().physics.X_WB.inverse();
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Vector3 moved_B = new_poses[i].X_BT_predicted.translation() - old_poses[i].X_BT_predicted.translation();
+    const Vector3 moved_B =
+        new_poses[i].X_BT_predicted.translation() - old_poses[i].X_BT_predicted.translation();
     const Vector3 by_physics = (X_BW_new * now.parts().physics.pose_W(poses[i])).translation() -
                                (X_BW_old * before.parts().physics.pose_W(poses[i])).translation();
     difference.moved_B.push_back(moved_B);

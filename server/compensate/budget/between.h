@@ -20,15 +20,16 @@ struct ParameterDifference {
 
 struct ModelDifference {
   std::vector<ParameterDifference> parameters;  ///< those of `now`, then those of `before` alone
-  /// The predicted poses of `now` minus those of `before`, line by line; `error_rms` is of that difference. Nothing is
-  /// left beyond the two models, so it has no steps to put right.
+  /// The predicted poses of `now` minus those of `before`, line by line; `error_rms` is of that
+  /// difference. Nothing is left beyond the two models, so it has no steps to put right.
   ErrorBudget budget;
   std::vector<Vector3> moved_B;  ///< m, of each pose, seen from the base
 };
 
-/// `before` and `now` are of one drawing; `poses` are not empty. What both models learned from the same measurements
-/// counts as independent in U: it is then too large.
-[[nodiscard]] ModelDifference difference_between(const CompensatedModel& before, const CompensatedModel& now,
+/// `before` and `now` are of one drawing; `poses` are not empty. What both models learned from the
+/// same measurements counts as independent in U: it is then too large.
+[[nodiscard]] ModelDifference difference_between(const CompensatedModel& before,
+                                                 const CompensatedModel& now,
                                                  const std::vector<PoseContext>& poses);
 
 }  // namespace trammel

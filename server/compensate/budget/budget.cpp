@@ -7,9 +7,9 @@ namespace trammel {
 
 namespace {
 
-constexpr std::array<std::string_view, 12> kKinds = {"base",     "joint_zero",       "length", "twist",
-                                                     "tool",     "joint_compliance", "cause",  "learned",
-                                                     "together", "untold",           "rest",   "instrument"};
+constexpr std::array<std::string_view, 12> kKinds = {
+    "base",  "joint_zero", "length",   "twist",  "tool", "joint_compliance",
+    "cause", "learned",    "together", "untold", "rest", "instrument"};
 
 }  // namespace
 
@@ -21,7 +21,8 @@ std::string BudgetLine::cause_or_kind() const {
 
 const BudgetLine* ErrorBudget::line(std::string_view name) const {
   const auto& lines = as_it_stands.lines;
-  const auto found = std::find_if(lines.begin(), lines.end(), [&](const BudgetLine& l) { return l.line == name; });
+  const auto found =
+      std::find_if(lines.begin(), lines.end(), [&](const BudgetLine& l) { return l.line == name; });
   return found == lines.end() ? nullptr : &*found;
 }
 

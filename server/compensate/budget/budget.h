@@ -5,8 +5,9 @@
 #include <string_view>
 #include <vector>
 
-/// Where the millimetres come from: the error of an arm, from its drawing to what is left, a line for each thing that a
-/// person can point at. server/compensate/budget/README.md derives the arithmetic.
+/// Where the millimetres come from: the error of an arm, from its drawing to what is left, a line
+/// for each thing that a person can point at. server/compensate/budget/README.md derives the
+/// arithmetic.
 namespace trammel {
 
 /// What a line of the budget is.
@@ -39,30 +40,35 @@ struct BudgetNumber {
 
 /// One thing that a person can point at.
 struct BudgetLine {
-  std::string line;  ///< `zero:4`, `length:2`, `twist:3`, `base`, `tool`, `compliance:2`, else as in a cell file
+  std::string line;  ///< `zero:4`, `length:2`, `twist:3`, `base`, `tool`, `compliance:2`, else as
+                     ///< in a cell file
   LineKind kind = LineKind::kCause;
-  std::string cause;                  ///< of a kCause, its spelling: `gear_transmission`
-  int joint = -1;                     ///< 0-based; -1: of no single joint
-  std::string name;                   ///< for people: `the zero of joint 4`
-  std::optional<BudgetNumber> value;  ///< the one number of the line, the largest of a link; a distance for a place
+  std::string cause;  ///< of a kCause, its spelling: `gear_transmission`
+  int joint = -1;     ///< 0-based; -1: of no single joint
+  std::string name;   ///< for people: `the zero of joint 4`
+  std::optional<BudgetNumber>
+      value;  ///< the one number of the line, the largest of a link; a distance for a place
   std::vector<BudgetNumber> numbers;  ///< of a line with several, each of them
   double alone_rms = 0;               ///< m, of the poses: what the line does to them
   double alone_max = 0;               ///< m
-  double share = 0;                   ///< of the mean square error; may be negative; all lines add to 1
-  double left_if_right = 0;           ///< m rms: what is left of the error if only this line were put right
+  double share = 0;          ///< of the mean square error; may be negative; all lines add to 1
+  double left_if_right = 0;  ///< m rms: what is left of the error if only this line were put right
   std::optional<double> times_usual;  ///< the value over what arms of this kind show
-  std::vector<std::string> with;      ///< lines that the poses cannot tell from it: they are counted here
-  std::string action;                 ///< what to do; empty: nothing stands out
+  std::vector<std::string>
+      with;            ///< lines that the poses cannot tell from it: they are counted here
+  std::string action;  ///< what to do; empty: nothing stands out
   [[nodiscard]] std::string cause_or_kind() const;
 };
 
-/// All lines, the largest share first; `kTogether`, `kUntold`, `kRest` and `kInstrument` stand last.
+/// All lines, the largest share first; `kTogether`, `kUntold`, `kRest` and `kInstrument` stand
+/// last.
 struct BudgetView {
   double error_rms = 0;  ///< m, of the error that the shares are of
   std::vector<BudgetLine> lines;
 };
 
-/// What is left when this and all before it is put right, with base and tool frames touched again each time.
+/// What is left when this and all before it is put right, with base and tool frames touched again
+/// each time.
 struct PutRight {
   std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `loads`, `trammel`
   std::string name;     ///< for people
@@ -73,8 +79,8 @@ struct PutRight {
 struct ErrorBudget {
   int poses = 0;
   BudgetView as_it_stands;
-  /// The same of what touching base and tool frames would leave: the best fit of both to the error is taken out of it
-  /// and of every line. Lines of frames do not stand here.
+  /// The same of what touching base and tool frames would leave: the best fit of both to the error
+  /// is taken out of it and of every line. Lines of frames do not stand here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
 

@@ -11,14 +11,17 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAlwaysShown = 0.1;  // of the error: a line beyond the first ones that has more is shown as well
+constexpr double kAlwaysShown =
+    0.1;  // of the error: a line beyond the first ones that has more is shown as well
 
 std::string value_of(const BudgetNumber& value) {
   const ShownValue read = show_read(value.value, value.u95, {1, value.unit});
   return fmt::format("{} ± {} {}", read.value, read.expanded, value.unit);
 }
 
-std::string joined(const std::vector<std::string>& all) { return fmt::format("{}", fmt::join(all, ", ")); }
+std::string joined(const std::vector<std::string>& all) {
+  return fmt::format("{}", fmt::join(all, ", "));
+}
 
 /// What stands behind the name, in brackets.
 std::string detail(const BudgetLine& line) {
@@ -35,8 +38,8 @@ std::string detail(const BudgetLine& line) {
 
 std::string sentence(const BudgetLine& line) {
   if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));
-  std::string text =
-      fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line), to_mm(line.alone_rms), 100 * line.share);
+  std::string text = fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line),
+                                 to_mm(line.alone_rms), 100 * line.share);
   if (!line.action.empty()) text += "; " + line.action;
   return text;
 }
@@ -54,10 +57,12 @@ std::vector<std::string> difference_in_words(const ModelDifference& difference, 
 std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   if (budget.as_it_stands.lines.empty()) return {};
   std::vector<std::string> text = {fmt::format(
-      "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave {:.3f} mm",
+      "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave "
+      "{:.3f} mm",
       to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
   for (const BudgetLine& line : budget.as_it_stands.lines) {
-    const bool shown = most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;
+    const bool shown =
+        most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;
     if (shown) text.push_back(sentence(line));
   }
   return text;

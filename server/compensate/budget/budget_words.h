@@ -8,14 +8,18 @@
 
 namespace trammel {
 
-/// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it shows): 14.6 mm alone, 46
+/// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it
+/// shows): 14.6 mm alone, 46
 /// %`.
 [[nodiscard]] std::string sentence(const BudgetLine& line);
 
-/// The budget in its `most` first lines, beneath a heading that names the whole error. Empty without lines.
+/// The budget in its `most` first lines, beneath a heading that names the whole error. Empty
+/// without lines.
 [[nodiscard]] std::vector<std::string> in_words(const ErrorBudget& budget, int most = 6);
 
-/// What is between two models in its `most` first lines, beyond what touching frames would take away.
-[[nodiscard]] std::vector<std::string> difference_in_words(const ModelDifference& difference, int most = 6);
+/// What is between two models in its `most` first lines, beyond what touching frames would take
+/// away.
+[[nodiscard]] std::vector<std::string> difference_in_words(const ModelDifference& difference,
+                                                           int most = 6);
 
 }  // namespace trammel

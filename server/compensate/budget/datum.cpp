@@ -10,15 +10,17 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNothingTold = 0.1;  // of one comparison size: a direction with less is not told by the poses
-constexpr double kPartner = 0.3;      // of the effect: a parameter with more is a partner
-constexpr double kBeyondChance = 3;   // standard deviations
-constexpr int kSteps = 2;             // of Gauss-Newton: the change of the datum is small
-constexpr double kMatched = 1e-7;     // m
-constexpr double kLaterJoint = 1e-6;  // of two equal candidates the later joint counts as being on its drawing
+constexpr double kNothingTold =
+    0.1;  // of one comparison size: a direction with less is not told by the poses
+constexpr double kPartner = 0.3;     // of the effect: a parameter with more is a partner
+constexpr double kBeyondChance = 3;  // standard deviations
+constexpr int kSteps = 2;            // of Gauss-Newton: the change of the datum is small
+constexpr double kMatched = 1e-7;    // m
+constexpr double kLaterJoint =
+    1e-6;  // of two equal candidates the later joint counts as being on its drawing
 
-/// What the measurements told of the parameters that were identified, F x F in units of `sizes`: the inverse of the
-/// covariance without what the priors said.
+/// What the measurements told of the parameters that were identified, F x F in units of `sizes`:
+/// the inverse of the covariance without what the priors said.
 struct Told {
   std::vector<Eigen::Index> free;  // places among the model's P
   Eigen::MatrixXd information;
@@ -32,9 +34,11 @@ Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
   const auto F = std::ssize(told.free);
   Eigen::VectorXd prior(F);
   for (Eigen::Index k = 0; k < F; ++k)
-    prior(k) = parts.parameters[static_cast<std::size_t>(told.free[static_cast<std::size_t>(k)])].parameter.prior_scale;
+    prior(k) = parts.parameters[static_cast<std::size_t>(told.free[static_cast<std::size_t>(k)])]
+                   .parameter.prior_scale;
   const Eigen::VectorXd inverse = prior.cwiseInverse();
-  const Eigen::MatrixXd scaled = inverse.asDiagonal() * parts.covariance(told.free, told.free) * inverse.asDiagonal();
+  const Eigen::MatrixXd scaled =
+      inverse.asDiagonal() * parts.covariance(told.free, told.free) * inverse.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(scaled);
   const Eigen::VectorXd share = solved.eigenvalues().cwiseMax(1e-14);
   const Eigen::VectorXd beyond_prior = (share.cwiseInverse().array() - 1).max(0);
@@ -48,17 +52,21 @@ Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
 Eigen::MatrixXd untold_directions(const Eigen::MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
   Eigen::Index count = 0;
-  while (count < information.rows() && solved.eigenvalues()(count) < kNothingTold * kNothingTold) ++count;
+  while (count < information.rows() && solved.eigenvalues()(count) < kNothingTold * kNothingTold)
+    ++count;
   return solved.eigenvectors().leftCols(count);
 }
 
-/// The R parameters that count as being on their drawing: those with the largest parts in what is not told.
+/// The R parameters that count as being on their drawing: those with the largest parts in what is
+/// not told.
 std::vector<Eigen::Index> chosen(const Eigen::MatrixXd& untold) {
   Eigen::MatrixXd rows = untold.transpose();
-  for (Eigen::Index k = 0; k < rows.cols(); ++k) rows.col(k) *= 1 + kLaterJoint * static_cast<double>(k);
+  for (Eigen::Index k = 0; k < rows.cols(); ++k)
+    rows.col(k) *= 1 + kLaterJoint * static_cast<double>(k);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivots(rows);
   std::vector<Eigen::Index> all;
-  for (Eigen::Index k = 0; k < untold.cols(); ++k) all.push_back(pivots.colsPermutation().indices()(k));
+  for (Eigen::Index k = 0; k < untold.cols(); ++k)
+    all.push_back(pivots.colsPermutation().indices()(k));
   return all;
 }
 
@@ -86,8 +94,9 @@ Eigen::VectorXd positions_of(const PhysicalModel& model, const std::vector<PoseC
 }
 
 /// Moves the parameters `kept` until the model predicts `wanted` (3N, m).
-void match(PhysicalModel& model, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& sizes,
-           const Eigen::VectorXd& wanted, const std::vector<PoseContext>& poses) {
+void match(PhysicalModel& model, const std::vector<Eigen::Index>& kept,
+           const Eigen::VectorXd& sizes, const Eigen::VectorXd& wanted,
+           const std::vector<PoseContext>& poses) {
   const Eigen::VectorXd scale = sizes(kept);
   for (int step = 0; step < kSteps; ++step) {
     const Eigen::VectorXd missing = wanted - positions_of(model, poses);
@@ -99,13 +108,14 @@ void match(PhysicalModel& model, const std::vector<Eigen::Index>& kept, const Ei
   }
 }
 
-/// Draws what the measurements hardly tell towards the drawing, as far as it is not beyond chance, and sets the
-/// covariance of what is kept.
+/// Draws what the measurements hardly tell towards the drawing, as far as it is not beyond chance,
+/// and sets the covariance of what is kept.
 void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& sizes,
             const Eigen::MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
   const Eigen::VectorXd scale = sizes(kept);
-  Eigen::VectorXd along = solved.eigenvectors().transpose() * datum.model.values(kept).cwiseQuotient(scale);
+  Eigen::VectorXd along =
+      solved.eigenvectors().transpose() * datum.model.values(kept).cwiseQuotient(scale);
   Eigen::VectorXd variance(along.size());
   for (Eigen::Index k = 0; k < along.size(); ++k) {
     const double told = std::max(solved.eigenvalues()(k), 0.0);
@@ -118,9 +128,11 @@ void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::Ve
   datum.covariance(kept, kept) = root * variance.asDiagonal() * root.transpose();
 }
 
-/// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that it is named after.
+/// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that
+/// it is named after.
 std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index named,
-                                   const std::vector<Eigen::Index>& not_among, const Eigen::VectorXd& effect) {
+                                   const std::vector<Eigen::Index>& not_among,
+                                   const Eigen::VectorXd& effect) {
   std::vector<Eigen::Index> all;
   const double own = std::abs(untold(named)) * effect(named);
   for (Eigen::Index i = 0; i < untold.size(); ++i) {
@@ -135,7 +147,8 @@ std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index n
 Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
   const PhysicalModel& physics = found.physics;
   const Eigen::VectorXd sizes = sizes_to_compare_by(physics);
-  Datum datum{physics, Eigen::MatrixXd::Zero(physics.parameter_count(), physics.parameter_count()), {}};
+  Datum datum{
+      physics, Eigen::MatrixXd::Zero(physics.parameter_count(), physics.parameter_count()), {}};
   const Told told = told_by(found, sizes);
   if (told.free.empty()) return datum;
   const Eigen::MatrixXd untold = untold_directions(told.information);
@@ -147,15 +160,19 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
     if (!is_gone) kept_of_free.push_back(k);
   }
   if (!gone.empty()) {
-    // Along what is not told the poses stay as they are, to first order: the chosen parameters go to their drawing.
+    // Along what is not told the poses stay as they are, to first order: the chosen parameters go
+    // to their drawing.
     Eigen::MatrixXd of_gone(std::ssize(gone), untold.cols());
-    for (Eigen::Index r = 0; r < of_gone.rows(); ++r) of_gone.row(r) = untold.row(gone[static_cast<std::size_t>(r)]);
-    const Eigen::MatrixXd by_each = untold * of_gone.inverse();  // F x R: each moves one chosen parameter by its size
+    for (Eigen::Index r = 0; r < of_gone.rows(); ++r)
+      of_gone.row(r) = untold.row(gone[static_cast<std::size_t>(r)]);
+    const Eigen::MatrixXd by_each =
+        untold * of_gone.inverse();  // F x R: each moves one chosen parameter by its size
     const Eigen::VectorXd effect = jacobian_of(physics, poses).colwise().norm();
     for (std::size_t r = 0; r < gone.size(); ++r) {
       const Eigen::Index parameter = told.free[static_cast<std::size_t>(gone[r])];
       Eigen::VectorXd direction = Eigen::VectorXd::Zero(sizes.size());
-      direction(told.free) = by_each.col(static_cast<Eigen::Index>(r)).cwiseProduct(sizes(told.free));
+      direction(told.free) =
+          by_each.col(static_cast<Eigen::Index>(r)).cwiseProduct(sizes(told.free));
       datum.model.values -= direction * (physics.values(parameter) / direction(parameter));
       datum.on_drawing.push_back({parameter, partners(direction, parameter, on_drawing, effect)});
     }

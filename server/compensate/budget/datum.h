@@ -4,17 +4,19 @@
 
 #include "server/calibrate/calibration.h"
 
-/// Inside of the room: which of all parameter values that predict the same poses a budget speaks of.
+/// Inside of the room: which of all parameter values that predict the same poses a budget speaks
+/// of.
 namespace trammel {
 
-/// Values and covariance of a model in the datum of the budget. What the poses cannot tell apart is counted once: of
-/// the parameters of such a combination, those that are smallest beside what is usual count as being on their drawing,
-/// and the others take what they would have. Frames take what they can.
+/// Values and covariance of a model in the datum of the budget. What the poses cannot tell apart is
+/// counted once: of the parameters of such a combination, those that are smallest beside what is
+/// usual count as being on their drawing, and the others take what they would have. Frames take
+/// what they can.
 struct Datum {
   PhysicalModel model;         ///< with the values of the datum
   Eigen::MatrixXd covariance;  ///< P x P, SI, of these values; 0 where `on_drawing`
-  /// A parameter that counts as being on its drawing, and those that the poses cannot tell from it; none: the poses do
-  /// not show it at all.
+  /// A parameter that counts as being on its drawing, and those that the poses cannot tell from it;
+  /// none: the poses do not show it at all.
   struct OnDrawing {
     Eigen::Index parameter = 0;
     std::vector<Eigen::Index> with;

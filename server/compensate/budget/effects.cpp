@@ -23,7 +23,8 @@ Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<Bud
   const Eigen::Matrix3Xd whole = positions_by(physics, positions);
   const PhysicalModel told_load = with_told_load(physics);
   const bool other_load = told_load.sources.size() != physics.sources.size();
-  const Eigen::Matrix3Xd whole_of_told_load = other_load ? positions_by(told_load, positions) : whole;
+  const Eigen::Matrix3Xd whole_of_told_load =
+      other_load ? positions_by(told_load, positions) : whole;
 
   Effects effects;
   effects.total = left.drawing;
@@ -32,15 +33,17 @@ Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<Bud
   effects.together = effects.total - effects.rest - effects.learned;
   for (const BudgetItem& item : items) {
     const bool of_gearbox = other_load && item.line.kind == LineKind::kJointCompliance;
-    const Eigen::Matrix3Xd rest = of_gearbox ? positions_by(without(told_load, in_told_load(physics, item)), positions)
-                                             : positions_by(without(physics, item), positions);
+    const Eigen::Matrix3Xd rest =
+        of_gearbox ? positions_by(without(told_load, in_told_load(physics, item)), positions)
+                   : positions_by(without(physics, item), positions);
     effects.lines.push_back((of_gearbox ? whole_of_told_load : whole) - rest);
     effects.together -= effects.lines.back();
   }
   return effects;
 }
 
-Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model, const std::vector<const BudgetItem*>& items,
+Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model,
+                               const std::vector<const BudgetItem*>& items,
                                const MeasurementBatch& positions) {
   PhysicalModel rest = model;
   for (const BudgetItem* item : items)
@@ -51,7 +54,8 @@ Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model, const std::vector<con
 BeyondFrames::BeyondFrames(const PhysicalModel& model, const MeasurementBatch& positions) {
   const auto n = std::ssize(positions.measurements);
   std::map<std::string, Eigen::Index> tools;  // first column of each
-  for (const Measurement& m : positions.measurements) tools.try_emplace(m.context.tool, 6 + 3 * std::ssize(tools));
+  for (const Measurement& m : positions.measurements)
+    tools.try_emplace(m.context.tool, 6 + 3 * std::ssize(tools));
   Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * n, 6 + 3 * std::ssize(tools));
   for (Eigen::Index i = 0; i < n; ++i) {
     const PoseContext& context = positions.measurements[static_cast<std::size_t>(i)].context;

@@ -16,15 +16,18 @@ struct Effects {
   Eigen::Matrix3Xd rest;                ///< measured minus compensated
   Eigen::Matrix3Xd together;            ///< what is then missing: lines that act on one another
 };
-/// Measured minus predicted, 3 x N, m, in W: by the drawing, by the physics as identified, and with the bias.
+/// Measured minus predicted, 3 x N, m, in W: by the drawing, by the physics as identified, and with
+/// the bias.
 struct LeftAt {
   Eigen::Matrix3Xd drawing, physics, all;
 };
-[[nodiscard]] Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<BudgetItem>& items,
+[[nodiscard]] Effects effects_of(const LeftAt& left, const Datum& datum,
+                                 const std::vector<BudgetItem>& items,
                                  const MeasurementBatch& positions);
 
 /// What `items` do together: the model minus the model in which all of them are on their drawing.
-[[nodiscard]] Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model, const std::vector<const BudgetItem*>& items,
+[[nodiscard]] Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model,
+                                             const std::vector<const BudgetItem*>& items,
                                              const MeasurementBatch& positions);
 
 /// Takes out of 3 x N vectors at poses what a small motion of the base and of each tool could do.

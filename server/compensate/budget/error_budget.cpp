@@ -46,23 +46,26 @@ void add_values(const Datum& datum, const std::vector<Parameter>& parameters, Bu
     const Parameter& parameter = parameters[static_cast<std::size_t>(place)];
     const auto [scale, unit] = shown(parameter);
     const double sign = counted(item, datum.model.cell->robot);
-    line.numbers.push_back(
-        {parameter.name, sign * scale * datum.model.values(place), scale * u95(datum.covariance(place, place)), unit});
+    line.numbers.push_back({parameter.name, sign * scale * datum.model.values(place),
+                            scale * u95(datum.covariance(place, place)), unit});
   }
   if (line.numbers.size() == 1) {
     line.value = line.numbers.front();
     line.numbers.clear();
   } else if (line.kind == LineKind::kLength || line.kind == LineKind::kTwist) {
-    line.value = *std::max_element(
-        line.numbers.begin(), line.numbers.end(),
-        [](const BudgetNumber& one, const BudgetNumber& other) { return std::abs(one.value) < std::abs(other.value); });
+    line.value = *std::max_element(line.numbers.begin(), line.numbers.end(),
+                                   [](const BudgetNumber& one, const BudgetNumber& other) {
+                                     return std::abs(one.value) < std::abs(other.value);
+                                   });
     line.name = name_of_link_parameter(line.value->name, datum.model.cell->robot);
   } else if (line.kind == LineKind::kBase || line.kind == LineKind::kTool) {
     const Eigen::Vector3d shift = datum.model.values.segment<3>(item.places.front());
-    const Matrix3 covariance = datum.covariance.block<3, 3>(item.places.front(), item.places.front());
+    const Matrix3 covariance =
+        datum.covariance.block<3, 3>(item.places.front(), item.places.front());
     const double length = shift.norm();
     const Vector3 along = length > 0 ? Vector3(shift / length) : Vector3::UnitX();
-    line.value = BudgetNumber{"shift", to_mm(length), to_mm(u95(along.dot(covariance * along))), "mm"};
+    line.value =
+        BudgetNumber{"shift", to_mm(length), to_mm(u95(along.dot(covariance * along))), "mm"};
   }
 }
 
@@ -84,16 +87,17 @@ std::ptrdiff_t item_with(const std::vector<BudgetItem>& items, Eigen::Index plac
   return found == items.end() ? -1 : found - items.begin();
 }
 
-/// Names a line that counts as being on its drawing where it is counted: beside its partners, or, where they have many
-/// or none, in one line of what is not told.
-void name_partners(const std::string& name, const std::set<std::ptrdiff_t>& partners, std::vector<BudgetItem>& items,
-                   BudgetLine& untold) {
+/// Names a line that counts as being on its drawing where it is counted: beside its partners, or,
+/// where they have many or none, in one line of what is not told.
+void name_partners(const std::string& name, const std::set<std::ptrdiff_t>& partners,
+                   std::vector<BudgetItem>& items, BudgetLine& untold) {
   constexpr std::size_t kMostPartners = 2;
   const auto add = [&](std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
   if (partners.empty() || partners.size() > kMostPartners) return add(untold.with);
-  for (const std::ptrdiff_t partner : partners) add(items[static_cast<std::size_t>(partner)].line.with);
+  for (const std::ptrdiff_t partner : partners)
+    add(items[static_cast<std::size_t>(partner)].line.with);
 }
 
 /// Leaves out parameters that count as being on their drawing, and lines that have no other.
@@ -112,7 +116,8 @@ void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold
     name_partners(item.line.line, partners, items, untold);
     std::erase(item.places, one.parameter);
   }
-  std::erase_if(items, [](const BudgetItem& item) { return item.places.empty() && !item.whole_source; });
+  std::erase_if(items,
+                [](const BudgetItem& item) { return item.places.empty() && !item.whole_source; });
 }
 
 BudgetLine named(LineKind kind, std::string name) {
@@ -136,15 +141,18 @@ BudgetLine sized(BudgetLine line, const Eigen::Matrix3Xd& effect, const Eigen::M
 /// m², of a position: what the instrument says of its own noise.
 double stated_mean_square(const MeasurementBatch& positions, const Cell& cell) {
   double sum = 0;
-  for (const Measurement& m : positions.measurements) sum += 3 * std::pow(m.sigma.value_or(cell.tracker.sigma), 2);
+  for (const Measurement& m : positions.measurements)
+    sum += 3 * std::pow(m.sigma.value_or(cell.tracker.sigma), 2);
   return sum / static_cast<double>(positions.measurements.size());
 }
 
 /// Splits what is left into the noise that the instrument states and the rest.
-void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, double stated, BudgetView& view) {
+void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, double stated,
+              BudgetView& view) {
   const double whole = mean_square(total);
   const double of_instrument = std::min(stated, mean_square(rest));
-  BudgetLine left = sized(named(LineKind::kRest, "what is left, by no cause that is known"), rest, total);
+  BudgetLine left =
+      sized(named(LineKind::kRest, "what is left, by no cause that is known"), rest, total);
   left.share -= whole > 0 ? of_instrument / whole : 0;
   left.alone_rms = std::sqrt(mean_square(rest) - of_instrument);
   view.lines.push_back(std::move(left));
@@ -177,17 +185,21 @@ BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
     view.lines.push_back(sized(asked.items[k].line, seen(asked.effects.lines[k]), total));
   }
   if (asked.has_bias)
-    view.lines.push_back(
-        sized(named(LineKind::kLearned, "what is learned beyond the physics"), seen(asked.effects.learned), total));
+    view.lines.push_back(sized(named(LineKind::kLearned, "what is learned beyond the physics"),
+                               seen(asked.effects.learned), total));
   // What stands out leads.
-  std::stable_sort(view.lines.begin(), view.lines.end(), [](const BudgetLine& one, const BudgetLine& other) {
-    return one.action.empty() == other.action.empty() ? one.share > other.share : other.action.empty();
-  });
-  // What frames do is out of every vector, so that their small remainder counts with what acts together.
+  std::stable_sort(view.lines.begin(), view.lines.end(),
+                   [](const BudgetLine& one, const BudgetLine& other) {
+                     return one.action.empty() == other.action.empty() ? one.share > other.share
+                                                                       : other.action.empty();
+                   });
+  // What frames do is out of every vector, so that their small remainder counts with what acts
+  // together.
   Eigen::Matrix3Xd together = asked.effects.together;
   for (std::size_t k = 0; k < asked.items.size(); ++k)
     if (!frames && is_frame(asked.items[k].line.kind)) together += asked.effects.lines[k];
-  view.lines.push_back(sized(named(LineKind::kTogether, "what the lines do together"), seen(together), total));
+  view.lines.push_back(
+      sized(named(LineKind::kTogether, "what the lines do together"), seen(together), total));
   if (!asked.untold.with.empty()) view.lines.push_back(asked.untold);
   add_rest(seen(asked.effects.rest), total, asked.stated, view);
   return view;
@@ -222,8 +234,9 @@ std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<Bu
                                 const Effects& effects, const MeasurementBatch& positions,
                                 const BeyondFrames& beyond_frames) {
   const auto rms = [](const Eigen::Matrix3Xd& vectors) { return std::sqrt(mean_square(vectors)); };
-  std::vector<PutRight> steps = {{"nothing", "as it stands", rms(effects.total)},
-                                 {"frames", "base and tool frames touched", rms(beyond_frames(effects.total))}};
+  std::vector<PutRight> steps = {
+      {"nothing", "as it stands", rms(effects.total)},
+      {"frames", "base and tool frames touched", rms(beyond_frames(effects.total))}};
   std::vector<const BudgetItem*> right;
   for (const auto& [step, name] :
        {std::pair("zeros", "zeros of the joints set in the controller"),
@@ -231,14 +244,16 @@ std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<Bu
         std::pair("loads", "load data, where a controller takes the gearboxes into account")}) {
     for (const BudgetItem& item : items)
       if (is_of_step(item.line, step)) right.push_back(&item);
-    steps.push_back({step, name, rms(beyond_frames(effects.total - effect_of_all(model, right, positions)))});
+    steps.push_back(
+        {step, name, rms(beyond_frames(effects.total - effect_of_all(model, right, positions)))});
   }
   steps.push_back({"trammel", "targets corrected by this model", rms(effects.rest)});
   return steps;
 }
 
 /// `positions` is not empty.
-ErrorBudget budget_of(const Identified& found, const LeftAt& left, const MeasurementBatch& positions, bool has_bias) {
+ErrorBudget budget_of(const Identified& found, const LeftAt& left,
+                      const MeasurementBatch& positions, bool has_bias) {
   ErrorBudget budget;
   budget.poses = static_cast<int>(positions.measurements.size());
   const Datum datum = datum_of(found, contexts_of(positions));
@@ -251,7 +266,8 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left, const Measure
     judge(datum, item);
   }
   const Effects effects = effects_of(left, datum, items, positions);
-  const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell), has_bias};
+  const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell),
+                        has_bias};
   budget.as_it_stands = view_of(asked, true, [](const Eigen::Matrix3Xd& all) { return all; });
   const BeyondFrames beyond_frames(datum.model, positions);
   budget.beyond_frames = view_of(asked, false, beyond_frames);
@@ -265,8 +281,8 @@ ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& 
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return {};
   const ModelParts& parts = model.parts();
-  return budget_of({parts.physics, parts.parameters, parts.covariance}, left_by(model, positions), positions,
-                   model.bias().has_value());
+  return budget_of({parts.physics, parts.parameters, parts.covariance}, left_by(model, positions),
+                   positions, model.bias().has_value());
 }
 
 ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseContext>& targets) {
@@ -294,7 +310,8 @@ ErrorBudget error_budget(const CalibrationResult& between, const PredictedDiffer
   }
   const auto n = std::ssize(predicted.poses);
   const LeftAt left{predicted.all, predicted.learned, Eigen::Matrix3Xd::Zero(3, n)};
-  return budget_of({between.model, between.parameters, between.covariance}, left, at, !predicted.learned.isZero(0));
+  return budget_of({between.model, between.parameters, between.covariance}, left, at,
+                   !predicted.learned.isZero(0));
 }
 
 ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {

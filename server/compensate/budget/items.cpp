@@ -22,7 +22,8 @@ Symbol symbol_of(const std::string& parameter) {
   return {parameter.substr(0, digit), std::stoi(parameter.substr(digit)) - 1};
 }
 
-/// What a parameter of the links is part of: the zero of its joint, or the lengths or the angles of its link.
+/// What a parameter of the links is part of: the zero of its joint, or the lengths or the angles of
+/// its link.
 BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
   const auto [letters, joint] = symbol_of(parameter);
   const bool slides = robot.joint(joint).type == JointType::kPrismatic;
@@ -31,7 +32,9 @@ BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
   line.kind = letters == "q" || (letters == "d" && slides) ? LineKind::kJointZero
               : letters == "d" || letters == "a"           ? LineKind::kLength
                                                            : LineKind::kTwist;
-  const char* word = line.kind == LineKind::kJointZero ? "zero" : line.kind == LineKind::kLength ? "length" : "twist";
+  const char* word = line.kind == LineKind::kJointZero ? "zero"
+                     : line.kind == LineKind::kLength  ? "length"
+                                                       : "twist";
   line.line = fmt::format("{}:{}", word, joint + 1);
   line.name = name_of_link_parameter(parameter, robot);
   return line;
@@ -40,16 +43,20 @@ BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
 /// Parameters of tools end in `[ID]` where a cell has several.
 std::string tool_of(const std::string& parameter) {
   const auto bracket = parameter.find('[');
-  return bracket == std::string::npos ? "" : parameter.substr(bracket + 1, parameter.size() - bracket - 2);
+  return bracket == std::string::npos
+             ? ""
+             : parameter.substr(bracket + 1, parameter.size() - bracket - 2);
 }
 
-void add_links(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
+void add_links(const PhysicalModel& model, std::size_t source, Eigen::Index first,
+               std::vector<BudgetItem>& items) {
   const std::size_t before = items.size();
   Eigen::Index place = first;
   for (const Parameter& parameter : model.sources[source]->parameters()) {
     BudgetLine line = line_of_link(parameter.name, model.cell->robot);
-    const auto same = std::find_if(items.begin() + static_cast<std::ptrdiff_t>(before), items.end(),
-                                   [&](const BudgetItem& item) { return item.line.line == line.line; });
+    const auto same =
+        std::find_if(items.begin() + static_cast<std::ptrdiff_t>(before), items.end(),
+                     [&](const BudgetItem& item) { return item.line.line == line.line; });
     if (same == items.end()) {
       items.push_back({std::move(line), source, {place}, false});
     } else {
@@ -59,7 +66,8 @@ void add_links(const PhysicalModel& model, std::size_t source, Eigen::Index firs
   }
 }
 
-void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
+void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index first,
+               std::vector<BudgetItem>& items) {
   std::map<std::string, BudgetItem> by_tool;
   Eigen::Index place = first;
   for (const Parameter& parameter : model.sources[source]->parameters()) {
@@ -67,14 +75,16 @@ void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index firs
     BudgetItem& item = by_tool[tool];
     item.line.line = tool.empty() ? "tool" : "tool:" + tool;
     item.line.kind = LineKind::kTool;
-    item.line.name = tool.empty() ? "the tool on the flange" : fmt::format("the tool {} on the flange", tool);
+    item.line.name =
+        tool.empty() ? "the tool on the flange" : fmt::format("the tool {} on the flange", tool);
     item.source = source;
     item.places.push_back(place++);
   }
   for (auto& [tool, item] : by_tool) items.push_back(std::move(item));
 }
 
-void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
+void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index first,
+                   std::vector<BudgetItem>& items) {
   const auto joints = std::ssize(model.sources[source]->parameters());
   for (Eigen::Index j = 0; j < joints; ++j) {
     BudgetItem item;
@@ -88,11 +98,12 @@ void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index 
   }
 }
 
-/// `joint_map:4` of `joint_map:4@8+20`: numbers that say how a cause is described are not its name; the pose that it
-/// begins at is.
+/// `joint_map:4` of `joint_map:4@8+20`: numbers that say how a cause is described are not its name;
+/// the pose that it begins at is.
 std::string line_of(const ErrorSource& source) {
   const std::string name = source.name();
-  return source.cause().lasting == causes::Lasting::kFromAPose ? name : name.substr(0, name.find('@'));
+  return source.cause().lasting == causes::Lasting::kFromAPose ? name
+                                                               : name.substr(0, name.find('@'));
 }
 
 BudgetItem whole(const PhysicalModel& model, std::size_t source, Eigen::Index first) {
@@ -102,7 +113,8 @@ BudgetItem whole(const PhysicalModel& model, std::size_t source, Eigen::Index fi
   item.line.kind = one.cause().part == causes::Part::kBase ? LineKind::kBase : LineKind::kCause;
   item.line.cause = one.cause().spelling;
   item.line.joint = one.joint();
-  item.line.name = item.line.kind == LineKind::kBase ? "the place of the base" : in_words(one.name());
+  item.line.name =
+      item.line.kind == LineKind::kBase ? "the place of the base" : in_words(one.name());
   item.source = source;
   item.whole_source = true;
   for (Eigen::Index k = 0; k < std::ssize(one.parameters()); ++k) item.places.push_back(first + k);
@@ -152,8 +164,9 @@ std::string name_of_link_parameter(const std::string& parameter, const Chain& ro
     return fmt::format("the zero of joint {}", n);
   if (letters == "a") return fmt::format("the length of link {} ({})", n, parameter);
   if (letters == "d") return fmt::format("the offset of link {} ({})", n, parameter);
-  return n < robot.size() ? fmt::format("the angle between axes {} and {} ({})", n, n + 1, parameter)
-                          : fmt::format("the angle of the flange to axis {} ({})", n, parameter);
+  return n < robot.size()
+             ? fmt::format("the angle between axes {} and {} ({})", n, n + 1, parameter)
+             : fmt::format("the angle of the flange to axis {} ({})", n, parameter);
 }
 
 std::vector<BudgetItem> items_of(const PhysicalModel& model) {
@@ -177,7 +190,8 @@ std::vector<BudgetItem> items_of(const PhysicalModel& model) {
 }
 
 PhysicalModel without(const PhysicalModel& model, const BudgetItem& item) {
-  if (item.whole_source) return without_sources(model, [&](std::size_t k) { return k == item.source; });
+  if (item.whole_source)
+    return without_sources(model, [&](std::size_t k) { return k == item.source; });
   PhysicalModel rest = model;
   for (const Eigen::Index place : item.places) rest.values(place) = 0;
   return rest;

@@ -6,28 +6,30 @@
 #include "server/compensate/budget/budget.h"
 #include "server/error_sources/physical_model.h"
 
-/// Inside of the room: the lines that a physical model has, and where their numbers stand among its parameters.
+/// Inside of the room: the lines that a physical model has, and where their numbers stand among its
+/// parameters.
 namespace trammel {
 
 struct BudgetItem {
   BudgetLine line;                   ///< with `line`, `kind`, `cause`, `joint` and `name`
   std::size_t source = 0;            ///< in PhysicalModel::sources
   std::vector<Eigen::Index> places;  ///< of its parameters, among the model's
-  bool whole_source = false;         ///< all that its source does: without it the source is not there
+  bool whole_source = false;  ///< all that its source does: without it the source is not there
 };
 
 /// For people: `the length of link 3 (a3)`.
 [[nodiscard]] std::string name_of_link_parameter(const std::string& parameter, const Chain& robot);
 
-/// The lines of a model. The lengths of a link (a, d) are one line, and so are its angles (alpha, beta). Sources that
-/// move no tool (anchors, zeros of instruments) have none; the links' own weights
+/// The lines of a model. The lengths of a link (a, d) are one line, and so are its angles (alpha,
+/// beta). Sources that move no tool (anchors, zeros of instruments) have none; the links' own
+/// weights
 /// (`self_weight`) act through the gearboxes and stand in their lines.
 [[nodiscard]] std::vector<BudgetItem> items_of(const PhysicalModel& model);
 
 /// The model as it would be if this line were on its drawing.
 [[nodiscard]] PhysicalModel without(const PhysicalModel& model, const BudgetItem& item);
-/// The model without the sources that change what the arm carries (payload, balancer): what they do is counted in their
-/// own lines, and not once more in those of the gearboxes.
+/// The model without the sources that change what the arm carries (payload, balancer): what they do
+/// is counted in their own lines, and not once more in those of the gearboxes.
 [[nodiscard]] PhysicalModel with_told_load(const PhysicalModel& model);
 /// The place of `item` in with_told_load().
 [[nodiscard]] BudgetItem in_told_load(const PhysicalModel& model, const BudgetItem& item);

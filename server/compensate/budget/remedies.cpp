@@ -24,24 +24,28 @@ const std::vector<Maker>& makers() {
   static const std::vector<Maker> all = {
       {"abb",
        {"ABB",
-        "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update the revolution "
-        "counters",
-        "not in the controller, but by ABB's Absolute Accuracy", "tooldata: mass, cog; LoadIdentify"}},
+        "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update "
+        "the revolution counters",
+        "not in the controller, but by ABB's Absolute Accuracy",
+        "tooldata: mass, cog; LoadIdentify"}},
       {"kuka",
        {"KUKA", "mastering of the axis (Start-up > Master), with the offset for the tool",
         "$machine.dat, by KUKA's service alone", "Load data of the tool ($LOAD): M, X, Y, Z"}},
       {"fanuc",
-       {"FANUC", "MENU > SYSTEM > Master/Cal, single-axis mastering ($DMR_GRP.$MASTER_COUN), then CALIBRATE",
+       {"FANUC",
+        "MENU > SYSTEM > Master/Cal, single-axis mastering ($DMR_GRP.$MASTER_COUN), then CALIBRATE",
         "not in the controller, but by iRCalibration", "MOTION PAYLOAD SET ($PLST_GRP)"}},
       {"yaskawa",
        {"Yaskawa", "HOME POSITION of the axis (ROBOT > HOME POSITION)", "not in the controller",
         "TOOL: W, Xg, Yg, Zg; W.GRAV.POS measurement"}},
       {"universal robots",
-       {"Universal Robots", "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
-        "calibration.conf: delta_a, delta_d, delta_alpha", "Payload: mass and centre of gravity (set_target_payload)"}},
+       {"Universal Robots",
+        "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
+        "calibration.conf: delta_a, delta_d, delta_alpha",
+        "Payload: mass and centre of gravity (set_target_payload)"}},
       {"staubli",
-       {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis", "arm.cfx, by the maker's service alone",
-        "load of the tool"}},
+       {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis",
+        "arm.cfx, by the maker's service alone", "load of the tool"}},
   };
   return all;
 }
@@ -56,7 +60,9 @@ std::string signed_value(double value, double u95, const std::string& unit) {
 std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget) {
   std::vector<ZeroRemedy> zeros;
   for (const BudgetLine& line : budget.as_it_stands.lines) {
-    if (line.kind != LineKind::kJointZero || !line.value || std::abs(line.value->value) <= line.value->u95) continue;
+    if (line.kind != LineKind::kJointZero || !line.value ||
+        std::abs(line.value->value) <= line.value->u95)
+      continue;
     zeros.push_back({line.joint, line.value->value, line.value->u95, line.value->unit});
   }
   std::sort(zeros.begin(), zeros.end(),
@@ -70,7 +76,8 @@ bool is_of_step(const BudgetLine& line, std::string_view step) {
   if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
   if (step != "loads") return false;
   const CauseRecord* cause = find_cause(line.cause);
-  return line.kind == LineKind::kJointCompliance || (cause != nullptr && cause->part == causes::Part::kPayload);
+  return line.kind == LineKind::kJointCompliance ||
+         (cause != nullptr && cause->part == causes::Part::kPayload);
 }
 
 std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_view step) {
@@ -82,8 +89,8 @@ std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_vi
     for (const BudgetNumber& number : numbers) {
       if (std::abs(number.value) <= number.u95) continue;
       const bool zero = line.kind == LineKind::kJointZero;
-      values.push_back(
-          {zero ? fmt::format("joint {}", line.joint + 1) : number.name, number.value, number.u95, number.unit});
+      values.push_back({zero ? fmt::format("joint {}", line.joint + 1) : number.name, number.value,
+                        number.u95, number.unit});
     }
   }
   return values;
@@ -93,8 +100,8 @@ MakersWords makers_words(const Chain& robot) {
   const std::string name = lower(robot.name());
   for (const Maker& maker : makers())
     if (name.starts_with(maker.begins)) return maker.words;
-  return {"", "the zero of the axis in the controller", "where the controller takes lengths of its own arm",
-          "the load data of the tool"};
+  return {"", "the zero of the axis in the controller",
+          "where the controller takes lengths of its own arm", "the load data of the tool"};
 }
 
 std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chain& robot) {
@@ -106,9 +113,11 @@ std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chai
   const std::vector<ZeroRemedy> zeros = zero_remedies(budget);
   if (!zeros.empty())
     text.push_back(fmt::format("zeros: the joint stands at the angle shown plus this; {}: {}",
-                               words.maker.empty() ? "in the controller" : words.maker, words.zeros));
+                               words.maker.empty() ? "in the controller" : words.maker,
+                               words.zeros));
   for (const ZeroRemedy& zero : zeros)
-    text.push_back(fmt::format("  joint {}: {}", zero.joint + 1, signed_value(zero.add, zero.u95, zero.unit)));
+    text.push_back(
+        fmt::format("  joint {}: {}", zero.joint + 1, signed_value(zero.add, zero.u95, zero.unit)));
   if (zeros.empty()) text.emplace_back("zeros: none is off by more than its uncertainty");
   text.push_back(fmt::format("lengths: {}", words.lengths));
   text.push_back(fmt::format("load data: {}", words.load));

@@ -9,7 +9,8 @@
 
 namespace trammel {
 
-/// What is done to the zero of one joint: the controller shows an angle, and the joint stands `add` beyond it.
+/// What is done to the zero of one joint: the controller shows an angle, and the joint stands `add`
+/// beyond it.
 struct ZeroRemedy {
   int joint = 0;  ///< 0-based
   double add = 0, u95 = 0;
@@ -18,7 +19,8 @@ struct ZeroRemedy {
 /// Of every joint whose zero is off by more than its U.
 [[nodiscard]] std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget);
 
-/// Whether a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`, `loads`.
+/// Whether a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`,
+/// `loads`.
 [[nodiscard]] bool is_of_step(const BudgetLine& line, std::string_view step);
 
 /// A number that is set in a step, and what is added to what is stated now.
@@ -28,16 +30,18 @@ struct RemedyValue {
   std::string unit;
 };
 /// Those of a step that are off by more than their U.
-[[nodiscard]] std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_view step);
+[[nodiscard]] std::vector<RemedyValue> remedy_values(const ErrorBudget& budget,
+                                                     std::string_view step);
 
-/// Where a maker's controller keeps zeros, lengths and load data, in the maker's own words. By the name of the robot
-/// file; general words where no maker is known.
+/// Where a maker's controller keeps zeros, lengths and load data, in the maker's own words. By the
+/// name of the robot file; general words where no maker is known.
 struct MakersWords {
   std::string maker, zeros, lengths, load;
 };
 [[nodiscard]] MakersWords makers_words(const Chain& robot);
 
 /// What a shop can put right, step by step, for people.
-[[nodiscard]] std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chain& robot);
+[[nodiscard]] std::vector<std::string> remedies_in_words(const ErrorBudget& budget,
+                                                         const Chain& robot);
 
 }  // namespace trammel

@@ -15,7 +15,8 @@ constexpr double kToolTurn = 0.02;   // rad
 /// m: the longest stretch of the drawing.
 double reach_of(const Chain& robot) {
   double reach = 0;
-  for (int j = 0; j < robot.size(); ++j) reach += std::hypot(robot.joint(j).link.a, robot.joint(j).link.d);
+  for (int j = 0; j < robot.size(); ++j)
+    reach += std::hypot(robot.joint(j).link.a, robot.joint(j).link.d);
   return reach;
 }
 
@@ -24,8 +25,9 @@ bool is_length(const Parameter& parameter) { return parameter.unit == "mm"; }
 }  // namespace
 
 UsualSizes usual_sizes(const Chain& robot) {
-  // A mastered zero repeats to about 0.02 degrees, and its reference is of the same size; axes are bored to about 0.03
-  // degrees; cast links are machined to some tenths of a millimetre, and with their length.
+  // A mastered zero repeats to about 0.02 degrees, and its reference is of the same size; axes are
+  // bored to about 0.03 degrees; cast links are machined to some tenths of a millimetre, and with
+  // their length.
   UsualSizes usual;
   usual.zero = from_deg(0.06);
   usual.rail_zero = from_mm(1.0);
@@ -39,8 +41,9 @@ std::optional<double> usual_value(const BudgetItem& item, const PhysicalModel& m
   const UsualSizes usual = usual_sizes(model.cell->robot);
   switch (item.line.kind) {
     case LineKind::kJointZero:
-      return model.cell->robot.joint(item.line.joint).type == JointType::kRevolute ? to_deg(usual.zero)
-                                                                                   : to_mm(usual.rail_zero);
+      return model.cell->robot.joint(item.line.joint).type == JointType::kRevolute
+                 ? to_deg(usual.zero)
+                 : to_mm(usual.rail_zero);
     case LineKind::kTwist:
       return to_deg(usual.twist);
     case LineKind::kLength:
@@ -84,7 +87,9 @@ std::string action_for(const BudgetLine& line, const PhysicalModel& model) {
       return fmt::format("re-master joint {}", n);
     case LineKind::kLength:
       return fmt::format(
-          "compare the robot file with the maker's drawing: is it of another reach? Else look at link {}", n);
+          "compare the robot file with the maker's drawing: is it of another reach? Else look at "
+          "link {}",
+          n);
     case LineKind::kTwist:
       return fmt::format("look at link {}: was it bent, or a bearing changed?", n);
     case LineKind::kTool:

@@ -15,12 +15,13 @@ struct UsualSizes {
 };
 [[nodiscard]] UsualSizes usual_sizes(const Chain& robot);
 
-/// The usual size of the value of a line, in the unit of the value; empty where nothing is usual (a base stands
-/// anywhere).
+/// The usual size of the value of a line, in the unit of the value; empty where nothing is usual (a
+/// base stands anywhere).
 [[nodiscard]] std::optional<double> usual_value(const BudgetItem& item, const PhysicalModel& model);
 
-/// The size by which parameters are compared when the poses cannot tell them apart, SI, one for each of the model's:
-/// what is usual for the arm; for frames far more, so that what a frame can take is counted as the frame's.
+/// The size by which parameters are compared when the poses cannot tell them apart, SI, one for
+/// each of the model's: what is usual for the arm; for frames far more, so that what a frame can
+/// take is counted as the frame's.
 [[nodiscard]] Eigen::VectorXd sizes_to_compare_by(const PhysicalModel& model);
 
 /// From so many times what is usual on, a line stands out.

@@ -5,7 +5,8 @@ namespace trammel::model_file {
 namespace {
 
 Json json_of(const BudgetNumber& number) {
-  return {{"name", number.name}, {"value", number.value}, {"u95", number.u95}, {"unit", number.unit}};
+  return {
+      {"name", number.name}, {"value", number.value}, {"u95", number.u95}, {"unit", number.unit}};
 }
 
 BudgetNumber number_of_line(const Json& json) {
@@ -48,7 +49,8 @@ BudgetLine line_from(const Json& json) {
   line.joint = json.contains("joint") ? whole_from<int>(json, "joint") - 1 : -1;
   if (json.contains("value")) line.value = number_of_line(json.at("value"));
   if (json.contains("numbers"))
-    for (const Json& number : list_from(json.at("numbers"))) line.numbers.push_back(number_of_line(number));
+    for (const Json& number : list_from(json.at("numbers")))
+      line.numbers.push_back(number_of_line(number));
   if (json.contains("times_usual")) line.times_usual = number_from(json, "times_usual");
   line.with = json.value("with", std::vector<std::string>{});
   line.action = json.value("action", "");
@@ -81,11 +83,13 @@ Json budget_json(const ErrorBudget& budget) {
 }
 
 ErrorBudget budget_from(const Json& json) {
-  ErrorBudget budget{
-      count_from(json, "poses"), view_from(json.at("as_it_stands")), view_from(json.at("beyond_frames")), {}};
+  ErrorBudget budget{count_from(json, "poses"),
+                     view_from(json.at("as_it_stands")),
+                     view_from(json.at("beyond_frames")),
+                     {}};
   for (const Json& step : list_from(json.at("put_right")))
-    budget.put_right.push_back(
-        {step.at("step").get<std::string>(), step.at("name").get<std::string>(), number_from(step, "left_m")});
+    budget.put_right.push_back({step.at("step").get<std::string>(),
+                                step.at("name").get<std::string>(), number_from(step, "left_m")});
   return budget;
 }
 

@@ -7,12 +7,13 @@
 namespace trammel::model_file {
 namespace {
 
-constexpr double kRigid = 1e-6;                      // |RᵀR - 1|: rounding of what was rigid is far below
-constexpr double kMostStretched = 0.1;               // of a session's lengths: a tenth is no instrument's scale
-constexpr double kMostMetres = 1e6;                  // of a frame: no cell is larger
-constexpr double kCorrelationRounding = 1e-6;        // of what was symmetric and positive semidefinite
-constexpr Eigen::Index kMostTrainingPoses = 20'000;  // of one training: the memory of a bias grows with them
-constexpr double kMostLog = 200;                     // of a hyperparameter: its square is still a number
+constexpr double kRigid = 1e-6;         // |RᵀR - 1|: rounding of what was rigid is far below
+constexpr double kMostStretched = 0.1;  // of a session's lengths: a tenth is no instrument's scale
+constexpr double kMostMetres = 1e6;     // of a frame: no cell is larger
+constexpr double kCorrelationRounding = 1e-6;  // of what was symmetric and positive semidefinite
+constexpr Eigen::Index kMostTrainingPoses =
+    20'000;                       // of one training: the memory of a bias grows with them
+constexpr double kMostLog = 200;  // of a hyperparameter: its square is still a number
 
 Status check_frame(const Pose& X, const std::string& name) {
   if (!X.matrix().allFinite() || X.translation().norm() > kMostMetres)
@@ -20,11 +21,13 @@ Status check_frame(const Pose& X, const std::string& name) {
   const Matrix3 R = X.linear();
   const double off = (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
   if (R.determinant() < 0)
-    return refused("model: {}: its rotation is a mirror image, determinant {:.3g}", name, R.determinant())
+    return refused("model: {}: its rotation is a mirror image, determinant {:.3g}", name,
+                   R.determinant())
         .of(name)
         .beyond(R.determinant(), 0);
   if (off > kRigid)
-    return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid)
+    return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off,
+                   kRigid)
         .of(name)
         .beyond(off, kRigid);
   return {};
@@ -55,12 +58,14 @@ Status check_covariance(const Eigen::MatrixXd& covariance) {
           .of("covariance")
           .beyond(variance(i), 0);
   }
-  const Eigen::VectorXd scale = variance.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  const Eigen::VectorXd scale =
+      variance.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
     // A parameter that is known exactly cannot be correlated.
     if (variance(i) == 0 && (!covariance.row(i).isZero(0) || !covariance.col(i).isZero(0)))
-      return refused("model: parameter {} has no variance but a covariance", i + 1).of("covariance");
+      return refused("model: parameter {} has no variance but a covariance", i + 1)
+          .of("covariance");
   }
   const double skew = asymmetry(correlation);
   if (!(skew <= kCorrelationRounding))
@@ -79,7 +84,8 @@ Status check_covariance(const Eigen::MatrixXd& covariance) {
 
 Status check_size(const Eigen::MatrixXd& covariance, Eigen::Index P) {
   if (covariance.rows() == P && covariance.cols() == P) return {};
-  return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(), covariance.cols(), P, P)
+  return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(),
+                 covariance.cols(), P, P)
       .of("covariance")
       .beyond(covariance.rows(), P);
 }
@@ -87,7 +93,8 @@ Status check_size(const Eigen::MatrixXd& covariance, Eigen::Index P) {
 Status check_parameters(const ModelParts& parts) {
   for (const IdentifiedParameter& p : parts.parameters) {
     if (p.stddev < 0)
-      return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name, p.stddev)
+      return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name,
+                     p.stddev)
           .of(p.parameter.name)
           .beyond(p.stddev, 0);
   }
@@ -100,12 +107,16 @@ Status check_parameters(const ModelParts& parts) {
 
 Status check_bias(const BiasState& bias) {
   if (bias.q.rows() > kMostTrainingPoses)
-    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(), kMostTrainingPoses)
+    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(),
+                   kMostTrainingPoses)
         .of("bias")
         .beyond(bias.q.rows(), kMostTrainingPoses);
-  const auto beyond = [](const Eigen::MatrixXd& m) { return m.size() > 0 && m.cwiseAbs().maxCoeff() > kMostLog; };
+  const auto beyond = [](const Eigen::MatrixXd& m) {
+    return m.size() > 0 && m.cwiseAbs().maxCoeff() > kMostLog;
+  };
   if (beyond(bias.hyperparameters) || beyond(bias.block_hyperparameters))
-    return refused("model: a hyperparameter of its bias is beyond {}, as a logarithm", kMostLog).of("bias");
+    return refused("model: a hyperparameter of its bias is beyond {}, as a logarithm", kMostLog)
+        .of("bias");
   return {};
 }
 
@@ -115,7 +126,9 @@ Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
     const auto& sources = origin.physics.sources;
     if (std::none_of(sources.begin(), sources.end(),
                      [&](const auto& one) { return &one->cause() == find_cause(name); }))
-      return refused("model: the physics that its bias was learned beside has no {}", name).of("bias").with_text(name);
+      return refused("model: the physics that its bias was learned beside has no {}", name)
+          .of("bias")
+          .with_text(name);
   }
   Status fine = check_frames(origin.physics, "bias_origin: ");
   if (fine) fine = check_size(origin.covariance, P);
@@ -124,14 +137,16 @@ Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
 }
 
 Status check_ranges(const ModelParts& parts) {
-  if (!parts.q_min.allFinite() || !parts.q_max.allFinite() || !parts.extrapolation_slope.allFinite())
+  if (!parts.q_min.allFinite() || !parts.q_max.allFinite() ||
+      !parts.extrapolation_slope.allFinite())
     return refused("model: a joint range is not finite").of("joint_ranges");
   if (parts.q_min.size() == parts.q_max.size() && (parts.q_min.array() > parts.q_max.array()).any())
     return refused("model: a joint range ends before it begins").of("joint_ranges");
   for (const auto& [tool, payload] : parts.trained_with) {
     const Cell& cell = *parts.physics.cell;
     if (!cell.tools.contains(tool) || (!payload.empty() && !cell.payloads.contains(payload)))
-      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload)
+      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have",
+                     tool, payload)
           .of("trained_with")
           .with_text(tool);
   }
@@ -142,8 +157,8 @@ Status check_measured(const ModelParts& parts) {
   const WhatWasMeasured& measured = *parts.measured;
   const auto joints = static_cast<std::size_t>(parts.physics.cell->robot.size());
   if (measured.approaches.size() != joints)
-    return refused("model: measured: sides of approach of {} joints, its robot has {}", measured.approaches.size(),
-                   joints)
+    return refused("model: measured: sides of approach of {} joints, its robot has {}",
+                   measured.approaches.size(), joints)
         .of("measured")
         .beyond(measured.approaches.size(), joints);
   if ((measured.lower.array() > measured.upper.array()).any() || measured.reach.value_or(0) < 0)
@@ -159,7 +174,8 @@ Status check_measured(const ModelParts& parts) {
 Status check_sessions(const ModelParts& parts) {
   for (const Change& change : parts.changes) {
     if (change.session >= parts.sessions.size())
-      return refused("model: a change since session {}, it has {}", change.session + 1, parts.sessions.size())
+      return refused("model: a change since session {}, it has {}", change.session + 1,
+                     parts.sessions.size())
           .of("changes")
           .beyond(change.session + 1, parts.sessions.size());
   }

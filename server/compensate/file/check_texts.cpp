@@ -30,7 +30,8 @@ Status check_batch_ids(std::string_view ids) {
     is_last = end == std::string_view::npos;
     TRY(check_name(ids.substr(0, end), "batch_id"));
     if (++batches > kMostBatches)
-      return failure(ErrorCode::kTooLarge, "batch_id of more than {} batches, its limit", kMostBatches)
+      return failure(ErrorCode::kTooLarge, "batch_id of more than {} batches, its limit",
+                     kMostBatches)
           .of("batch_id")
           .beyond(batches, kMostBatches);
     if (!is_last) ids.remove_prefix(end + 1);
@@ -53,7 +54,8 @@ Status check_all(const Json& json, const std::string& key) {
     }
   }
   if (!json.is_object()) return {};
-  static const std::set<std::string, std::less<>> kReadElsewhere = {"cell_yaml", "error_sources", "robot_yaml"};
+  static const std::set<std::string, std::less<>> kReadElsewhere = {"cell_yaml", "error_sources",
+                                                                    "robot_yaml"};
   for (const auto& [name, one] : json.items()) {
     TRY(check_name(name, "key"));
     if (kReadElsewhere.contains(name)) continue;

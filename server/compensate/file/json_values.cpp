@@ -12,10 +12,13 @@ Json matrix_json(const Eigen::Ref<const Eigen::MatrixXd>& m) {
 
 Json pose_json(const Pose& X) { return matrix_json(Eigen::MatrixXd(X.matrix().topRows<3>())); }
 
-void wrong(const char* what, const Json& json) { throw Json::other_error::create(501, what, &json); }
+void wrong(const char* what, const Json& json) {
+  throw Json::other_error::create(501, what, &json);
+}
 
 double number_from(const Json& json) {
-  if (!json.is_number() || !std::isfinite(json.get<double>())) wrong("expected a finite number", json);
+  if (!json.is_number() || !std::isfinite(json.get<double>()))
+    wrong("expected a finite number", json);
   return json.get<double>();
 }
 double number_from(const Json& json, const char* key) { return number_from(json.at(key)); }
@@ -54,7 +57,8 @@ Eigen::MatrixXd matrix_from(const Json& json) {
   }
   Eigen::MatrixXd m(rows, columns);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < columns; ++j) m(i, j) = number_from(values[static_cast<std::size_t>(i * columns + j)]);
+    for (Eigen::Index j = 0; j < columns; ++j)
+      m(i, j) = number_from(values[static_cast<std::size_t>(i * columns + j)]);
   }
   return m;
 }

@@ -36,9 +36,10 @@ OrientationFigures orientation_from(const Json& json) {
 }
 
 GaugeFigures gauges_from(const Json& json) {
-  return {count_from(json, "rows"),           number_from(json, "nominal_m"),       number_from(json, "calibrated_m"),
-          number_from(json, "compensated_m"), number_from(json, "max_m"),           number_from(json, "coverage_95"),
-          count_from(json, "in_domain"),      number_if(json, "coverage_95_stated")};
+  return {count_from(json, "rows"),          number_from(json, "nominal_m"),
+          number_from(json, "calibrated_m"), number_from(json, "compensated_m"),
+          number_from(json, "max_m"),        number_from(json, "coverage_95"),
+          count_from(json, "in_domain"),     number_if(json, "coverage_95_stated")};
 }
 
 Evaluation evaluation_from(const Json& json) {
@@ -85,11 +86,13 @@ PoseContext context_from(const Json& json) {
   context.temperature = number_if(json, "temperature_c");
   if (json.contains("velocity")) context.velocity = vector_from(json.at("velocity"));
   if (json.contains("direction")) {
-    for (const Json& one : list_from(json.at("direction"))) context.direction.push_back(whole_from<int>(one));
+    for (const Json& one : list_from(json.at("direction")))
+      context.direction.push_back(whole_from<int>(one));
   }
   if (json.contains("before")) context.before = vector_from(json.at("before"));
   if (json.contains("lagged_c")) {
-    for (const Json& one : list_from(json.at("lagged_c"))) context.lagged.push_back(number_from(one));
+    for (const Json& one : list_from(json.at("lagged_c")))
+      context.lagged.push_back(number_from(one));
   }
   return context;
 }
@@ -133,16 +136,19 @@ SessionSetting session_from(const Json& json) {
 
 void read_sessions(const Json& content, ModelParts& parts) {
   if (content.contains("sessions")) {
-    for (const Json& session : list_from(content.at("sessions"))) parts.sessions.push_back(session_from(session));
+    for (const Json& session : list_from(content.at("sessions")))
+      parts.sessions.push_back(session_from(session));
   }
-  parts.sessions_as_given = content.contains("sessions_as_given") && truth_from(content.at("sessions_as_given"));
+  parts.sessions_as_given =
+      content.contains("sessions_as_given") && truth_from(content.at("sessions_as_given"));
   if (content.contains("changes")) {
     for (const Json& change : list_from(content.at("changes"))) {
-      parts.changes.push_back({.source = change.at("source"),
-                               .session = static_cast<std::size_t>(count_from(change, "session")),
-                               .gain = number_from(change, "gain"),
-                               .p_value = number_from(change, "p_value"),
-                               .could_also_be = change.at("could_also_be").get<std::vector<std::string>>()});
+      parts.changes.push_back(
+          {.source = change.at("source"),
+           .session = static_cast<std::size_t>(count_from(change, "session")),
+           .gain = number_from(change, "gain"),
+           .p_value = number_from(change, "p_value"),
+           .could_also_be = change.at("could_also_be").get<std::vector<std::string>>()});
       if (!change.contains("rate_rad")) continue;
       parts.changes.back().rate = number_from(change, "rate_rad");
       parts.changes.back().steps = change.at("steps").get<std::vector<std::string>>();
@@ -155,7 +161,8 @@ void read_sessions(const Json& content, ModelParts& parts) {
 
 /// The physics of this cell with the frames and values that a file gives.
 Result<PhysicalModel> physics_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
-  Result<PhysicalModel> physics = make_physical_model(cell, json.at("error_sources").get<std::vector<std::string>>());
+  Result<PhysicalModel> physics =
+      make_physical_model(cell, json.at("error_sources").get<std::vector<std::string>>());
   if (!physics) return physics;
   physics->X_WB = pose_from(json.at("X_WB"));
   for (auto& [name, X_FT] : physics->tools) X_FT = pose_from(json.at("tools").at(name));
@@ -163,7 +170,8 @@ Result<PhysicalModel> physics_from(const Json& json, const std::shared_ptr<const
   return physics;
 }
 
-Result<ModelParts::BiasOrigin> origin_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
+Result<ModelParts::BiasOrigin> origin_from(const Json& json,
+                                           const std::shared_ptr<const Cell>& cell) {
   return physics_from(json, cell).map([&](PhysicalModel physics) {
     return ModelParts::BiasOrigin{std::move(physics), matrix_from(json.at("covariance"))};
   });
@@ -225,12 +233,14 @@ WhatWasMeasured measured_from(const Json& json) {
   WhatWasMeasured measured;
   measured.poses = count_from(json, "poses");
   for (const Json& one : list_from(json.at("approaches")))
-    measured.approaches.push_back({.rising = count_from(one, "rising"), .falling = count_from(one, "falling")});
+    measured.approaches.push_back(
+        {.rising = count_from(one, "rising"), .falling = count_from(one, "falling")});
   measured.lower = vector3_from(json.at("lower_m"));
   measured.upper = vector3_from(json.at("upper_m"));
   measured.volume = number_from(json, "volume_m3");
   const Eigen::MatrixXd places = matrix_from(json.at("flange_m"));
-  if (places.cols() != 3 || places.rows() < 1) wrong("expected places of the flange, three columns", json.at("poses"));
+  if (places.cols() != 3 || places.rows() < 1)
+    wrong("expected places of the flange, three columns", json.at("poses"));
   measured.flange_B = places.transpose();
   measured.reach = number_if(json, "reach_m");
   if (json.contains("outline_m")) measured.outline = vector_from(json.at("outline_m"));
@@ -261,14 +271,15 @@ Status read_bias_contexts(const Json& bias, const std::string& where, ModelParts
   if (!bias.contains("poses")) return {};
   if (bias.value("fades", "") != kFades) {
     return refused(
-               "its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would answer "
-               "otherwise now",
+               "its bias `{}` was learned when a bias with blocks faded as a whole beyond the "
+               "domain, and would answer otherwise now",
                parts.bias->kernel)
         .in(where)
         .of("bias")
         .next("train it again");
   }
-  for (const Json& context : list_from(bias.at("poses"))) parts.bias_contexts.push_back(context_from(context));
+  for (const Json& context : list_from(bias.at("poses")))
+    parts.bias_contexts.push_back(context_from(context));
   return {};
 }
 
@@ -277,45 +288,54 @@ Status read_bias(const Json& content, const std::string& where, ModelParts& part
   if (!content.contains("bias")) return {};
   parts.bias = bias_from(content.at("bias"));
   TRY(read_bias_contexts(content.at("bias"), where, parts));
-  if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
+  if (content.contains("rotation_bias"))
+    parts.rotation_bias = bias_from(content.at("rotation_bias"));
   if (content.contains("bias_origin")) {
-    Result<ModelParts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);
+    Result<ModelParts::BiasOrigin> origin =
+        origin_from(content.at("bias_origin"), parts.physics.cell);
     if (!origin) return Failure(origin.error()).as(ErrorCode::kRefused).in(where);
     parts.bias_origin = std::move(*origin);
   }
-  if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");
+  if (content.contains("oriented_poses"))
+    parts.oriented_poses = count_from(content, "oriented_poses");
   return {};
 }
 
 /// Whether the cause is a function of the angle of a joint that a coupling concerns, or turns it.
 bool is_of_coupled_joint(const ErrorSource& source, const Chain& robot) {
   const CauseRecord& cause = source.cause();
-  const bool turns = cause.acts.on == causes::ActsOn::kJoints || cause.scope == causes::Scope::kJoint;
+  const bool turns =
+      cause.acts.on == causes::ActsOn::kJoints || cause.scope == causes::Scope::kJoint;
   if (!turns || cause.gives_way) return false;
   const int joint = source.joint();
-  return std::any_of(robot.couplings().begin(), robot.couplings().end(), [joint](const Coupling& coupling) {
-    return joint < 0 || joint == coupling.joint || joint == coupling.follows;
-  });
+  return std::any_of(robot.couplings().begin(), robot.couplings().end(),
+                     [joint](const Coupling& coupling) {
+                       return joint < 0 || joint == coupling.joint || joint == coupling.follows;
+                     });
 }
 
 /// What a model has of coupled joints, as its file spells it; empty where it has nothing.
 std::string learned_of_coupled_joints(const ModelParts& parts) {
   const Chain& robot = parts.physics.cell->robot;
-  const auto of_coupled = [&](const ErrorSourcePtr& source) { return is_of_coupled_joint(*source, robot); };
-  const auto found = std::find_if(parts.physics.sources.begin(), parts.physics.sources.end(), of_coupled);
+  const auto of_coupled = [&](const ErrorSourcePtr& source) {
+    return is_of_coupled_joint(*source, robot);
+  };
+  const auto found =
+      std::find_if(parts.physics.sources.begin(), parts.physics.sources.end(), of_coupled);
   if (found != parts.physics.sources.end()) return (*found)->name();
   const Result<SpelledBias> bias = spelled_bias(parts.bias ? parts.bias->kernel : "");
   return bias && bias->has("joint_map") && !robot.couplings().empty() ? parts.bias->kernel : "";
 }
 
-/// Once, causes of coupled joints were functions of the commanded angle on every arm, and files said nothing of it.
+/// Once, causes of coupled joints were functions of the commanded angle on every arm, and files
+/// said nothing of it.
 Status check_angles(const Json& content, const std::string& where, const ModelParts& parts) {
   if (content.value("angles", "") == kAngles) return {};
   const std::string learned = learned_of_coupled_joints(parts);
   if (learned.empty()) return {};
   return refused(
-             "its `{}` was learned when causes of coupled joints followed the commanded angles and not those of the "
-             "gears, and would answer otherwise now",
+             "its `{}` was learned when causes of coupled joints followed the commanded angles and "
+             "not those of the gears, and would answer otherwise now",
              learned)
       .in(where)
       .of("angles")
@@ -332,7 +352,8 @@ ModelProvenance provenance_from(const Json& json, const Json& stamp) {
   provenance.seed = whole_from<std::uint64_t>(json, "seed");
   provenance.trained_at = whole_from<std::int64_t>(stamp, "trained_at");
   provenance.program_version = stamp.at("program_version");
-  if (stamp.contains("measured_at")) provenance.measured_at = whole_from<std::int64_t>(stamp, "measured_at");
+  if (stamp.contains("measured_at"))
+    provenance.measured_at = whole_from<std::int64_t>(stamp, "measured_at");
   if (json.contains("refits")) {
     for (const Json& refit : json.at("refits")) provenance.refits.push_back(refit_from(refit));
   }
@@ -348,7 +369,8 @@ Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std:
     damaged.row.reset();  // of a text inside the file
     return Failure(std::move(damaged));
   }
-  Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
+  Result<PhysicalModel> physics =
+      physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
   if (!physics) return Failure(physics.error()).as(ErrorCode::kRefused).in(where);
   ModelParts parts;
   parts.physics = std::move(*physics);

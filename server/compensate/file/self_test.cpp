@@ -20,7 +20,8 @@ struct TestPose {
   std::string tool, payload;
 };
 
-/// In the range of the training: its middle, and two more that lie elsewhere for each joint. Then one beside the range.
+/// In the range of the training: its middle, and two more that lie elsewhere for each joint. Then
+/// one beside the range.
 std::vector<TestPose> test_poses(const CompensatedModel& model) {
   const ModelParts& parts = model.parts();
   std::vector<TestPose> poses;
@@ -61,8 +62,10 @@ Result<TestPose> pose_of(const Json& json, const CompensatedModel& model) {
     return refused("model: its self test has joints that its robot has not").of("self_test");
   if (!model.parts().physics.tools.contains(pose.tool) ||
       (!pose.payload.empty() && !cell.payloads.contains(pose.payload)))
-    return refused("model: its self test is with tool '{}' and payload '{}', which its cell does not have", pose.tool,
-                   pose.payload)
+    return refused(
+               "model: its self test is with tool '{}' and payload '{}', which its cell does not "
+               "have",
+               pose.tool, pose.payload)
         .of("self_test")
         .with_text(pose.tool);
   return pose;
@@ -78,26 +81,30 @@ struct Difference {
 Difference worst_of(const ErrorPrediction& now, const Json& stated) {
   const auto largest = [](const Eigen::MatrixXd& difference) {
     // A maximum passes over what is no number.
-    return difference.allFinite() ? difference.cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
+    return difference.allFinite() ? difference.cwiseAbs().maxCoeff()
+                                  : std::numeric_limits<double>::infinity();
   };
   const double of_error = kErrorShare * now.error_B.norm() + kSelfTestMetres;
   const Vector3 above = now.stddev_B - vector3_from(stated.at("stddev_m"));
   if (!above.allFinite()) return {std::numeric_limits<double>::infinity(), 0};
-  const auto of_stddev = [&](double share) { return share * now.stddev_B.norm() + kSelfTestMetres; };
+  const auto of_stddev = [&](double share) {
+    return share * now.stddev_B.norm() + kSelfTestMetres;
+  };
   const std::array<Difference, 4> all = {
       {{largest(now.X_BT_predicted.matrix() - pose_from(stated.at("X_BT")).matrix()), of_error},
        {largest(now.error_B - vector3_from(stated.at("error_m"))), of_error},
        {largest(above.cwiseMax(0.0)), of_stddev(kStddevShare)},
        {largest(above.cwiseMin(0.0)), of_stddev(kStatedMoreShare)}}};
-  return *std::max_element(all.begin(), all.end(), [](const Difference& one, const Difference& other) {
-    return one.off / one.limit < other.off / other.limit;
-  });
+  return *std::max_element(all.begin(), all.end(),
+                           [](const Difference& one, const Difference& other) {
+                             return one.off / one.limit < other.off / other.limit;
+                           });
 }
 
 /// Whether the numbers are lengths of this world.
 bool possible(const ErrorPrediction& prediction) {
-  const double most =
-      prediction.X_BT_predicted.matrix().norm() + prediction.error_B.norm() + prediction.stddev_B.norm();
+  const double most = prediction.X_BT_predicted.matrix().norm() + prediction.error_B.norm() +
+                      prediction.stddev_B.norm();
   return std::isfinite(most) && most < kMostMetres;
 }
 
@@ -116,7 +123,8 @@ Json self_test_of(const CompensatedModel& model) {
 
 Status check_self_test(const CompensatedModel& model, const Json& self_test) {
   if (list_from(self_test).size() > kMostPoses)
-    return failure(ErrorCode::kTooLarge, "model: a self test of {} poses, limit {}", self_test.size(), kMostPoses)
+    return failure(ErrorCode::kTooLarge, "model: a self test of {} poses, limit {}",
+                   self_test.size(), kMostPoses)
         .of("self_test")
         .beyond(self_test.size(), kMostPoses);
   for (const Json& one : self_test) {
@@ -125,8 +133,9 @@ Status check_self_test(const CompensatedModel& model, const Json& self_test) {
     if (!possible(now)) return impossible();
     const auto [off, limit] = worst_of(now, one);
     if (off <= limit) continue;
-    return refused("model: predicts otherwise than when it was written, by {:.3g} mm, limit {:.3g} mm", 1e3 * off,
-                   1e3 * limit)
+    return refused(
+               "model: predicts otherwise than when it was written, by {:.3g} mm, limit {:.3g} mm",
+               1e3 * off, 1e3 * limit)
         .of("self_test")
         .beyond(off, limit)
         .next("train it again");

@@ -62,7 +62,8 @@ Json json_of(const BiasState& bias) {
                {"sigma", matrix_json(bias.sigma)},
                {"offset", matrix_json(bias.offset)},
                {"hyperparameters", matrix_json(bias.hyperparameters)}};
-  if (bias.block_hyperparameters.size() > 0) json["block_hyperparameters"] = matrix_json(bias.block_hyperparameters);
+  if (bias.block_hyperparameters.size() > 0)
+    json["block_hyperparameters"] = matrix_json(bias.block_hyperparameters);
   return json;
 }
 
@@ -100,15 +101,22 @@ Json json_of(const RefitRecord& refit) {
 }
 
 Json json_of(const IdentifiedParameter& p) {
-  return {{"name", p.parameter.name}, {"value", p.value}, {"stddev", p.stddev}, {"identified", p.identified}};
+  return {{"name", p.parameter.name},
+          {"value", p.value},
+          {"stddev", p.stddev},
+          {"identified", p.identified}};
 }
 
 Json json_of(const UnidentifiableCombination& u) {
-  return {{"singular_value", u.singular_value}, {"parameters", u.parameters}, {"sentence", u.sentence}};
+  return {
+      {"singular_value", u.singular_value}, {"parameters", u.parameters}, {"sentence", u.sentence}};
 }
 
 Json json_of(const SuspectPose& pose) {
-  return {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_m", pose.distance}, {"sigmas", pose.sigmas}};
+  return {{"pose_id", pose.pose_id},
+          {"row", pose.row},
+          {"distance_m", pose.distance},
+          {"sigmas", pose.sigmas}};
 }
 
 Json json_of(const SessionSetting& session) {
@@ -144,7 +152,9 @@ Json list_of(const std::vector<Thing>& things) {
 }
 
 Json json_of(const BiasChoice& choice) {
-  return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", list_of(choice.candidates)}};
+  return {{"kernel", choice.kernel},
+          {"sentence", choice.sentence},
+          {"candidates", list_of(choice.candidates)}};
 }
 
 /// Frames, sources and values.
@@ -196,12 +206,14 @@ void add_calibration(const ModelParts& parts, Json& content) {
   if (!parts.sessions.empty()) content["sessions"] = list_of(parts.sessions);
   if (parts.sessions_as_given) content["sessions_as_given"] = true;
   if (!parts.changes.empty()) content["changes"] = list_of(parts.changes);
-  if (!parts.sessions_left_out.empty()) content["sessions_left_out"] = list_of(parts.sessions_left_out);
+  if (!parts.sessions_left_out.empty())
+    content["sessions_left_out"] = list_of(parts.sessions_left_out);
 }
 
 Json json_of(const WhatWasMeasured& measured) {
   Json approaches = Json::array();
-  for (const auto& one : measured.approaches) approaches.push_back({{"rising", one.rising}, {"falling", one.falling}});
+  for (const auto& one : measured.approaches)
+    approaches.push_back({{"rising", one.rising}, {"falling", one.falling}});
   Json json = {{"poses", measured.poses},
                {"approaches", std::move(approaches)},
                {"lower_m", matrix_json(measured.lower)},
@@ -209,7 +221,8 @@ Json json_of(const WhatWasMeasured& measured) {
                {"volume_m3", measured.volume},
                {"flange_m", matrix_json(measured.flange_B.transpose())}};
   if (measured.temperature)
-    json["temperature_c"] = {{"least", measured.temperature->first}, {"most", measured.temperature->second}};
+    json["temperature_c"] = {{"least", measured.temperature->first},
+                             {"most", measured.temperature->second}};
   if (measured.reach) json["reach_m"] = *measured.reach;
   if (measured.outline.size() > 0) json["outline_m"] = matrix_json(measured.outline);
   return json;
@@ -223,9 +236,11 @@ void add_domain(const ModelParts& parts, Json& content) {
   content["prior_share_limit"] = parts.prior_share_limit;
   if (parts.bias_spread != 1) content["bias_spread"] = parts.bias_spread;
   content["trained_with"] = parts.trained_with;
-  if (parts.extrapolation_slope.size() > 0) content["extrapolation_slope"] = matrix_json(parts.extrapolation_slope);
+  if (parts.extrapolation_slope.size() > 0)
+    content["extrapolation_slope"] = matrix_json(parts.extrapolation_slope);
   if (parts.temperature_mean) {
-    content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
+    content["temperature_c"] = {{"mean", *parts.temperature_mean},
+                                {"stddev", parts.temperature_stddev}};
   }
 }
 
@@ -260,7 +275,8 @@ Json content_of(const ModelParts& parts) {
 }
 
 Json stamp_of(const ModelProvenance& provenance) {
-  Json stamp = {{"trained_at", provenance.trained_at}, {"program_version", provenance.program_version}};
+  Json stamp = {{"trained_at", provenance.trained_at},
+                {"program_version", provenance.program_version}};
   if (provenance.measured_at) stamp["measured_at"] = *provenance.measured_at;
   return stamp;
 }

@@ -7,7 +7,9 @@ namespace trammel {
 namespace {
 
 /// JSON has no NaN: what is not known is null.
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
+std::string number(double value) {
+  return std::isfinite(value) ? fmt::format("{}", value) : "null";
+}
 
 std::string text(const std::string& value) {
   std::string escaped = "\"";
@@ -37,8 +39,9 @@ std::string pose(const wire::PoseMm& X) {
 }
 
 std::string approach(const wire::Approach& approach) {
-  return fmt::format("\"directions\":{},\"temperature_c\":{},\"time_s\":{}", list(approach.directions()),
-                     number(approach.temperature_c()), number(approach.time_s()));
+  return fmt::format("\"directions\":{},\"temperature_c\":{},\"time_s\":{}",
+                     list(approach.directions()), number(approach.temperature_c()),
+                     number(approach.time_s()));
 }
 
 const char* word_of(wire::TargetStatus status) {
@@ -49,19 +52,20 @@ const char* word_of(wire::TargetStatus status) {
 
 /// What all records begin with.
 template <typename Request, typename Reply>
-std::string beginning(const char* operation, const Request& request, const Reply& reply, std::int64_t at_unix_s) {
+std::string beginning(const char* operation, const Request& request, const Reply& reply,
+                      std::int64_t at_unix_s) {
   return fmt::format(
-      "{{\"record\":1,\"operation\":\"{}\",\"at_unix_s\":{},\"trace\":{},\"cell\":{},\"tool\":{},\"payload\":{},"
-      "\"model\":{{\"id\":{},\"hash\":{},\"version\":{}}},\"items\":[",
-      operation, at_unix_s, text(request.header().trace_id().to_string()), text(request.about().cell()),
-      text(request.about().tool()), text(request.about().payload()), text(reply.model().id()),
-      text(reply.model().hash()), reply.model().version());
+      "{{\"record\":1,\"operation\":\"{}\",\"at_unix_s\":{},\"trace\":{},\"cell\":{},\"tool\":{},"
+      "\"payload\":{},\"model\":{{\"id\":{},\"hash\":{},\"version\":{}}},\"items\":[",
+      operation, at_unix_s, text(request.header().trace_id().to_string()),
+      text(request.about().cell()), text(request.about().tool()), text(request.about().payload()),
+      text(reply.model().id()), text(reply.model().hash()), reply.model().version());
 }
 
 std::string item(const wire::CommandedJoints& asked, const wire::PredictedError& answer) {
   return fmt::format(
-      "{{\"joints_rad\":{},{},\"error_mm\":{},\"stddev_mm\":{},\"true_stddev_mm\":{},\"turn_rad\":{},\"in_domain\":{}}"
-      "}",
+      "{{\"joints_rad\":{},{},\"error_mm\":{},\"stddev_mm\":{},\"true_stddev_mm\":{},\"turn_rad\":{"
+      "},\"in_domain\":{}}}",
       list(asked.joints_rad()), approach(asked.approach()),
       list(std::array{answer.dx_mm(), answer.dy_mm(), answer.dz_mm()}),
       list(std::array{answer.sx_mm(), answer.sy_mm(), answer.sz_mm()}),
@@ -72,11 +76,13 @@ std::string item(const wire::CommandedJoints& asked, const wire::PredictedError&
 std::string item(const wire::Target& asked, const wire::CorrectedTarget& answer) {
   constexpr std::array kKinds = {"pose_near_joints", "pose_on_branch", "joints"};
   return fmt::format(
-      "{{\"kind\":\"{}\",\"pose_mm\":{},\"joints_rad\":{},\"conf\":{},{},\"status\":\"{}\",\"commanded_mm\":{},"
-      "\"commanded_joints_rad\":{},\"error_before_mm\":{},\"error_after_mm\":{},\"sigma_mm\":{}}}",
-      kKinds.at(static_cast<std::size_t>(asked.kind())), pose(asked.pose()), list(asked.joints_rad()), asked.conf(),
-      approach(asked.approach()), word_of(answer.status()), pose(answer.commanded()), list(answer.joints_rad()),
-      number(answer.error_before_mm()), number(answer.error_after_mm()), number(answer.sigma_mm()));
+      "{{\"kind\":\"{}\",\"pose_mm\":{},\"joints_rad\":{},\"conf\":{},{},\"status\":\"{}\","
+      "\"commanded_mm\":{},\"commanded_joints_rad\":{},\"error_before_mm\":{},\"error_after_mm\":{}"
+      ",\"sigma_mm\":{}}}",
+      kKinds.at(static_cast<std::size_t>(asked.kind())), pose(asked.pose()),
+      list(asked.joints_rad()), asked.conf(), approach(asked.approach()), word_of(answer.status()),
+      pose(answer.commanded()), list(answer.joints_rad()), number(answer.error_before_mm()),
+      number(answer.error_after_mm()), number(answer.sigma_mm()));
 }
 
 template <typename Asked, typename Answers>
@@ -91,14 +97,16 @@ std::string items(const Asked& asked, const Answers& answers) {
 
 }  // namespace
 
-std::string record_line(const wire::PredictErrorRequest& request, const wire::PredictErrorReply& reply,
-                        std::int64_t at_unix_s) {
-  return beginning("predict", request, reply, at_unix_s) + items(request.poses(), reply.predictions()) + "]}";
+std::string record_line(const wire::PredictErrorRequest& request,
+                        const wire::PredictErrorReply& reply, std::int64_t at_unix_s) {
+  return beginning("predict", request, reply, at_unix_s) +
+         items(request.poses(), reply.predictions()) + "]}";
 }
 
-std::string record_line(const wire::CorrectTargetRequest& request, const wire::CorrectTargetReply& reply,
-                        std::int64_t at_unix_s) {
-  return beginning("correct", request, reply, at_unix_s) + items(request.targets(), reply.corrections()) + "]}";
+std::string record_line(const wire::CorrectTargetRequest& request,
+                        const wire::CorrectTargetReply& reply, std::int64_t at_unix_s) {
+  return beginning("correct", request, reply, at_unix_s) +
+         items(request.targets(), reply.corrections()) + "]}";
 }
 
 }  // namespace trammel

@@ -36,9 +36,10 @@ std::int64_t number_of(const fs::path& file) {
 std::vector<std::pair<std::int64_t, fs::path>> files_in(const std::string& folder) {
   std::vector<std::pair<std::int64_t, fs::path>> files;
   std::error_code wrong;
-  for (auto entry = fs::directory_iterator(folder, wrong); !wrong && entry != fs::directory_iterator();
-       entry.increment(wrong)) {
-    if (const std::int64_t number = number_of(entry->path()); number > 0) files.emplace_back(number, entry->path());
+  for (auto entry = fs::directory_iterator(folder, wrong);
+       !wrong && entry != fs::directory_iterator(); entry.increment(wrong)) {
+    if (const std::int64_t number = number_of(entry->path()); number > 0)
+      files.emplace_back(number, entry->path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -48,7 +49,9 @@ fs::path path_of(const RecordOptions& options, std::int64_t number) {
   return fs::path(options.folder) / fmt::format("{}{:09}{}", kBegin, number, kEnd);
 }
 
-std::uintmax_t room_of(const RecordOptions& options) { return static_cast<std::uintmax_t>(options.max_mb) << 20; }
+std::uintmax_t room_of(const RecordOptions& options) {
+  return static_cast<std::uintmax_t>(options.max_mb) << 20;
+}
 
 std::uintmax_t taken_by(const fs::path& file) {
   std::error_code gone;
@@ -88,9 +91,10 @@ Failure not_there(const RecordOptions& options) {
 Status RequestRecorder::check(const RecordOptions& options) {
   std::error_code unknown;
   fs::path at = fs::absolute(options.folder, unknown);
-  while (!options.folder.empty() && !fs::exists(at, unknown) && at.has_relative_path()) at = at.parent_path();
-  const bool is_usable =
-      options.folder.empty() || (fs::is_directory(at, unknown) && ::access(at.c_str(), W_OK | X_OK) == 0);
+  while (!options.folder.empty() && !fs::exists(at, unknown) && at.has_relative_path())
+    at = at.parent_path();
+  const bool is_usable = options.folder.empty() ||
+                         (fs::is_directory(at, unknown) && ::access(at.c_str(), W_OK | X_OK) == 0);
   return is_usable ? Status() : not_there(options);
 }
 
@@ -165,7 +169,8 @@ void RequestRecorder::next_file() {
   do {
     made = make_file(path_of(options_, ++number_));
   } while (!made && errno == EEXIST);  // somebody else's
-  file_ = made ? std::ofstream(path_of(options_, number_), std::ios::binary | std::ios::app) : std::ofstream();
+  file_ = made ? std::ofstream(path_of(options_, number_), std::ios::binary | std::ios::app)
+               : std::ofstream();
 }
 
 void RequestRecorder::give_up_file() {

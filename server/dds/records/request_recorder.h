@@ -18,14 +18,17 @@
 
 namespace trammel {
 
-/// What was asked and answered, as one line of JSON: README.md has its members. Nothing in it says who asked.
-[[nodiscard]] std::string record_line(const wire::PredictErrorRequest& request, const wire::PredictErrorReply& reply,
-                                      std::int64_t at_unix_s);
-[[nodiscard]] std::string record_line(const wire::CorrectTargetRequest& request, const wire::CorrectTargetReply& reply,
+/// What was asked and answered, as one line of JSON: README.md has its members. Nothing in it says
+/// who asked.
+[[nodiscard]] std::string record_line(const wire::PredictErrorRequest& request,
+                                      const wire::PredictErrorReply& reply, std::int64_t at_unix_s);
+[[nodiscard]] std::string record_line(const wire::CorrectTargetRequest& request,
+                                      const wire::CorrectTargetReply& reply,
                                       std::int64_t at_unix_s);
 
-/// Writes what predictions and corrections were asked and answered to files that follow each other, in a thread of its
-/// own: nobody waits for the disk. What does not fit into its queue is dropped and counted. Thread-safe.
+/// Writes what predictions and corrections were asked and answered to files that follow each other,
+/// in a thread of its own: nobody waits for the disk. What does not fit into its queue is dropped
+/// and counted. Thread-safe.
 class RequestRecorder {
  public:
   /// Whether open() could make its folder; makes nothing.
@@ -50,7 +53,8 @@ class RequestRecorder {
   void run(const std::stop_token& stop);
   void write(const std::string& line);
   void next_file();
-  /// What the disk has not taken whole goes; what was written before stays. A disk that is full now may not be later.
+  /// What the disk has not taken whole goes; what was written before stays. A disk that is full now
+  /// may not be later.
   void give_up_file();
 
   const RecordOptions options_;

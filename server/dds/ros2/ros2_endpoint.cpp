@@ -21,22 +21,25 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Writes answers where all nodes hear them, once the node that asked does: its reader may be matched a little later
-/// than its writer, and nobody gets what was written before. Thread-safe.
+/// Writes answers where all nodes hear them, once the node that asked does: its reader may be
+/// matched a little later than its writer, and nobody gets what was written before. Thread-safe.
 template <typename Ros>
 class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListener {
  public:
   using Reply = typename Ros::Operation::Reply::type;
   using Message = typename Ros::Reply::type;
 
-  [[nodiscard]] static Result<std::unique_ptr<Ros2Replies>> open(ServiceCore& core, WorkUnderWay& writing) {
-    const auto topic = TRY(wire::make_topic(core.participant, Ros::kReplyTopic,
-                                            new wire::SafeType<typename Ros::Reply>(Ros::Operation::kMaxSample)));
+  [[nodiscard]] static Result<std::unique_ptr<Ros2Replies>> open(ServiceCore& core,
+                                                                 WorkUnderWay& writing) {
+    const auto topic =
+        TRY(wire::make_topic(core.participant, Ros::kReplyTopic,
+                             new wire::SafeType<typename Ros::Reply>(Ros::Operation::kMaxSample)));
     std::unique_ptr<Ros2Replies> replies(new Ros2Replies(core, writing));
     replies->publisher_ = core.participant.create_publisher(wire::publisher_qos({}));
     if (replies->publisher_ != nullptr)
       replies->writer_ = replies->publisher_->create_datawriter(
-          topic, wire::call_writer_qos(wire::kReplyDepth), replies.get(), wire::dds::StatusMask::publication_matched());
+          topic, wire::call_writer_qos(wire::kReplyDepth), replies.get(),
+          wire::dds::StatusMask::publication_matched());
     if (replies->writer_ == nullptr)
       return failure(ErrorCode::kInternal, "cannot create the writer of {}", Ros::kReplyTopic);
     replies->start();
@@ -56,12 +59,13 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
     post(to, std::move(reply), bytes);
   }
 
-  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can be told.
+  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can
+  /// be told.
   void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
     {
       const MutexLock lock(mutex_);
-      static_cast<void>(
-          waiting_.put({to.participant, {}, to.topic, std::move(reply), bytes, Clock::now() + kReplyPatience}));
+      static_cast<void>(waiting_.put(
+          {to.participant, {}, to.topic, std::move(reply), bytes, Clock::now() + kReplyPatience}));
       has_news_ = true;
     }
     due_.notify_all();
@@ -71,9 +75,11 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
   static constexpr std::size_t kWrittenAtOnce = 64;
   static constexpr std::chrono::milliseconds kLook{500};  // for what waits too long
 
-  Ros2Replies(ServiceCore& core, WorkUnderWay& writing) : core_(core), writing_(writing), waiting_(OutboxLimits{}) {}
+  Ros2Replies(ServiceCore& core, WorkUnderWay& writing)
+      : core_(core), writing_(writing), waiting_(OutboxLimits{}) {}
 
-  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
+  void on_publication_matched(wire::dds::DataWriter*,
+                              const wire::dds::PublicationMatchedStatus& status) override {
     const auto reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
     {
       const MutexLock lock(mutex_);
@@ -99,7 +105,8 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
     });
   }
 
-  /// A question may come from another process than the one that hears the answer: after a while it is written as well.
+  /// A question may come from another process than the one that hears the answer: after a while it
+  /// is written as well.
   [[nodiscard]] std::list<Parcel> wait_for_due(const std::stop_token& stop) {
     MutexLock lock(mutex_);
     due_.wait_for(lock, stop, kLook, [this]() TRAMMEL_REQUIRES(mutex_) { return has_news_; });
@@ -141,16 +148,18 @@ class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataRe
   using Operation = typename Ros::Operation;
   using Message = wire::ReceivedMessage<typename Ros::Request::type>;
 
-  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lane& lane,
+  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core,
+                                                                         Lane& lane,
                                                                          WorkUnderWay& writing) {
-    const auto topic = TRY(
-        wire::make_topic(core.participant, Ros::kRequestTopic,
-                         new wire::ReceivedMessageType<typename Ros::Request>(Operation::kMaxSample, core.unreadable)));
+    const auto topic = TRY(wire::make_topic(core.participant, Ros::kRequestTopic,
+                                            new wire::ReceivedMessageType<typename Ros::Request>(
+                                                Operation::kMaxSample, core.unreadable)));
     auto replies = TRY(Ros2Replies<Ros>::open(core, writing));
     std::unique_ptr<Ros2Endpoint> endpoint(new Ros2Endpoint(core, lane, std::move(replies)));
-    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
-    endpoint->reader_ =
-        core.subscriber.create_datareader(topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
+    const auto heard = wire::dds::StatusMask::data_available()
+                       << wire::dds::StatusMask::sample_lost();
+    endpoint->reader_ = core.subscriber.create_datareader(
+        topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
     if (endpoint->reader_ == nullptr)
       return failure(ErrorCode::kInternal, "cannot create the reader of {}", Ros::kRequestTopic);
     return endpoint;
@@ -191,7 +200,8 @@ class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataRe
 
   bool take(wire::dds::DataReader& reader, Message& message, wire::dds::SampleInfo& info) {
     const WorkUnderWay::Piece piece = core_.taking.begin();
-    return reader.take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+    return reader.take_next_sample(&message, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
   /// In the thread that receives all requests: it must not wait, nor write.
@@ -200,11 +210,13 @@ class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataRe
     auto request = ros2::asked(message, core_.trainer.cells());
     request->header().request_id().writer_guid(wire::octets_of(writer));
     const ReplyAddress to{wire::participant_of(writer), {}, context_.reply_topic};
-    const std::string sent = to.participant +
-                             std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
-                             message.id();
+    const std::string sent =
+        to.participant +
+        std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
+        message.id();
     Ask ask = ask_of<Operation>(core_.trainer, *request, to.participant);
-    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, nullptr);
+    const auto call =
+        std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, nullptr);
     if (call->is_answered_for_its_id() || !call->is_first()) return;
     if (const auto shed = lane_.submit(call, std::move(ask))) call->shed(*shed);
   }
@@ -219,13 +231,14 @@ class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataRe
 }  // namespace
 
 template <typename Ros>
-Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint(ServiceCore& core, Lane& lane, WorkUnderWay& writing) {
+Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint(ServiceCore& core, Lane& lane,
+                                                                WorkUnderWay& writing) {
   return Ros2Endpoint<Ros>::open(core, lane, writing);
 }
 
-template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2PredictErrors>(ServiceCore&, Lane&,
-                                                                                                  WorkUnderWay&);
-template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2CorrectTargets>(ServiceCore&, Lane&,
-                                                                                                   WorkUnderWay&);
+template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2PredictErrors>(
+    ServiceCore&, Lane&, WorkUnderWay&);
+template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2CorrectTargets>(
+    ServiceCore&, Lane&, WorkUnderWay&);
 
 }  // namespace trammel

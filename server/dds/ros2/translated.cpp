@@ -47,9 +47,11 @@ RosPose to_ros(const wire::PoseMm& pose) {
 }
 
 /// The joints of one of the poses that follow each other in `all`.
-wire::Joints joints_of(const std::vector<double>& all, std::size_t n, std::size_t pose, const Chain* robot) {
+wire::Joints joints_of(const std::vector<double>& all, std::size_t n, std::size_t pose,
+                       const Chain* robot) {
   wire::Joints joints(n);
-  for (std::size_t j = 0; j < n; ++j) joints[j] = is_rail(robot, j) ? to_mm(all[n * pose + j]) : all[n * pose + j];
+  for (std::size_t j = 0; j < n; ++j)
+    joints[j] = is_rail(robot, j) ? to_mm(all[n * pose + j]) : all[n * pose + j];
   return joints;
 }
 
@@ -70,8 +72,10 @@ wire::Fault misfit(const char* what, const char* field, std::size_t value, std::
 }
 
 std::optional<wire::Fault> fault_of_joints(std::size_t n, std::size_t numbers, std::size_t poses) {
-  if (n < 1 || n > wire::MAX_JOINTS) return misfit("joints of one pose, 1 at least", "joints", n, wire::MAX_JOINTS);
-  if (poses > wire::MAX_TARGETS) return misfit("poses, at most", "joints_rad", poses, wire::MAX_TARGETS);
+  if (n < 1 || n > wire::MAX_JOINTS)
+    return misfit("joints of one pose, 1 at least", "joints", n, wire::MAX_JOINTS);
+  if (poses > wire::MAX_TARGETS)
+    return misfit("poses, at most", "joints_rad", poses, wire::MAX_TARGETS);
   if (numbers != n * poses) return misfit("joint values", "joints_rad", numbers, n * poses);
   return std::nullopt;
 }
@@ -89,7 +93,8 @@ std::optional<wire::Fault> fault_of(const CorrectTargets_& message) {
   }
   if (!message.joints_rad().empty())
     return misfit("joint values without `joints`", "joints_rad", message.joints_rad().size(), 0);
-  if (branches != count) return misfit("branches where no joints are given", "conf", branches, count);
+  if (branches != count)
+    return misfit("branches where no joints are given", "conf", branches, count);
   return std::nullopt;
 }
 
@@ -99,7 +104,8 @@ wire::Target target_of(const CorrectTargets_& message, std::size_t i, const Chai
               : message.joints() != 0 ? wire::TARGET_POSE_NEAR_JOINTS
                                       : wire::TARGET_POSE_ON_BRANCH);
   if (!message.poses().empty()) target.pose(to_wire(message.poses()[i]));
-  if (message.joints() != 0) target.joints_rad(joints_of(message.joints_rad(), message.joints(), i, robot));
+  if (message.joints() != 0)
+    target.joints_rad(joints_of(message.joints_rad(), message.joints(), i, robot));
   if (!message.conf().empty()) target.conf(message.conf()[i]);
   target.approach(nothing_known());
   return target;
@@ -136,7 +142,8 @@ Message begun(const Reply& reply) {
   return message;
 }
 
-void add_joints(const wire::Joints& joints, const Chain* robot, std::size_t n, std::vector<double>& all) {
+void add_joints(const wire::Joints& joints, const Chain* robot, std::size_t n,
+                std::vector<double>& all) {
   for (std::size_t j = 0; j < n; ++j) {
     const bool known = joints.size() == n;
     all.push_back(!known              ? std::numeric_limits<double>::quiet_NaN()
@@ -147,8 +154,8 @@ void add_joints(const wire::Joints& joints, const Chain* robot, std::size_t n, s
 
 }  // namespace
 
-std::unique_ptr<wire::Received<wire::PredictErrorRequest>> asked(const wire::ReceivedMessage<PredictErrors_>& message,
-                                                                 const ServedCells& cells) {
+std::unique_ptr<wire::Received<wire::PredictErrorRequest>> asked(
+    const wire::ReceivedMessage<PredictErrors_>& message, const ServedCells& cells) {
   auto request = begun<wire::PredictErrorRequest>(message);
   const std::size_t n = message.joints(), numbers = message.joints_rad().size();
   const std::size_t poses = n == 0 ? 0 : numbers / n;
@@ -163,14 +170,15 @@ std::unique_ptr<wire::Received<wire::PredictErrorRequest>> asked(const wire::Rec
   return request;
 }
 
-std::unique_ptr<wire::Received<wire::CorrectTargetRequest>> asked(const wire::ReceivedMessage<CorrectTargets_>& message,
-                                                                  const ServedCells& cells) {
+std::unique_ptr<wire::Received<wire::CorrectTargetRequest>> asked(
+    const wire::ReceivedMessage<CorrectTargets_>& message, const ServedCells& cells) {
   auto request = begun<wire::CorrectTargetRequest>(message);
   if (!request->fault) request->fault = fault_of(message);
   if (request->fault) return request;
   const Chain* robot = robot_of(message.cell(), cells);
   const std::size_t count = count_of(message);
-  for (std::size_t i = 0; i < count; ++i) request->targets().push_back(target_of(message, i, robot));
+  for (std::size_t i = 0; i < count; ++i)
+    request->targets().push_back(target_of(message, i, robot));
   return request;
 }
 
@@ -179,7 +187,8 @@ PredictedErrors_ answered(const wire::PredictErrorReply& reply, const ServedCell
   for (const wire::PredictedError& item : reply.predictions()) {
     message.nominal().push_back(to_ros(item.nominal()));
     message.predicted().push_back(to_ros(item.predicted()));
-    for (const double mm : {item.sx_mm(), item.sy_mm(), item.sz_mm()}) message.stddev_m().push_back(from_mm(mm));
+    for (const double mm : {item.sx_mm(), item.sy_mm(), item.sz_mm()})
+      message.stddev_m().push_back(from_mm(mm));
     for (const double mm : {item.slx_mm(), item.sly_mm(), item.slz_mm()})
       message.true_stddev_m().push_back(from_mm(mm));
     message.in_domain().push_back(item.in_domain());

@@ -9,13 +9,13 @@ namespace {
 constexpr std::size_t kMostKnown = 4096;  // clients; more are heard when some have left
 constexpr int kPartitionsOfOne = 4;       // a participant may be as many clients
 constexpr std::size_t kMostBeside = 64;   // readers of others in a client's partition
-/// A channel costs all others something, too. A participant may come under so many names at once, and under one more in
-/// each period.
+/// A channel costs all others something, too. A participant may come under so many names at once,
+/// and under one more in each period.
 constexpr int kNamesAtOnce = 8;
 constexpr std::chrono::milliseconds kPeriodOfName{500};
 constexpr std::size_t kOpenedAtOnce = 16;  // so that those who have a channel are not held up
-/// The longest penalty, for each client that is there: a change is told to all of them. Among few it is short, since
-/// some clients send nothing before they are matched.
+/// The longest penalty, for each client that is there: a change is told to all of them. Among few
+/// it is short, since some clients send nothing before they are matched.
 constexpr std::chrono::milliseconds kPenaltyOfEach{100};
 constexpr std::chrono::milliseconds kLongestAmongFew{12'000}, kLongestAmongMany{30'000};
 
@@ -59,7 +59,8 @@ void ChannelBook::lost(const ReplyReader& reader) {
 void ChannelBook::left(const std::string& participant) {
   for (auto client = clients_.begin(); client != clients_.end();) {
     const auto next = std::next(client);
-    std::erase_if(client->second.others, [&](const ReplyReader& one) { return one.participant == participant; });
+    std::erase_if(client->second.others,
+                  [&](const ReplyReader& one) { return one.participant == participant; });
     if (client->second.participant == participant) drop(client);
     client = next;
   }
@@ -78,8 +79,9 @@ void ChannelBook::drop(Clients::iterator client) {
 }
 
 void ChannelBook::forget_listeners(SteadyTime now) {
-  std::erase_if(listeners_,
-                [now](const auto& entry) { return entry.second.partitions == 0 && entry.second.next_free <= now; });
+  std::erase_if(listeners_, [now](const auto& entry) {
+    return entry.second.partitions == 0 && entry.second.next_free <= now;
+  });
 }
 
 bool ChannelBook::may_listen(const std::string& participant, const std::string& partition) const {
@@ -146,10 +148,11 @@ void ChannelBook::close(Clients::iterator client, SteadyTime now, std::vector<Ch
   Client& one = client->second;
   one.is_open = false;
   one.opened.clear();
-  const auto longest =
-      std::clamp(static_cast<int>(clients_.size()) * kPenaltyOfEach, kLongestAmongFew, kLongestAmongMany);
-  one.penalty = one.was_useful ? SteadyTime::duration(0)
-                               : std::min<SteadyTime::duration>(std::max(2 * one.penalty, grace_), longest);
+  const auto longest = std::clamp(static_cast<int>(clients_.size()) * kPenaltyOfEach,
+                                  kLongestAmongFew, kLongestAmongMany);
+  one.penalty = one.was_useful
+                    ? SteadyTime::duration(0)
+                    : std::min<SteadyTime::duration>(std::max(2 * one.penalty, grace_), longest);
   one.waits_since = now + one.penalty;
   --open_;
 }

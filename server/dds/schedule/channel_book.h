@@ -20,21 +20,24 @@ struct ReplyReader {
   bool operator==(const ReplyReader&) const = default;
 };
 
-/// Who listens where, and which clients have a reply channel. Only the participant that was the first to listen in a
-/// partition gets replies there. When there are more clients than channels, those take turns that do nothing: the one
-/// whose last request is longest ago makes room for the one that has waited longest, a client that asked first. Whoever
-/// had a channel for nothing waits longer each time, and so does who comes under one name after the other, 12 s at most
-/// among few clients and 30 s among hundreds. Not thread-safe.
+/// Who listens where, and which clients have a reply channel. Only the participant that was the
+/// first to listen in a partition gets replies there. When there are more clients than channels,
+/// those take turns that do nothing: the one whose last request is longest ago makes room for the
+/// one that has waited longest, a client that asked first. Whoever had a channel for nothing waits
+/// longer each time, and so does who comes under one name after the other, 12 s at most among few
+/// clients and 30 s among hundreds. Not thread-safe.
 class ChannelBook {
  public:
   /// `grace`: nobody loses a channel sooner than this after it was opened or used.
-  ChannelBook(std::size_t capacity, SteadyTime::duration grace) : capacity_(capacity), grace_(grace) {}
+  ChannelBook(std::size_t capacity, SteadyTime::duration grace)
+      : capacity_(capacity), grace_(grace) {}
 
   void found(const ReplyReader& reader, SteadyTime now);
   void lost(const ReplyReader& reader);
   void left(const std::string& participant);
 
-  /// Whether the participant may be answered in the partition: it listens there, or nobody does yet.
+  /// Whether the participant may be answered in the partition: it listens there, or nobody does
+  /// yet.
   [[nodiscard]] bool may_listen(const std::string& participant, const std::string& partition) const;
   [[nodiscard]] bool listens(const std::string& participant, const std::string& partition) const;
   /// A request of this client has come. True: it has no channel, and had not asked for one.
@@ -57,9 +60,10 @@ class ChannelBook {
  private:
   struct Client {
     std::string participant;
-    std::set<std::string> topics;     // that it listens to
-    std::vector<ReplyReader> others;  // of participants that listen there too; they follow when it has left
-    std::set<std::string> opened;     // topics with a writer
+    std::set<std::string> topics;  // that it listens to
+    std::vector<ReplyReader>
+        others;  // of participants that listen there too; they follow when it has left
+    std::set<std::string> opened;  // topics with a writer
     bool is_open = false;
     bool was_useful = false;   // since it was opened
     bool asks = false;         // since it has no channel

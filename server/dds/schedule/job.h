@@ -18,14 +18,17 @@ struct Shed {
   bool too_late = false;  ///< it was taken in, and its time is over now
 };
 
-/// A request that is worked on in portions. Its items (targets, joint vectors) do not depend on each other. begin(),
-/// finish() and shed() are called once at most, by one thread each; of finish() and shed() exactly one is called.
+/// A request that is worked on in portions. Its items (targets, joint vectors) do not depend on
+/// each other. begin(), finish() and shed() are called once at most, by one thread each; of
+/// finish() and shed() exactly one is called.
 class Job {
  public:
   virtual ~Job() = default;
-  /// Looks up everything that the items need. Returns the number of items; 0: there is nothing to compute.
+  /// Looks up everything that the items need. Returns the number of items; 0: there is nothing to
+  /// compute.
   [[nodiscard]] virtual std::size_t begin() = 0;
-  /// Computes the items [first, first + count). Several threads may call it at once, each with other items.
+  /// Computes the items [first, first + count). Several threads may call it at once, each with
+  /// other items.
   virtual void compute(std::size_t first, std::size_t count) = 0;
   /// Answers: all items are computed.
   virtual void finish() = 0;
@@ -35,12 +38,13 @@ class Job {
 
 /// What the schedule must know of a request.
 struct Ask {
-  std::string client;                        ///< who sent it; clients are served in turn
-  std::string cell = {};                     ///< empty: of no cell in particular
-  std::string work = {};                     ///< what costs alike: such requests share a figure for the cost of an item
-  std::size_t items = 1;                     ///< as far as the request tells
-  std::size_t bytes = 0;                     ///< of memory while it waits
-  SteadyTime start_by{};                     ///< nobody waits any longer for the beginning of the work
+  std::string client;     ///< who sent it; clients are served in turn
+  std::string cell = {};  ///< empty: of no cell in particular
+  std::string work =
+      {};  ///< what costs alike: such requests share a figure for the cost of an item
+  std::size_t items = 1;  ///< as far as the request tells
+  std::size_t bytes = 0;  ///< of memory while it waits
+  SteadyTime start_by{};  ///< nobody waits any longer for the beginning of the work
   std::optional<SteadyTime> finish_by = {};  ///< nor for its end
 };
 

@@ -56,8 +56,11 @@ std::optional<Shed> Lane::submit(std::shared_ptr<Job> job, Ask ask) {
   {
     const MutexLock lock(mutex_);
     if (stopped_) return Shed{"the server stops", kSoon, false};
-    if (!place) return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client), false};
-    if (auto shed = turns_.add(std::move(job), std::move(ask), std::move(*place), now_())) return shed;
+    if (!place)
+      return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client),
+                  false};
+    if (auto shed = turns_.add(std::move(job), std::move(ask), std::move(*place), now_()))
+      return shed;
     waits_ = true;
     workable_ = true;
     all_are_busy = idle_ == 0;
@@ -93,7 +96,8 @@ void Lane::work(const std::stop_token& stop, Turns::Which which) {
     if (step(which)) continue;
     MutexLock lock(mutex_);
     if (which == Turns::Which::kShort) {
-      express_arrived_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return express_waits_; });
+      express_arrived_.wait(lock, stop,
+                            [this]() TRAMMEL_REQUIRES(mutex_) { return express_waits_; });
       continue;
     }
     ++idle_;
@@ -175,7 +179,8 @@ void Lane::compute(Turns::Entry& entry, SteadyTime begun, Turns::Done* done) {
   SteadyTime from = now_();
   while (!done->answered && from - begun < limits_.portion) {
     std::size_t first = 0;
-    const std::size_t count = entry.claim(next_size(done->items, done->computing, limits_.portion), &first);
+    const std::size_t count =
+        entry.claim(next_size(done->items, done->computing, limits_.portion), &first);
     if (count == 0) return;
     entry.job().compute(first, count);
     done->items += count;

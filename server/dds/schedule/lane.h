@@ -19,22 +19,25 @@
 
 namespace trammel {
 
-/// Requests of one kind and the workers that carry them out in turns: see Turns. A worker goes on to the next client
-/// after one portion; the portions of one request go to all workers that have nothing better to do. Thread-safe.
+/// Requests of one kind and the workers that carry them out in turns: see Turns. A worker goes on
+/// to the next client after one portion; the portions of one request go to all workers that have
+/// nothing better to do. Thread-safe.
 class Lane {
  public:
   using Clock = std::function<SteadyTime()>;
 
   /// `room` outlives it. `nice` is added to the priority value of the workers.
   Lane(
-      const TurnLimits& limits, Room& room, int nice = 0, Clock now = [] { return std::chrono::steady_clock::now(); });
+      const TurnLimits& limits, Room& room, int nice = 0,
+      Clock now = [] { return std::chrono::steady_clock::now(); });
   ~Lane();  ///< stops as stop()
 
   /// Starts the workers.
   void start();
   /// Lets the portions under way end, and sheds all other requests. Nothing is taken in afterwards.
   void stop();
-  /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what is not taken in.
+  /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what
+  /// is not taken in.
   [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
   /// See Turns::set_limits().
   void set_limits(const TurnLimits& limits);
@@ -46,8 +49,8 @@ class Lane {
   [[nodiscard]] std::size_t requests() const;
   /// A number while workers are at portions, that of the portion begun first. Takes no lock.
   [[nodiscard]] std::optional<std::uint64_t> oldest_portion() const { return under_way_.oldest(); }
-  /// For the watchdog: a number while a request could be worked on and an idle worker has not taken it up; else empty.
-  /// The number is how many portions were taken up before. Takes no lock.
+  /// For the watchdog: a number while a request could be worked on and an idle worker has not taken
+  /// it up; else empty. The number is how many portions were taken up before. Takes no lock.
   [[nodiscard]] std::optional<std::uint64_t> unseen() const;
 
  private:
@@ -73,9 +76,9 @@ class Lane {
   bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;          // something is workable
   bool express_waits_ TRAMMEL_GUARDED_BY(mutex_) = false;  // by express workers
   std::atomic<bool> workable_{false};                      // as waits_, for the watchdog
-  std::atomic<int> idle_{0};                               // workers asleep, the express ones left out
-  std::atomic<std::uint64_t> taken_up_{0};                 // portions
-  WorkUnderWay under_way_;                                 // portions
+  std::atomic<int> idle_{0};                // workers asleep, the express ones left out
+  std::atomic<std::uint64_t> taken_up_{0};  // portions
+  WorkUnderWay under_way_;                  // portions
   std::vector<std::jthread> workers_;
 };
 

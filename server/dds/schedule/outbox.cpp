@@ -7,7 +7,8 @@ namespace trammel {
 
 bool Outbox::put(Parcel parcel) {
   const Held held = held_.contains(parcel.client) ? held_.at(parcel.client) : Held{};
-  if (held.replies >= limits_.client_replies || held.bytes + parcel.bytes > limits_.client_bytes) return false;
+  if (held.replies >= limits_.client_replies || held.bytes + parcel.bytes > limits_.client_bytes)
+    return false;
   if (bytes_ + parcel.bytes > limits_.bytes) return false;
   held_[parcel.client] = {held.replies + 1, held.bytes + parcel.bytes};
   ++listens_[parcel.partition];
@@ -16,7 +17,8 @@ bool Outbox::put(Parcel parcel) {
   return true;
 }
 
-std::list<Parcel>::iterator Outbox::remove(std::list<Parcel>::iterator parcel, std::list<Parcel>* to) {
+std::list<Parcel>::iterator Outbox::remove(std::list<Parcel>::iterator parcel,
+                                           std::list<Parcel>* to) {
   const auto held = held_.find(parcel->client);
   held->second.bytes -= parcel->bytes;
   if (--held->second.replies == 0) held_.erase(held);

@@ -27,7 +27,8 @@ struct Parcel {
   SteadyTime until{};     ///< when it is dropped
 };
 
-/// Replies that cannot be written yet: nobody listens, or the thread that has them may not write. Not thread-safe.
+/// Replies that cannot be written yet: nobody listens, or the thread that has them may not write.
+/// Not thread-safe.
 class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
@@ -35,7 +36,8 @@ class Outbox {
   /// False, and the parcel is dropped, when there is no room.
   [[nodiscard]] bool put(Parcel parcel);
   /// Takes out those that `may_go`, oldest first, at most `most`.
-  [[nodiscard]] std::list<Parcel> take(std::size_t most, const std::function<bool(const Parcel&)>& may_go);
+  [[nodiscard]] std::list<Parcel> take(std::size_t most,
+                                       const std::function<bool(const Parcel&)>& may_go);
   /// Drops what is out of date. Returns how many.
   std::size_t expire(SteadyTime now);
   [[nodiscard]] bool empty() const { return parcels_.empty(); }

@@ -10,7 +10,8 @@ std::size_t used(const std::map<std::string, std::size_t>& by_name, const std::s
   return found == by_name.end() ? 0 : found->second;
 }
 
-void take_off(std::map<std::string, std::size_t>& by_name, const std::string& name, std::size_t bytes) {
+void take_off(std::map<std::string, std::size_t>& by_name, const std::string& name,
+              std::size_t bytes) {
   const auto found = by_name.find(name);
   found->second -= bytes;
   if (found->second == 0) by_name.erase(found);
@@ -31,11 +32,14 @@ Room::Place::~Place() {
   if (room_ != nullptr) room_->give_back(*this);
 }
 
-std::optional<Room::Place> Room::take(const std::string& client, const std::string& cell, std::size_t bytes) {
+std::optional<Room::Place> Room::take(const std::string& client, const std::string& cell,
+                                      std::size_t bytes) {
   const std::size_t some = bytes + 1;  // an entry of nothing must not look like no entry
   const MutexLock lock(mutex_);
-  const auto cell_limit = static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.bytes));
-  if (bytes_ + some > limits_.bytes || used(by_client_, client) + some > limits_.client_bytes) return std::nullopt;
+  const auto cell_limit =
+      static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.bytes));
+  if (bytes_ + some > limits_.bytes || used(by_client_, client) + some > limits_.client_bytes)
+    return std::nullopt;
   if (!cell.empty() && used(by_cell_, cell) + some > cell_limit) return std::nullopt;
   bytes_ += some;
   by_client_[client] += some;

@@ -35,8 +35,10 @@ class Room {
     std::size_t bytes_;
   };
 
-  /// Empty when the room, the client's share or the cell's share (no cell: no such limit) is used up.
-  [[nodiscard]] std::optional<Place> take(const std::string& client, const std::string& cell, std::size_t bytes);
+  /// Empty when the room, the client's share or the cell's share (no cell: no such limit) is used
+  /// up.
+  [[nodiscard]] std::optional<Place> take(const std::string& client, const std::string& cell,
+                                          std::size_t bytes);
   [[nodiscard]] std::size_t bytes() const;
   /// From now on; what is in the room already stays.
   void set_limits(const RoomLimits& limits);

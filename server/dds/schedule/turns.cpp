@@ -31,14 +31,16 @@ std::size_t Turns::Entry::claim(std::size_t most, std::size_t* first) {
   return *first >= items_ ? 0 : std::min(most, items_ - *first);
 }
 
-std::optional<Shed> Turns::add(std::shared_ptr<Job> job, Ask ask, Room::Place place, SteadyTime now) {
+std::optional<Shed> Turns::add(std::shared_ptr<Job> job, Ask ask, Room::Place place,
+                               SteadyTime now) {
   const Cost own = costs_.per_item(ask.work, now) * static_cast<double>(ask.items);
   Client& client = arrived(ask.client);
   if (auto why = refusal(client, ask, own, now)) return why;
   if (!ask.cell.empty()) ++cells_[ask.cell].requests;
   ++requests_;
   client.backlog += own;
-  client.entries.push_back(std::make_shared<Entry>(std::move(job), std::move(ask), std::move(place), own));
+  client.entries.push_back(
+      std::make_shared<Entry>(std::move(job), std::move(ask), std::move(place), own));
   return std::nullopt;
 }
 
@@ -56,14 +58,18 @@ void Turns::forget_clients() {
   });
 }
 
-std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost own, SteadyTime now) const {
-  const auto full = [&](const std::string& why) { return Shed{why, retry_after(ask.client), false}; };
+std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost own,
+                                   SteadyTime now) const {
+  const auto full = [&](const std::string& why) {
+    return Shed{why, retry_after(ask.client), false};
+  };
   if (client.entries.size() >= limits_.client_requests) {
     return full(fmt::format("{} requests of this client wait", client.entries.size()));
   }
   if (requests_ >= limits_.requests) return full(fmt::format("{} requests wait", requests_));
   const auto cell = cells_.find(ask.cell);
-  const auto cell_limit = static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.requests));
+  const auto cell_limit =
+      static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.requests));
   if (cell != cells_.end() && cell->second.requests >= cell_limit) {
     return full(fmt::format("{} requests of this cell wait", cell->second.requests));
   }
@@ -72,7 +78,8 @@ std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost ow
   const Cost late = std::max(ask.finish_by ? ends - Cost(*ask.finish_by - now) : Cost(0),  //
                              begins - Cost(ask.start_by - now));
   if (late <= Cost(0)) return std::nullopt;
-  return Shed{fmt::format("its {} items would be done in {:.0f} ms, too late", ask.items, 1e3 * ends.count()),
+  return Shed{fmt::format("its {} items would be done in {:.0f} ms, too late", ask.items,
+                          1e3 * ends.count()),
               as_retry(late), false};
 }
 
@@ -108,9 +115,10 @@ bool Turns::is_short(const Entry& entry) const {
 
 std::shared_ptr<Turns::Entry> Turns::workable(const Client& client, Which which) const {
   if (client.running >= limits_.client_workers) return nullptr;
-  const auto found = std::find_if(client.entries.begin(), client.entries.end(), [&](const auto& entry) {
-    return may_run(*entry) && (which == Which::kAll || is_short(*entry));
-  });
+  const auto found =
+      std::find_if(client.entries.begin(), client.entries.end(), [&](const auto& entry) {
+        return may_run(*entry) && (which == Which::kAll || is_short(*entry));
+      });
   return found == client.entries.end() ? nullptr : *found;
 }
 
@@ -118,7 +126,8 @@ std::optional<Turns::Portion> Turns::next(SteadyTime now, Which which) {
   Client* best = nullptr;
   std::shared_ptr<Entry> entry;
   for (auto& [name, client] : clients_) {
-    if (best != nullptr && std::pair(client.had, client.turn) >= std::pair(best->had, best->turn)) continue;
+    if (best != nullptr && std::pair(client.had, client.turn) >= std::pair(best->had, best->turn))
+      continue;
     if (auto work = workable(client, which)) {
       best = &client;
       entry = std::move(work);
@@ -129,8 +138,9 @@ std::optional<Turns::Portion> Turns::next(SteadyTime now, Which which) {
 }
 
 bool Turns::has_work() const {
-  return std::any_of(clients_.begin(), clients_.end(),
-                     [this](const auto& one) { return workable(one.second, Which::kAll) != nullptr; });
+  return std::any_of(clients_.begin(), clients_.end(), [this](const auto& one) {
+    return workable(one.second, Which::kAll) != nullptr;
+  });
 }
 
 std::optional<Turns::Portion> Turns::next_late(SteadyTime now) {
@@ -166,17 +176,18 @@ Turns::Portion Turns::hand_out(Client& client, std::shared_ptr<Entry> entry, Ste
   return {std::move(entry), part};
 }
 
-std::optional<Shed> Turns::too_late(const Client& client, const Entry& entry, SteadyTime now) const {
+std::optional<Shed> Turns::too_late(const Client& client, const Entry& entry,
+                                    SteadyTime now) const {
   const Ask& ask = entry.ask_;
   const bool begun = entry.state_ != Entry::State::kWaits;
   const SteadyTime limit = ask.finish_by ? *ask.finish_by : ask.start_by;
   if (begun && (!ask.finish_by || now <= limit)) return std::nullopt;
-  const Cost together(entry.left_ /
-                      static_cast<double>(std::max<std::size_t>(1, std::min(ask.items, limits_.workers))));
+  const Cost together(entry.left_ / static_cast<double>(std::max<std::size_t>(
+                                        1, std::min(ask.items, limits_.workers))));
   const Cost late = Cost(now - limit) + (ask.finish_by && !begun ? together : Cost(0));
   if (late <= Cost(0)) return std::nullopt;
-  return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1)),
-              ask.finish_by && now > limit};
+  return Shed{fmt::format("its {} items were not done in time", ask.items),
+              as_retry(served_in(client, Cost(0), 1)), ask.finish_by && now > limit};
 }
 
 void Turns::open(Entry& entry, std::size_t items) {
@@ -200,7 +211,8 @@ bool Turns::settle(const Portion& portion, const Done& done, SteadyTime now) {
     return sheds;
   }
   if (entry.state_ == Entry::State::kOver) return false;  // another worker has answered
-  const Cost left = costs_.per_item(ask.work, now) * static_cast<double>(entry.items_ - entry.computed_);
+  const Cost left =
+      costs_.per_item(ask.work, now) * static_cast<double>(entry.items_ - entry.computed_);
   client.backlog += left - entry.left_;
   entry.left_ = left;
   return false;

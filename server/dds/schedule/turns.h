@@ -18,10 +18,10 @@ namespace trammel {
 
 struct TurnLimits {
   std::size_t workers = 2;
-  /// More workers, who take up short requests only. They mostly sleep, so the system lets them run at once where the
-  /// others have computed all the time and wait for a core themselves.
+  /// More workers, who take up short requests only. They mostly sleep, so the system lets them run
+  /// at once where the others have computed all the time and wait for a core themselves.
   std::size_t express_workers = 0;
-  Cost portion{0.002};               ///< a worker goes to the next request after this, or after one item
+  Cost portion{0.002};  ///< a worker goes to the next request after this, or after one item
   std::size_t client_requests = 64;  ///< of one client that wait or are worked on
   std::size_t requests = 4096;       ///< of all clients
   double cell_share = 0.5;           ///< of `requests`, for one cell
@@ -29,10 +29,11 @@ struct TurnLimits {
   std::size_t cell_workers = 64;     ///< that work for one cell at a time
 };
 
-/// Which request a worker takes up next. The client comes next that has had the least of the workers' time: whoever
-/// waits with many or with long requests waits behind his own, and takes turns with the others portion by portion. A
-/// client that was away starts level with those who stayed. Among clients that had the same, the one that has waited
-/// longest for a portion comes first. No lock, no clock, no thread.
+/// Which request a worker takes up next. The client comes next that has had the least of the
+/// workers' time: whoever waits with many or with long requests waits behind his own, and takes
+/// turns with the others portion by portion. A client that was away starts level with those who
+/// stayed. Among clients that had the same, the one that has waited longest for a portion comes
+/// first. No lock, no clock, no thread.
 class Turns {
  public:
   explicit Turns(const TurnLimits& limits) : limits_(limits) {}
@@ -49,7 +50,9 @@ class Turns {
     /// The next `most` items, or fewer; `first` is their first. 0: none is left. Thread-safe.
     [[nodiscard]] std::size_t claim(std::size_t most, std::size_t* first);
     /// Whether these were the last items. Thread-safe.
-    [[nodiscard]] bool computed(std::size_t count) { return computed_.fetch_add(count) + count == items_; }
+    [[nodiscard]] bool computed(std::size_t count) {
+      return computed_.fetch_add(count) + count == items_;
+    }
 
    private:
     friend class Turns;
@@ -82,9 +85,12 @@ class Turns {
     bool answered = false;  ///< with it the request is over
   };
 
-  /// Takes the request in, or tells why not. What cannot be done in time by what is known of the costs is not taken in.
-  [[nodiscard]] std::optional<Shed> add(std::shared_ptr<Job> job, Ask ask, Room::Place place, SteadyTime now);
-  /// Which requests are looked at: all, or those that are done within one portion by what is known of the costs.
+  /// Takes the request in, or tells why not. What cannot be done in time by what is known of the
+  /// costs is not taken in.
+  [[nodiscard]] std::optional<Shed> add(std::shared_ptr<Job> job, Ask ask, Room::Place place,
+                                        SteadyTime now);
+  /// Which requests are looked at: all, or those that are done within one portion by what is known
+  /// of the costs.
   enum class Which { kAll, kShort };
   /// Empty when there is nothing that may be worked on.
   [[nodiscard]] std::optional<Portion> next(SteadyTime now, Which which = Which::kAll);
@@ -94,8 +100,8 @@ class Turns {
   [[nodiscard]] std::optional<Portion> next_late(SteadyTime now);
   /// After Job::begin(): other workers may join.
   void open(Entry& entry, std::size_t items);
-  /// Ends a portion of another part than kShed. True: the request is given up and nobody works for it any longer, so
-  /// the caller sheds it.
+  /// Ends a portion of another part than kShed. True: the request is given up and nobody works for
+  /// it any longer, so the caller sheds it.
   [[nodiscard]] bool settle(const Portion& portion, const Done& done, SteadyTime now);
 
   /// When a client whose request found no room should try again.
@@ -107,10 +113,10 @@ class Turns {
 
  private:
   struct Client {
-    double had = 0;                              // s of the workers' time, level with `level_` when it comes
-    std::uint64_t turn = 0;                      // number of its last portion
-    std::size_t running = 0;                     // portions under way
-    Cost backlog{0};                             // estimated
+    double had = 0;           // s of the workers' time, level with `level_` when it comes
+    std::uint64_t turn = 0;   // number of its last portion
+    std::size_t running = 0;  // portions under way
+    Cost backlog{0};          // estimated
     std::deque<std::shared_ptr<Entry>> entries;  // oldest first
   };
   struct CellUse {
@@ -118,7 +124,8 @@ class Turns {
     std::size_t running = 0;  // portions under way
   };
 
-  [[nodiscard]] std::optional<Shed> refusal(const Client& client, const Ask& ask, Cost own, SteadyTime now) const;
+  [[nodiscard]] std::optional<Shed> refusal(const Client& client, const Ask& ask, Cost own,
+                                            SteadyTime now) const;
   /// How long it takes until the client has had `own` more, everybody being served in turn.
   [[nodiscard]] Cost served_in(const Client& client, Cost own, std::size_t items) const;
   [[nodiscard]] Client& arrived(const std::string& client);
@@ -126,7 +133,8 @@ class Turns {
   [[nodiscard]] bool is_short(const Entry& entry) const;
   [[nodiscard]] std::shared_ptr<Entry> workable(const Client& client, Which which) const;
   [[nodiscard]] Portion hand_out(Client& client, std::shared_ptr<Entry> entry, SteadyTime now);
-  [[nodiscard]] std::optional<Shed> too_late(const Client& client, const Entry& entry, SteadyTime now) const;
+  [[nodiscard]] std::optional<Shed> too_late(const Client& client, const Entry& entry,
+                                             SteadyTime now) const;
   void remove(Client& client, Entry& entry);
   void forget_clients();
 

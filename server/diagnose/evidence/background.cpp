@@ -33,7 +33,9 @@ Background::Background(MatrixXd columns, const MatrixXd& information)
       inverse_(inverse_factor_of(information)),
       root_(times_lower_transposed(columns_, inverse_)) {}
 
-MatrixXd Background::project(const MatrixXd& y) const { return y - root_ * transposed_product(root_, y); }
+MatrixXd Background::project(const MatrixXd& y) const {
+  return y - root_ * transposed_product(root_, y);
+}
 
 MatrixXd Background::estimate(const MatrixXd& y) const {
   return inverse_.transpose() * (inverse_ * transposed_product(columns_, y));

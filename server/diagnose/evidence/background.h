@@ -7,9 +7,10 @@ namespace trammel::cause_search {
 /// L⁻¹ of an information matrix L Lᵀ.
 [[nodiscard]] Eigen::MatrixXd inverse_factor_of(const Eigen::MatrixXd& information);
 
-/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` Z times
-/// unknown numbers of unit variance. The columns are the model's own parameters, in units of their priors, and the
-/// anonymous functions found before. The covariance of the rows is S = 1 + Z Zᵀ. By the matrix inversion lemma S⁻¹ = 1
+/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and
+/// `columns` Z times unknown numbers of unit variance. The columns are the model's own parameters,
+/// in units of their priors, and the anonymous functions found before. The covariance of the rows
+/// is S = 1 + Z Zᵀ. By the matrix inversion lemma S⁻¹ = 1
 /// - U Uᵀ with U = Z L⁻ᵀ and 1 + ZᵀZ = L Lᵀ.
 class Background {
  public:

@@ -8,10 +8,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// The strength that a step from each pose on explains; 0 for the first pose, where it would have acted always. Sums
-/// from the end give every beginning in one pass.
-VectorXd explained_from(const LinearProblem& problem, const MatrixXd& always, const Background& rest,
-                        const VectorXd& data) {
+/// The strength that a step from each pose on explains; 0 for the first pose, where it would have
+/// acted always. Sums from the end give every beginning in one pass.
+VectorXd explained_from(const LinearProblem& problem, const MatrixXd& always,
+                        const Background& rest, const VectorXd& data) {
   const VectorXd projected = rest.project(data);
   const Index m = always.cols();
   VectorXd along = VectorXd::Zero(m);
@@ -33,8 +33,8 @@ VectorXd explained_from(const LinearProblem& problem, const MatrixXd& always, co
 
 }  // namespace
 
-std::vector<Index> possible_beginnings(const LinearProblem& problem, const MatrixXd& always, const Background& rest,
-                                       const VectorXd& data, Index found) {
+std::vector<Index> possible_beginnings(const LinearProblem& problem, const MatrixXd& always,
+                                       const Background& rest, const VectorXd& data, Index found) {
   const VectorXd explained = explained_from(problem, always, rest, data);
   const double least = explained.maxCoeff() - kBeginning95;
   std::vector<Index> possible;

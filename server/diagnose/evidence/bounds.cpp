@@ -17,24 +17,28 @@ using Eigen::VectorXd;
 constexpr int kSweeps = 200;  // over a dozen numbers: far more than they need
 
 /// The parameter of each number of a source.
-std::vector<const Parameter*> parameters_at(const LinearProblem& problem, const std::vector<Index>& places) {
+std::vector<const Parameter*> parameters_at(const LinearProblem& problem,
+                                            const std::vector<Index>& places) {
   std::vector<const Parameter*> all;
-  for (const Index place : places) all.push_back(&problem.nuisance_parameters()[static_cast<std::size_t>(place)]);
+  for (const Index place : places)
+    all.push_back(&problem.nuisance_parameters()[static_cast<std::size_t>(place)]);
   return all;
 }
 
-/// The lower bound of each number in units of its prior; minus infinity where it has none, or says only where an effect
-/// is.
+/// The lower bound of each number in units of its prior; minus infinity where it has none, or says
+/// only where an effect is.
 VectorXd bounds_of(const std::vector<const Parameter*>& parameters) {
   VectorXd bounds(static_cast<Index>(parameters.size()));
   for (Index k = 0; k < bounds.size(); ++k) {
     const Parameter& one = *parameters[static_cast<std::size_t>(k)];
-    bounds(k) = one.is_place ? -std::numeric_limits<double>::infinity() : one.lower / one.prior_scale;
+    bounds(k) =
+        one.is_place ? -std::numeric_limits<double>::infinity() : one.lower / one.prior_scale;
   }
   return bounds;
 }
 
-/// The numbers nearest to the estimate, by its precision, of which none is below its bound: one after the other.
+/// The numbers nearest to the estimate, by its precision, of which none is below its bound: one
+/// after the other.
 VectorXd nearest_within(const OwnEstimate& own, const VectorXd& bounds) {
   VectorXd x = own.size.cwiseMax(bounds);
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -46,8 +50,10 @@ VectorXd nearest_within(const OwnEstimate& own, const VectorXd& bounds) {
   return x;
 }
 
-/// What an effect of the cause changes with. `joints`: 1-based, whose numbers are beyond their bounds.
-std::vector<std::string> circumstances_of(const CauseRecord& record, const std::vector<int>& joints) {
+/// What an effect of the cause changes with. `joints`: 1-based, whose numbers are beyond their
+/// bounds.
+std::vector<std::string> circumstances_of(const CauseRecord& record,
+                                          const std::vector<int>& joints) {
   if (record.gives_way) return {"torque"};
   if (record.needs.temperature) return {"temperature"};
   std::vector<std::string> on;
@@ -58,7 +64,8 @@ std::vector<std::string> circumstances_of(const CauseRecord& record, const std::
   return on;
 }
 
-/// Of a number that is a joint's: `early3`. That of the cause where it has one, 0 where neither has.
+/// Of a number that is a joint's: `early3`. That of the cause where it has one, 0 where neither
+/// has.
 int joint_of(const Parameter& parameter, const Cause& cause) {
   if (cause.joint >= 0) return cause.joint + 1;
   const std::size_t end = parameter.name.find_last_not_of("0123456789") + 1;
@@ -68,8 +75,8 @@ int joint_of(const Parameter& parameter, const Cause& cause) {
 }  // namespace
 
 bool WrongSign::is_beyond_chance() const {
-  const double price =
-      std::pow(thresholds::kWrongSign, 2) + 2 * std::log(std::max(1.0, static_cast<double>(numbers.size())));
+  const double price = std::pow(thresholds::kWrongSign, 2) +
+                       2 * std::log(std::max(1.0, static_cast<double>(numbers.size())));
   return lost > std::max(price, thresholds::kShapeError * strength);
 }
 
@@ -100,9 +107,11 @@ WrongSign wrong_sign_of(const LinearProblem& problem, const std::string& source,
 std::string what_wrong_sign_means(const WrongSign& wrong) {
   std::vector<std::string> numbers;
   for (const Estimate& one : wrong.numbers)
-    numbers.push_back(fmt::format("{} = {:.3g} ± {:.2g} {}", one.name, one.value, one.u95, one.unit));
-  return fmt::format("it has the shape of {} with a sign that this cannot have ({}): it is something else",
-                     in_words(wrong.cause), fmt::join(numbers, ", "));
+    numbers.push_back(
+        fmt::format("{} = {:.3g} ± {:.2g} {}", one.name, one.value, one.u95, one.unit));
+  return fmt::format(
+      "it has the shape of {} with a sign that this cannot have ({}): it is something else",
+      in_words(wrong.cause), fmt::join(numbers, ", "));
 }
 
 }  // namespace trammel::cause_search

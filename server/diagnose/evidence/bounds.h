@@ -6,8 +6,9 @@
 #include "server/diagnose/diagnosis.h"
 #include "server/diagnose/evidence/effect.h"
 
-/// The bounds of a cause's numbers (Parameter::lower) are part of its name. Friction that takes a joint too far, a gear
-/// that lifts its load are not those causes, however well they fit. Play has a rule of its own (play_sign.h).
+/// The bounds of a cause's numbers (Parameter::lower) are part of its name. Friction that takes a
+/// joint too far, a gear that lifts its load are not those causes, however well they fit. Play has
+/// a rule of its own (play_sign.h).
 namespace trammel::cause_search {
 
 /// A cause whose numbers came out beyond their bounds.
@@ -18,16 +19,19 @@ struct WrongSign {
   double strength = 0;                  ///< of all numbers as they came out
   double lost = 0;                      ///< what of it goes where no number is beyond its bound
 
-  /// More numbers, or larger ones, are beyond their bounds than chance and the shape of real causes make.
+  /// More numbers, or larger ones, are beyond their bounds than chance and the shape of real causes
+  /// make.
   [[nodiscard]] bool is_beyond_chance() const;
   /// Most of what the cause would explain needs numbers that it cannot have.
   [[nodiscard]] bool is_another_cause() const;
 };
 
-/// The numbers of the cause that the model has as `source`, against their bounds. `change`, `covariance`: the joint
-/// estimate of all parameters about where the model stands, in units of priors.
-[[nodiscard]] WrongSign wrong_sign_of(const LinearProblem& problem, const std::string& source, const Cause& cause,
-                                      const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance);
+/// The numbers of the cause that the model has as `source`, against their bounds. `change`,
+/// `covariance`: the joint estimate of all parameters about where the model stands, in units of
+/// priors.
+[[nodiscard]] WrongSign wrong_sign_of(const LinearProblem& problem, const std::string& source,
+                                      const Cause& cause, const Eigen::VectorXd& change,
+                                      const Eigen::MatrixXd& covariance);
 
 /// For people: which cause it looks like, and why it is not that.
 [[nodiscard]] std::string what_wrong_sign_means(const WrongSign& wrong);

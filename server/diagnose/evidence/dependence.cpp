@@ -21,9 +21,11 @@ using Eigen::VectorXd;
 constexpr Index kMostPoses = 200;   // distances are quadratic in them; evenly drawn from more
 constexpr Index kFewestPoses = 20;  // fewer say nothing about sixteen questions
 constexpr int kPermutations = 999;
-constexpr int kAsLarge = 10;            // permutations at least as large: then their share is known to a third
-constexpr double kNegligible = 1e-4;    // of the largest weight
-constexpr double kNarrow = 1e-6;        // standard deviations: so near the mean the saddlepoint divides by zero
+constexpr int kAsLarge =
+    10;  // permutations at least as large: then their share is known to a third
+constexpr double kNegligible = 1e-4;  // of the largest weight
+constexpr double kNarrow =
+    1e-6;  // standard deviations: so near the mean the saddlepoint divides by zero
 constexpr double kLeastSpread = 1e-9;   // rad, s or of a unit variance: less is a constant
 constexpr double kLeastTorque = 1e-12;  // Nm, against division by zero
 constexpr double kFarOut = 30;          // standard deviations, beyond which erfc() is zero
@@ -45,16 +47,19 @@ double permuted_product(const MatrixXd& a, const MatrixXd& b, const std::vector<
   double sum = 0;
   for (Index j = 0; j < a.cols(); ++j) {
     const auto& column = b.col(order[static_cast<std::size_t>(j)]);
-    for (Index i = 0; i < a.rows(); ++i) sum += a(i, j) * column(order[static_cast<std::size_t>(i)]);
+    for (Index i = 0; i < a.rows(); ++i)
+      sum += a(i, j) * column(order[static_cast<std::size_t>(i)]);
   }
   return sum;
 }
 
 /// Positive eigenvalues of minus the centred distances, largest first.
 std::vector<double> spectrum(const MatrixXd& centred) {
-  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(-centred, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorXd values =
+      Eigen::SelfAdjointEigenSolver<MatrixXd>(-centred, Eigen::EigenvaluesOnly).eigenvalues();
   std::vector<double> positive;
-  for (Index k = values.size() - 1; k >= 0 && values(k) > kNegligible * values(values.size() - 1); --k)
+  for (Index k = values.size() - 1; k >= 0 && values(k) > kNegligible * values(values.size() - 1);
+       --k)
     positive.push_back(values(k));
   return positive;
 }
@@ -122,16 +127,19 @@ class WeightedChiSquare {
   double largest_, mean_ = 0;
 };
 
-/// The tail of the statistic beyond `tenth`, its kAsLarge-th largest of all permutations, at `observed`.
+/// The tail of the statistic beyond `tenth`, its kAsLarge-th largest of all permutations, at
+/// `observed`.
 double p_value_in_tail(const MatrixXd& a, const MatrixXd& b, double observed, double tenth) {
   const WeightedChiSquare null(spectrum(a), spectrum(b));
-  const double scale = static_cast<double>(a.rows() - 1);  // a product of unit vectors varies by 1 / (n - 1)
+  const double scale =
+      static_cast<double>(a.rows() - 1);  // a product of unit vectors varies by 1 / (n - 1)
   const double beyond = null.log_tail(scale * observed) - null.log_tail(scale * tenth);
   const double share = kAsLarge / static_cast<double>(kPermutations);
   return std::max(kLeastPValue, share * std::exp(std::min(0.0, beyond)));
 }
 
-/// Of two centred distance matrices: the share of permutations that are as large, or its tail where too few are.
+/// Of two centred distance matrices: the share of permutations that are as large, or its tail where
+/// too few are.
 double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Index> order(static_cast<std::size_t>(a.rows()));
@@ -140,18 +148,20 @@ double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   std::vector<double> drawn;
   int above = 0;
   while (static_cast<int>(drawn.size()) < kPermutations) {
-    for (std::size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    for (std::size_t i = order.size() - 1; i > 0; --i)
+      std::swap(order[i], order[random() % (i + 1)]);
     drawn.push_back(permuted_product(a, b, order));
-    if (drawn.back() >= observed && ++above == kAsLarge) return kAsLarge / static_cast<double>(drawn.size());
+    if (drawn.back() >= observed && ++above == kAsLarge)
+      return kAsLarge / static_cast<double>(drawn.size());
   }
   std::nth_element(drawn.begin(), drawn.begin() + kAsLarge - 1, drawn.end(), std::greater<>());
   return p_value_in_tail(a, b, observed, drawn[kAsLarge - 1]);
 }
 
-/// N x 3: the positions of `poses` in S⁻¹ y, scaled to unit covariance of each if there is nothing but noise. The
-/// covariance of S⁻¹ y is S⁻¹ = 1 - U Uᵀ.
-MatrixXd standardised(const LinearProblem& problem, const Background& background, const VectorXd& left,
-                      const std::vector<Index>& poses) {
+/// N x 3: the positions of `poses` in S⁻¹ y, scaled to unit covariance of each if there is nothing
+/// but noise. The covariance of S⁻¹ y is S⁻¹ = 1 - U Uᵀ.
+MatrixXd standardised(const LinearProblem& problem, const Background& background,
+                      const VectorXd& left, const std::vector<Index>& poses) {
   MatrixXd rows(static_cast<Index>(poses.size()), 3);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Index row = problem.first_row(poses[i]);
@@ -160,7 +170,8 @@ MatrixXd standardised(const LinearProblem& problem, const Background& background
     const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(covariance);
     const Vector3 scale = eigen.eigenvalues().cwiseMax(kLeastSpread).cwiseSqrt().cwiseInverse();
     const Matrix3& V = eigen.eigenvectors();
-    rows.row(static_cast<Index>(i)) = (V * scale.asDiagonal() * V.transpose() * left.segment<3>(row)).transpose();
+    rows.row(static_cast<Index>(i)) =
+        (V * scale.asDiagonal() * V.transpose() * left.segment<3>(row)).transpose();
   }
   return rows;
 }
@@ -182,12 +193,15 @@ Circumstances circumstances_of(const LinearProblem& problem, const std::vector<I
   const int joints = problem.model().cell->robot.size();
   Circumstances all{MatrixXd(n, joints), MatrixXd(n, joints), VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
-    const Measurement& m = problem.batch().measurements[static_cast<std::size_t>(poses[static_cast<std::size_t>(i)])];
+    const Measurement& m =
+        problem.batch().measurements[static_cast<std::size_t>(poses[static_cast<std::size_t>(i)])];
     all.q.row(i) = problem.gear_angles(poses[static_cast<std::size_t>(i)]).transpose();
-    all.torque.row(i) = ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
+    all.torque.row(i) =
+        ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
     all.time(i) = static_cast<double>(m.context.index);
   }
-  const VectorXd largest = all.torque.cwiseAbs().colwise().maxCoeff().cwiseMax(kLeastTorque).transpose();
+  const VectorXd largest =
+      all.torque.cwiseAbs().colwise().maxCoeff().cwiseMax(kLeastTorque).transpose();
   all.torque = (all.torque * largest.cwiseInverse().asDiagonal()).eval();
   return all;
 }
@@ -199,7 +213,8 @@ std::vector<Question> questions(const LinearProblem& problem, const std::vector<
     if ((x.rowwise() - x.colwise().mean()).norm() < kLeastSpread) return;
     all.push_back({std::move(on), centred_distances(x)});
   };
-  for (Index j = 0; j < circumstances.q.cols(); ++j) ask(fmt::format("q{}", j + 1), circumstances.q.col(j));
+  for (Index j = 0; j < circumstances.q.cols(); ++j)
+    ask(fmt::format("q{}", j + 1), circumstances.q.col(j));
   ask("torque", circumstances.torque);
   ask("time", circumstances.time);
   return all;
@@ -207,10 +222,12 @@ std::vector<Question> questions(const LinearProblem& problem, const std::vector<
 
 /// Sorts by p-value and corrects each for the number of questions, after Holm.
 void correct_for_number(std::vector<Dependence>& found) {
-  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
   double highest = 0;
   for (std::size_t k = 0; k < found.size(); ++k) {
-    highest = std::max(highest, std::min(1.0, found[k].p_value * static_cast<double>(found.size() - k)));
+    highest =
+        std::max(highest, std::min(1.0, found[k].p_value * static_cast<double>(found.size() - k)));
     found[k].p_value = highest;
   }
 }
@@ -222,8 +239,8 @@ double independence_p_value(const MatrixXd& x, const MatrixXd& y, std::uint64_t 
   return p_value(centred_distances(x), centred_distances(y), seed);
 }
 
-std::vector<Dependence> dependence_of(const LinearProblem& problem, const Background& background, const VectorXd& left,
-                                      std::uint64_t seed) {
+std::vector<Dependence> dependence_of(const LinearProblem& problem, const Background& background,
+                                      const VectorXd& left, std::uint64_t seed) {
   const Index n = std::min(kMostPoses, problem.poses());
   if (n < kFewestPoses) return {};
   std::vector<Index> poses(static_cast<std::size_t>(n));
@@ -233,7 +250,8 @@ std::vector<Dependence> dependence_of(const LinearProblem& problem, const Backgr
   const MatrixXd by_size = centred_distances(residual.rowwise().norm());
   std::vector<Dependence> found;
   for (const Question& question : questions(problem, poses)) {
-    found.push_back({question.on, false, p_value(by_residual, question.distances, seed + found.size())});
+    found.push_back(
+        {question.on, false, p_value(by_residual, question.distances, seed + found.size())});
     found.push_back({question.on, true, p_value(by_size, question.distances, seed + found.size())});
   }
   correct_for_number(found);

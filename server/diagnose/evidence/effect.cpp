@@ -45,8 +45,8 @@ VectorXd effect_of_source(const LinearProblem& problem, const std::string& sourc
   return effect.cwiseProduct(problem.weight());
 }
 
-OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source, const VectorXd& change,
-                         const Eigen::MatrixXd& covariance) {
+OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source,
+                         const VectorXd& change, const Eigen::MatrixXd& covariance) {
   const std::vector<Index> places = places_of_source(problem.model(), source);
   OwnEstimate own{VectorXd(change(places)), Eigen::MatrixXd(covariance(places, places))};
   for (std::size_t k = 0; k < places.size(); ++k) {

@@ -18,13 +18,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kCut = 3;  // standard deviations, beyond which a row's size no longer counts in the noise
+constexpr double kCut =
+    3;  // standard deviations, beyond which a row's size no longer counts in the noise
 constexpr double kMeanBelowCut = 0.9950;  // of min(z^2, kCut^2), z standard normal
-constexpr double kLeastFreedom = 0.05;    // share that a fit is taken to leave, however many parameters it has
-constexpr int kHalvings = 60;             // of an interval: all that a double can hold
+constexpr double kLeastFreedom =
+    0.05;                      // share that a fit is taken to leave, however many parameters it has
+constexpr int kHalvings = 60;  // of an interval: all that a double can hold
 
-/// The surplus s at which the rows' squares, cut off at kCut, average to what white noise has, given the share of
-/// freedom that the fit leaves. Zero where there is none.
+/// The surplus s at which the rows' squares, cut off at kCut, average to what white noise has,
+/// given the share of freedom that the fit leaves. Zero where there is none.
 double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double share) {
   const double wanted = kMeanBelowCut * share * static_cast<double>(residual.size());
   const auto excess = [&](double s) {
@@ -45,16 +47,17 @@ double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double sh
 Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& model) {
   Result<ErrorSourcePtr> source = make_error_source(spec, *model.cell);
   if (!source) return source;
-  const bool there = std::any_of(model.sources.begin(), model.sources.end(), [&](const ErrorSourcePtr& own) {
-    return are_forms_of_one(own->name(), (*source)->name());
-  });
+  const bool there = std::any_of(
+      model.sources.begin(), model.sources.end(),
+      [&](const ErrorSourcePtr& own) { return are_forms_of_one(own->name(), (*source)->name()); });
   if (there) return refused("{} is in the model", in_words(spec)).with_text(spec);
   return source;
 }
 
 VectorXd scales_of(const std::vector<Parameter>& parameters) {
   VectorXd scales(static_cast<Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k) scales(static_cast<Index>(k)) = parameters[k].prior_scale;
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    scales(static_cast<Index>(k)) = parameters[k].prior_scale;
   return scales;
 }
 
@@ -68,8 +71,10 @@ Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
   return first;
 }
 
-/// Adds `source` so that it does nothing yet. What is expected of some is not nothing (the weight of the links).
-void add_at_zero(PhysicalModel& model, const ErrorSourcePtr& source, const MeasurementBatch& batch) {
+/// Adds `source` so that it does nothing yet. What is expected of some is not nothing (the weight
+/// of the links).
+void add_at_zero(PhysicalModel& model, const ErrorSourcePtr& source,
+                 const MeasurementBatch& batch) {
   const Pose without = model.pose_W(batch.measurements.front().context);
   const Index first = add_source(model, source);
   if (model.pose_W(batch.measurements.front().context).isApprox(without, 1e-12)) return;
@@ -87,8 +92,8 @@ VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
 }
 
 /// `nuisance`: what the parameters do, SI, in units of their `scales`. `sigma`: of each row.
-LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance, const VectorXd& scales,
-                                    const VectorXd& sigma) {
+LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance,
+                                    const VectorXd& scales, const VectorXd& sigma) {
   MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
   MatrixXd information = gram(scaled);
   information.diagonal().array() += 1;
@@ -97,8 +102,8 @@ LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nu
   const double taken = static_cast<double>(scales.size()) - inverse.squaredNorm();
   const VectorXd right = scaled.transpose() * residual.cwiseQuotient(sigma);
   return {residual - sigma.asDiagonal() * (scaled * (inverse.transpose() * (inverse * right))),
-          std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size())), std::move(scaled),
-          std::move(inverse)};
+          std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size())),
+          std::move(scaled), std::move(inverse)};
 }
 
 }  // namespace
@@ -112,11 +117,13 @@ struct LinearProblem::Extended {
 };
 
 LinearProblem::LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
-                             const std::vector<Parameter>& priors, const std::vector<std::string>& further)
+                             const std::vector<Parameter>& priors,
+                             const std::vector<std::string>& further)
     : model_(model), batch_(&batch), priors_(priors) {
   TRAMMEL_CHECK(static_cast<int>(priors.size()) == model.parameter_count());
   first_row_ = {0};
-  for (const Measurement& m : batch_->measurements) first_row_.push_back(first_row_.back() + (m.R_WT ? 6 : 3));
+  for (const Measurement& m : batch_->measurements)
+    first_row_.push_back(first_row_.back() + (m.R_WT ? 6 : 3));
   differentiate(extended_by(further));
   whiten();
 }
@@ -125,8 +132,10 @@ LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string
   std::vector<ErrorSourcePtr> joints, wanted;
   const CauseRecord& slip = first_searched_by(causes::SearchFamily::kZeroStep);
   for (int joint = 0; joint < model_.cell->robot.size(); ++joint) {
-    // A joint that has slipped before the first pose is off everywhere: its column is the joint's own.
-    joints.push_back(*make_error_source(fmt::format("{}:{}@1", slip.spelling, joint + 1), *model_.cell));
+    // A joint that has slipped before the first pose is off everywhere: its column is the joint's
+    // own.
+    joints.push_back(
+        *make_error_source(fmt::format("{}:{}@1", slip.spelling, joint + 1), *model_.cell));
   }
   for (const std::string& spec : further) {
     Result<ErrorSourcePtr> source = possible(spec, model_);
@@ -158,7 +167,8 @@ void LinearProblem::differentiate(const Extended& extended) {
   sigma_.resize(R);
   by_joint_.resize(R, static_cast<Index>(extended.joints.size()));
   nuisance_.resize(R, static_cast<Index>(priors_.size()));
-  for (Effect& effect : effects_) effect.columns.resize(R, static_cast<Index>(effect.parameters.size()));
+  for (Effect& effect : effects_)
+    effect.columns.resize(R, static_cast<Index>(effect.parameters.size()));
   MatrixXd J;
   for (Index i = 0; i < poses(); ++i) {
     const Measurement& m = batch_->measurements[static_cast<std::size_t>(i)];
@@ -174,7 +184,8 @@ void LinearProblem::differentiate(const Extended& extended) {
   }
 }
 
-/// How far `pose` is measured from `X_WT`, and the standard deviations that its measurement is said to have.
+/// How far `pose` is measured from `X_WT`, and the standard deviations that its measurement is said
+/// to have.
 void LinearProblem::measure(Index pose, const Pose& X_WT) {
   const Measurement& m = batch_->measurements[static_cast<std::size_t>(pose)];
   const Tracker& tracker = model_.cell->tracker;
@@ -193,18 +204,21 @@ VectorXd LinearProblem::residual_of(const PhysicalModel& model) const {
   return residual.cwiseProduct(weight_);
 }
 
-/// From what was measured to rows of unit variance: adds to every standard deviation what is left beyond it, and
-/// divides by it.
+/// From what was measured to rows of unit variance: adds to every standard deviation what is left
+/// beyond it, and divides by it.
 void LinearProblem::whiten() {
   std::vector<Index> position, rotation;
   for (Index i = 0; i < poses(); ++i) {
-    for (Index k = 0; k < row_count(i); ++k) (k < 3 ? position : rotation).push_back(first_row(i) + k);
+    for (Index k = 0; k < row_count(i); ++k)
+      (k < 3 ? position : rotation).push_back(first_row(i) + k);
   }
   const VectorXd scales = scales_of(priors_);
-  // The noise is what no parameter explains, whether the model stands at its best fit already or not.
+  // The noise is what no parameter explains, whether the model stands at its best fit already or
+  // not.
   const Leftover left = leftover_of(residual_, nuisance_, scales, sigma_);
   const double surplus = robust_surplus(left.residual(position), sigma_(position), left.share);
-  const double surplus_rotation = robust_surplus(left.residual(rotation), sigma_(rotation), left.share);
+  const double surplus_rotation =
+      robust_surplus(left.residual(rotation), sigma_(rotation), left.share);
   weight_.resize(sigma_.size());
   position_ = weigh(position, surplus, left.share);
   weigh_together(left);
@@ -214,13 +228,15 @@ void LinearProblem::whiten() {
   nuisance_ = (weight_.asDiagonal() * nuisance_ * scales.asDiagonal()).eval();
   by_joint_ = (weight_.asDiagonal() * by_joint_).eval();
   for (Effect& effect : effects_) {
-    effect.columns = (weight_.asDiagonal() * effect.columns * scales_of(effect.parameters).asDiagonal()).eval();
+    effect.columns =
+        (weight_.asDiagonal() * effect.columns * scales_of(effect.parameters).asDiagonal()).eval();
   }
 }
 
-/// Weighs `rows` by their stated standard deviation with `surplus` (SI) on top. `share`: of freedom that the fit
-/// leaves.
-LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, double surplus, double share) {
+/// Weighs `rows` by their stated standard deviation with `surplus` (SI) on top. `share`: of freedom
+/// that the fit leaves.
+LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, double surplus,
+                                           double share) {
   if (rows.empty()) return {};
   const auto count = static_cast<double>(rows.size());
   const double stated = sigma_(rows).norm() / std::sqrt(count);
@@ -233,8 +249,8 @@ LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, doubl
   return {std::sqrt(sum / count), stated, share * count};
 }
 
-/// Weighs positions at one joint vector as one pose as far as their means are off by more than chance makes of what is
-/// left of each (design effect), and counts their freedom so.
+/// Weighs positions at one joint vector as one pose as far as their means are off by more than
+/// chance makes of what is left of each (design effect), and counts their freedom so.
 void LinearProblem::weigh_together(const Leftover& left) {
   const std::vector<PoseGroup> groups = groups_seen_together(*batch_);
   if (std::ssize(groups) == poses()) return;
@@ -265,7 +281,8 @@ void LinearProblem::weigh_together(const Leftover& left) {
       // No more than if all that is left were shared.
       const Vector3 most = std::sqrt(count) * weight.cwiseInverse();
       const Vector3 together = (own.array().square() + count * of_pose * of_pose).sqrt();
-      if (group.size() > 1) weight = together.cwiseMin(most).cwiseMax(weight.cwiseInverse()).cwiseInverse().eval();
+      if (group.size() > 1)
+        weight = together.cwiseMin(most).cwiseMax(weight.cwiseInverse()).cwiseInverse().eval();
     }
   }
   const double shared = std::min(1.0, std::pow(of_pose / position_.noise, 2));

@@ -15,26 +15,35 @@ struct Effect {
   Eigen::MatrixXd columns;            ///< R x m, whitened
 };
 
-/// A batch seen from a calibrated model, to first order. A pose has 3 rows, or 6 with its orientation; every row is
-/// divided by the standard deviation of its noise, so that white noise has unit variance.
+/// A batch seen from a calibrated model, to first order. A pose has 3 rows, or 6 with its
+/// orientation; every row is divided by the standard deviation of its noise, so that white noise
+/// has unit variance.
 class LinearProblem {
  public:
-  /// The noise is that of the measurement and, on top, a robust estimate of what is left beyond it, whatever its
-  /// reason: as long as something large is unexplained, nothing small is claimed. `further` names sources whose effect
-  /// is wanted too; those that the cell or the model cannot have are left out. `batch` outlives the problem.
-  LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch, const std::vector<Parameter>& priors,
-                const std::vector<std::string>& further);
+  /// The noise is that of the measurement and, on top, a robust estimate of what is left beyond it,
+  /// whatever its reason: as long as something large is unexplained, nothing small is claimed.
+  /// `further` names sources whose effect is wanted too; those that the cell or the model cannot
+  /// have are left out. `batch` outlives the problem.
+  LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
+                const std::vector<Parameter>& priors, const std::vector<std::string>& further);
 
-  [[nodiscard]] Eigen::Index poses() const { return static_cast<Eigen::Index>(batch_->measurements.size()); }
+  [[nodiscard]] Eigen::Index poses() const {
+    return static_cast<Eigen::Index>(batch_->measurements.size());
+  }
   [[nodiscard]] Eigen::Index rows() const { return residual_.size(); }
-  [[nodiscard]] Eigen::Index first_row(Eigen::Index pose) const { return first_row_[static_cast<std::size_t>(pose)]; }
-  [[nodiscard]] Eigen::Index row_count(Eigen::Index pose) const { return first_row(pose + 1) - first_row(pose); }
+  [[nodiscard]] Eigen::Index first_row(Eigen::Index pose) const {
+    return first_row_[static_cast<std::size_t>(pose)];
+  }
+  [[nodiscard]] Eigen::Index row_count(Eigen::Index pose) const {
+    return first_row(pose + 1) - first_row(pose);
+  }
 
   [[nodiscard]] const PhysicalModel& model() const { return model_; }
   [[nodiscard]] const MeasurementBatch& batch() const { return *batch_; }
   /// n: of the gears at that pose (Chain::gear_angles), which causes of joints act on.
   [[nodiscard]] JointVector gear_angles(Eigen::Index pose) const {
-    return model_.cell->robot.gear_angles(batch_->measurements[static_cast<std::size_t>(pose)].context.q);
+    return model_.cell->robot.gear_angles(
+        batch_->measurements[static_cast<std::size_t>(pose)].context.q);
   }
   /// R: measured - model, whitened.
   [[nodiscard]] const Eigen::VectorXd& residual() const { return residual_; }
@@ -47,23 +56,27 @@ class LinearProblem {
   [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
   /// R x n: what one radian (metre) of each joint's gear does, whitened.
   [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
-  /// R: 1 / standard deviation of each row, in 1/m and 1/rad. Positions at one joint vector weigh together as one pose
-  /// as far as they share what is left.
+  /// R: 1 / standard deviation of each row, in 1/m and 1/rad. Positions at one joint vector weigh
+  /// together as one pose as far as they share what is left.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
   /// m per axis: noise of a typical position, whatever its reason. A root mean square.
   [[nodiscard]] double noise() const { return position_.noise; }
   /// m per axis: standard deviation that is stated for a measured position. A root mean square.
   [[nodiscard]] double instrument() const { return position_.stated; }
-  /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of freedom behind them.
+  /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of
+  /// freedom behind them.
   struct Spread {
     double noise = 0, stated = 0;
-    double freedom = 0;  ///< 0 where none were measured; positions of a pose that share an error count as fewer
+    double freedom =
+        0;  ///< 0 where none were measured; positions of a pose that share an error count as fewer
   };
-  /// What is left of the residual (SI) beside the model's own parameters, and the share of freedom that they leave.
+  /// What is left of the residual (SI) beside the model's own parameters, and the share of freedom
+  /// that they leave.
   struct Leftover {
     Eigen::VectorXd residual;
     double share = 1;
-    Eigen::MatrixXd scaled, root;  ///< of rows in units of their sigma; scaled rootᵀ is a root of the fit's hat matrix
+    Eigen::MatrixXd scaled,
+        root;  ///< of rows in units of their sigma; scaled rootᵀ is a root of the fit's hat matrix
   };
   [[nodiscard]] const Spread& position_spread() const { return position_; }
   [[nodiscard]] const Spread& rotation_spread() const { return rotation_; }

@@ -5,9 +5,9 @@
 
 #include "server/diagnose/evidence/linear_problem.h"
 
-/// The sign of play. A joint with play hangs back from where its motor is: after moving up it lies below. So the play
-/// b + k |tau| is positive by definition (backlash.cpp). With the other sign the joint goes beyond where it was sent,
-/// which no gap between teeth does.
+/// The sign of play. A joint with play hangs back from where its motor is: after moving up it lies
+/// below. So the play b + k |tau| is positive by definition (backlash.cpp). With the other sign the
+/// joint goes beyond where it was sent, which no gap between teeth does.
 namespace trammel::cause_search {
 
 /// Play of one joint over the poses that were approached from a known side.
@@ -17,12 +17,15 @@ struct PlaySign {
   bool negative = false;        ///< beyond chance, in the mean or at a quarter of those poses
 };
 
-/// The play of `joint`, which the model has as `source`. `change`, `covariance`: the joint estimate of all parameters
-/// about where the model stands, in units of priors.
-[[nodiscard]] PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint,
-                                    const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance);
+/// The play of `joint`, which the model has as `source`. `change`, `covariance`: the joint estimate
+/// of all parameters about where the model stands, in units of priors.
+[[nodiscard]] PlaySign sign_of_play(const LinearProblem& problem, const std::string& source,
+                                    int joint, const Eigen::VectorXd& change,
+                                    const Eigen::MatrixXd& covariance);
 
-/// What may stand behind play of the wrong sign, for people. `every`: no joint has play of the right sign.
-[[nodiscard]] std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, bool every);
+/// What may stand behind play of the wrong sign, for people. `every`: no joint has play of the
+/// right sign.
+[[nodiscard]] std::string what_negative_play_may_be(const std::vector<PlaySign>& negative,
+                                                    bool every);
 
 }  // namespace trammel::cause_search

@@ -16,10 +16,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 5;      // of Gauss and Newton; one and a chord settle what is nearly linear
-constexpr int kMostChords = 4;     // steps by one derivative
-constexpr double kStraight = 1;    // standard deviations, of all rows together: what a derivative may mistake
-constexpr double kSettled = 0.05;  // standard deviations, of all parameters together: a step that changes no result
+constexpr int kMostSteps = 5;   // of Gauss and Newton; one and a chord settle what is nearly linear
+constexpr int kMostChords = 4;  // steps by one derivative
+constexpr double kStraight =
+    1;  // standard deviations, of all rows together: what a derivative may mistake
+constexpr double kSettled =
+    0.05;  // standard deviations, of all parameters together: a step that changes no result
 
 /// How far each parameter stands from its prior, in units of it.
 VectorXd from_prior(const PriorModel& at) {
@@ -38,9 +40,10 @@ struct NormalEquation {
   VectorXd right;
 };
 
-/// The step that lowers the sum of squares most and takes every parameter that is `held` to its bound: `room` from
-/// where it stands, at any price.
-VectorXd step_to_bounds(const NormalEquation& equation, const std::vector<bool>& held, const VectorXd& room) {
+/// The step that lowers the sum of squares most and takes every parameter that is `held` to its
+/// bound: `room` from where it stands, at any price.
+VectorXd step_to_bounds(const NormalEquation& equation, const std::vector<bool>& held,
+                        const VectorXd& room) {
   MatrixXd left = equation.information;
   VectorXd rest = equation.right;
   for (Index i = 0; i < room.size(); ++i) {
@@ -66,9 +69,9 @@ VectorXd room_of(const PriorModel& at) {
   return room;
 }
 
-/// The step that lowers the sum of squares most without leaving a parameter below its bound. What would go beyond stops
-/// there, and everything else is solved for anew: a step that is cut off afterwards leaves the others where they made
-/// up for what was cut.
+/// The step that lowers the sum of squares most without leaving a parameter below its bound. What
+/// would go beyond stops there, and everything else is solved for anew: a step that is cut off
+/// afterwards leaves the others where they made up for what was cut.
 VectorXd bounded_step(const PriorModel& at, const NormalEquation& equation) {
   VectorXd step = equation.inverse_factor.transpose() * (equation.inverse_factor * equation.right);
   const VectorXd room = room_of(at);
@@ -92,9 +95,10 @@ NormalEquation normal_equation(const MatrixXd& columns) {
   return {std::move(information), std::move(inverse), {}};
 }
 
-/// What pulls where the model stands: `left` (R, whitened) of the data and, of the model's own parameters, their
-/// priors. The anonymous functions stand at `functions` times their columns.
-VectorXd pull(const MatrixXd& columns, const VectorXd& left, const PriorModel& at, const VectorXd& functions) {
+/// What pulls where the model stands: `left` (R, whitened) of the data and, of the model's own
+/// parameters, their priors. The anonymous functions stand at `functions` times their columns.
+VectorXd pull(const MatrixXd& columns, const VectorXd& left, const PriorModel& at,
+              const VectorXd& functions) {
   const Index P = at.model.values.size();
   VectorXd right = columns.transpose() * (left - columns.rightCols(functions.size()) * functions);
   right.head(P) -= from_prior(at);
@@ -136,18 +140,21 @@ Status add_to(PriorModel& prior_model, const std::string& spec) {
   ErrorSourcePtr source = TRY(make_error_source(spec, *prior_model.model.cell));
   const std::vector<Parameter> parameters = source->parameters();
   const Index first = add_source(prior_model.model, std::move(source));
-  prior_model.priors.insert(prior_model.priors.begin() + first, parameters.begin(), parameters.end());
+  prior_model.priors.insert(prior_model.priors.begin() + first, parameters.begin(),
+                            parameters.end());
   return {};
 }
 
 void remove_from(PriorModel& prior_model, const std::string& source) {
   const std::vector<Index> places = places_of_source(prior_model.model, source);
   if (places.empty()) return;
-  prior_model.priors.erase(prior_model.priors.begin() + places.front(), prior_model.priors.begin() + places.back() + 1);
+  prior_model.priors.erase(prior_model.priors.begin() + places.front(),
+                           prior_model.priors.begin() + places.back() + 1);
   prior_model.model = without_source(prior_model.model, source);
 }
 
-void refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed) {
+void refine(PriorModel& prior_model, const MeasurementBatch& batch,
+            const std::vector<Unnamed>& unnamed) {
   const Index P = prior_model.model.values.size();
   for (int k = 0; k < kMostSteps; ++k) {
     const LinearProblem problem(prior_model.model, batch, prior_model.priors, {});

@@ -9,14 +9,16 @@ namespace trammel::cause_search {
 /// An anonymous function that explains what no named cause does.
 struct Unnamed {
   std::vector<std::string> depends_on;  ///< `q4`, `time`
-  Eigen::MatrixXd columns;              ///< R x m over the poses that are not out, SI, of the fitted size
-  double score = 0;                     ///< nat
+  Eigen::MatrixXd columns;  ///< R x m over the poses that are not out, SI, of the fitted size
+  double score = 0;         ///< nat
   double p_value = 1;
   std::string wanderer = {};  ///< what moves slowly, for people, where it says no more than that
 };
 
-/// All columns of a background, whitened, R x p: the model's own parameters, then the anonymous functions.
-[[nodiscard]] Eigen::MatrixXd background_columns(const LinearProblem& problem, const std::vector<Unnamed>& unnamed);
+/// All columns of a background, whitened, R x p: the model's own parameters, then the anonymous
+/// functions.
+[[nodiscard]] Eigen::MatrixXd background_columns(const LinearProblem& problem,
+                                                 const std::vector<Unnamed>& unnamed);
 
 /// A model and the prior of each of its parameters.
 struct PriorModel {
@@ -24,13 +26,15 @@ struct PriorModel {
   std::vector<Parameter> priors;
 };
 
-/// Adds the source that `spec` names (in its first form), at its prior. Refused as make_error_source().
+/// Adds the source that `spec` names (in its first form), at its prior. Refused as
+/// make_error_source().
 [[nodiscard]] Status add_to(PriorModel& prior_model, const std::string& spec);
 /// Takes the source of that name out.
 void remove_from(PriorModel& prior_model, const std::string& source);
 
-/// Identifies all parameters anew, from where they stand, beside the anonymous functions: Gauss-Newton on the whitened
-/// rows, maximum a posteriori.
-void refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed);
+/// Identifies all parameters anew, from where they stand, beside the anonymous functions:
+/// Gauss-Newton on the whitened rows, maximum a posteriori.
+void refine(PriorModel& prior_model, const MeasurementBatch& batch,
+            const std::vector<Unnamed>& unnamed);
 
 }  // namespace trammel::cause_search

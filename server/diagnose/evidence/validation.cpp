@@ -15,8 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFarthest = 400;  // of chi-square: beyond it no chance is left that a double tells from 0
-constexpr int kHalvings = 60;      // of an interval: all that a double can hold
+constexpr double kFarthest =
+    400;  // of chi-square: beyond it no chance is left that a double tells from 0
+constexpr int kHalvings = 60;  // of an interval: all that a double can hold
 
 /// The value that chi-square of three degrees of freedom exceeds with that chance.
 double chi_square_3(double chance) {
@@ -35,12 +36,13 @@ double chi_square_3(double chance) {
 /// How far rows that nothing was learned from are from a model.
 struct Judged {
   Eigen::Matrix3Xd error_B;  ///< m
-  VectorXd distance;         ///< squared error over the expected one: chi-square of three if the row fits
+  VectorXd distance;  ///< squared error over the expected one: chi-square of three if the row fits
 };
 
 VectorXd scales_of(const std::vector<Parameter>& parameters) {
   VectorXd scales(static_cast<Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k) scales(static_cast<Index>(k)) = parameters[k].prior_scale;
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    scales(static_cast<Index>(k)) = parameters[k].prior_scale;
   return scales;
 }
 
@@ -56,7 +58,8 @@ Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
     const Vector3 error = m.p_W - model.pose_W(m.context, model.values, &J).translation();
     const MatrixXd scaled = J.topRows<3>() * scale.asDiagonal();
     const double sigma = std::max(fitted.noise(), m.sigma.value_or(0));
-    const Matrix3 expected = scaled * covariance * scaled.transpose() + sigma * sigma * Matrix3::Identity();
+    const Matrix3 expected =
+        scaled * covariance * scaled.transpose() + sigma * sigma * Matrix3::Identity();
     result.error_B.col(i) = model.X_WB.linear().transpose() * error;
     result.distance(i) = error.dot(expected.llt().solve(error));
   }
@@ -65,10 +68,12 @@ Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
 
 }  // namespace
 
-Validation validate(const LinearProblem& before, const LinearProblem& after, const MeasurementBatch& rows) {
+Validation validate(const LinearProblem& before, const LinearProblem& after,
+                    const MeasurementBatch& rows) {
   const Judged first = judged(before, rows);
   const Judged last = judged(after, rows);
-  const double limit = chi_square_3(thresholds::kMisjudgedHeldOut / static_cast<double>(rows.measurements.size()));
+  const double limit =
+      chi_square_3(thresholds::kMisjudgedHeldOut / static_cast<double>(rows.measurements.size()));
   Validation validation{figures_of(first.error_B), figures_of(last.error_B), {}, {}, {}};
   std::vector<Index> fit;
   for (Index i = 0; i < first.distance.size(); ++i) {

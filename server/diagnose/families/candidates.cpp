@@ -53,8 +53,10 @@ double heaviest(const Cell& cell) {
   return mass;
 }
 
-/// What `batch` would have to record for a cause of `joint` (-1: of no single one) to show; empty where it does.
-std::string lacking(const ContextNeeds& needs, const Cell& cell, const MeasurementBatch& batch, int joint) {
+/// What `batch` would have to record for a cause of `joint` (-1: of no single one) to show; empty
+/// where it does.
+std::string lacking(const ContextNeeds& needs, const Cell& cell, const MeasurementBatch& batch,
+                    int joint) {
   if (needs.payload && heaviest(cell) <= 0) return "a payload in the cell file, with its mass";
   if (needs.direction && !every(batch, [](const PoseContext& c) { return !c.direction.empty(); }))
     return "the approach direction of every pose (dir columns)";
@@ -68,19 +70,21 @@ std::string lacking(const ContextNeeds& needs, const Cell& cell, const Measureme
     return "the time of every pose (time_s)";
   if (needs.velocity && !any(batch, [](const PoseContext& c) { return c.velocity.has_value(); }))
     return "a continuous path with times (time_s)";
-  if (needs.stand && !cell.tracker.p_W) return "where the instrument stands (tracker: xyz_mm in the cell file)";
+  if (needs.stand && !cell.tracker.p_W)
+    return "where the instrument stands (tracker: xyz_mm in the cell file)";
   if (needs.before && !any(batch, [](const PoseContext& c) { return c.before.has_value(); }))
     return "the time of every pose (time_s), in the order in which they were measured";
   if (needs.history && !every(batch, [](const PoseContext& c) { return !c.lagged.empty(); }))
     return "the temperature and the time of every pose (temperature_c, time_s)";
-  if (needs.temperature && !(every(batch, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
-                             warming(batch) > thresholds::kSameTemperature))
+  if (needs.temperature &&
+      !(every(batch, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
+        warming(batch) > thresholds::kSameTemperature))
     return "the temperature of every pose (temperature_c), differing between poses";
   return "";
 }
 
-/// Each cause with each joint that it may be of (-1 where it is of none), in the order of looking: causes of a joint
-/// that follow one another in the catalogue are taken joint by joint.
+/// Each cause with each joint that it may be of (-1 where it is of none), in the order of looking:
+/// causes of a joint that follow one another in the catalogue are taken joint by joint.
 template <typename Take>
 void for_each_cause(const Chain& robot, const Take& take) {
   const std::vector<const CauseRecord*> all = all_causes();
@@ -93,7 +97,8 @@ void for_each_cause(const Chain& robot, const Take& take) {
     const auto last = std::find_if_not(first, all.end(), is_of_joint);
     for (int joint = 0; joint < robot.size(); ++joint) {
       for (auto one = first; one != last; ++one) {
-        if (!(*one)->of_turning_joint || robot.joint(joint).type == JointType::kRevolute) take(**one, joint);
+        if (!(*one)->of_turning_joint || robot.joint(joint).type == JointType::kRevolute)
+          take(**one, joint);
       }
     }
     first = last;
@@ -101,7 +106,9 @@ void for_each_cause(const Chain& robot, const Take& take) {
 }
 
 /// As a list of error sources spells it, without the pose at which it begins.
-std::string spelled(const CauseRecord& record, int joint) { return to_string(cause_at(record, joint)); }
+std::string spelled(const CauseRecord& record, int joint) {
+  return to_string(cause_at(record, joint));
+}
 
 /// The same of one that acts at all poses.
 std::string always_acting(const CauseRecord& record, int joint) {
@@ -124,19 +131,22 @@ const Effect* effect_of(const LinearProblem& problem, std::string_view source) {
 double surprise_of(const CauseRecord& record, const LinearProblem& problem) {
   double surprise = 0;
   for (const causes::Rival& rival : record.rivals) {
-    if (rival.surprise > 0 && effect_of(problem, rival.cause) != nullptr) surprise += rival.surprise;
+    if (rival.surprise > 0 && effect_of(problem, rival.cause) != nullptr)
+      surprise += rival.surprise;
   }
   return surprise;
 }
 
-/// R: what the whole arm growing by kPriorOfSize does, whitened: everything moves away from the base.
+/// R: what the whole arm growing by kPriorOfSize does, whitened: everything moves away from the
+/// base.
 VectorXd size_of_arm(const LinearProblem& problem) {
   VectorXd column = VectorXd::Zero(problem.rows());
   for (Index i = 0; i < problem.poses(); ++i) {
     const PoseContext& context = problem.batch().measurements[static_cast<std::size_t>(i)].context;
     const ArmState state = problem.model().state(context);
     const Index row = problem.first_row(i);
-    column.segment<3>(row) = kPriorOfSize * (problem.model().pose_W(context).translation() - state.X_WB.translation());
+    column.segment<3>(row) =
+        kPriorOfSize * (problem.model().pose_W(context).translation() - state.X_WB.translation());
   }
   return column.cwiseProduct(problem.weight());
 }
@@ -189,7 +199,8 @@ class Families {
   void add_fixed(const CauseRecord& record, const Cause& cause) {
     const Effect* effect = effect_of(problem_, to_string(cause));
     if (effect == nullptr) return;
-    add(make_fixed_family(problem_, *effect, cause, all_columns(*effect), surprise_of(record, problem_)));
+    add(make_fixed_family(problem_, *effect, cause, all_columns(*effect),
+                          surprise_of(record, problem_)));
     if (record.numbers == Numbers::kTogether || effect->parameters.size() < 2) return;
     for (std::size_t k = 0; k < effect->parameters.size(); ++k) {
       Cause single = cause;
@@ -203,7 +214,10 @@ class Families {
     const std::string spec = always_acting(record, cause.joint);
     const Result<ErrorSourcePtr> source = make_error_source(spec, *problem_.model().cell);
     if (!source) return;
-    const Effect slip{spec, {}, (*source)->parameters().front().prior_scale * problem_.by_joint().col(cause.joint)};
+    const Effect slip{
+        spec,
+        {},
+        (*source)->parameters().front().prior_scale * problem_.by_joint().col(cause.joint)};
     add(make_step_family(problem_, slip, cause, to_string(cause)));
   }
 
@@ -228,7 +242,8 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
     }
     // That nothing is carried is said once, of the payload itself.
     const bool said_elsewhere = record.needs.payload && (record.part != Part::kPayload);
-    if (unseen != nullptr && !said_elsewhere) unseen->push_back({cause_at(record, joint), 0, {}, {}, lacks});
+    if (unseen != nullptr && !said_elsewhere)
+      unseen->push_back({cause_at(record, joint), 0, {}, {}, lacks});
   });
   return sources;
 }
@@ -247,7 +262,8 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
   for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add(record, joint); });
   // Along such a path a lag goes on as smoothly.
   if (!is_path_without_times(problem.batch())) {
-    for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
+    for_each_cause(robot,
+                   [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
     families.add(make_slow_family(problem, size_of_arm(problem), "the size of the arm", -1));
   }
   families.add(make_attitude_family(problem));

@@ -39,7 +39,8 @@ MatrixXd summed_up(const LinearProblem& problem, const VectorXd& g, const Matrix
     const auto column = rows.col(k);
     for (Index i = 0; i < problem.poses(); ++i) {
       double sum = 0;
-      for (Index row = problem.first_row(i); row < problem.first_row(i + 1); ++row) sum += g(row) * column(row);
+      for (Index row = problem.first_row(i); row < problem.first_row(i + 1); ++row)
+        sum += g(row) * column(row);
       sums(i, k) = sum;
     }
   }
@@ -48,13 +49,13 @@ MatrixXd summed_up(const LinearProblem& problem, const VectorXd& g, const Matrix
 
 }  // namespace
 
-const Shares& shares_of(const LinearProblem& problem, const View& view, const std::string& name, const VectorXd& g,
-                        const MatrixXd& projected) {
+const Shares& shares_of(const LinearProblem& problem, const View& view, const std::string& name,
+                        const VectorXd& g, const MatrixXd& projected) {
   const auto known = view.known->find(name);
   if (known != view.known->end()) return known->second;
   const VectorXd kept = view.keep ? VectorXd(view.keep->cwiseProduct(g)) : g;
-  Shares shares{summed_up(problem, kept, projected), summed_up(problem, kept, view.background.root()),
-                summed_up(problem, kept, kept)};
+  Shares shares{summed_up(problem, kept, projected),
+                summed_up(problem, kept, view.background.root()), summed_up(problem, kept, kept)};
   return view.known->insert_or_assign(name, std::move(shares)).first->second;
 }
 
@@ -63,7 +64,10 @@ namespace {
 class FixedFamily : public Family {
  public:
   FixedFamily(Cause cause, std::string source, MatrixXd columns, double surprise)
-      : cause_(std::move(cause)), source_(std::move(source)), columns_(std::move(columns)), surprise_(surprise) {}
+      : cause_(std::move(cause)),
+        source_(std::move(source)),
+        columns_(std::move(columns)),
+        surprise_(surprise) {}
   double surprise() const override { return surprise_; }
 
   Cause cause(const Best&) const override { return cause_; }
@@ -74,7 +78,8 @@ class FixedFamily : public Family {
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;
     const MatrixXd shared = transposed_product(view.background.root(), C);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C - shared.transpose() * shared);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C -
+                                                        shared.transpose() * shared);
     // Directions that at their prior's size change less than the noise cannot be told from none.
     Index hidden = 0;
     while (hidden < C.cols() && eigen.eigenvalues()(hidden) < 1) ++hidden;
@@ -82,8 +87,8 @@ class FixedFamily : public Family {
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     if (seen == 0) return best;
     const VectorXd scale = eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse();
-    const MatrixXd along =
-        scale.asDiagonal() * (eigen.eigenvectors().rightCols(seen).transpose() * (C.transpose() * projected));
+    const MatrixXd along = scale.asDiagonal() * (eigen.eigenvectors().rightCols(seen).transpose() *
+                                                 (C.transpose() * projected));
     for (Index k = 0; k < projected.cols(); ++k) {
       const double strength = along.col(k).squaredNorm();
       const auto freedom = static_cast<int>(seen);
@@ -104,17 +109,20 @@ constexpr double kTypicalSag = 1e-3;  // m
 
 class AttitudeFamily final : public FixedFamily {
  public:
-  explicit AttitudeFamily(MatrixXd columns) : FixedFamily(unknown_cause(), "", std::move(columns), 0) {}
+  explicit AttitudeFamily(MatrixXd columns)
+      : FixedFamily(unknown_cause(), "", std::move(columns), 0) {}
   bool named() const override { return false; }
   std::vector<std::string> depends_on() const override { return {kAttitude}; }
 };
 
-/// How far the tool moves along each of its axes where gravity has a part along each of them: nine columns.
+/// How far the tool moves along each of its axes where gravity has a part along each of them: nine
+/// columns.
 MatrixXd sags(const LinearProblem& problem) {
   const PhysicalModel& model = problem.model();
   MatrixXd columns = MatrixXd::Zero(problem.rows(), 9);
   for (Index i = 0; i < problem.poses(); ++i) {
-    const Matrix3 R_WT = model.pose_W(problem.batch().measurements[static_cast<std::size_t>(i)].context).linear();
+    const Matrix3 R_WT =
+        model.pose_W(problem.batch().measurements[static_cast<std::size_t>(i)].context).linear();
     const Vector3 down_T = R_WT.transpose() * model.cell->gravity_W.normalized();
     const Index row = problem.first_row(i);
     for (Index k = 0; k < 3; ++k)
@@ -131,9 +139,10 @@ FamilyPtr make_attitude_family(const LinearProblem& problem) {
   return std::make_unique<AttitudeFamily>(sags(problem));
 }
 
-FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause cause, const std::vector<Index>& chosen,
-                            double surprise) {
-  return std::make_unique<FixedFamily>(std::move(cause), effect.source, effect.columns(Eigen::all, chosen), surprise);
+FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause cause,
+                            const std::vector<Index>& chosen, double surprise) {
+  return std::make_unique<FixedFamily>(std::move(cause), effect.source,
+                                       effect.columns(Eigen::all, chosen), surprise);
 }
 
 }  // namespace trammel::cause_search

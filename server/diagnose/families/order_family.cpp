@@ -16,15 +16,19 @@ using Eigen::VectorXd;
 
 constexpr double kAmplitude = 1e-3;                            // rad, prior: wide, the data choose
 constexpr double kPriorShare = 1 / (kAmplitude * kAmplitude);  // of the information, per rad^2
-constexpr double kLowestOrder = 2;                             // below lie eccentricity and geometry
-constexpr double kHighestOrder = 400;  // cycles a joint turn: two waves a motor turn at a ratio of 200
-constexpr double kStep = 0.2;          // of what two orders differ by that the joint's range just tells apart
-constexpr double kFineSteps = 5;       // to a coarse one, about the best
-constexpr Index kFineOrders = 11;      // a coarse step to either side
-constexpr double kOrdersOfMaps = 60;   // cycles a joint turn: a map of 48 harmonics takes over what is below
+constexpr double kLowestOrder = 2;  // below lie eccentricity and geometry
+constexpr double kHighestOrder =
+    400;  // cycles a joint turn: two waves a motor turn at a ratio of 200
+constexpr double kStep =
+    0.2;  // of what two orders differ by that the joint's range just tells apart
+constexpr double kFineSteps = 5;   // to a coarse one, about the best
+constexpr Index kFineOrders = 11;  // a coarse step to either side
+constexpr double kOrdersOfMaps =
+    60;  // cycles a joint turn: a map of 48 harmonics takes over what is below
 constexpr double kMostAbsorbed = 0.75;
-constexpr double kSameStep = 1e-6;    // of a step: rounding
-constexpr double kTypicalOrder = 50;  // cycles a joint turn: to speak of a gear where none was found
+constexpr double kSameStep = 1e-6;  // of a step: rounding
+constexpr double kTypicalOrder =
+    50;  // cycles a joint turn: to speak of a gear where none was found
 constexpr Index kOrdersAtATime = 96;
 
 class OrderFamily final : public Family {
@@ -71,7 +75,8 @@ class OrderFamily final : public Family {
     if (one) {
       const double fine = step_ / kFineSteps;
       const double from = std::max(kLowestOrder, best[0].order - step_);
-      scan_orders(shares, VectorXd::LinSpaced(kFineOrders, from, from + fine * (kFineOrders - 1)), best);
+      scan_orders(shares, VectorXd::LinSpaced(kFineOrders, from, from + fine * (kFineOrders - 1)),
+                  best);
     }
     for (Best& of_data : best) of_data.evidence = log_evidence(of_data.strength, of_data.freedom);
     return best;
@@ -92,10 +97,12 @@ class OrderFamily final : public Family {
 
  private:
   const Shares& shares_in(const View& view, const MatrixXd& projected) const {
-    return shares_of(problem_, view, fmt::format("joint {}", joint_), problem_.by_joint().col(joint_), projected);
+    return shares_of(problem_, view, fmt::format("joint {}", joint_),
+                     problem_.by_joint().col(joint_), projected);
   }
   VectorXd all_orders() const {
-    return kLowestOrder + step_ * VectorXd::LinSpaced(orders_, 0, static_cast<double>(orders_ - 1)).array();
+    return kLowestOrder +
+           step_ * VectorXd::LinSpaced(orders_, 0, static_cast<double>(orders_ - 1)).array();
   }
 
   /// A sine and a cosine of every pose's angle, N x orders each.
@@ -130,13 +137,14 @@ class OrderFamily final : public Family {
   static Information own_information(const Waves& waves, Index k, const VectorXd& square) {
     const auto sine = waves.sine.col(k);
     const auto cosine = waves.cosine.col(k);
-    return {kPriorShare + sine.cwiseAbs2().dot(square), kPriorShare + cosine.cwiseAbs2().dot(square),
-            sine.cwiseProduct(cosine).dot(square)};
+    return {kPriorShare + sine.cwiseAbs2().dot(square),
+            kPriorShare + cosine.cwiseAbs2().dot(square), sine.cwiseProduct(cosine).dot(square)};
   }
 
-  /// The orders among which the strongest is. What an order would explain if nothing of it were in the background is
-  /// soon computed, and explains no more than it does. Beyond what maps of the joint take over, the background makes
-  /// kMostAbsorbed of a wave at most: what is weaker even so is not the strongest.
+  /// The orders among which the strongest is. What an order would explain if nothing of it were in
+  /// the background is soon computed, and explains no more than it does. Beyond what maps of the
+  /// joint take over, the background makes kMostAbsorbed of a wave at most: what is weaker even so
+  /// is not the strongest.
   VectorXd promising_orders(const Shares& shares) const {
     const VectorXd orders = all_orders();
     VectorXd least(orders_);
@@ -151,7 +159,8 @@ class OrderFamily final : public Family {
     const double strongest = least.maxCoeff();
     std::vector<double> promising;
     for (Index k = 0; k < orders_; ++k) {
-      if (orders(k) < kOrdersOfMaps || least(k) >= (1 - kMostAbsorbed) * strongest) promising.push_back(orders(k));
+      if (orders(k) < kOrdersOfMaps || least(k) >= (1 - kMostAbsorbed) * strongest)
+        promising.push_back(orders(k));
     }
     return Eigen::Map<const VectorXd>(promising.data(), static_cast<Index>(promising.size()));
   }
@@ -159,7 +168,8 @@ class OrderFamily final : public Family {
   /// Improves `best` where one of the `orders` is stronger.
   void scan_orders(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
     for (Index first = 0; first < orders.size(); first += kOrdersAtATime)
-      scan_some(shares, orders.segment(first, std::min(kOrdersAtATime, orders.size() - first)), best);
+      scan_some(shares, orders.segment(first, std::min(kOrdersAtATime, orders.size() - first)),
+                best);
   }
   void scan_some(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
     const Waves waves = waves_of(orders);

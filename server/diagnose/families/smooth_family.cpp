@@ -16,28 +16,31 @@ using Eigen::VectorXd;
 
 constexpr double kBox = 1.2;  // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr Index kFunctionsOfOne = 16;
-constexpr Index kFunctionsOfEach = 7;                      // of two
-constexpr Index kSlowFunctions = 8;                        // of the time: what is faster is not slow
-constexpr double kLeastTime = 1e-6;                        // s
+constexpr Index kFunctionsOfEach = 7;  // of two
+constexpr Index kSlowFunctions = 8;    // of the time: what is faster is not slow
+constexpr double kLeastTime = 1e-6;    // s
 constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
-constexpr double kTelling = 1e-4;                  // of the largest deviation: what a function may have and be left out
-constexpr int kSizes = 17;                         // a quarter of a decade apart
+constexpr double kTelling =
+    1e-4;                   // of the largest deviation: what a function may have and be left out
+constexpr int kSizes = 17;  // a quarter of a decade apart
 constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
 
 /// Angular frequency of a sine of the box.
 double frequency(Index k) { return kPi * static_cast<double>(k + 1) / (2 * kBox); }
 
-/// N x count: sines in a box. Weighed by deviations() their random sums are a Gaussian process with a squared
-/// exponential kernel of unit variance (Solin and Särkkä 2020).
+/// N x count: sines in a box. Weighed by deviations() their random sums are a Gaussian process with
+/// a squared exponential kernel of unit variance (Solin and Särkkä 2020).
 MatrixXd sines(const VectorXd& x, Index count) {
   MatrixXd functions(x.size(), count);
-  for (Index k = 0; k < count; ++k) functions.col(k) = (frequency(k) * (x.array() + kBox)).sin() / std::sqrt(kBox);
+  for (Index k = 0; k < count; ++k)
+    functions.col(k) = (frequency(k) * (x.array() + kBox)).sin() / std::sqrt(kBox);
   return functions;
 }
 VectorXd deviations(Index count, double length_scale) {
   VectorXd spectrum(count);
   for (Index k = 0; k < count; ++k) {
-    spectrum(k) = std::sqrt(2 * kPi) * length_scale * std::exp(-0.5 * std::pow(length_scale * frequency(k), 2));
+    spectrum(k) = std::sqrt(2 * kPi) * length_scale *
+                  std::exp(-0.5 * std::pow(length_scale * frequency(k), 2));
   }
   return spectrum.cwiseSqrt();
 }
@@ -56,8 +59,8 @@ VectorXd angles(const LinearProblem& problem, int joint) {
   return q;
 }
 
-/// A random smooth function of the pose, times one or more columns g: numbers are wanted for every g and every
-/// function. Its length scale and its size are chosen by the data.
+/// A random smooth function of the pose, times one or more columns g: numbers are wanted for every
+/// g and every function. Its length scale and its size are chosen by the data.
 class SmoothFamily : public Family {
  public:
   explicit SmoothFamily(const LinearProblem& problem) : problem_(problem) {}
@@ -102,7 +105,9 @@ class SmoothFamily : public Family {
       all.middleCols(static_cast<Index>(s) * each, each) = times_functions(g_[s], functions);
     return all;
   }
-  Best typical() const final { return {.freedom = 1, .length_scale = deviations_.size() - 1, .size = typical_}; }
+  Best typical() const final {
+    return {.freedom = 1, .length_scale = deviations_.size() - 1, .size = typical_};
+  }
 
  protected:
   const LinearProblem& problem_;
@@ -110,7 +115,8 @@ class SmoothFamily : public Family {
   std::vector<std::string> g_names_;  // what each is called among the families
   MatrixXd functions_;                // N x k
   std::size_t looked_for_ = 0;        // how many of the length scales; 0: all
-  std::vector<VectorXd> deviations_;  // one for every length scale, of the functions that it takes: the first ones
+  std::vector<VectorXd>
+      deviations_;  // one for every length scale, of the functions that it takes: the first ones
   double smallest_ = 1e-6;
   double typical_ = 1e-4;
   bool pose_by_pose_ = true;  // g is shared with other families, or there are many functions
@@ -126,7 +132,8 @@ class SmoothFamily : public Family {
     }
     return all;
   }
-  void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
+  void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale,
+              std::vector<Best>& best) const {
     std::vector<Index> telling;
     for (Index k = 0; k < deviations_[scale].size(); ++k) {
       if (deviations_[scale](k) > kTelling * deviations_[scale].maxCoeff()) telling.push_back(k);
@@ -136,14 +143,16 @@ class SmoothFamily : public Family {
     for (Index first = 0; first < information.cols(); first += apart) {
       for (const Index k : telling) taken.push_back(first + k);
     }
-    const VectorXd deviation = VectorXd(deviations_[scale](telling)).replicate(static_cast<Index>(g_.size()), 1);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information(taken, taken) *
-                                                        deviation.asDiagonal());
+    const VectorXd deviation =
+        VectorXd(deviations_[scale](telling)).replicate(static_cast<Index>(g_.size()), 1);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+        deviation.asDiagonal() * information(taken, taken) * deviation.asDiagonal());
     const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
-    const MatrixXd square = transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along(taken, Eigen::all))
-                                .array()
-                                .square()
-                                .matrix();
+    const MatrixXd square =
+        transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along(taken, Eigen::all))
+            .array()
+            .square()
+            .matrix();
     double size = smallest_;
     for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
       const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
@@ -178,8 +187,10 @@ class JointMapFamily final : public SmoothFamily {
       functions_.col(2 * h - 1) = (static_cast<double>(h) * q.array()).cos();
     }
     for (const Index harmonics : kHarmonics) {
-      deviations_.emplace_back(VectorXd::Constant(2 * harmonics, 1 / std::sqrt(static_cast<double>(harmonics))));
-      if (deviations_.size() == 1 || harmonics <= problem.poses() / 10) looked_for_ = deviations_.size();
+      deviations_.emplace_back(
+          VectorXd::Constant(2 * harmonics, 1 / std::sqrt(static_cast<double>(harmonics))));
+      if (deviations_.size() == 1 || harmonics <= problem.poses() / 10)
+        looked_for_ = deviations_.size();
     }
     smallest_ = 1e-7;
     typical_ = 5e-5;
@@ -195,7 +206,8 @@ class JointMapFamily final : public SmoothFamily {
 
 class AnonymousFamily final : public SmoothFamily {
  public:
-  AnonymousFamily(const LinearProblem& problem, std::vector<std::string> on, const std::vector<VectorXd>& x)
+  AnonymousFamily(const LinearProblem& problem, std::vector<std::string> on,
+                  const std::vector<VectorXd>& x)
       : SmoothFamily(problem), on_(std::move(on)) {
     const Index count = x.size() == 1 ? kFunctionsOfOne : kFunctionsOfEach;
     functions_ = sines(x[0], count);
@@ -240,7 +252,8 @@ class SlowFamily final : public SmoothFamily {
     functions_ = sines(time, kSlowFunctions);
     // Where it stands on average is another cause: a zero, a base.
     functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
-    for (const double length_scale : {0.3, 0.6, 1.2}) deviations_.push_back(deviations(kSlowFunctions, length_scale));
+    for (const double length_scale : {0.3, 0.6, 1.2})
+      deviations_.push_back(deviations(kSlowFunctions, length_scale));
     for (Index k = 0; k < columns.cols(); ++k) g_.emplace_back(columns.col(k));
     pose_by_pose_ = false;
     smallest_ = 1e-3;
@@ -259,19 +272,23 @@ class SlowFamily final : public SmoothFamily {
   int joint_;
 };
 
-/// [-1, 1] over the poses; by the row where not every pose has its time. Empty where no time goes by.
+/// [-1, 1] over the poses; by the row where not every pose has its time. Empty where no time goes
+/// by.
 VectorXd times_of(const LinearProblem& problem) {
   VectorXd time = VectorXd::LinSpaced(problem.poses(), 0, static_cast<double>(problem.poses() - 1));
   const auto& poses = problem.batch().measurements;
-  if (std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.time.has_value(); })) {
-    for (Index i = 0; i < time.size(); ++i) time(i) = *poses[static_cast<std::size_t>(i)].context.time;
+  if (std::all_of(poses.begin(), poses.end(),
+                  [](const Measurement& m) { return m.context.time.has_value(); })) {
+    for (Index i = 0; i < time.size(); ++i)
+      time(i) = *poses[static_cast<std::size_t>(i)].context.time;
   }
   return spread(time, kLeastTime);
 }
 
 }  // namespace
 
-FamilyPtr make_slow_family(const LinearProblem& problem, const MatrixXd& columns, std::string wanderer, int joint) {
+FamilyPtr make_slow_family(const LinearProblem& problem, const MatrixXd& columns,
+                           std::string wanderer, int joint) {
   const VectorXd time = times_of(problem);
   if (time.size() == 0) return nullptr;
   return std::make_unique<SlowFamily>(problem, columns, std::move(wanderer), joint, time);
@@ -294,7 +311,8 @@ FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<
     on.emplace_back("time");
     x.push_back(VectorXd::LinSpaced(problem.poses(), -1, 1));
   }
-  if (std::any_of(x.begin(), x.end(), [](const VectorXd& one) { return one.size() == 0; })) return nullptr;
+  if (std::any_of(x.begin(), x.end(), [](const VectorXd& one) { return one.size() == 0; }))
+    return nullptr;
   return std::make_unique<AnonymousFamily>(problem, std::move(on), x);
 }
 

@@ -16,7 +16,10 @@ constexpr Index kFewestPoses = 4;  // on either side of a step
 class StepFamily final : public Family {
  public:
   StepFamily(const LinearProblem& problem, MatrixXd columns, Cause cause, std::string spec)
-      : problem_(problem), columns_(std::move(columns)), cause_(std::move(cause)), spec_(std::move(spec)) {}
+      : problem_(problem),
+        columns_(std::move(columns)),
+        cause_(std::move(cause)),
+        spec_(std::move(spec)) {}
 
   Cause cause(const Best& best) const override {
     Cause cause = cause_;
@@ -31,7 +34,9 @@ class StepFamily final : public Family {
     C.topRows(problem_.first_row(best.pose)).setZero();
     return C;
   }
-  Best typical() const override { return {.freedom = static_cast<int>(columns_.cols()), .pose = problem_.poses() / 2}; }
+  Best typical() const override {
+    return {.freedom = static_cast<int>(columns_.cols()), .pose = problem_.poses() / 2};
+  }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const Index m = columns_.cols();
@@ -54,7 +59,8 @@ class StepFamily final : public Family {
       for (Index d = 0; d < projected.cols(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
         const double strength = whitened.col(d).squaredNorm();
-        if (strength > one.strength) one = {.strength = strength, .freedom = static_cast<int>(m), .pose = i};
+        if (strength > one.strength)
+          one = {.strength = strength, .freedom = static_cast<int>(m), .pose = i};
       }
     }
     for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
@@ -74,7 +80,8 @@ class StepFamily final : public Family {
 
 class PoseFamily final : public Family {
  public:
-  PoseFamily(const LinearProblem& problem, Cause cause) : problem_(problem), cause_(std::move(cause)) {}
+  PoseFamily(const LinearProblem& problem, Cause cause)
+      : problem_(problem), cause_(std::move(cause)) {}
 
   Cause cause(const Best& best) const override {
     Cause cause = cause_;
@@ -105,11 +112,12 @@ class PoseFamily final : public Family {
   static constexpr double kPriorSigmas = 100;
 
   /// `count` rows of a pose: its position, or all of it.
-  static void consider(const View& view, const MatrixXd& projected, Index pose, Index row, Index count,
-                       std::vector<Best>& best) {
+  static void consider(const View& view, const MatrixXd& projected, Index pose, Index row,
+                       Index count, std::vector<Best>& best) {
     const auto U = view.background.root().middleRows(row, count);
     const MatrixXd information =
-        (1 + 1 / (kPriorSigmas * kPriorSigmas)) * MatrixXd::Identity(count, count) - U * U.transpose();
+        (1 + 1 / (kPriorSigmas * kPriorSigmas)) * MatrixXd::Identity(count, count) -
+        U * U.transpose();
     const Eigen::LLT<MatrixXd> factor(information);
     if (factor.info() != Eigen::Success) return;
     const MatrixXd whitened = factor.matrixL().solve(projected.middleRows(row, count));
@@ -118,7 +126,10 @@ class PoseFamily final : public Family {
       const double strength = whitened.col(d).squaredNorm();
       const double evidence = log_evidence(strength, static_cast<double>(count));
       if (evidence > one.evidence) {
-        one = {.evidence = evidence, .strength = strength, .freedom = static_cast<int>(count), .pose = pose};
+        one = {.evidence = evidence,
+               .strength = strength,
+               .freedom = static_cast<int>(count),
+               .pose = pose};
       }
     }
   }
@@ -129,7 +140,8 @@ class PoseFamily final : public Family {
 
 }  // namespace
 
-FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, Cause cause, std::string spec) {
+FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, Cause cause,
+                           std::string spec) {
   return std::make_unique<StepFamily>(problem, effect.columns, std::move(cause), std::move(spec));
 }
 

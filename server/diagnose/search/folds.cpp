@@ -65,19 +65,20 @@ VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>
   return left;
 }
 
-VectorXd Folds::rest_beside(const Background& background, const VectorXd& keep, const MatrixXd& columns,
-                            const VectorXd& data) const {
+VectorXd Folds::rest_beside(const Background& background, const VectorXd& keep,
+                            const MatrixXd& columns, const VectorXd& data) const {
   const VectorXd known = keep.cwiseProduct(data);
   if (columns.cols() == 0) return data - columns_ * background.estimate(known);
   const MatrixXd kept = keep.asDiagonal() * columns;
-  const MatrixXd information =
-      kept.transpose() * background.project(kept) + MatrixXd::Identity(columns.cols(), columns.cols());
+  const MatrixXd information = kept.transpose() * background.project(kept) +
+                               MatrixXd::Identity(columns.cols(), columns.cols());
   const VectorXd numbers = information.llt().solve(kept.transpose() * background.project(known));
   const VectorXd rest = known - kept * numbers;
   return data - columns * numbers - columns_ * background.estimate(rest);
 }
 
-Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<FamilyPtr>& families, const Chance& chance,
+Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<FamilyPtr>& families,
+                                     const Chance& chance,
                                      const std::function<bool(std::size_t)>& admitted) const {
   Gain gain;
   for (std::size_t fold = 0; fold < held_.size(); ++fold) {
@@ -86,8 +87,10 @@ Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<Fam
     const Background background(keep.asDiagonal() * columns_, information_without(fold));
     const Scan seen = scan(families, {background, &keep}, data, chance, admitted);
     const auto best = seen.strongest([](std::size_t) { return true; });
-    const MatrixXd chosen = best ? families[*best]->columns(seen.best[*best]) : MatrixXd(data.size(), 0);
-    gain.before += VectorXd(rest_beside(background, keep, MatrixXd(data.size(), 0), data)(held)).squaredNorm();
+    const MatrixXd chosen =
+        best ? families[*best]->columns(seen.best[*best]) : MatrixXd(data.size(), 0);
+    gain.before +=
+        VectorXd(rest_beside(background, keep, MatrixXd(data.size(), 0), data)(held)).squaredNorm();
     gain.after += VectorXd(rest_beside(background, keep, chosen, data)(held)).squaredNorm();
   }
   return gain;

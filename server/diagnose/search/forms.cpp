@@ -14,12 +14,14 @@ using Eigen::VectorXd;
 
 constexpr int kFewestHarmonics = 4;  // of a map: the fewest that the search looks for
 
-/// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
+/// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics
+/// of a map.
 std::vector<std::string> spellings(const std::string& source, const Cell& cell) {
   if (cause_spelled(source).search != causes::SearchFamily::kMap) return alternatives(source, cell);
   const std::size_t at = source.find('@');
   std::vector<std::string> all;
-  for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
+  for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics;
+       harmonics /= 2)
     all.push_back(source.substr(0, at + 1) + std::to_string(harmonics));
   return all;
 }
@@ -35,8 +37,8 @@ std::vector<std::string> forms_in(const PhysicalModel& model) {
 
 /// Notes that a cause of the cell's own list now has another form.
 void note(std::vector<Reformed>& reformed, const std::string& from, const std::string& to) {
-  const auto before =
-      std::find_if(reformed.begin(), reformed.end(), [&](const Reformed& one) { return one.to == from; });
+  const auto before = std::find_if(reformed.begin(), reformed.end(),
+                                   [&](const Reformed& one) { return one.to == from; });
   if (before == reformed.end()) {
     reformed.push_back({from, to});
   } else {
@@ -44,9 +46,10 @@ void note(std::vector<Reformed>& reformed, const std::string& from, const std::s
   }
 }
 
-/// `now` with `other` in place of `form`, starting at its values; empty where the cell cannot have it.
-std::optional<PriorModel> with_other_form(const PriorModel& now, const std::string& form, const std::string& other,
-                                          const SearchResult& result) {
+/// `now` with `other` in place of `form`, starting at its values; empty where the cell cannot have
+/// it.
+std::optional<PriorModel> with_other_form(const PriorModel& now, const std::string& form,
+                                          const std::string& other, const SearchResult& result) {
   const VectorXd values = now.model.values(places_of_source(now.model, form));
   PriorModel changed = now;
   remove_from(changed, form);
@@ -83,9 +86,11 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
 
 namespace {
 
-bool choose_form_again(SearchResult& result, const std::string& form, const std::vector<std::string>& own_sources) {
+bool choose_form_again(SearchResult& result, const std::string& form,
+                       const std::vector<std::string>& own_sources) {
   const std::string cause(cause_spelled(form).spelling);
-  const bool own_is_open = std::find(own_sources.begin(), own_sources.end(), cause) != own_sources.end();
+  const bool own_is_open =
+      std::find(own_sources.begin(), own_sources.end(), cause) != own_sources.end();
   const auto finding = std::find_if(result.accepted.begin(), result.accepted.end(),
                                     [&](const Accepted& one) { return one.in_model == form; });
   if (finding == result.accepted.end() && !own_is_open) return false;

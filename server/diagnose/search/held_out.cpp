@@ -13,7 +13,8 @@ VectorXd weight_of(const PriorModel& prior_model, const MeasurementBatch& batch)
 double held_out_square(const PriorModel& prior_model, const MeasurementBatch& batch,
                        const std::vector<Unnamed>& unnamed, const VectorXd& weight) {
   const LinearProblem problem(prior_model.model, batch, prior_model.priors, {});
-  const VectorXd left = Folds(problem, background_columns(problem, unnamed)).held_out_residual(problem.residual());
+  const VectorXd left =
+      Folds(problem, background_columns(problem, unnamed)).held_out_residual(problem.residual());
   return left.cwiseQuotient(problem.weight()).cwiseProduct(weight).squaredNorm();
 }
 

@@ -24,17 +24,18 @@ bool no_rival(const Cause& named, const Cause& other) {
 
 /// A step so near to the first pose that it stands for something that always acted.
 bool begins_at_once(const Cause& cause, const Best& best, Index poses) {
-  return !cause.pose_id.empty() && static_cast<double>(best.pose) < thresholds::kAtOnce * static_cast<double>(poses);
+  return !cause.pose_id.empty() &&
+         static_cast<double>(best.pose) < thresholds::kAtOnce * static_cast<double>(poses);
 }
 
 VectorXd fitted(const Background& background, const MatrixXd& columns, const VectorXd& data) {
-  const MatrixXd information =
-      columns.transpose() * background.project(columns) + MatrixXd::Identity(columns.cols(), columns.cols());
+  const MatrixXd information = columns.transpose() * background.project(columns) +
+                               MatrixXd::Identity(columns.cols(), columns.cols());
   return columns * information.llt().solve(columns.transpose() * background.project(data));
 }
 
-/// Whether `rival`, as the record of `own` has it, means `other`: of the same joint where it is of one, and the number
-/// that it names. `or_whole`: the cause as a whole counts for its number.
+/// Whether `rival`, as the record of `own` has it, means `other`: of the same joint where it is of
+/// one, and the number that it names. `or_whole`: the cause as a whole counts for its number.
 bool means(const causes::Rival& rival, const Cause& own, const Cause& other, bool or_whole) {
   if (other.cause != rival.cause) return false;
   if (record_of(other).scope == causes::Scope::kJoint && other.joint != own.joint) return false;
@@ -42,7 +43,8 @@ bool means(const causes::Rival& rival, const Cause& own, const Cause& other, boo
   return other.parameter == parameter_of(rival, own.joint);
 }
 
-bool has_rival(const Cause& own, const Cause& other, std::initializer_list<Likeness> likenesses, bool or_whole) {
+bool has_rival(const Cause& own, const Cause& other, std::initializer_list<Likeness> likenesses,
+               bool or_whole) {
   const std::vector<causes::Rival>& rivals = record_of(own).rivals;
   return std::any_of(rivals.begin(), rivals.end(), [&](const causes::Rival& rival) {
     return std::find(likenesses.begin(), likenesses.end(), rival.likeness) != likenesses.end() &&
@@ -69,11 +71,14 @@ causes::Part part_of(const Cause& cause) {
 
 bool is_description_of(const Cause& general, const Cause& special) {
   if (general.cause == special.cause) {
-    if (numbers_are_causes(record_of(general)) && !general.parameter.empty() && !special.parameter.empty())
+    if (numbers_are_causes(record_of(general)) && !general.parameter.empty() &&
+        !special.parameter.empty())
       return general.parameter == special.parameter;
     return general.joint == special.joint || general.joint < 0 || special.joint < 0;
   }
-  return has_rival(general, special, {Likeness::kSpecialCase, Likeness::kSimplerCase, Likeness::kDoubtfulCase}, false);
+  return has_rival(general, special,
+                   {Likeness::kSpecialCase, Likeness::kSimplerCase, Likeness::kDoubtfulCase},
+                   false);
 }
 
 bool is_simpler_case(const Cause& simple, const Cause& general) {
@@ -86,7 +91,8 @@ bool is_doubtful_case(const Cause& general, const Cause& special) {
 
 namespace {
 
-/// Where links are off and the tool stays where it is, base and tool make up for each other, and links for both.
+/// Where links are off and the tool stays where it is, base and tool make up for each other, and
+/// links for both.
 std::vector<Cause> rivals_at_one_point(const Cause& cause) {
   std::vector<Cause> rivals;
   if (record_of(cause).part != causes::Part::kLinks) return rivals;
@@ -103,17 +109,20 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
                        [&](const Measurement& m) { return has(m.context); });
   };
   const bool times = recorded([](const PoseContext& c) { return c.time.has_value(); });
-  const bool temperatures = recorded([](const PoseContext& c) { return c.temperature.has_value(); });
+  const bool temperatures =
+      recorded([](const PoseContext& c) { return c.temperature.has_value(); });
   const auto lacks = [&](const ContextNeeds& needs) {
     return (needs.time && !times) || (needs.temperature && !temperatures);
   };
   const CauseRecord& own = record_of(cause);
-  std::vector<Cause> rivals = is_each_tool_at_one_place(batch) ? rivals_at_one_point(cause) : std::vector<Cause>();
+  std::vector<Cause> rivals =
+      is_each_tool_at_one_place(batch) ? rivals_at_one_point(cause) : std::vector<Cause>();
   for (const CauseRecord* other : all_causes()) {
     if (own.goes_with_time && other->goes_with_time && other != &own && lacks(other->needs))
       rivals.push_back(cause_at(*other));
   }
-  // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
+  // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on
+  // the way.
   if (!is_path_without_times(batch) || own.search == causes::SearchFamily::kPose) return rivals;
   for (const CauseRecord* other : all_causes()) {
     if (other->needs.velocity) rivals.push_back(cause_at(*other));
@@ -126,8 +135,8 @@ namespace {
 /// The cause at `place` of a scan, and how its effect as fitted looks to all the others.
 class Doubt {
  public:
-  Doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
-        const Scan& seen, std::size_t place)
+  Doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+        const Background& background, const Scan& seen, std::size_t place)
       : problem_(problem),
         families_(families),
         background_(background),
@@ -139,14 +148,16 @@ class Doubt {
 
   /// Repeats the batch in simulation, with the effect as it was fitted.
   void repeat(const Chance& chance, std::uint64_t seed) {
-    repeated_ = winners(families_, background_, draw_null(background_, kRepetitions, seed).colwise() + effect_, chance,
+    repeated_ = winners(families_, background_,
+                        draw_null(background_, kRepetitions, seed).colwise() + effect_, chance,
                         [&](std::size_t f) { return contends(f); });
   }
   /// Share of the repetitions that give the name, or that of something that is no rival for it.
   [[nodiscard]] double frequency() const {
     double sum = 0;
     for (std::size_t f = 0; f < families_.size(); ++f) {
-      if (families_[f]->named() && (f == place_ || no_rival(cause(), families_[f]->cause(seen_.best[f]))))
+      if (families_[f]->named() &&
+          (f == place_ || no_rival(cause(), families_[f]->cause(seen_.best[f]))))
         sum += share_of(f);
     }
     return sum;
@@ -161,12 +172,14 @@ class Doubt {
     return seen_.score[f] > thresholds::kNamingContender * seen_.score[place_];
   }
   [[nodiscard]] double share_of(std::size_t f) const {
-    return static_cast<double>(std::count(repeated_.family.begin(), repeated_.family.end(), static_cast<int>(f))) /
+    return static_cast<double>(
+               std::count(repeated_.family.begin(), repeated_.family.end(), static_cast<int>(f))) /
            static_cast<double>(repeated_.family.size());
   }
   /// Repetitions tell how often such data decide; these data may have decided.
   [[nodiscard]] bool is_decided(std::size_t f, double frequency) const {
-    const double margin = frequency < thresholds::kSureFrequency ? thresholds::kDecidedUnsure : thresholds::kDecided;
+    const double margin =
+        frequency < thresholds::kSureFrequency ? thresholds::kDecidedUnsure : thresholds::kDecided;
     return gap(f) > std::max(margin, thresholds::kShapeError * seen_.best[place_].strength);
   }
   /// nat.
@@ -185,26 +198,30 @@ class Doubt {
 };
 
 bool Doubt::is_rival(std::size_t f, double frequency) const {
-  if (f == place_ || !families_[f]->named() || !families_[f]->predicts() || !contends(f)) return false;
+  if (f == place_ || !families_[f]->named() || !families_[f]->predicts() || !contends(f))
+    return false;
   const Cause other = families_[f]->cause(seen_.best[f]);
   const bool decided = is_decided(f, frequency);
   // A more general description that is as likely says that the special one is not sure.
-  const bool only_describes = no_rival(cause(), other) && (decided || !is_doubtful_case(other, cause()));
+  const bool only_describes =
+      no_rival(cause(), other) && (decided || !is_doubtful_case(other, cause()));
   if (only_describes || begins_at_once(other, seen_.best[f], problem_.poses())) return false;
   const double made = families_[f]->scan({background_}, projected_).front().strength;
   if (is_as_good(f, made)) return true;
   // Another cause may be there as well: only what makes much of this effect is a rival for it.
   const bool related = made > thresholds::kRelatedShare * whole_;
-  const bool wins = frequency < thresholds::kSureFrequency && share_of(f) > thresholds::kRivalFrequency &&
+  const bool wins = frequency < thresholds::kSureFrequency &&
+                    share_of(f) > thresholds::kRivalFrequency &&
                     made > thresholds::kCoincidenceShare * whole_;
   return !decided && (related || wins);
 }
 
-/// Whether the cause at `f`, which makes so much of the effect's strength, does the same to the poses and explains the
-/// data nearly as well.
+/// Whether the cause at `f`, which makes so much of the effect's strength, does the same to the
+/// poses and explains the data nearly as well.
 bool Doubt::is_as_good(std::size_t f, double made) const {
   const Best& best = seen_.best[place_];
-  const double lacks = (best.strength - best.freedom) - (seen_.best[f].strength - seen_.best[f].freedom);
+  const double lacks =
+      (best.strength - best.freedom) - (seen_.best[f].strength - seen_.best[f].freedom);
   return made > thresholds::kSameShare * whole_ &&
          lacks < std::max(thresholds::kAsGoodStrength, thresholds::kShapeError * best.strength) &&
          (made > thresholds::kWholeShare * whole_ || gap(f) < thresholds::kMoreNumbers);
@@ -216,15 +233,18 @@ void add(std::vector<Cause>& causes, const Cause& cause) {
 
 }  // namespace
 
-Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
-                     const Scan& seen, const Chance& chance, std::size_t place, std::uint64_t seed) {
+Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                     const Background& background, const Scan& seen, const Chance& chance,
+                     std::size_t place, std::uint64_t seed) {
   Doubt doubt(problem, families, background, seen, place);
   doubt.repeat(chance, seed);
   Naming naming{doubt.frequency(), {}};
   for (std::size_t f = 0; f < families.size(); ++f) {
-    if (doubt.is_rival(f, naming.frequency)) naming.could_also_be.push_back(families[f]->cause(seen.best[f]));
+    if (doubt.is_rival(f, naming.frequency))
+      naming.could_also_be.push_back(families[f]->cause(seen.best[f]));
   }
-  for (const Cause& rival : untestable_rivals(families[place]->cause(seen.best[place]), problem.batch())) {
+  for (const Cause& rival :
+       untestable_rivals(families[place]->cause(seen.best[place]), problem.batch())) {
     add(naming.could_also_be, rival);
   }
   return naming;

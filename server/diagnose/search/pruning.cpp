@@ -20,10 +20,11 @@ LinearProblem problem_of(const SearchResult& result) {
   return {result.after.model, result.batch, result.after.priors, {}};
 }
 
-/// nat: log marginal likelihood of `columns` (R x m, per prior) against none of them, beside `rest`.
+/// nat: log marginal likelihood of `columns` (R x m, per prior) against none of them, beside
+/// `rest`.
 double evidence_of(const MatrixXd& columns, const Background& rest, const VectorXd& data) {
-  const MatrixXd information =
-      columns.transpose() * rest.project(columns) + MatrixXd::Identity(columns.cols(), columns.cols());
+  const MatrixXd information = columns.transpose() * rest.project(columns) +
+                               MatrixXd::Identity(columns.cols(), columns.cols());
   const VectorXd right = columns.transpose() * rest.project(data);
   const Eigen::LLT<MatrixXd> factor(information);
   const double log_det = 2 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
@@ -62,19 +63,22 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-/// The first of the causes that always act with which poses held out are predicted no better. What begins at a pose may
-/// act at few of them.
-std::optional<std::size_t> idle_cause(const SearchResult& result, const LinearProblem& problem, double limit) {
+/// The first of the causes that always act with which poses held out are predicted no better. What
+/// begins at a pose may act at few of them.
+std::optional<std::size_t> idle_cause(const SearchResult& result, const LinearProblem& problem,
+                                      double limit) {
   const MatrixXd columns = background_columns(problem, result.unnamed);
   const Folds folds(problem, columns);
   const VectorXd with = folds.held_out_residual(problem.residual());
   for (std::size_t k = 0; k < result.accepted.size(); ++k) {
     const Accepted& one = result.accepted[k];
     if (one.is_outlier() || record_of(one.cause).lasting != causes::Lasting::kAlways) continue;
-    const std::vector<Index> others = all_but(columns.cols(), places_of_source(problem.model(), one.in_model));
+    const std::vector<Index> others =
+        all_but(columns.cols(), places_of_source(problem.model(), one.in_model));
     const VectorXd whole = problem.residual() + effect_of_source(problem, one.in_model);
     const Gain gain = gain_of(problem, with, folds.held_out_residual(whole, others));
-    const bool beyond_chance = one.best.evidence > thresholds::kBeyondFolds * limit || !gain.is_by_chance();
+    const bool beyond_chance =
+        one.best.evidence > thresholds::kBeyondFolds * limit || !gain.is_by_chance();
     if (gain.is_none() || !beyond_chance) return k;
   }
   return std::nullopt;

@@ -11,7 +11,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kRepetitions = 25;                             // of each size: a share is known to a tenth
+constexpr Index kRepetitions = 25;  // of each size: a share is known to a tenth
 constexpr double kStrengths[] = {5, 15, 30, 45, 60, 90, 150};  // hidden, from never named to always
 
 /// A family's effect at every size, in noise: R x (sizes * kRepetitions).
@@ -20,10 +20,10 @@ struct Hidden {
   MatrixXd data;
 };
 
-/// The direction within the cause is that of equal shares of its priors. Empty where the effect does not stand out of
-/// the background.
-std::optional<Hidden> hidden_in(const MatrixXd& noise, const LinearProblem& problem, const Family& family,
-                                const Background& background) {
+/// The direction within the cause is that of equal shares of its priors. Empty where the effect
+/// does not stand out of the background.
+std::optional<Hidden> hidden_in(const MatrixXd& noise, const LinearProblem& problem,
+                                const Family& family, const Background& background) {
   const Best typical = family.typical();
   const VectorXd effect = family.columns(typical).rowwise().sum();
   const double strength = effect.dot(background.project(effect).col(0));
@@ -40,19 +40,22 @@ std::optional<Hidden> hidden_in(const MatrixXd& noise, const LinearProblem& prob
 }
 
 /// Adds to `recovery` how often its cause won a column, and passed the line.
-void count_named(const Winners& won, const std::vector<FamilyPtr>& families, double limit, Recovery& recovery) {
+void count_named(const Winners& won, const std::vector<FamilyPtr>& families, double limit,
+                 Recovery& recovery) {
   for (std::size_t d = 0; d < won.family.size(); ++d) {
     if (won.score[d] < limit) continue;
     const Family& winner = *families[static_cast<std::size_t>(won.family[d])];
     const Cause cause = winner.cause(winner.typical());
     if (cause.cause == recovery.cause.cause && cause.joint == recovery.cause.joint)
-      recovery.named(static_cast<Index>(d) / kRepetitions) += 1.0 / static_cast<double>(kRepetitions);
+      recovery.named(static_cast<Index>(d) / kRepetitions) +=
+          1.0 / static_cast<double>(kRepetitions);
   }
 }
 
 }  // namespace
 
-std::vector<Recovery> recovery_of(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+std::vector<Recovery> recovery_of(const LinearProblem& problem,
+                                  const std::vector<FamilyPtr>& families,
                                   const Background& background, const Chance& chance,
                                   const std::vector<std::size_t>& places, std::uint64_t seed) {
   const MatrixXd noise = draw_null(background, kRepetitions, seed);
@@ -60,7 +63,8 @@ std::vector<Recovery> recovery_of(const LinearProblem& problem, const std::vecto
   for (const std::size_t place : places) {
     std::optional<Hidden> hidden = hidden_in(noise, problem, *families[place], background);
     if (!hidden) continue;
-    count_named(winners(families, background, hidden->data, chance), families, chance.limit, hidden->recovery);
+    count_named(winners(families, background, hidden->data, chance), families, chance.limit,
+                hidden->recovery);
     all.push_back(std::move(hidden->recovery));
   }
   return all;

@@ -14,13 +14,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTail = 0.1;  // share of the draws that the tail is fitted to: 40 of 400 give its fall to a sixth
+constexpr double kTail =
+    0.1;  // share of the draws that the tail is fitted to: 40 of 400 give its fall to a sixth
 
 double quantile(const VectorXd& ascending, double share) {
   const double place = share * static_cast<double>(ascending.size() - 1);
   const auto below = static_cast<Index>(place);
   const Index above = std::min(below + 1, ascending.size() - 1);
-  return ascending(below) + (place - static_cast<double>(below)) * (ascending(above) - ascending(below));
+  return ascending(below) +
+         (place - static_cast<double>(below)) * (ascending(above) - ascending(below));
 }
 
 /// The draws above `threshold` fall off exponentially; `scale` is their mean distance from it.
@@ -53,8 +55,10 @@ double Chance::limit_at(double share) const {
 
 double Chance::p_value(double score) const {
   const Tail tail = tail_of(null_score);
-  if (score > tail.threshold) return std::max(kLeastPValue, kTail * std::exp(-(score - tail.threshold) / tail.scale));
-  const auto above = std::count_if(null_score.begin(), null_score.end(), [&](double s) { return s >= score; });
+  if (score > tail.threshold)
+    return std::max(kLeastPValue, kTail * std::exp(-(score - tail.threshold) / tail.scale));
+  const auto above =
+      std::count_if(null_score.begin(), null_score.end(), [&](double s) { return s >= score; });
   return static_cast<double>(above + 1) / static_cast<double>(null_score.size() + 1);
 }
 
@@ -77,7 +81,8 @@ Chance chance_of(const std::vector<FamilyPtr>& families, const Background& backg
   for (const FamilyPtr& family : families) {
     const std::vector<Best> drawn = family->scan(view, projected);
     std::vector<double> evidence(drawn.size());
-    std::transform(drawn.begin(), drawn.end(), evidence.begin(), [](const Best& one) { return one.evidence; });
+    std::transform(drawn.begin(), drawn.end(), evidence.begin(),
+                   [](const Best& one) { return one.evidence; });
     const auto middle = evidence.begin() + static_cast<std::ptrdiff_t>(evidence.size() / 2);
     std::nth_element(evidence.begin(), middle, evidence.end());
     const double penalty = *middle + family->surprise();
@@ -92,20 +97,22 @@ Chance chance_of(const std::vector<FamilyPtr>& families, const Background& backg
   return chance;
 }
 
-Scan scan(const std::vector<FamilyPtr>& families, const View& view, const VectorXd& data, const Chance& chance,
-          const std::function<bool(std::size_t)>& admitted) {
-  const MatrixXd projected =
-      view.background.project(view.keep == nullptr ? data : VectorXd(view.keep->cwiseProduct(data)));
+Scan scan(const std::vector<FamilyPtr>& families, const View& view, const VectorXd& data,
+          const Chance& chance, const std::function<bool(std::size_t)>& admitted) {
+  const MatrixXd projected = view.background.project(
+      view.keep == nullptr ? data : VectorXd(view.keep->cwiseProduct(data)));
   Scan result;
   for (std::size_t f = 0; f < families.size(); ++f) {
-    result.best.push_back(admitted && !admitted(f) ? Best{} : families[f]->scan(view, projected).front());
+    result.best.push_back(admitted && !admitted(f) ? Best{}
+                                                   : families[f]->scan(view, projected).front());
     result.score.push_back(result.best.back().evidence - chance.penalty_of(*families[f]));
   }
   return result;
 }
 
-Winners winners(const std::vector<FamilyPtr>& families, const Background& background, const MatrixXd& data,
-                const Chance& chance, const std::function<bool(std::size_t)>& admitted) {
+Winners winners(const std::vector<FamilyPtr>& families, const Background& background,
+                const MatrixXd& data, const Chance& chance,
+                const std::function<bool(std::size_t)>& admitted) {
   const MatrixXd projected = background.project(data);
   Winners winners{std::vector<int>(static_cast<std::size_t>(data.cols()), -1), {}};
   winners.score.assign(winners.family.size(), 0);

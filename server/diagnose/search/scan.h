@@ -13,24 +13,27 @@ namespace trammel::cause_search {
 
 /// What chance alone brings at these poses, from a parametric bootstrap of the background.
 struct Chance {
-  std::map<std::string, double> penalty;  ///< nat, by a family's label: the median of what it reaches by chance (it may
-                                          ///< search far), and how much less it is to be expected than others
-  Eigen::VectorXd null_score;             ///< nat: the best score of all families in each draw, ascending
+  std::map<std::string, double>
+      penalty;  ///< nat, by a family's label: the median of what it reaches by chance (it may
+                ///< search far), and how much less it is to be expected than others
+  Eigen::VectorXd null_score;  ///< nat: the best score of all families in each draw, ascending
   double limit = 0;  ///< nat: the line, which the best of all passes in 3 of 1000 batches by chance
 
   [[nodiscard]] double penalty_of(const Family& family) const;
-  /// nat: the score that the best of all passes by chance in `share` of the batches. `share` is below a tenth.
+  /// nat: the score that the best of all passes by chance in `share` of the batches. `share` is
+  /// below a tenth.
   [[nodiscard]] double limit_at(double share) const;
-  /// Chance of such a score of the best of all with nothing to find. Beyond the draws it follows their exponential
-  /// tail, not below kLeastPValue.
+  /// Chance of such a score of the best of all with nothing to find. Beyond the draws it follows
+  /// their exponential tail, not below kLeastPValue.
   [[nodiscard]] double p_value(double score) const;
 };
 
 /// R x draws: samples of whitened rows in which nothing but the background acts.
-[[nodiscard]] Eigen::MatrixXd draw_null(const Background& background, Eigen::Index draws, std::uint64_t seed);
+[[nodiscard]] Eigen::MatrixXd draw_null(const Background& background, Eigen::Index draws,
+                                        std::uint64_t seed);
 
-[[nodiscard]] Chance chance_of(const std::vector<FamilyPtr>& families, const Background& background, Eigen::Index draws,
-                               std::uint64_t seed);
+[[nodiscard]] Chance chance_of(const std::vector<FamilyPtr>& families, const Background& background,
+                               Eigen::Index draws, std::uint64_t seed);
 
 /// How well every family explains one data vector.
 struct Scan {
@@ -49,10 +52,12 @@ struct Scan {
 };
 
 /// Scans `data` (R, whitened). Families that are not `admitted` keep an empty best.
-[[nodiscard]] Scan scan(const std::vector<FamilyPtr>& families, const View& view, const Eigen::VectorXd& data,
-                        const Chance& chance, const std::function<bool(std::size_t)>& admitted = {});
+[[nodiscard]] Scan scan(const std::vector<FamilyPtr>& families, const View& view,
+                        const Eigen::VectorXd& data, const Chance& chance,
+                        const std::function<bool(std::size_t)>& admitted = {});
 
-/// The family that scores best in each column of `data`, and its score; -1 and 0 where none scores above 0.
+/// The family that scores best in each column of `data`, and its score; -1 and 0 where none scores
+/// above 0.
 struct Winners {
   std::vector<int> family;
   std::vector<double> score;

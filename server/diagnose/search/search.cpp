@@ -21,9 +21,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 40;          // forward and backward: no batch has needed half of them
-constexpr double kShareOfWork = 0.6;    // of a diagnosis, for the line of progress
-constexpr double kTellingColumn = 0.1;  // standard deviations over all rows together: what moves them less is left out
+constexpr int kMostSteps = 40;        // forward and backward: no batch has needed half of them
+constexpr double kShareOfWork = 0.6;  // of a diagnosis, for the line of progress
+constexpr double kTellingColumn =
+    0.1;  // standard deviations over all rows together: what moves them less is left out
 
 std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   std::vector<Parameter> priors;
@@ -40,8 +41,9 @@ void drop_rows(MatrixXd& columns, Index first, Index count) {
 
 /// As the model names the source of a cause that it has: the cause in one of its forms.
 std::string name_in(const PhysicalModel& model, const Cause& cause) {
-  const auto source = std::find_if(model.sources.begin(), model.sources.end(),
-                                   [&](const ErrorSourcePtr& one) { return one->cause().spelling == cause.cause; });
+  const auto source =
+      std::find_if(model.sources.begin(), model.sources.end(),
+                   [&](const ErrorSourcePtr& one) { return one->cause().spelling == cause.cause; });
   return source == model.sources.end() ? to_string(cause) : (*source)->name();
 }
 
@@ -50,29 +52,35 @@ std::vector<Measurement>::const_iterator place_in(const MeasurementBatch& batch,
                       [&](const Measurement& m) { return m.row == row; });
 }
 
-/// Forward and backward selection. Every step leaves `result_` a model that is identified beside all that was found.
+/// Forward and backward selection. Every step leaves `result_` a model that is identified beside
+/// all that was found.
 class Search {
  public:
   Search(std::shared_ptr<const Cell> cell, const DiagnoseOptions& options)
       : cell_(std::move(cell)), options_(options) {}
 
-  [[nodiscard]] Status start(const std::vector<std::string>& sources, const MeasurementBatch& batch);
-  /// Accepts one more cause or function, or closes one that does not hold; false where nothing passes.
+  [[nodiscard]] Status start(const std::vector<std::string>& sources,
+                             const MeasurementBatch& batch);
+  /// Accepts one more cause or function, or closes one that does not hold; false where nothing
+  /// passes.
   [[nodiscard]] Result<bool> step();
   /// Drops one that does not pass any more beside all the rest; false where all pass.
   [[nodiscard]] bool prune();
   /// Chooses the form of each cause in the model anew; false where all stay what they are.
-  [[nodiscard]] bool choose_forms_again() { return cause_search::choose_forms_again(result_, own_sources_); }
+  [[nodiscard]] bool choose_forms_again() {
+    return cause_search::choose_forms_again(result_, own_sources_);
+  }
   /// Puts a cause of the list in the place of all that has no name; false where none explains it.
   [[nodiscard]] bool name_functions();
   /// Whether so much was found since the forms were chosen that they may be others.
   [[nodiscard]] bool is_time_for_forms();
-  /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
-  /// more like it.
+  /// Asks of every finding again what it is, all others in place: while they were missing another
+  /// cause may have looked more like it.
   [[nodiscard]] Status reconsider();
   /// Poses that were out while a cause was missing, and fit now that it is there, come back.
   void take_back_outliers();
-  /// What has the shape of a cause and a sign that it cannot have becomes a dependence that has no name.
+  /// What has the shape of a cause and a sign that it cannot have becomes a dependence that has no
+  /// name.
   [[nodiscard]] Status open_wrong_signs();
   [[nodiscard]] SearchResult take();
 
@@ -84,14 +92,19 @@ class Search {
   [[nodiscard]] bool is_function(const Standing& standing, const Choice& choice, std::size_t best,
                                  std::optional<std::size_t> named) const;
   [[nodiscard]] double named_path_score(const Standing& standing, const Admitted& open) const;
-  [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const;
-  [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen, std::size_t place) const;
+  [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice,
+                                    std::size_t place) const;
+  [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen,
+                                  std::size_t place) const;
 
   /// `columns`: R x k, whitened, of the fitted size.
-  void take_function(const LinearProblem& problem, const MatrixXd& columns, const std::vector<std::string>& depends_on,
-                     const std::string& wanderer, double score);
-  [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice, std::size_t place);
-  [[nodiscard]] std::vector<Accepted> all_out(const Standing& standing, const Scan& seen, std::size_t place) const;
+  void take_function(const LinearProblem& problem, const MatrixXd& columns,
+                     const std::vector<std::string>& depends_on, const std::string& wanderer,
+                     double score);
+  [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice,
+                                  std::size_t place);
+  [[nodiscard]] std::vector<Accepted> all_out(const Standing& standing, const Scan& seen,
+                                              std::size_t place) const;
   void take_outliers(const LinearProblem& problem, std::vector<Accepted> out);
   void take_outlier(const LinearProblem& problem, Accepted one);
   [[nodiscard]] Status take_cause(Accepted one);
@@ -148,16 +161,16 @@ Result<bool> Search::step() {
   const auto named = best_named(standing.families, choice);
   if (is_function(standing, choice, *best, named)) {
     const Family& family = *standing.families[*best];
-    take_function(standing.problem, family.columns(choice.seen.best[*best]), family.depends_on(), family.wanderer(),
-                  choice.seen.score[*best]);
+    take_function(standing.problem, family.columns(choice.seen.best[*best]), family.depends_on(),
+                  family.wanderer(), choice.seen.score[*best]);
     return true;
   }
   TRY(take_named(standing, choice, *named));
   return true;
 }
 
-/// Draws the line anew where it was never drawn, and where the best is so near to it that it must be known for the
-/// present background.
+/// Draws the line anew where it was never drawn, and where the best is so near to it that it must
+/// be known for the present background.
 Scan Search::scan_beside_all(const Standing& standing) {
   if (chance_.null_score.size() == 0) renew_chance(standing);
   Scan seen = standing.scan(chance_);
@@ -185,20 +198,23 @@ Choice Search::choice_of(const Standing& standing, Scan seen) const {
 
 bool Search::is_closed(const Cause& cause) const {
   return std::any_of(closed_.begin(), closed_.end(), [&](const Cause& one) {
-    return one.cause == cause.cause && one.joint == cause.joint && one.parameter == cause.parameter &&
-           one.pose_id == cause.pose_id &&
-           (!one.order || !cause.order || std::abs(*one.order - *cause.order) < thresholds::kSameOrder);
+    return one.cause == cause.cause && one.joint == cause.joint &&
+           one.parameter == cause.parameter && one.pose_id == cause.pose_id &&
+           (!one.order || !cause.order ||
+            std::abs(*one.order - *cause.order) < thresholds::kSameOrder);
   });
 }
 
-/// Whether an anonymous function explains more than any named cause, and more than a few of them together.
+/// Whether an anonymous function explains more than any named cause, and more than a few of them
+/// together.
 bool Search::is_function(const Standing& standing, const Choice& choice, std::size_t best,
                          std::optional<std::size_t> named) const {
   if (standing.families[best]->named()) return false;
   if (!named) return true;
   const std::vector<double>& score = choice.seen.score;
   const bool is_slow = !standing.families[best]->wanderer().empty();
-  return score[best] > score[*named] + (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
+  return score[best] >
+             score[*named] + (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
          named_path_score(standing, choice.open) < score[best];
 }
 
@@ -214,8 +230,9 @@ double Search::named_path_score(const Standing& standing, const Admitted& open) 
       const Cause cause = standing.families[f]->cause(standing.families[f]->typical());
       return cause.pose_id.empty() || std::find(steps.begin(), steps.end(), f) == steps.end();
     };
-    const Scan seen = scan(standing.families, {background}, standing.problem.residual(), chance_,
-                           [&](std::size_t f) { return standing.families[f]->named() && open(f) && is_new(f); });
+    const Scan seen =
+        scan(standing.families, {background}, standing.problem.residual(), chance_,
+             [&](std::size_t f) { return standing.families[f]->named() && open(f) && is_new(f); });
     const auto best = seen.strongest([](std::size_t) { return true; });
     if (!best || seen.score[*best] < chance_.limit) break;
     total += seen.score[*best];
@@ -228,15 +245,19 @@ double Search::named_path_score(const Standing& standing, const Admitted& open) 
 }
 
 /// Whether poses held out are predicted better where every fold chooses its cause by itself.
-bool Search::holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const {
+bool Search::holds_in_folds(const Standing& standing, const Choice& choice,
+                            std::size_t place) const {
   const std::vector<double>& score = choice.seen.score;
-  if (!standing.families[place]->predicts() || score[place] >= thresholds::kBeyondFolds * chance_.limit) return true;
+  if (!standing.families[place]->predicts() ||
+      score[place] >= thresholds::kBeyondFolds * chance_.limit)
+    return true;
   const auto contends = [&](std::size_t f) {
     return standing.families[f]->named() && standing.families[f]->predicts() && choice.open(f) &&
            score[f] > thresholds::kFoldContender * score[place];
   };
-  const auto gain = Folds(standing.problem, standing.columns)
-                        .gain_of_selection(standing.problem.residual(), standing.families, chance_, contends);
+  const auto gain =
+      Folds(standing.problem, standing.columns)
+          .gain_of_selection(standing.problem.residual(), standing.families, chance_, contends);
   return gain.after < gain.before;
 }
 
@@ -250,24 +271,27 @@ Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_
   one.penalty = chance_.penalty_of(family);
   one.p_value = chance_.p_value(seen.score[place]);
   if (!family.predicts()) return one;
-  Naming naming = name_or_doubt(standing.problem, standing.families, standing.background, seen, chance_, place,
-                                options_.seed + kNamingDraw);
+  Naming naming = name_or_doubt(standing.problem, standing.families, standing.background, seen,
+                                chance_, place, options_.seed + kNamingDraw);
   one.naming_frequency = naming.frequency;
   one.could_also_be = std::move(naming.could_also_be);
   const auto slow = slow_rival(standing, seen, place);
-  const double ahead = std::max(0.0, thresholds::kStepShare * one.best.strength - thresholds::kStepChance);
+  const double ahead =
+      std::max(0.0, thresholds::kStepShare * one.best.strength - thresholds::kStepChance);
   if (slow && slow->gap > -ahead) one.could_also_be.push_back(unknown_cause(one.cause.joint));
   return one;
 }
 
 void Search::take_function(const LinearProblem& problem, const MatrixXd& columns,
-                           const std::vector<std::string>& depends_on, const std::string& wanderer, double score) {
+                           const std::vector<std::string>& depends_on, const std::string& wanderer,
+                           double score) {
   std::vector<Index> telling;
   for (Index k = 0; k < columns.cols(); ++k) {
     if (columns.col(k).norm() > kTellingColumn) telling.push_back(k);
   }
-  result_.unnamed.push_back({depends_on, problem.weight().cwiseInverse().asDiagonal() * columns(Eigen::all, telling),
-                             score, chance_.p_value(score), wanderer});
+  result_.unnamed.push_back(
+      {depends_on, problem.weight().cwiseInverse().asDiagonal() * columns(Eigen::all, telling),
+       score, chance_.p_value(score), wanderer});
   refine_all();
 }
 
@@ -282,17 +306,21 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
                   choice.seen.score[place] + slow->gap);
     return {};
   }
-  if (standing.families[place]->predicts()) return take_cause(accepted(standing, choice.seen, place));
+  if (standing.families[place]->predicts())
+    return take_cause(accepted(standing, choice.seen, place));
   take_outliers(standing.problem, all_out(standing, choice.seen, place));
   return {};
 }
 
-/// The pose at `place` of the scan, and those that are out nearly as far: they need no look of their own.
-std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen, std::size_t place) const {
+/// The pose at `place` of the scan, and those that are out nearly as far: they need no look of
+/// their own.
+std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen,
+                                      std::size_t place) const {
   const Family& family = *standing.families[place];
   const VectorXd projected = standing.background.project(standing.problem.residual());
-  const double enough = std::max(thresholds::kOutAsWell * seen.best[place].evidence,
-                                 chance_.penalty_of(family) + thresholds::kBeyondFolds * chance_.limit);
+  const double enough =
+      std::max(thresholds::kOutAsWell * seen.best[place].evidence,
+               chance_.penalty_of(family) + thresholds::kBeyondFolds * chance_.limit);
   std::vector<Accepted> out;
   VectorXd keep = VectorXd::Ones(standing.problem.rows());
   Scan next = seen;
@@ -308,14 +336,15 @@ std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen
 
 void Search::take_outliers(const LinearProblem& problem, std::vector<Accepted> out) {
   // The last first: the places of the others stay what they are.
-  std::sort(out.begin(), out.end(), [](const Accepted& a, const Accepted& b) { return a.best.pose > b.best.pose; });
+  std::sort(out.begin(), out.end(),
+            [](const Accepted& a, const Accepted& b) { return a.best.pose > b.best.pose; });
   for (Accepted& one : out) take_outlier(problem, std::move(one));
   refine_all();
 }
 
 void Search::take_outlier(const LinearProblem& problem, Accepted one) {
-  const auto outliers =
-      std::count_if(result_.accepted.begin(), result_.accepted.end(), [](const Accepted& a) { return a.is_outlier(); });
+  const auto outliers = std::count_if(result_.accepted.begin(), result_.accepted.end(),
+                                      [](const Accepted& a) { return a.is_outlier(); });
   const auto poses = static_cast<double>(result_.all.measurements.size());
   if (static_cast<double>(outliers) >= thresholds::kMostOutliers * poses) {
     closed_.push_back(one.cause);
@@ -335,7 +364,8 @@ void Search::take_outlier(const LinearProblem& problem, Accepted one) {
   result_.accepted.push_back(std::move(one));
 }
 
-/// Puts the cause into the model. A second map of a joint is more of the first, and takes its place.
+/// Puts the cause into the model. A second map of a joint is more of the first, and takes its
+/// place.
 Status Search::take_cause(Accepted one) {
   const auto poorer = known_map(one.cause);
   const bool is_known = poorer != result_.accepted.end();
@@ -420,7 +450,8 @@ bool Search::name_functions() {
 Status Search::reconsider() {
   if (result_.accepted.size() < 2) return {};
   for (Accepted& one : result_.accepted) {
-    const bool beyond_doubt = one.could_also_be.empty() && one.best.evidence > thresholds::kBeyondFolds * chance_.limit;
+    const bool beyond_doubt =
+        one.could_also_be.empty() && one.best.evidence > thresholds::kBeyondFolds * chance_.limit;
     if (one.is_outlier() || beyond_doubt) continue;
     const PriorModel with = result_.after;
     remove_from(result_.after, one.in_model);
@@ -437,7 +468,8 @@ Result<bool> Search::name_again(Accepted& one) {
   Choice choice = choice_of(standing, standing.scan(chance_));
   choice.open = [&, open = choice.open](std::size_t f) {
     const auto map = known_map(standing.families[f]->cause(choice.seen.best[f]));
-    return open(f) && standing.families[f]->predicts() && (map == result_.accepted.end() || &*map == &one);
+    return open(f) && standing.families[f]->predicts() &&
+           (map == result_.accepted.end() || &*map == &one);
   };
   const auto place = best_named(standing.families, choice);
   if (!place || choice.seen.score[*place] < chance_.limit) return false;
@@ -451,7 +483,8 @@ void Search::take_back_outliers() {
   if (!result_.unnamed.empty()) return;  // their functions have no rows for these poses
   for (std::size_t k = 0; k < result_.accepted.size();) {
     const Accepted& one = result_.accepted[k];
-    const auto out = one.is_outlier() ? place_in(result_.all, one.pose.row) : result_.all.measurements.cend();
+    const auto out =
+        one.is_outlier() ? place_in(result_.all, one.pose.row) : result_.all.measurements.cend();
     if (out == result_.all.measurements.cend() || !fits_beside_the_others(*out)) {
       ++k;
       continue;
@@ -460,13 +493,15 @@ void Search::take_back_outliers() {
   }
 }
 
-/// Whether the pose, which was out, fits where it is learned from as well; then it is one of the batch again. A pose
-/// that stands alone is where something is largest that is missing, and nothing else says where it should be.
+/// Whether the pose, which was out, fits where it is learned from as well; then it is one of the
+/// batch again. A pose that stands alone is where something is largest that is missing, and nothing
+/// else says where it should be.
 bool Search::fits_beside_the_others(const Measurement& pose) {
   MeasurementBatch batch = result_.batch;
   auto& all = batch.measurements;
-  const auto after =
-      std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.context.index > pose.context.index; });
+  const auto after = std::find_if(all.begin(), all.end(), [&](const Measurement& m) {
+    return m.context.index > pose.context.index;
+  });
   const Index at = after - all.begin();
   all.insert(after, pose);
   PriorModel with = result_.after;
@@ -499,8 +534,8 @@ Status Search::open_wrong_signs() {
   return {};
 }
 
-/// Whether `one`, which is in the model, is another cause by its sign; then it is among what has no name. Where only a
-/// part of it is, it may be something unknown.
+/// Whether `one`, which is in the model, is another cause by its sign; then it is among what has no
+/// name. Where only a part of it is, it may be something unknown.
 bool Search::open_wrong_sign(Accepted& one) {
   if (record_of(one.cause).search == causes::SearchFamily::kPlay) {
     const PlaySign sign = play_of(one);
@@ -520,7 +555,8 @@ bool Search::open_wrong_sign(Accepted& one) {
   return false;
 }
 
-/// Whether `one`, which was put away for its sign, is there now that all else is known: with a name or without.
+/// Whether `one`, which was put away for its sign, is there now that all else is known: with a name
+/// or without.
 Status Search::ask_again_for(const Accepted& one) {
   if (!add_to(result_.after, one.in_model)) return {};  // another form of it is in the model
   refine_all();
@@ -554,9 +590,10 @@ WrongSign Search::sign_of(const Accepted& one) const {
 void Search::make_unnamed(const Accepted& one, const std::vector<std::string>& depends_on) {
   const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
   const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
-  result_.unnamed.push_back({depends_on,
-                             problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
-                             one.best.evidence - one.penalty, one.p_value});
+  result_.unnamed.push_back(
+      {depends_on,
+       problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
+       one.best.evidence - one.penalty, one.p_value});
 }
 
 SearchResult Search::take() {
@@ -572,7 +609,8 @@ SearchResult Search::take() {
   for (Accepted& one : result_.accepted) {
     const auto pose = place_in(result_.all, one.pose.row);
     if (one.is_outlier() && pose != result_.all.measurements.end())
-      one.pose.distance = (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
+      one.pose.distance =
+          (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
   }
   result_.chance = std::move(chance_);
   return std::move(result_);
@@ -580,7 +618,8 @@ SearchResult Search::take() {
 
 }  // namespace
 
-Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell,
+                                   const std::vector<std::string>& sources,
                                    const MeasurementBatch& batch, const DiagnoseOptions& options) {
   Search search(cell, options);
   TRY(search.start(sources, batch));

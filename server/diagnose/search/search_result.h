@@ -18,7 +18,8 @@ struct Accepted {
   Best best;
   double penalty = 0;  ///< nat: what its family reaches by chance
   double p_value = 1;
-  double naming_frequency = 1;       ///< share of simulated repetitions of the batch that name this cause
+  double naming_frequency =
+      1;  ///< share of simulated repetitions of the batch that name this cause
   std::vector<Cause> could_also_be;  ///< explain the data as well
   SuspectedPose pose;                ///< of an outlier
 
@@ -38,7 +39,8 @@ struct SearchResult {
   MeasurementBatch batch;  ///< the same without outliers
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
-  /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not among the accepted.
+  /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not
+  /// among the accepted.
   std::vector<PlaySign> negative_play;
   /// The same of other causes with numbers beyond their bounds.
   std::vector<WrongSign> wrong_signs;

@@ -16,10 +16,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSoon = 1e-3;       // of the batch's time: too early for a drift to have gone anywhere
+constexpr double kSoon = 1e-3;  // of the batch's time: too early for a drift to have gone anywhere
 constexpr double kLeastTime = 1e-6;  // s
-constexpr double kChoice = 1.5;      // nat: what choosing one of five courses is worth; a step has its places instead
-constexpr int kRounds = 2;           // of motion and course by turns
+constexpr double kChoice =
+    1.5;  // nat: what choosing one of five courses is worth; a step has its places instead
+constexpr int kRounds = 2;  // of motion and course by turns
 /// Of warming up, in shares of the batch's time; with the last one it goes on steadily.
 constexpr double kLags[] = {0.1, 0.2, 0.4, 0.8, 100};
 
@@ -29,12 +30,14 @@ bool is_step(const Cause& cause) {
 
 bool is_drift(const Cause& cause) {
   const CauseRecord& record = record_of(cause);
-  return record.scope == causes::Scope::kSession && record.lasting == causes::Lasting::kOfTheSession &&
-         record.needs.time && !record.needs.velocity;
+  return record.scope == causes::Scope::kSession &&
+         record.lasting == causes::Lasting::kOfTheSession && record.needs.time &&
+         !record.needs.velocity;
 }
 
 /// The columns of a step or a drift, as if it had gone all the way at every pose.
-MatrixXd gone_all_the_way(const Family& family, const Best& best, const LinearProblem& problem, bool at_once) {
+MatrixXd gone_all_the_way(const Family& family, const Best& best, const LinearProblem& problem,
+                          bool at_once) {
   if (at_once) return family.columns({.pose = 0});
   MatrixXd columns = family.columns(best);
   const auto& poses = problem.batch().measurements;
@@ -66,24 +69,29 @@ struct Course {
   bool of_temperature = false;
 };
 
-/// The share of the batch's time that had gone by at each pose; of its poses where not every one has its time.
+/// The share of the batch's time that had gone by at each pose; of its poses where not every one
+/// has its time.
 VectorXd shares_of_time(const LinearProblem& problem) {
   const auto& poses = problem.batch().measurements;
   const VectorXd by_row = VectorXd::LinSpaced(problem.poses(), 0, 1);
-  if (!std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.time.has_value(); }))
+  if (!std::all_of(poses.begin(), poses.end(),
+                   [](const Measurement& m) { return m.context.time.has_value(); }))
     return by_row;
   VectorXd time(problem.poses());
-  for (Index i = 0; i < time.size(); ++i) time(i) = *poses[static_cast<std::size_t>(i)].context.time;
+  for (Index i = 0; i < time.size(); ++i)
+    time(i) = *poses[static_cast<std::size_t>(i)].context.time;
   const double all = time.maxCoeff() - time.minCoeff();
   return all < kLeastTime ? by_row : VectorXd((time.array() - time.minCoeff()) / all);
 }
 
 std::optional<Course> course_of_temperature(const LinearProblem& problem) {
   const auto& poses = problem.batch().measurements;
-  if (!std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.temperature.has_value(); }))
+  if (!std::all_of(poses.begin(), poses.end(),
+                   [](const Measurement& m) { return m.context.temperature.has_value(); }))
     return std::nullopt;
   VectorXd way(problem.poses());
-  for (Index i = 0; i < way.size(); ++i) way(i) = *poses[static_cast<std::size_t>(i)].context.temperature;
+  for (Index i = 0; i < way.size(); ++i)
+    way(i) = *poses[static_cast<std::size_t>(i)].context.temperature;
   const double span = way.maxCoeff() - way.minCoeff();
   if (span < thresholds::kSameTemperature) return std::nullopt;
   return Course{(way.array() - way(0)) / span, true};
@@ -94,13 +102,15 @@ std::vector<Course> courses_of(const LinearProblem& problem) {
   std::vector<Course> courses;
   for (const double lag : kLags)
     courses.push_back({(1 - (-share.array() / lag).exp()) / (1 - std::exp(-1 / lag)), false});
-  if (std::optional<Course> warm = course_of_temperature(problem)) courses.push_back(std::move(*warm));
+  if (std::optional<Course> warm = course_of_temperature(problem))
+    courses.push_back(std::move(*warm));
   return courses;
 }
 
 MatrixXd on_course(const LinearProblem& problem, const MatrixXd& always, const VectorXd& way) {
   MatrixXd columns = always;
-  for (Index i = 0; i < problem.poses(); ++i) columns.middleRows(problem.first_row(i), problem.row_count(i)) *= way(i);
+  for (Index i = 0; i < problem.poses(); ++i)
+    columns.middleRows(problem.first_row(i), problem.row_count(i)) *= way(i);
   return columns;
 }
 
@@ -115,7 +125,8 @@ Fitted fitted(const Standing& standing, const MatrixXd& columns) {
   information.diagonal().array() += 1;
   const MatrixXd inverse = inverse_factor_of(information);
   const VectorXd along = inverse * (projected.transpose() * standing.problem.residual());
-  return {inverse.transpose() * along, log_evidence(along.squaredNorm(), static_cast<double>(columns.cols()))};
+  return {inverse.transpose() * along,
+          log_evidence(along.squaredNorm(), static_cast<double>(columns.cols()))};
 }
 
 std::vector<std::string> depending(int joint, bool on_temperature) {
@@ -133,7 +144,8 @@ std::string wanderer_of(const Cause& cause) {
     default:
       break;
   }
-  return cause.joint >= 0 ? fmt::format("the zero of joint {}", cause.joint + 1) : "the instrument or the base";
+  return cause.joint >= 0 ? fmt::format("the zero of joint {}", cause.joint + 1)
+                          : "the instrument or the base";
 }
 
 /// A step or a drift, and what moves in it.
@@ -144,8 +156,8 @@ struct Mover {
   MatrixXd always;  // as if it had gone all the way at every pose
 };
 
-/// The best of a few courses that things take as they warm up. The temperature is said where it says clearly more than
-/// the time.
+/// The best of a few courses that things take as they warm up. The temperature is said where it
+/// says clearly more than the time.
 SlowRival warming_up(const Standing& standing, const Mover& mover) {
   SlowRival best;
   double least = -std::numeric_limits<double>::infinity();
@@ -154,13 +166,15 @@ SlowRival warming_up(const Standing& standing, const Mover& mover) {
     const Fitted fit = fitted(standing, columns);
     if (fit.evidence - (course.of_temperature ? thresholds::kUnnamedMargin : 0) <= least) continue;
     least = fit.evidence;
-    best = {columns * fit.size.cwiseAbs().asDiagonal(), depending(mover.cause.joint, course.of_temperature),
-            wanderer_of(mover.cause), fit.evidence - mover.best.evidence};
+    best = {columns * fit.size.cwiseAbs().asDiagonal(),
+            depending(mover.cause.joint, course.of_temperature), wanderer_of(mover.cause),
+            fit.evidence - mover.best.evidence};
   }
   return best;
 }
 
-/// Any smooth course; both as if the motion were known, as the cause was fitted with. Empty where no time goes by.
+/// Any smooth course; both as if the motion were known, as the cause was fitted with. Empty where
+/// no time goes by.
 std::optional<SlowRival> moving_smoothly(const Standing& standing, const Mover& mover) {
   const LinearProblem& problem = standing.problem;
   const VectorXd projected = standing.background.project(problem.residual());

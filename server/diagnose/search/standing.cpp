@@ -25,15 +25,19 @@ Scan Standing::scan(const Chance& chance) const {
   return cause_search::scan(families, {background}, problem.residual(), chance);
 }
 
-std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families, const Choice& choice) {
+std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families,
+                                      const Choice& choice) {
   const Scan& seen = choice.seen;
   const auto named = [&](std::size_t f) { return choice.open(f) && families[f]->named(); };
   const auto strongest = seen.strongest(named);
   if (!strongest) return std::nullopt;
   const Cause cause = families[*strongest]->cause(seen.best[*strongest]);
-  const auto simpler =
-      seen.strongest([&](std::size_t f) { return named(f) && is_simpler(families[f]->cause(seen.best[f]), cause); });
-  return simpler && seen.score[*simpler] > seen.score[*strongest] - thresholds::kSimplerMargin ? simpler : strongest;
+  const auto simpler = seen.strongest([&](std::size_t f) {
+    return named(f) && is_simpler(families[f]->cause(seen.best[f]), cause);
+  });
+  return simpler && seen.score[*simpler] > seen.score[*strongest] - thresholds::kSimplerMargin
+             ? simpler
+             : strongest;
 }
 
 }  // namespace trammel::cause_search

@@ -31,8 +31,10 @@ struct Choice {
   [[nodiscard]] std::optional<std::size_t> best() const { return seen.strongest(open); }
 };
 
-/// The best named cause. A step gives way to the same cause from the first pose on where that explains nearly as much,
-/// and a cause to a simpler case of it: a map of a joint's angle to an off-centre encoder.
-[[nodiscard]] std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families, const Choice& choice);
+/// The best named cause. A step gives way to the same cause from the first pose on where that
+/// explains nearly as much, and a cause to a simpler case of it: a map of a joint's angle to an
+/// off-centre encoder.
+[[nodiscard]] std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families,
+                                                    const Choice& choice);
 
 }  // namespace trammel::cause_search

@@ -16,16 +16,22 @@ struct Trial {
   double square = 0;
 };
 
-/// The causes that always act, by their own parameters: of the whole arm or cell, and `of_joints` as well.
+/// The causes that always act, by their own parameters: of the whole arm or cell, and `of_joints`
+/// as well.
 std::vector<Cause> causes_to_try(const SearchResult& result, bool of_joints) {
   std::vector<Cause> all;
-  for (const std::string& source : candidate_sources(*result.after.model.cell, result.batch, nullptr)) {
+  for (const std::string& source :
+       candidate_sources(*result.after.model.cell, result.batch, nullptr)) {
     const CauseRecord& record = cause_spelled(source);
     const bool of_joint = record.scope == causes::Scope::kJoint;
-    const bool is_open = record.scope == causes::Scope::kArm || record.scope == causes::Scope::kCell;
-    if (record.lasting != causes::Lasting::kAlways || record.search != causes::SearchFamily::kColumns) continue;
+    const bool is_open =
+        record.scope == causes::Scope::kArm || record.scope == causes::Scope::kCell;
+    if (record.lasting != causes::Lasting::kAlways ||
+        record.search != causes::SearchFamily::kColumns)
+      continue;
     if (is_open || (of_joint && of_joints))
-      all.push_back(cause_at(record, of_joint ? std::stoi(source.substr(source.find(':') + 1)) - 1 : -1));
+      all.push_back(
+          cause_at(record, of_joint ? std::stoi(source.substr(source.find(':') + 1)) - 1 : -1));
   }
   return all;
 }
@@ -42,7 +48,8 @@ std::vector<Trial> trials_of(const SearchResult& result, const std::vector<Cause
   for (const Cause& cause : causes_to_try(result, result.unnamed.empty())) {
     const bool tried = std::find(closed.begin(), closed.end(), cause) != closed.end();
     Trial trial{cause, result.after, 0};
-    if (tried || has_cause(trial.model.model, cause) || !add_to(trial.model, to_string(cause))) continue;
+    if (tried || has_cause(trial.model.model, cause) || !add_to(trial.model, to_string(cause)))
+      continue;
     refine(trial.model, result.batch, {});
     trial.square = held_out_square(trial.model, result.batch, {}, weight);
     trials.push_back(std::move(trial));
@@ -52,15 +59,17 @@ std::vector<Trial> trials_of(const SearchResult& result, const std::vector<Cause
 
 }  // namespace
 
-std::optional<NamedInstead> named_instead_of_functions(const SearchResult& result, const std::vector<Cause>& closed) {
+std::optional<NamedInstead> named_instead_of_functions(const SearchResult& result,
+                                                       const std::vector<Cause>& closed) {
   const bool nothing_found = result.unnamed.empty();
   if (nothing_found && !leaves_much(result)) return std::nullopt;
   const Eigen::VectorXd weight = weight_of(result.after, result.batch);
   const double share = nothing_found ? thresholds::kMuchBetterHeldOut : thresholds::kAsGoodHeldOut;
   const double limit = share * held_out_square(result.after, result.batch, result.unnamed, weight);
   std::vector<Trial> trials = trials_of(result, closed, weight);
-  const auto best = std::min_element(trials.begin(), trials.end(),
-                                     [](const Trial& a, const Trial& b) { return a.square < b.square; });
+  const auto best =
+      std::min_element(trials.begin(), trials.end(),
+                       [](const Trial& a, const Trial& b) { return a.square < b.square; });
   if (best == trials.end() || best->square > limit) return std::nullopt;
   NamedInstead named{best->cause, std::move(best->model), {}};
   for (const Trial& other : trials) {

@@ -28,8 +28,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPeriodogramLine = 0.01;  // share of the batches in which chance passes the line of a periodogram
-constexpr std::size_t kRecoveries = 3;     // curves on the page
+constexpr double kPeriodogramLine =
+    0.01;  // share of the batches in which chance passes the line of a periodogram
+constexpr std::size_t kRecoveries = 3;  // curves on the page
 
 LinearProblem problem_of(const Cell& cell, const PriorModel& model, const MeasurementBatch& batch) {
   return {model.model, batch, model.priors, candidate_sources(cell, batch, nullptr)};
@@ -47,16 +48,18 @@ bool is_play(const Cause& cause) { return record_of(cause).search == causes::Sea
 std::vector<const CauseRecord*> examples() {
   std::vector<const CauseRecord*> all = all_causes();
   std::erase_if(all, [](const CauseRecord* record) { return !record->example; });
-  std::stable_sort(all.begin(), all.end(),
-                   [](const CauseRecord* a, const CauseRecord* b) { return a->example->rank < b->example->rank; });
+  std::stable_sort(all.begin(), all.end(), [](const CauseRecord* a, const CauseRecord* b) {
+    return a->example->rank < b->example->rank;
+  });
   return all;
 }
 
-Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all,
-                           const Surrogates& unrecorded) {
+Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem,
+                           const Background& all, const Surrogates& unrecorded) {
   if (found.unnamed.empty()) return {};
-  const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
-                                               [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
+  const Unnamed& strongest =
+      *std::max_element(found.unnamed.begin(), found.unnamed.end(),
+                        [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
   Unexplained unexplained{true, {}, 0, strongest.p_value, {}};
   for (const Unnamed& one : found.unnamed) {
     for (const std::string& on : one.depends_on) {
@@ -73,8 +76,9 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
     unexplained.hint += (unexplained.hint.empty() ? "" : "; ") + what_wrong_sign_means(one);
   const auto& on = unexplained.depends_on;
   if (std::find(on.begin(), on.end(), kAttitude) != on.end())
-    unexplained.hint += std::string(unexplained.hint.empty() ? "" : "; ") +
-                        "the tool moves by how it stands to gravity: see whether it sags in its clamp or mount";
+    unexplained.hint +=
+        std::string(unexplained.hint.empty() ? "" : "; ") +
+        "the tool moves by how it stands to gravity: see whether it sags in its clamp or mount";
   const std::string slow = what_moves(found, problem, all, unrecorded);
   unexplained.hint += (unexplained.hint.empty() || slow.empty() ? "" : ". ") + slow;
   const Index P = problem.nuisance().cols();
@@ -86,7 +90,8 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   return unexplained;
 }
 
-/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last what none explains.
+/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last
+/// what none explains.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
                                         const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
@@ -97,7 +102,8 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   }
   steps.push_back({"nominal", figures_of(nominal).rms});
   steps.push_back({"calibrated", before.position_rms(before.residual())});
-  // Each finding in turn, everything else refitted: the later ones' effects are put back into what is left.
+  // Each finding in turn, everything else refitted: the later ones' effects are put back into what
+  // is left.
   VectorXd data = after.residual();
   std::vector<Index> chosen(static_cast<std::size_t>(after.nuisance().cols()));
   std::iota(chosen.begin(), chosen.end(), Index{0});
@@ -105,10 +111,12 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   for (auto finding = found.accepted.rbegin(); finding != found.accepted.rend(); ++finding) {
     if (finding->is_outlier()) continue;
     const Background fitted(after.nuisance()(Eigen::all, chosen));
-    tail.push_back({to_string(finding->cause), after.position_rms(data - fitted.columns() * fitted.estimate(data))});
+    tail.push_back({to_string(finding->cause),
+                    after.position_rms(data - fitted.columns() * fitted.estimate(data))});
     data += effect_of_source(after, finding->in_model);
     const std::vector<Index> own = places_of_source(after.model(), finding->in_model);
-    std::erase_if(chosen, [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
+    std::erase_if(chosen,
+                  [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
   }
   steps.insert(steps.end(), tail.rbegin(), tail.rend());
   steps.push_back({noise_name(noise, after.instrument()), std::sqrt(3.0) * noise});
@@ -136,13 +144,13 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
   diagnosis.poses = static_cast<int>(explained.found.all.measurements.size());
   diagnosis.noise = after.noise();
   diagnosis.instrument = after.instrument();
-  diagnosis.noise_from =
-      fmt::format("{}the tracker's stated sigma alone gives {:.1f} um",
-                  prepared.repeats.degrees_of_freedom > 0
-                      ? fmt::format("{} poses measured repeatedly scatter by {:.1f} um; ", prepared.repeats.groups,
-                                    1e6 * std::sqrt(3.0) * prepared.repeats.sigma)
-                      : "",
-                  1e6 * std::sqrt(3.0) * after.instrument() / prepared.vouched);
+  diagnosis.noise_from = fmt::format(
+      "{}the tracker's stated sigma alone gives {:.1f} um",
+      prepared.repeats.degrees_of_freedom > 0
+          ? fmt::format("{} poses measured repeatedly scatter by {:.1f} um; ",
+                        prepared.repeats.groups, 1e6 * std::sqrt(3.0) * prepared.repeats.sigma)
+          : "",
+      1e6 * std::sqrt(3.0) * after.instrument() / prepared.vouched);
   const LinearProblem& before = explained.before;
   const LinearProblem& served = explained.served;
   diagnosis.before = figures_of(before.positions(before.residual()));
@@ -153,22 +161,28 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
   diagnosis.residual_before_B = R_BW * before.positions(before.residual());
 }
 
-void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   const Remainder& remainder, Diagnosis& diagnosis) {
+void tell_findings(const Explained& explained, const PreparedBatch& prepared,
+                   const MeasurementBatch& recorded, const Remainder& remainder,
+                   Diagnosis& diagnosis) {
   const SearchResult& found = explained.found;
-  diagnosis.unexplained = unexplained_of(found, explained.after, explained.all, prepared.surrogates);
+  diagnosis.unexplained =
+      unexplained_of(found, explained.after, explained.all, prepared.surrogates);
   const double left = std::max(remainder.rms, diagnosis.unexplained.rms);
-  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded,
-                                   {remainder.more_than_noise, left, remainder.larger});
+  diagnosis.findings =
+      findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded,
+                  {remainder.more_than_noise, left, remainder.larger});
   std::vector<SuspectedPose> out;
   for (const Accepted& one : found.accepted) {
     if (!one.is_outlier()) continue;
     out.push_back(one.pose);
-    const bool is_in_doubt =
-        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(), [&](const Finding& finding) {
-          return finding.cause.pose_id == one.cause.pose_id && finding.source.empty() && !finding.could_also_be.empty();
+    const bool is_in_doubt = std::any_of(
+        diagnosis.findings.begin(), diagnosis.findings.end(), [&](const Finding& finding) {
+          return finding.cause.pose_id == one.cause.pose_id && finding.source.empty() &&
+                 !finding.could_also_be.empty();
         });
-    if (is_in_doubt) out.back().reason = "what the simulation lacks may be largest there: repeat it and its neighbours";
+    if (is_in_doubt)
+      out.back().reason =
+          "what the simulation lacks may be largest there: repeat it and its neighbours";
   }
   diagnosis.suspects.insert(diagnosis.suspects.begin(), out.begin(), out.end());
 }
@@ -180,32 +194,39 @@ void tell_verdict(Diagnosis& diagnosis) {
     diagnosis.verdict = left ? Verdict::kUnknown : Verdict::kNothing;
     return;
   }
-  const bool doubt = std::any_of(findings.begin(), findings.end(),
-                                 [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  const bool doubt = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return !finding.could_also_be.empty();
+  });
   diagnosis.verdict = doubt ? Verdict::kAmbiguous : Verdict::kNamed;
 }
 
 void tell_largest_first(Diagnosis& diagnosis) {
-  std::stable_sort(diagnosis.findings.begin(), diagnosis.findings.end(), [](const Finding& a, const Finding& b) {
-    return std::pair(is_outlier(a), -a.effect_rms) < std::pair(is_outlier(b), -b.effect_rms);
-  });
+  std::stable_sort(
+      diagnosis.findings.begin(), diagnosis.findings.end(), [](const Finding& a, const Finding& b) {
+        return std::pair(is_outlier(a), -a.effect_rms) < std::pair(is_outlier(b), -b.effect_rms);
+      });
 }
 
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) {
-  for (const ErrorSourcePtr& source : found.before.model.sources) diagnosis.sources_before.push_back(source->name());
+  for (const ErrorSourcePtr& source : found.before.model.sources)
+    diagnosis.sources_before.push_back(source->name());
   diagnosis.sources_after = diagnosis.sources_before;
   for (const Finding& finding : diagnosis.findings) {
-    // A list of sources says by its row where a cause begins; in a batch whose rows were moved that row is another.
+    // A list of sources says by its row where a cause begins; in a batch whose rows were moved that
+    // row is another.
     const bool at_a_row = !sorted || finding.cause.pose_id.empty();
-    if (!finding.source.empty() && is_sure(finding) && at_a_row) diagnosis.sources_after.push_back(finding.source);
+    if (!finding.source.empty() && is_sure(finding) && at_a_row)
+      diagnosis.sources_after.push_back(finding.source);
   }
   if (diagnosis.sources_after.size() > diagnosis.sources_before.size()) {
     for (const Reformed& one : found.reformed)
-      std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), one.from, one.to);
+      std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), one.from,
+                   one.to);
   }
 }
 
-void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
+void tell_held_out(const Explained& explained, const PreparedBatch& prepared,
+                   Diagnosis& diagnosis) {
   if (prepared.validation.measurements.empty()) {
     const HeldOut held_out = held_out_of(explained.before, explained.served);
     diagnosis.held_out_before = held_out.before;
@@ -220,21 +241,27 @@ void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Di
   diagnosis.held_out_after = validation.after;
   diagnosis.held_out_before_without = validation.before_without;
   diagnosis.held_out_after_without = validation.after_without;
-  std::move(validation.fit_neither.begin(), validation.fit_neither.end(), std::back_inserter(diagnosis.suspects));
-  diagnosis.held_out_how = fmt::format("{} validation rows", prepared.validation.measurements.size());
+  std::move(validation.fit_neither.begin(), validation.fit_neither.end(),
+            std::back_inserter(diagnosis.suspects));
+  diagnosis.held_out_how =
+      fmt::format("{} validation rows", prepared.validation.measurements.size());
 }
 
-void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families, const Cell& cell,
-                    const Surrogates& surrogates, const MeasurementBatch& recorded, Diagnosis& diagnosis) {
+void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families,
+                    const Cell& cell, const Surrogates& surrogates,
+                    const MeasurementBatch& recorded, Diagnosis& diagnosis) {
   Blindness blind = blindness(explained.after, families, explained.all, explained.found.chance);
   diagnosis.could_not_have_seen = std::move(blind.unseen);
   std::erase_if(diagnosis.could_not_have_seen,
                 [&](const Unseen& unseen) { return is_by_surrogate(surrogates, unseen.cause); });
-  std::erase_if(diagnosis.could_not_have_seen, [&](const Unseen& unseen) {  // seen, with a sign that has no name
-    const std::vector<PlaySign>& seen = explained.found.negative_play;
-    return is_play(unseen.cause) &&
-           std::any_of(seen.begin(), seen.end(), [&](const PlaySign& one) { return one.joint == unseen.cause.joint; });
-  });
+  std::erase_if(diagnosis.could_not_have_seen,
+                [&](const Unseen& unseen) {  // seen, with a sign that has no name
+                  const std::vector<PlaySign>& seen = explained.found.negative_play;
+                  return is_play(unseen.cause) &&
+                         std::any_of(seen.begin(), seen.end(), [&](const PlaySign& one) {
+                           return one.joint == unseen.cause.joint;
+                         });
+                });
   static_cast<void>(candidate_sources(cell, recorded, &diagnosis.could_not_have_seen));
   diagnosis.not_separable = std::move(blind.inseparable);
   for (Inseparable& pair : hidden_by_constancy(explained.found.before.model, recorded))
@@ -257,9 +284,11 @@ void tell_periodograms(const Explained& explained, Diagnosis& diagnosis) {
   }
 }
 
-void tell_next_poses(const Explained& explained, const DiagnoseOptions& options, Diagnosis& diagnosis) {
+void tell_next_poses(const Explained& explained, const DiagnoseOptions& options,
+                     Diagnosis& diagnosis) {
   diagnosis.next_poses = next_poses_for(explained.found, explained.before, options);
-  if (diagnosis.next_poses.q.empty()) diagnosis.next_poses.none_because = why_no_next_poses(diagnosis.findings);
+  if (diagnosis.next_poses.q.empty())
+    diagnosis.next_poses.none_because = why_no_next_poses(diagnosis.findings);
 }
 
 void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis) {
@@ -275,28 +304,31 @@ void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& d
   }
 }
 
-void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,
-                   Diagnosis& diagnosis) {
+void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families,
+                   std::uint64_t seed, Diagnosis& diagnosis) {
   std::vector<std::size_t> places;
   const auto add = [&](std::string_view cause, int joint) {
     for (std::size_t f = 0; f < families.size() && places.size() < kRecoveries; ++f) {
       const Cause one = families[f]->cause(families[f]->typical());
-      if (!families[f]->named() || one.cause != cause || (joint >= 0 && one.joint != joint)) continue;
+      if (!families[f]->named() || one.cause != cause || (joint >= 0 && one.joint != joint))
+        continue;
       if (std::find(places.begin(), places.end(), f) == places.end()) places.push_back(f);
       break;
     }
   };
   for (const Finding& finding : diagnosis.findings) add(finding.cause.cause, finding.cause.joint);
   for (const CauseRecord* example : examples()) add(example->spelling, example->example->joint);
-  diagnosis.recovery = recovery_of(explained.after, families, explained.all, explained.found.chance, places, seed);
+  diagnosis.recovery =
+      recovery_of(explained.after, families, explained.all, explained.found.chance, places, seed);
 }
 
-void tell_limits(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                 Diagnosis& diagnosis) {
+void tell_limits(const Explained& explained, const PreparedBatch& prepared,
+                 const MeasurementBatch& recorded, Diagnosis& diagnosis) {
   std::vector<std::string>& limits = diagnosis.limits;
-  const auto recorded_of = [&](bool (*has)(const Measurement&), std::string_view what, std::string_view of_none,
-                               std::string_view of_some) {
-    const auto count = std::count_if(recorded.measurements.begin(), recorded.measurements.end(), has);
+  const auto recorded_of = [&](bool (*has)(const Measurement&), std::string_view what,
+                               std::string_view of_none, std::string_view of_some) {
+    const auto count =
+        std::count_if(recorded.measurements.begin(), recorded.measurements.end(), has);
     const auto all = static_cast<std::ptrdiff_t>(recorded.measurements.size());
     if (count == 0) limits.push_back(fmt::format("no {}: {}", what, of_none));
     if (count > 0 && count < all)
@@ -306,26 +338,31 @@ void tell_limits(const Explained& explained, const PreparedBatch& prepared, cons
               "several geometry parameters and all of the tool's rotation stay unseen",
               "the others count with their positions");
   recorded_of([](const Measurement& m) { return m.context.time.has_value(); }, "times",
-              "a drift, and what warms up, can only be told by the order of the poses", "no drift was looked for");
-  recorded_of([](const Measurement& m) { return m.context.temperature.has_value(); }, "temperatures",
-              "thermal growth was looked for by the order of the poses, and cannot be told from a drift",
-              "thermal growth was not looked for");
-  recorded_of([](const Measurement& m) { return !m.context.direction.empty(); }, "approach directions",
-              "backlash was looked for as if each joint came from where it was at the row before, and cannot be named "
-              "for certain",
+              "a drift, and what warms up, can only be told by the order of the poses",
+              "no drift was looked for");
+  recorded_of(
+      [](const Measurement& m) { return m.context.temperature.has_value(); }, "temperatures",
+      "thermal growth was looked for by the order of the poses, and cannot be told from a drift",
+      "thermal growth was not looked for");
+  recorded_of([](const Measurement& m) { return !m.context.direction.empty(); },
+              "approach directions",
+              "backlash was looked for as if each joint came from where it was at the row before, "
+              "and cannot be named for certain",
               "backlash was not looked for");
   if (prepared.repeats.degrees_of_freedom == 0)
-    limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
+    limits.emplace_back(
+        "no repeated poses: the noise is taken from the tracker and from what is left");
   if (prepared.sorted)
     limits.emplace_back(
-        "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
-        "applied");
+        "the rows are not in the order of their times: they were put into it, and what begins at a "
+        "pose is not applied");
   if (is_each_tool_at_one_place(recorded))
     limits.emplace_back(
-        "every tool was measured at one point: base, tool and the zeros of the last three joints cannot be told apart "
-        "there; measure poses all over the workspace");
+        "every tool was measured at one point: base, tool and the zeros of the last three joints "
+        "cannot be told apart there; measure poses all over the workspace");
   if (explained.found.too_many_outliers)
-    limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
+    limits.emplace_back(
+        "more than a tenth of the poses fit neither the model nor each other: measure again");
 }
 
 }  // namespace trammel::cause_search

@@ -17,51 +17,60 @@ namespace trammel::cause_search {
 struct PreparedBatch {
   MeasurementBatch train, validation;  ///< in the order of measuring; repeats of the one merged
   RepeatStatistics repeats;
-  double vouched = 1;                    ///< times the stated sigma: noise that the repeats vouch for; the rows have it
-  Surrogates surrogates;                 ///< what was put in for what nobody recorded
-  std::vector<SessionSetting> sessions;  ///< of several: with the noise of each that its repeated poses show
-  bool sorted = false;                   ///< rows had to be moved into the order of their times
+  double vouched =
+      1;  ///< times the stated sigma: noise that the repeats vouch for; the rows have it
+  Surrogates surrogates;  ///< what was put in for what nobody recorded
+  std::vector<SessionSetting>
+      sessions;         ///< of several: with the noise of each that its repeated poses show
+  bool sorted = false;  ///< rows had to be moved into the order of their times
 };
 
-/// What was found, about the poses that were searched: everything that is told is read from here. Before and after are
-/// compared on the same poses: leaving one out is no gain.
+/// What was found, about the poses that were searched: everything that is told is read from here.
+/// Before and after are compared on the same poses: leaving one out is no gain.
 struct Explained {
   Explained(const Cell& cell, SearchResult search);
 
   SearchResult found;
-  LinearProblem before, after;  ///< about the cell's own model and about the extended one, with all candidates
-  Background all;               ///< all that was found, named or not
-  /// What the extended model leaves when it is fitted by itself, as a training would: nothing unnamed beside it.
+  LinearProblem before,
+      after;       ///< about the cell's own model and about the extended one, with all candidates
+  Background all;  ///< all that was found, named or not
+  /// What the extended model leaves when it is fitted by itself, as a training would: nothing
+  /// unnamed beside it.
   LinearProblem served;
 };
 
 /// Noise, errors before and after, the waterfall from the one to the other.
 void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
 /// Findings, what stays unexplained, suspects. `recorded`: the batch without surrogates.
-void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   const Remainder& remainder, Diagnosis& diagnosis);
-/// Once all is found, and what is left is known. Single poses that are out are no cause: where more than noise is left
-/// beside them, that is unknown.
+void tell_findings(const Explained& explained, const PreparedBatch& prepared,
+                   const MeasurementBatch& recorded, const Remainder& remainder,
+                   Diagnosis& diagnosis);
+/// Once all is found, and what is left is known. Single poses that are out are no cause: where more
+/// than noise is left beside them, that is unknown.
 void tell_verdict(Diagnosis& diagnosis);
-/// The sources before and those that the model could be extended to: what was found and is beyond doubt.
+/// The sources before and those that the model could be extended to: what was found and is beyond
+/// doubt.
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis);
 /// The findings by the size of their effects, single poses at the end.
 void tell_largest_first(Diagnosis& diagnosis);
-/// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects among them.
+/// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects
+/// among them.
 void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
 /// What these poses could not have told apart or shown.
-void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families, const Cell& cell,
-                    const Surrogates& surrogates, const MeasurementBatch& recorded, Diagnosis& diagnosis);
+void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families,
+                    const Cell& cell, const Surrogates& surrogates,
+                    const MeasurementBatch& recorded, Diagnosis& diagnosis);
 void tell_periodograms(const Explained& explained, Diagnosis& diagnosis);
 /// What to measure next, or why nothing would help.
-void tell_next_poses(const Explained& explained, const DiagnoseOptions& options, Diagnosis& diagnosis);
+void tell_next_poses(const Explained& explained, const DiagnoseOptions& options,
+                     Diagnosis& diagnosis);
 /// What is left after all that was found, and what it still depends on.
 void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis);
 /// What hiding effects of the causes found, and of some common ones, in these poses brings back.
-void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,
-                   Diagnosis& diagnosis);
+void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families,
+                   std::uint64_t seed, Diagnosis& diagnosis);
 /// What was missing, or wrong, in the batch. `recorded`: all of its rows, without surrogates.
-void tell_limits(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                 Diagnosis& diagnosis);
+void tell_limits(const Explained& explained, const PreparedBatch& prepared,
+                 const MeasurementBatch& recorded, Diagnosis& diagnosis);
 
 }  // namespace trammel::cause_search

@@ -26,23 +26,27 @@ bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }
 
-/// What describes several of its kind better than one by one, where there are too many of them at its joint to be
-/// believed or where that stands beside them: a map of the joint's angle for the orders of a gear.
+/// What describes several of its kind better than one by one, where there are too many of them at
+/// its joint to be believed or where that stands beside them: a map of the joint's angle for the
+/// orders of a gear.
 std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Cause>& found) {
   const auto at_joint = [&](std::string_view name) {
-    return std::count_if(found.begin(), found.end(),
-                         [&](const Cause& other) { return other.cause == name && other.joint == cause.joint; });
+    return std::count_if(found.begin(), found.end(), [&](const Cause& other) {
+      return other.cause == name && other.joint == cause.joint;
+    });
   };
   const bool too_many = at_joint(cause.cause) > thresholds::kMostOrders;
   std::vector<Cause> all;
   for (const CauseRecord* record : all_causes()) {
     const Cause general = cause_at(*record, cause.joint);
-    if (is_doubtful_case(general, cause) && (too_many || at_joint(general.cause) > 0)) all.push_back(general);
+    if (is_doubtful_case(general, cause) && (too_many || at_joint(general.cause) > 0))
+      all.push_back(general);
   }
   return all;
 }
 
-/// Whether more is left than is stated, and not so much that it is unknown: a name may be a part of that.
+/// Whether more is left than is stated, and not so much that it is unknown: a name may be a part of
+/// that.
 bool is_a_little_more(const Beside& beside) { return beside.larger && !beside.more_than_noise; }
 
 /// Whether a cause of one joint has so many numbers that it fits a part of much else.
@@ -65,11 +69,13 @@ bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
 
 bool goes_with_time(const Unexplained& unexplained) {
   const auto& on = unexplained.depends_on;
-  return std::any_of(on.begin(), on.end(), [](const auto& one) { return one == "time" || one == "temperature"; });
+  return std::any_of(on.begin(), on.end(),
+                     [](const auto& one) { return one == "time" || one == "temperature"; });
 }
 
-/// Whether lengths that go with the temperature may be the instrument's own: its scale moves the base as well, about
-/// the instrument, so that something else is there that moves in the course of the batch.
+/// Whether lengths that go with the temperature may be the instrument's own: its scale moves the
+/// base as well, about the instrument, so that something else is there that moves in the course of
+/// the batch.
 bool may_be_scale(const Cause& cause, const Beside& beside) {
   const CauseRecord& own = record_of(cause);
   if (own.acts.on != causes::ActsOn::kLinks || !own.needs.temperature) return false;
@@ -105,10 +111,11 @@ void add_what_weighs(std::vector<Cause>& rivals) {
 
 std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
   if (record_of(cause).needs.direction)
-    return "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
+    return "needs the approach direction of each pose (dir columns): it was taken from the order "
+           "of the rows";
   return fmt::format(
-      "record {} with every pose, and measure reference reflectors in between: what was not recorded was taken from "
-      "the order of the rows",
+      "record {} with every pose, and measure reference reflectors in between: what was not "
+      "recorded was taken from the order of the rows",
       !surrogates.temperature ? "the time (time_s)"
       : surrogates.time       ? "temperature and time (temperature_c, time_s)"
                               : "the temperature (temperature_c)");
@@ -119,7 +126,8 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size) {
   const CauseRecord& record = record_of(cause);
   if (record.lasting != causes::Lasting::kAlways || size.size() == 0) return false;
-  if (record.summary == causes::Summary::kAmplitude) return size.norm() > thresholds::kUnlikelyEccentricity;
+  if (record.summary == causes::Summary::kAmplitude)
+    return size.norm() > thresholds::kUnlikelyEccentricity;
   if (record.part != causes::Part::kPayload) return false;
   double farthest = 0;  // of a centre of gravity; a mass may be anything
   for (Eigen::Index k = 0; k < size.size(); ++k) {
@@ -130,7 +138,8 @@ bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size) {
 
 bool differ_in_form_only(const Cause& cause, const std::vector<Cause>& others) {
   return std::all_of(others.begin(), others.end(), [&](const Cause& other) {
-    return (other.cause == cause.cause && other.joint == cause.joint) || is_description_of(other, cause);
+    return (other.cause == cause.cause && other.joint == cause.joint) ||
+           is_description_of(other, cause);
   });
 }
 
@@ -138,11 +147,12 @@ namespace {
 
 /// The reasons for which a cause is doubted.
 struct Doubts {
-  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, changes, is_part, by_many_numbers,
-      at_one_point;
+  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, changes,
+      is_part, by_many_numbers, at_one_point;
   std::vector<Cause> many;
 
-  Doubts(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside)
+  Doubts(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals,
+         const Beside& beside)
       : by_surrogate(is_by_surrogate(beside.surrogates, cause)),
         dwarfed(is_dwarfed(evidence.effect_rms, beside.unexplained)),
         again(begins_again(cause, beside.found)),
@@ -154,11 +164,13 @@ struct Doubts {
         changes(evidence.changes),
         is_part(is_a_little_more(beside) && evidence.effect_rms <= beside.left),
         by_many_numbers(is_a_little_more(beside) && is_flexible(cause, evidence)),
-        at_one_point(record_of(cause).part == causes::Part::kLinks && is_each_tool_at_one_place(beside.recorded)),
+        at_one_point(record_of(cause).part == causes::Part::kLinks &&
+                     is_each_tool_at_one_place(beside.recorded)),
         many(descriptions_of_many(cause, beside.found)) {
     std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
   }
-  [[nodiscard]] std::vector<Cause> could_also_be(const Cause& cause, const std::vector<Cause>& rivals,
+  [[nodiscard]] std::vector<Cause> could_also_be(const Cause& cause,
+                                                 const std::vector<Cause>& rivals,
                                                  const Beside& beside) const;
   /// What to do about the last of them; empty where there is none.
   [[nodiscard]] std::string action(const Cause& cause, const Surrogates& surrogates) const;
@@ -173,51 +185,65 @@ std::vector<Cause> Doubts::could_also_be(const Cause& cause, const std::vector<C
   all.insert(all.end(), many.begin(), many.end());
   if (again || slow) add(all, unknown_cause(cause.joint));
   if (unlikely) add_what_weighs(all);
-  if (not_held_out || by_half || changes || is_part || by_many_numbers) add(all, unknown_cause(cause.joint));
+  if (not_held_out || by_half || changes || is_part || by_many_numbers)
+    add(all, unknown_cause(cause.joint));
   return all;
 }
 
 std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) const {
   if (!many.empty())
-    return fmt::format("measure more poses over the range of joint {}: its error has no single order", cause.joint + 1);
+    return fmt::format(
+        "measure more poses over the range of joint {}: its error has no single order",
+        cause.joint + 1);
   if (dwarfed) return "find first what is unknown here: it is several times larger";
   if (again)
-    return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need(surrogates);
-  if (slow) return "something moves slowly as well, of which it may be part: " + what_slow_changes_need(surrogates);
+    return "it changes more than once, as something that moves slowly does: " +
+           what_slow_changes_need(surrogates);
+  if (slow)
+    return "something moves slowly as well, of which it may be part: " +
+           what_slow_changes_need(surrogates);
   if (unlikely)
-    return "it is larger than robots have it: measure with another known payload, which the arm's own weight does not "
-           "follow";
+    return "it is larger than robots have it: measure with another known payload, which the arm's "
+           "own weight does not follow";
   if (by_scale)
-    return "it may be the scale of the instrument, which follows the temperature of the air: see that its weather "
-           "station is right, and measure reference reflectors at known distances in between";
+    return "it may be the scale of the instrument, which follows the temperature of the air: see "
+           "that its weather station is right, and measure reference reflectors at known distances "
+           "in between";
   if (at_one_point)
-    return "measure poses at other places of the workspace, too: about one point base, tool and links make up for each "
-           "other";
+    return "measure poses at other places of the workspace, too: about one point base, tool and "
+           "links make up for each other";
   if (by_half)
-    return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
-  if (not_held_out) return "measure again with other poses: those that are held out are not predicted better with it";
+    return "measure again with other poses: half of these do not show it by themselves, and more "
+           "than noise is left";
+  if (not_held_out)
+    return "measure again with other poses: those that are held out are not predicted better with "
+           "it";
   if (changes)
     return "its size changed while the batch was measured, as that of this cause does not: " +
            what_slow_changes_need(surrogates);
-  if (is_part) return "find first what is unknown here: more is left beyond the stated noise than this";
+  if (is_part)
+    return "find first what is unknown here: more is left beyond the stated noise than this";
   if (by_many_numbers)
-    return "measure more poses: a cause of so many numbers fits a part of many others, and what is left is larger than "
-           "the stated noise";
+    return "measure more poses: a cause of so many numbers fits a part of many others, and what is "
+           "left is larger than the stated noise";
   return by_surrogate ? what_to_record(cause, surrogates) : "";
 }
 
 }  // namespace
 
-Judgement judge(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside) {
+Judgement judge(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals,
+                const Beside& beside) {
   const Doubts doubts(cause, evidence, rivals, beside);
   std::vector<Cause> could_also_be = doubts.could_also_be(cause, rivals, beside);
   const bool whole = !beside.more_than_noise || !differ_in_form_only(cause, could_also_be);
   const Cause unknown = unknown_cause(cause.joint);
-  if (beside.more_than_noise && !contains(could_also_be, unknown_cause())) add(could_also_be, unknown);
+  if (beside.more_than_noise && !contains(could_also_be, unknown_cause()))
+    add(could_also_be, unknown);
   std::string action = doubts.action(cause, beside.surrogates);
   if (action.empty()) {
-    action = !whole && evidence.effect_rms <= beside.left ? "find first what is unknown here: more is left than this"
-                                                          : action_for(cause, rivals);
+    action = !whole && evidence.effect_rms <= beside.left
+                 ? "find first what is unknown here: more is left than this"
+                 : action_for(cause, rivals);
   }
   return {std::move(could_also_be), whole, std::move(action)};
 }

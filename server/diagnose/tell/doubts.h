@@ -32,31 +32,36 @@ struct Evidence {
 /// How sure the name of a finding is, and what people do about it.
 struct Judgement {
   std::vector<Cause> could_also_be;  ///< empty: its name is sure
-  bool whole = true;                 ///< false: it has the best known shape, and is not all of what is there
+  bool whole = true;  ///< false: it has the best known shape, and is not all of what is there
   std::string action;
 };
 
 /// Judges a cause. `rivals`: what the search could not tell from it. Its name is doubted
 /// - where something was not recorded that would show whether it is another cause;
 /// - beside something unknown that is several times larger, of which it may be part;
-/// - of a gear, where its joint has a map or more than two orders: an error with no single order has as many sines as
+/// - of a gear, where its joint has a map or more than two orders: an error with no single order
+/// has as many sines as
 ///   the poses show;
-/// - of what begins at a pose, where it begins a second time, or beside something unknown that depends on time: a slow
+/// - of what begins at a pose, where it begins a second time, or beside something unknown that
+/// depends on time: a slow
 ///   change is several steps;
-/// - of an encoder or a payload that is off by more than robots have it: the weight of the arm itself, or a balancer,
+/// - of an encoder or a payload that is off by more than robots have it: the weight of the arm
+/// itself, or a balancer,
 ///   does the same through joints that give way;
-/// - of an arm that grows with the temperature, beside an instrument that moved or something unknown that depends on
+/// - of an arm that grows with the temperature, beside an instrument that moved or something
+/// unknown that depends on
 ///   time: the scale of the instrument may go with the temperature, and it moves the base as well;
 /// - where poses held out are not predicted better with it;
-/// - where more than noise is left, named or not. What has another form than all known causes is explained in part by
-///   the nearest of them: the finding may be the best known shape of that. Where half of the poses do not show it by
-///   themselves, it may be nothing at all.
+/// - where more than noise is left, named or not. What has another form than all known causes is
+/// explained in part by
+///   the nearest of them: the finding may be the best known shape of that. Where half of the poses
+///   do not show it by themselves, it may be nothing at all.
 /// Of several doubts the action answers the one that comes last in this list.
-[[nodiscard]] Judgement judge(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals,
-                              const Beside& beside);
+[[nodiscard]] Judgement judge(const Cause& cause, const Evidence& evidence,
+                              const std::vector<Cause>& rivals, const Beside& beside);
 
-/// Whether all of `others` are the cause itself by another number or a description of it: which of them it is may stay
-/// open, for they do the same to the poses.
+/// Whether all of `others` are the cause itself by another number or a description of it: which of
+/// them it is may stay open, for they do the same to the poses.
 [[nodiscard]] bool differ_in_form_only(const Cause& cause, const std::vector<Cause>& others);
 
 /// Whether numbers of that size (in units of their priors) are larger than robots have them.

@@ -14,8 +14,8 @@ namespace {
 /// Whether the cause acts at every pose alike, by the angles of the joints alone, as a tilt does.
 bool acts_by_angles(const CauseRecord& record) {
   const ContextNeeds& needs = record.needs;
-  return record.lasting == causes::Lasting::kAlways && !needs.time && !needs.temperature && !needs.direction &&
-         !needs.velocity && !needs.payload && !needs.before && !needs.history;
+  return record.lasting == causes::Lasting::kAlways && !needs.time && !needs.temperature &&
+         !needs.direction && !needs.velocity && !needs.payload && !needs.before && !needs.history;
 }
 
 /// The tilt of the axis of `joint` (0-based) against the next one.
@@ -31,24 +31,27 @@ void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis) {
   for (const int joint : rows_without_hayati(robot)) {
     for (Finding& finding : diagnosis.findings) {
       const Cause& cause = finding.cause;
-      if ((cause.joint != joint && cause.joint != joint + 1) || !acts_by_angles(record_of(cause))) continue;
+      if ((cause.joint != joint && cause.joint != joint + 1) || !acts_by_angles(record_of(cause)))
+        continue;
       finding.could_also_be.push_back(tilt_of(joint));
       finding.whole = true;  // what may be a row of the robot file goes into no model
       finding.action = fmt::format(
-          "write `hayati: true` in row {} of the robot file and diagnose again: the tilt of its axis against "
-          "the next one has no number without it",
+          "write `hayati: true` in row {} of the robot file and diagnose again: the tilt of its "
+          "axis against the next one has no number without it",
           joint + 1);
     }
   }
 }
 
-void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis) {
+void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                      Diagnosis& diagnosis) {
   const Result<CalibrationResult> found =
       calibrate(cell, diagnosis.sources_after, batch, {.held = {}, .weigh_links = true});
   auto off = found ? robot_off_drawing(found->model, found->parameters) : std::nullopt;
   if (off) diagnosis.notes.push_back(*std::move(off));
   for (const CellDoubt& doubt : doubts_of(*cell))
-    if (doubt.of_robot_file) diagnosis.notes.push_back({doubt.code, Note::Severity::kWarning, doubt.text});
+    if (doubt.of_robot_file)
+      diagnosis.notes.push_back({doubt.code, Note::Severity::kWarning, doubt.text});
 }
 
 std::string file_doubts_said(const Diagnosis& diagnosis) {

@@ -8,13 +8,14 @@
 /// What a diagnosis says of the robot file.
 namespace trammel::cause_search {
 
-/// Without a Hayati row between parallel axes no number of the model is their tilt: what always acts in one of the two
-/// joints may be that. Its name is in doubt.
+/// Without a Hayati row between parallel axes no number of the model is their tilt: what always
+/// acts in one of the two joints may be that. Its name is in doubt.
 void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis);
 
-/// Adds to the notes what is doubtful of the robot file: by itself, and by what is identified on `batch` with all
-/// sources that the diagnosis ends with.
-void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis);
+/// Adds to the notes what is doubtful of the robot file: by itself, and by what is identified on
+/// `batch` with all sources that the diagnosis ends with.
+void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                      Diagnosis& diagnosis);
 
 /// The notes, a sentence each, with a blank behind; empty where there are none.
 [[nodiscard]] std::string file_doubts_said(const Diagnosis& diagnosis);

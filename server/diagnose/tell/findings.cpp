@@ -25,7 +25,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::ptrdiff_t kMostAccidents = 3;  // poses that are out beside something unexplained
-constexpr Index kBlocksOfHalves = 16;  // of poses one after the other, taken by turns: each half has all of the day
+constexpr Index kBlocksOfHalves =
+    16;  // of poses one after the other, taken by turns: each half has all of the day
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -34,19 +35,24 @@ struct Estimated {
 };
 
 Estimate in_units(const Parameter& parameter, double value, double stddev) {
-  return {parameter.name, parameter.unit, parameter.scale * value, parameter.scale * kExpanded * stddev};
+  return {parameter.name, parameter.unit, parameter.scale * value,
+          parameter.scale * kExpanded * stddev};
 }
 
 /// Of a sine and a cosine: their common amplitude and what it is uncertain by.
-Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, const Eigen::Matrix2d& covariance) {
+Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value,
+                      const Eigen::Matrix2d& covariance) {
   const double amplitude = value.norm();
-  const Eigen::Vector2d slope = amplitude > 0 ? Eigen::Vector2d(value / amplitude) : Eigen::Vector2d::UnitX();
-  return {name, "urad", 1e6 * amplitude, 1e6 * kExpanded * std::sqrt(slope.dot(covariance * slope))};
+  const Eigen::Vector2d slope =
+      amplitude > 0 ? Eigen::Vector2d(value / amplitude) : Eigen::Vector2d::UnitX();
+  return {name, "urad", 1e6 * amplitude,
+          1e6 * kExpanded * std::sqrt(slope.dot(covariance * slope))};
 }
 
-/// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a
-/// cosine of every harmonic, rad.
-Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd& values, const MatrixXd& covariance) {
+/// What a map makes of a joint's angle between the two poses that it moves farthest apart.
+/// `values`: a sine and a cosine of every harmonic, rad.
+Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd& values,
+                         const MatrixXd& covariance) {
   const auto functions = [&](double q) {
     VectorXd f(values.size());
     for (Index h = 0; 2 * h + 1 < f.size(); ++h) {
@@ -67,8 +73,8 @@ Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd
           1e6 * kExpanded * std::sqrt(across.dot(covariance * across))};
 }
 
-std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::string& source, const Cause& cause,
-                                    const Estimated& estimated) {
+std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::string& source,
+                                    const Cause& cause, const Estimated& estimated) {
   const std::vector<Index> places = places_of_source(problem.model(), source);
   std::vector<Estimate> estimates;
   VectorXd values(static_cast<Index>(places.size()));
@@ -80,31 +86,36 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
     values(i) = problem.model().values(k) + scale * estimated.change(k);
     for (Index j = 0; j < values.size(); ++j) {
       const Index other = places[static_cast<std::size_t>(j)];
-      covariance(i, j) = scale * priors[static_cast<std::size_t>(other)].prior_scale * estimated.covariance(k, other);
+      covariance(i, j) = scale * priors[static_cast<std::size_t>(other)].prior_scale *
+                         estimated.covariance(k, other);
     }
   }
   const Summary summary = record_of(cause).summary;
   if (summary == Summary::kOrderAndAmplitude) {
     estimates.push_back({"order", "", values(0), kExpanded * std::sqrt(covariance(0, 0))});
-    estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
+    estimates.push_back(
+        amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
   } else if (summary == Summary::kAmplitude) {
-    estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
+    estimates.push_back(
+        amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
   } else if (summary == Summary::kPeakToPeak && values.size() > 0) {
     estimates.push_back(peak_to_peak_of(problem, cause.joint, values, covariance));
   }
   if (!cause.parameter.empty()) {
     const OwnEstimate own = own_estimate(problem, source, estimated.change, estimated.covariance);
     for (Index i = 0; i < values.size(); ++i) {
-      const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
+      const Parameter& parameter =
+          priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
       if (parameter.name != cause.parameter) continue;
       // The others of its source at zero: it is this one that is named.
       const double alone = own.precision.row(i).dot(own.size) / own.precision(i, i);
-      return {
-          in_units(parameter, parameter.prior_scale * alone, parameter.prior_scale / std::sqrt(own.precision(i, i)))};
+      return {in_units(parameter, parameter.prior_scale * alone,
+                       parameter.prior_scale / std::sqrt(own.precision(i, i)))};
     }
   }
   for (Index i = 0; i < values.size(); ++i) {
-    const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
+    const Parameter& parameter =
+        priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
     if (parameter.is_place) continue;
     if (summary == Summary::kPeakToPeak) break;  // a hundred harmonics tell people nothing
     estimates.push_back(in_units(parameter, values(i), std::sqrt(covariance(i, i))));
@@ -112,17 +123,21 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   return estimates;
 }
 
-/// Whether other numbers of its source than the one that a cause is named by are there as well. That one is estimated
-/// with the others at zero, which then would be wrong.
+/// Whether other numbers of its source than the one that a cause is named by are there as well.
+/// That one is estimated with the others at zero, which then would be wrong.
 bool others_speak(const LinearProblem& problem, const Accepted& one, const Estimated& estimated) {
   if (one.cause.parameter.empty()) return false;
-  const OwnEstimate own = own_estimate(problem, one.in_model, estimated.change, estimated.covariance);
+  const OwnEstimate own =
+      own_estimate(problem, one.in_model, estimated.change, estimated.covariance);
   const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
   const auto& priors = problem.nuisance_parameters();
   for (Index i = 0; i < own.size.size(); ++i) {
-    if (priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])].name != one.cause.parameter) continue;
+    if (priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])].name !=
+        one.cause.parameter)
+      continue;
     const double alone = std::pow(own.precision.row(i).dot(own.size), 2) / own.precision(i, i);
-    return log_evidence(own.strength() - alone, static_cast<double>(own.size.size() - 1)) > thresholds::kOthersSpeak;
+    return log_evidence(own.strength() - alone, static_cast<double>(own.size.size() - 1)) >
+           thresholds::kOthersSpeak;
   }
   return false;
 }
@@ -135,13 +150,15 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-/// In what a pose may lie at the edge of all: the angles of the gears, the torques on them, how far the arm reaches.
+/// In what a pose may lie at the edge of all: the angles of the gears, the torques on them, how far
+/// the arm reaches.
 VectorXd posture_of(const PhysicalModel& model, const PoseContext& context) {
   const ArmState state = model.state(context);
   const JointVector gears = model.cell->robot.gear_angles(context.q);
   const VectorXd torques = ArmKinematics(state).gravity_torque();
   VectorXd posture(gears.size() + torques.size() + 1);
-  posture << gears, torques, (model.X_WB.inverse() * ArmKinematics(state).tool_pose_W()).translation().norm();
+  posture << gears, torques,
+      (model.X_WB.inverse() * ArmKinematics(state).tool_pose_W()).translation().norm();
   return posture;
 }
 
@@ -149,9 +166,12 @@ VectorXd posture_of(const PhysicalModel& model, const PoseContext& context) {
 class Findings {
  public:
   Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-           const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder);
+           const Surrogates& surrogates, const MeasurementBatch& recorded,
+           const Remainder& remainder);
 
-  [[nodiscard]] Finding of(const Accepted& one) const { return one.is_outlier() ? outlier(one) : cause(one); }
+  [[nodiscard]] Finding of(const Accepted& one) const {
+    return one.is_outlier() ? outlier(one) : cause(one);
+  }
 
  private:
   [[nodiscard]] Finding outlier(const Accepted& one) const;
@@ -161,14 +181,17 @@ class Findings {
   [[nodiscard]] Finding cause(const Accepted& one) const;
   /// As it is told: by one number only where that is alone.
   [[nodiscard]] Cause named(const Accepted& one) const;
-  /// The poses at which `one` may have begun, given its `effect` and everything else that is free (`rest`).
-  [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one, const VectorXd& effect,
+  /// The poses at which `one` may have begun, given its `effect` and everything else that is free
+  /// (`rest`).
+  [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one,
+                                                          const VectorXd& effect,
                                                           const Background& rest) const;
-  /// Whether the poses of every second block, and the others, show `one` by themselves. `effect`: what it does, with
-  /// the columns `others` free.
+  /// Whether the poses of every second block, and the others, show `one` by themselves. `effect`:
+  /// what it does, with the columns `others` free.
   [[nodiscard]] bool is_in_both_halves(const Accepted& one, const VectorXd& effect,
                                        const std::vector<Index>& others) const;
-  /// Whether `one`, which does `effect` and always acts, did so more at some times or temperatures than at others.
+  /// Whether `one`, which does `effect` and always acts, did so more at some times or temperatures
+  /// than at others.
   [[nodiscard]] bool changes_size(const Accepted& one, const VectorXd& effect) const;
   /// The family of `one`; null where it does not begin at a pose.
   [[nodiscard]] const Family* step_family(const Accepted& one) const;
@@ -201,35 +224,41 @@ Estimated estimated_beside(const MatrixXd& columns, const VectorXd& data) {
 
 bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_id.empty(); }
 
-Findings::Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-                   const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder)
+Findings::Findings(const SearchResult& found, const LinearProblem& problem,
+                   const Unexplained& unexplained, const Surrogates& surrogates,
+                   const MeasurementBatch& recorded, const Remainder& remainder)
     : problem_(problem),
       all_(found.all),
       surrogates_(surrogates),
       causes_(causes_of(found.accepted)),
       limit_(found.chance.limit),
-      beside_{causes_, unexplained, surrogates, recorded, remainder.more_than_noise, remainder.rms, remainder.larger},
+      beside_{causes_,       unexplained,     surrogates, recorded, remainder.more_than_noise,
+              remainder.rms, remainder.larger},
       columns_(background_columns(problem, found.unnamed)),
       estimated_(estimated_beside(columns_, problem.residual())),
       folds_(problem, columns_),
       held_out_(folds_.held_out_residual(problem.residual())) {
-  if (std::any_of(found.accepted.begin(), found.accepted.end(), begins)) families_ = make_families(problem);
-  more_than_accidents_ = std::count_if(found.accepted.begin(), found.accepted.end(),
-                                       [](const Accepted& one) { return one.is_outlier(); }) > kMostAccidents;
-  several_beyond_others_ = std::count_if(found.accepted.begin(), found.accepted.end(), [this](const Accepted& one) {
-                             return one.is_outlier() && is_beyond_others(one);
-                           }) > 1;
+  if (std::any_of(found.accepted.begin(), found.accepted.end(), begins))
+    families_ = make_families(problem);
+  more_than_accidents_ =
+      std::count_if(found.accepted.begin(), found.accepted.end(),
+                    [](const Accepted& one) { return one.is_outlier(); }) > kMostAccidents;
+  several_beyond_others_ =
+      std::count_if(found.accepted.begin(), found.accepted.end(), [this](const Accepted& one) {
+        return one.is_outlier() && is_beyond_others(one);
+      }) > 1;
 }
 
 Finding Findings::outlier(const Accepted& one) const {
   const ErrorFigures held_out = figures_of(problem_.positions(held_out_));
   std::vector<Cause> could_also_be;
   if (may_show_what_lacks(one)) could_also_be.push_back(unknown_cause());
-  std::string action = could_also_be.empty()
-                           ? action_for(one.cause, {})
-                           : "measure it again, and more poses near it: what the simulation lacks may be largest there";
+  std::string action = could_also_be.empty() ? action_for(one.cause, {})
+                                             : "measure it again, and more poses near it: what the "
+                                               "simulation lacks may be largest there";
   return {.cause = one.cause,
-          .parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * problem_.noise())}},
+          .parameters = {{"distance", "mm", to_mm(one.pose.distance),
+                          to_mm(kExpanded * problem_.noise())}},
           .effect_rms = one.pose.distance,
           .held_out_before = held_out,
           .held_out_after = held_out,
@@ -241,14 +270,15 @@ Finding Findings::outlier(const Accepted& one) const {
 
 bool Findings::may_show_what_lacks(const Accepted& one) const {
   if (several_beyond_others_ && is_beyond_others(one)) return true;
-  return beside_.more_than_noise &&
-         (more_than_accidents_ || is_beyond_others(one) || one.pose.distance < thresholds::kFarOut * beside_.left);
+  return beside_.more_than_noise && (more_than_accidents_ || is_beyond_others(one) ||
+                                     one.pose.distance < thresholds::kFarOut * beside_.left);
 }
 
 /// Whether the pose lies beyond all others in some way, where nothing says what the arm does.
 bool Findings::is_beyond_others(const Accepted& one) const {
   const auto& all = all_.measurements;
-  const auto out = std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
+  const auto out = std::find_if(all.begin(), all.end(),
+                                [&](const Measurement& m) { return m.row == one.pose.row; });
   if (out == all.end()) return false;
   VectorXd low = posture_of(problem_.model(), problem_.batch().measurements.front().context);
   VectorXd high = low;
@@ -259,7 +289,8 @@ bool Findings::is_beyond_others(const Accepted& one) const {
   }
   const VectorXd margin = thresholds::kBeyondOthers * (high - low);
   const VectorXd posture = posture_of(problem_.model(), out->context);
-  return ((posture - high - margin).array() > 0).any() || ((low - margin - posture).array() > 0).any();
+  return ((posture - high - margin).array() > 0).any() ||
+         ((low - margin - posture).array() > 0).any();
 }
 
 Cause Findings::named(const Accepted& one) const {
@@ -273,14 +304,16 @@ Finding Findings::cause(const Accepted& one) const {
   std::vector<Estimate> parameters = parameters_of(problem_, one.in_model, cause, estimated_);
   if (cause.order && !parameters.empty()) cause.order = parameters.front().value;
   if (has_made_up_numbers(surrogates_, cause)) parameters.clear();
-  const std::vector<Index> others = all_but(columns_.cols(), places_of_source(problem_.model(), one.in_model));
+  const std::vector<Index> others =
+      all_but(columns_.cols(), places_of_source(problem_.model(), one.in_model));
   const VectorXd effect = effect_of_source(problem_, one.in_model);
   const Background rest(columns_(Eigen::all, others));
   const double effect_rms = problem_.position_rms(rest.project(effect));
   const VectorXd without = folds_.held_out_residual(problem_.residual() + effect, others);
   const ErrorFigures before = figures_of(problem_.positions(without));
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
-  const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
+  const OwnEstimate own =
+      own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
   const Evidence evidence{effect_rms,
                           !beside_.more_than_noise || is_in_both_halves(one, effect, others),
                           held_out_.squaredNorm() < without.squaredNorm(),
@@ -304,7 +337,8 @@ Finding Findings::cause(const Accepted& one) const {
           .action = std::move(judgement.action)};
 }
 
-bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect, const std::vector<Index>& others) const {
+bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect,
+                                 const std::vector<Index>& others) const {
   const std::vector<Index> own = places_of_source(problem_.model(), one.in_model);
   const VectorXd data = problem_.residual() + effect;
   const Index block = std::max<Index>(1, problem_.poses() / kBlocksOfHalves);
@@ -312,13 +346,15 @@ bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect, co
     std::vector<Index> rows;
     for (Index i = 0; i < problem_.poses(); ++i) {
       if ((i / block) % 2 != half) continue;
-      for (Index row = problem_.first_row(i); row < problem_.first_row(i + 1); ++row) rows.push_back(row);
+      for (Index row = problem_.first_row(i); row < problem_.first_row(i + 1); ++row)
+        rows.push_back(row);
     }
     const Background rest(columns_(rows, others));
     const MatrixXd C = columns_(rows, own);
     MatrixXd information = transposed_product(C, rest.project(C));
     information.diagonal().array() += 1;
-    const VectorXd along = inverse_factor_of(information) * (C.transpose() * rest.project(data(rows)));
+    const VectorXd along =
+        inverse_factor_of(information) * (C.transpose() * rest.project(data(rows)));
     const double freedom = std::min<double>(one.best.freedom, static_cast<double>(own.size()));
     if (log_evidence(along.squaredNorm(), freedom) - one.penalty < limit_) return false;
   }
@@ -327,7 +363,8 @@ bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect, co
 
 bool Findings::changes_size(const Accepted& one, const VectorXd& effect) const {
   const CauseRecord& record = record_of(one.cause);
-  if (record.lasting != causes::Lasting::kAlways || record.scope != causes::Scope::kJoint) return false;
+  if (record.lasting != causes::Lasting::kAlways || record.scope != causes::Scope::kJoint)
+    return false;
   const auto& poses = problem_.batch().measurements;
   VectorXd time = VectorXd::LinSpaced(problem_.poses(), -1, 1);
   VectorXd temperature = VectorXd::Zero(problem_.poses());
@@ -340,7 +377,8 @@ bool Findings::changes_size(const Accepted& one, const VectorXd& effect) const {
     if (!(course.norm() > 0)) return 0.0;
     VectorXd more = effect;
     for (Index i = 0; i < problem_.poses(); ++i)
-      more.segment(problem_.first_row(i), problem_.row_count(i)) *= course(i) / course.cwiseAbs().maxCoeff();
+      more.segment(problem_.first_row(i), problem_.row_count(i)) *=
+          course(i) / course.cwiseAbs().maxCoeff();
     const double own = more.dot(VectorXd(all.project(more)));
     return own > 0 ? log_evidence(std::pow(more.dot(left), 2) / own, 1) : 0;
   };
@@ -360,13 +398,14 @@ std::vector<PossibleBeginning> Findings::beginnings(const Accepted& one, const V
                                                     const Background& rest) const {
   const Family* family = step_family(one);
   const auto& poses = problem_.batch().measurements;
-  const auto found =
-      std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.pose_id == one.cause.pose_id; });
+  const auto found = std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) {
+    return m.pose_id == one.cause.pose_id;
+  });
   if (family == nullptr || found == poses.end()) return {};
   const MatrixXd always = family->columns({.pose = 0});
   std::vector<PossibleBeginning> beginnings;
-  for (const Index i :
-       possible_beginnings(problem_, always, rest, problem_.residual() + effect, found - poses.begin())) {
+  for (const Index i : possible_beginnings(problem_, always, rest, problem_.residual() + effect,
+                                           found - poses.begin())) {
     const Measurement& m = poses[static_cast<std::size_t>(i)];
     beginnings.push_back({m.pose_id, m.row, surrogates_.time ? std::nullopt : m.context.time});
   }
@@ -386,7 +425,8 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
 
 HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {
   const auto of = [](const LinearProblem& problem, const MatrixXd& columns) {
-    return figures_of(problem.positions(Folds(problem, columns).held_out_residual(problem.residual())));
+    return figures_of(
+        problem.positions(Folds(problem, columns).held_out_residual(problem.residual())));
   };
   return {of(before, before.nuisance()), of(after, after.nuisance())};
 }

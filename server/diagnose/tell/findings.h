@@ -12,12 +12,13 @@ struct Remainder {
   bool larger = false;  ///< than stated, and not by chance: perhaps more than noise
 };
 
-/// The findings of a search, each built once: its numbers beside everything else that was found (parameters by
-/// generalised least squares, effects, strengths, what it gains on poses held out), and how sure its name is.
-/// `problem`: about the extended model. `recorded`: the batch without surrogates.
-[[nodiscard]] std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
-                                               const Unexplained& unexplained, const Surrogates& surrogates,
-                                               const MeasurementBatch& recorded, const Remainder& remainder);
+/// The findings of a search, each built once: its numbers beside everything else that was found
+/// (parameters by generalised least squares, effects, strengths, what it gains on poses held out),
+/// and how sure its name is. `problem`: about the extended model. `recorded`: the batch without
+/// surrogates.
+[[nodiscard]] std::vector<Finding> findings_of(
+    const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
+    const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder);
 
 /// Errors of poses held out, fold by fold, before and after.
 struct HeldOut {

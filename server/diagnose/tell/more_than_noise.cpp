@@ -27,27 +27,33 @@ double deviations(const LeftOver& left) {
   return std::log(ratio_of(left)) / std::hypot(thresholds::kSigmaKnownTo, by_chance(left));
 }
 
-LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
+LeftOver left_of(const LinearProblem::Spread& spread) {
+  return {spread.noise, spread.stated, spread.freedom};
+}
 
-/// What the model leaves in position with its numbers within their bounds. A spread is what no number explains wherever
-/// it would have to stand: a gearbox that lifts its load explains away what then is left.
+/// What the model leaves in position with its numbers within their bounds. A spread is what no
+/// number explains wherever it would have to stand: a gearbox that lifts its load explains away
+/// what then is left.
 LeftOver left_within_bounds(const LinearProblem& served) {
   LeftOver left = left_of(served.position_spread());
   double square = 0;
   for (Eigen::Index i = 0; i < served.poses(); ++i)
-    square += served.residual().segment<3>(served.first_row(i)).cwiseAbs2().cwiseMin(kCut * kCut).sum();
+    square +=
+        served.residual().segment<3>(served.first_row(i)).cwiseAbs2().cwiseMin(kCut * kCut).sum();
   if (left.freedom > 0) left.left *= std::sqrt(std::max(1.0, square / left.freedom));
   return left;
 }
 
-/// Of positions: what has no name is told by itself, and the model cannot be held to what it leaves without that.
+/// Of positions: what has no name is told by itself, and the model cannot be held to what it leaves
+/// without that.
 LeftOver left_in_position(const Explained& explained) {
   return explained.found.unnamed.empty() ? left_within_bounds(explained.served)
                                          : left_of(explained.after.position_spread());
 }
 
 NoiseVerdict worst_of(const Explained& explained) {
-  return std::max(judge_noise(left_in_position(explained)), judge_noise(left_of(explained.after.rotation_spread())));
+  return std::max(judge_noise(left_in_position(explained)),
+                  judge_noise(left_of(explained.after.rotation_spread())));
 }
 
 /// The causes that the model has and whose numbers would have to stand beyond their bounds.
@@ -57,7 +63,8 @@ std::vector<WrongSign> wrong_signs_of(const LinearProblem& served) {
   const Eigen::MatrixXd covariance = all.covariance();
   std::vector<WrongSign> wrong;
   for (const ErrorSourcePtr& source : served.model().sources) {
-    WrongSign sign = wrong_sign_of(served, source->name(), cause_of(*source, served.batch()), change, covariance);
+    WrongSign sign = wrong_sign_of(served, source->name(), cause_of(*source, served.batch()),
+                                   change, covariance);
     if (!sign.numbers.empty() && sign.is_beyond_chance()) wrong.push_back(std::move(sign));
   }
   return wrong;
@@ -88,32 +95,41 @@ std::string with_what_was_not_recorded(const Surrogates& unrecorded) {
 }
 
 /// Whether repeated poses scatter by more than they vouch for.
-bool scatter_beyond_noise(const RepeatStatistics& repeats) { return repeats.sigma_factor > thresholds::kRepeatsVouch; }
+bool scatter_beyond_noise(const RepeatStatistics& repeats) {
+  return repeats.sigma_factor > thresholds::kRepeatsVouch;
+}
 
 /// What would show more, given what repeated poses say.
 std::string what_shows_more(const PreparedBatch& prepared) {
   if (prepared.repeats.degrees_of_freedom == 0)
-    return "measure some poses repeatedly, which tells a noisy measurement from something that the simulation "
-           "lacks, and check the tracker's sigma in the cell file";
-  if (scatter_beyond_noise(prepared.repeats)) return "find first what moves between poses measured repeatedly";
+    return "measure some poses repeatedly, which tells a noisy measurement from something that the "
+           "simulation lacks, and check the tracker's sigma in the cell file";
+  if (scatter_beyond_noise(prepared.repeats))
+    return "find first what moves between poses measured repeatedly";
   return fmt::format(
-      "poses measured repeatedly scatter by {} an axis only: the simulation lacks something that more poses{} may show",
+      "poses measured repeatedly scatter by {} an axis only: the simulation lacks something that "
+      "more poses{} may show",
       micrometres(prepared.repeats.sigma), with_what_was_not_recorded(prepared.surrogates));
 }
 
 /// The sessions that leave more than noise.
-std::vector<LeftBySession> sessions_beyond_noise(const Explained& explained, const PreparedBatch& prepared) {
-  std::vector<LeftBySession> sessions = left_by_session(explained.after, explained.all, prepared.sessions);
-  std::erase_if(sessions,
-                [](const LeftBySession& one) { return judge_noise(one.left) != NoiseVerdict::kMoreThanNoise; });
+std::vector<LeftBySession> sessions_beyond_noise(const Explained& explained,
+                                                 const PreparedBatch& prepared) {
+  std::vector<LeftBySession> sessions =
+      left_by_session(explained.after, explained.all, prepared.sessions);
+  std::erase_if(sessions, [](const LeftBySession& one) {
+    return judge_noise(one.left) != NoiseVerdict::kMoreThanNoise;
+  });
   return sessions;
 }
 
-/// "session day-2 leaves 1.8 times the stated noise": those of several sessions; empty where none does.
+/// "session day-2 leaves 1.8 times the stated noise": those of several sessions; empty where none
+/// does.
 std::string said_of_sessions(const std::vector<LeftBySession>& beyond) {
   std::vector<std::string> all;
   for (const LeftBySession& one : beyond)
-    all.push_back(fmt::format("session {} leaves {:.1f} times the stated noise", one.id, ratio_of(one.left)));
+    all.push_back(
+        fmt::format("session {} leaves {:.1f} times the stated noise", one.id, ratio_of(one.left)));
   return fmt::format("{}", fmt::join(all, ", "));
 }
 
@@ -127,13 +143,12 @@ void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   const RepeatStatistics& repeats = prepared.repeats;
   if (!scatter_beyond_noise(repeats)) return;
   const std::string hint = fmt::format(
-      "poses measured repeatedly scatter by {} an axis, {:.0f} times the stated noise: that is no noise of the "
-      "instrument; {}",
+      "poses measured repeatedly scatter by {} an axis, {:.0f} times the stated noise: that is no "
+      "noise of the instrument; {}",
       micrometres(repeats.sigma), repeats.sigma_factor,
-      prepared.surrogates.direction
-          ? "were they approached from different sides (record dir columns), or did something "
-            "move between them?"
-          : "did something move between them?");
+      prepared.surrogates.direction ? "were they approached from different sides (record dir "
+                                      "columns), or did something move between them?"
+                                    : "did something move between them?");
   Unexplained& unexplained = diagnosis.unexplained;
   if (unexplained.present) {
     diagnosis.limits.push_back(hint);
@@ -158,8 +173,10 @@ bool has_unseen_side(const MeasurementBatch& recorded) {
   return false;
 }
 
-/// Adds what the effects of the model's own causes with a wrong sign change with; what they mean, and what to measure.
-std::optional<std::string> tell_wrong_signs(const LinearProblem& served, const MeasurementBatch& recorded,
+/// Adds what the effects of the model's own causes with a wrong sign change with; what they mean,
+/// and what to measure.
+std::optional<std::string> tell_wrong_signs(const LinearProblem& served,
+                                            const MeasurementBatch& recorded,
                                             Unexplained& unexplained) {
   std::string text;
   bool gives_way = false;
@@ -172,10 +189,12 @@ std::optional<std::string> tell_wrong_signs(const LinearProblem& served, const M
     }
   }
   if (text.empty()) return std::nullopt;
-  text += gives_way && has_unseen_side(recorded)
-              ? "Play that grows with the load does this where every pose comes from one side: approach the poses from "
-                "both sides of each joint, and record the sides (dir columns)."
-              : "Measure with another known payload, or without any, which tells what goes with the load.";
+  text +=
+      gives_way && has_unseen_side(recorded)
+          ? "Play that grows with the load does this where every pose comes from one side: "
+            "approach the poses from both sides of each joint, and record the sides (dir columns)."
+          : "Measure with another known payload, or without any, which tells what goes with the "
+            "load.";
   return text;
 }
 
@@ -191,9 +210,11 @@ bool is_worse_held_out(const PreparedBatch& prepared, const Diagnosis& diagnosis
 }  // namespace
 
 NoiseVerdict judge_noise(const LeftOver& left) {
-  if (left.freedom <= 0 || std::log(ratio_of(left)) <= thresholds::kNoiseDeviations * by_chance(left))
+  if (left.freedom <= 0 ||
+      std::log(ratio_of(left)) <= thresholds::kNoiseDeviations * by_chance(left))
     return NoiseVerdict::kAsStated;
-  return deviations(left) > thresholds::kNoiseDeviations ? NoiseVerdict::kMoreThanNoise : NoiseVerdict::kLarger;
+  return deviations(left) > thresholds::kNoiseDeviations ? NoiseVerdict::kMoreThanNoise
+                                                         : NoiseVerdict::kLarger;
 }
 
 double chance_of_noise(const LeftOver& left) {
@@ -201,15 +222,20 @@ double chance_of_noise(const LeftOver& left) {
   return std::max(kLeastPValue, 0.5 * std::erfc(deviations(left) / std::sqrt(2.0)));
 }
 
-double vouched_by(const RepeatStatistics& repeats) { return scatter_beyond_noise(repeats) ? 1 : repeats.sigma_factor; }
+double vouched_by(const RepeatStatistics& repeats) {
+  return scatter_beyond_noise(repeats) ? 1 : repeats.sigma_factor;
+}
 
 bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared) {
-  return worst_of(explained) == NoiseVerdict::kMoreThanNoise || scatter_beyond_noise(prepared.repeats) ||
+  return worst_of(explained) == NoiseVerdict::kMoreThanNoise ||
+         scatter_beyond_noise(prepared.repeats) ||
          !sessions_beyond_noise(explained, prepared).empty();
 }
 
-Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
-  const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained, prepared) ||
+Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared,
+                       const Diagnosis& diagnosis) {
+  const bool more = !explained.found.unnamed.empty() ||
+                    leaves_more_than_noise(explained, prepared) ||
                     is_worse_held_out(prepared, diagnosis);
   const bool larger = worst_of(explained) >= NoiseVerdict::kLarger;
   return {more, more || larger ? rms_beyond(left_in_position(explained)) : 0, larger};
@@ -225,14 +251,16 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   const std::string more = what_shows_more(prepared);
   if (worst != NoiseVerdict::kMoreThanNoise && beyond.empty()) {
     diagnosis.limits.push_back(fmt::format("a little more than noise: what is left is {}; {}",
-                                           figures(position, rotation, NoiseVerdict::kLarger), more));
+                                           figures(position, rotation, NoiseVerdict::kLarger),
+                                           more));
     return;
   }
   std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
   if (!beyond.empty()) what += (what.empty() ? "" : "; ") + said_of_sessions(beyond);
   Unexplained& unexplained = diagnosis.unexplained;
   if (unexplained.present) {
-    diagnosis.limits.push_back(fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
+    diagnosis.limits.push_back(
+        fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
     return;
   }
   unexplained.present = true;
@@ -243,7 +271,8 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
     unexplained.p_value = std::min(unexplained.p_value, chance_of_noise(one.left));
   }
   unexplained.hint = fmt::format("more than noise is left: {}. ", what);
-  unexplained.hint += tell_wrong_signs(explained.served, diagnosis.batch, unexplained).value_or(as_sentence(more));
+  unexplained.hint +=
+      tell_wrong_signs(explained.served, diagnosis.batch, unexplained).value_or(as_sentence(more));
 }
 
 }  // namespace trammel::cause_search

@@ -34,18 +34,22 @@ struct Member {
 /// The index of a pose in a batch, 0 where it has none of that name.
 Index index_of(const MeasurementBatch& batch, const std::string& pose_id) {
   const auto& all = batch.measurements;
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.pose_id == pose_id; });
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [&](const Measurement& m) { return m.pose_id == pose_id; });
   return found == all.end() ? 0 : found - all.begin();
 }
 
 /// `cause` among the families of `problem`; its size and length scale as the data have them.
-std::optional<Member> member_of(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+std::optional<Member> member_of(const LinearProblem& problem,
+                                const std::vector<FamilyPtr>& families,
                                 const Background& background, const Cause& cause) {
   for (const FamilyPtr& family : families) {
     if (!family->named() || !family->predicts()) continue;
     const Cause one = family->cause(family->typical());
-    if (one.cause != cause.cause || one.joint != cause.joint || one.parameter != cause.parameter) continue;
-    Member member{family.get(), family->scan({background}, background.project(problem.residual())).front(),
+    if (one.cause != cause.cause || one.joint != cause.joint || one.parameter != cause.parameter)
+      continue;
+    Member member{family.get(),
+                  family->scan({background}, background.project(problem.residual())).front(),
                   !cause.pose_id.empty()};
     if (!(member.best.evidence > 0)) member.best = family->typical();
     if (cause.order) member.best.order = *cause.order;
@@ -55,8 +59,8 @@ std::optional<Member> member_of(const LinearProblem& problem, const std::vector<
   return std::nullopt;
 }
 
-/// Columns of everything that is free when a finding is doubted: the model's parameters, the rivals, and last the
-/// finding itself.
+/// Columns of everything that is free when a finding is doubted: the model's parameters, the
+/// rivals, and last the finding itself.
 struct Doubted {
   MatrixXd columns;
   Index own = 0;  // the last ones
@@ -73,11 +77,13 @@ Doubted doubted(const LinearProblem& problem, const std::vector<Member>& members
 }
 
 /// The same causes among the families of poses that are measured afterwards.
-std::vector<Member> afterwards(const std::vector<Member>& members, const std::vector<FamilyPtr>& families) {
+std::vector<Member> afterwards(const std::vector<Member>& members,
+                               const std::vector<FamilyPtr>& families) {
   std::vector<Member> later;
   for (const Member& member : members) {
-    const auto same = std::find_if(families.begin(), families.end(),
-                                   [&](const FamilyPtr& family) { return family->label() == member.family->label(); });
+    const auto same = std::find_if(families.begin(), families.end(), [&](const FamilyPtr& family) {
+      return family->label() == member.family->label();
+    });
     if (same == families.end()) return {};
     later.push_back({same->get(), member.best, member.begins});
     if (member.begins) later.back().best.pose = 0;
@@ -85,10 +91,12 @@ std::vector<Member> afterwards(const std::vector<Member>& members, const std::ve
   return later;
 }
 
-/// The uncertainty of the finding's effect over the poses measured, in shares of its size, and how more poses lower it.
+/// The uncertainty of the finding's effect over the poses measured, in shares of its size, and how
+/// more poses lower it.
 class Uncertainty {
  public:
-  Uncertainty(const Doubted& doubted, MatrixXd weight) : weight_(std::move(weight)), own_(doubted.own) {
+  Uncertainty(const Doubted& doubted, MatrixXd weight)
+      : weight_(std::move(weight)), own_(doubted.own) {
     const Index P = doubted.columns.cols();
     information_ = doubted.columns.transpose() * doubted.columns + MatrixXd::Identity(P, P);
     covariance_ = information_.llt().solve(MatrixXd::Identity(P, P));
@@ -96,12 +104,14 @@ class Uncertainty {
   double variance() const { return (covariance_.bottomRightCorner(own_, own_) * weight_).trace(); }
   double variance_with(const MatrixXd& rows) const {
     const MatrixXd gain = covariance_.bottomRows(own_) * rows.transpose();
-    const MatrixXd innovation = rows * covariance_ * rows.transpose() + MatrixXd::Identity(rows.rows(), rows.rows());
+    const MatrixXd innovation =
+        rows * covariance_ * rows.transpose() + MatrixXd::Identity(rows.rows(), rows.rows());
     return variance() - (gain * innovation.llt().solve(gain.transpose()) * weight_).trace();
   }
   void add(const MatrixXd& rows) {
     information_ += rows.transpose() * rows;
-    covariance_ = information_.llt().solve(MatrixXd::Identity(information_.rows(), information_.rows()));
+    covariance_ =
+        information_.llt().solve(MatrixXd::Identity(information_.rows(), information_.rows()));
   }
 
  private:
@@ -119,7 +129,8 @@ using Candidates = std::vector<Candidate>;
 class Measuring {
  public:
   /// `columns`: how many the members and the model's parameters have together.
-  Measuring(const SearchResult& found, const std::vector<Member>& members, Index columns, std::uint64_t seed)
+  Measuring(const SearchResult& found, const std::vector<Member>& members, Index columns,
+            std::uint64_t seed)
       : found_(found), members_(members), columns_(columns), random_(seed), seed_(seed) {}
 
   /// Evenly over the cell's ranges.
@@ -127,8 +138,8 @@ class Measuring {
     const MatrixXd planned = TRY(plan_poses(cell(), {.count = kPool, .seed = seed_}));
     return measurable(planned);
   }
-  /// `chosen` with one or two joints elsewhere: anywhere in their ranges, or as near to an end as they can be
-  /// approached.
+  /// `chosen` with one or two joints elsewhere: anywhere in their ranges, or as near to an end as
+  /// they can be approached.
   Candidates variants(const JointVector& chosen) {
     const Result<JointRanges> ranges = planning_ranges(cell());
     if (!ranges) return {};
@@ -148,9 +159,11 @@ class Measuring {
   }
 
  private:
-  /// Those that a plan takes as they will be written: on the grid of programs, with a way to be approached on.
+  /// Those that a plan takes as they will be written: on the grid of programs, with a way to be
+  /// approached on.
   Candidates measurable(MatrixXd all) {
-    for (Index i = 0; i < all.rows(); ++i) all.row(i) = on_program_grid(cell().robot, all.row(i).transpose());
+    for (Index i = 0; i < all.rows(); ++i)
+      all.row(i) = on_program_grid(cell().robot, all.row(i).transpose());
     const Result<std::vector<bool>> may = plannable(cell(), all);
     std::vector<Index> kept;
     for (Index i = 0; may && i < all.rows(); ++i) {
@@ -190,7 +203,8 @@ class Measuring {
     TRAMMEL_CHECK(columns.cols() == columns_);
     Candidates all;
     for (Index i = 0; i < q.rows(); ++i)
-      all.push_back({q.row(i).transpose(), columns.middleRows(problem.first_row(i), problem.row_count(i))});
+      all.push_back(
+          {q.row(i).transpose(), columns.middleRows(problem.first_row(i), problem.row_count(i))});
     return all;
   }
 
@@ -243,7 +257,8 @@ void move(Candidates& chosen, Measuring& measuring, const Uncertainty& now) {
 }
 
 /// Standard deviation with as many random ones of the pool, on average.
-double stddev_with_random(Candidates pool, std::size_t count, const Uncertainty& now, std::uint64_t seed) {
+double stddev_with_random(Candidates pool, std::size_t count, const Uncertainty& now,
+                          std::uint64_t seed) {
   std::mt19937_64 random(seed);
   double sum = 0;
   for (int set = 0; set < kRandomSets; ++set) {
@@ -256,7 +271,8 @@ double stddev_with_random(Candidates pool, std::size_t count, const Uncertainty&
 
 }  // namespace
 
-NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before, const DiagnoseOptions& options) {
+NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
+                         const DiagnoseOptions& options) {
   const auto finding = std::find_if(found.accepted.begin(), found.accepted.end(),
                                     [](const Accepted& one) { return !one.could_also_be.empty(); });
   if (finding == found.accepted.end() || options.next_poses <= 0) return {};
@@ -287,7 +303,8 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
 
   NextPoses next;
   next.separates = {finding->cause};
-  next.separates.insert(next.separates.end(), finding->could_also_be.begin(), finding->could_also_be.end());
+  next.separates.insert(next.separates.end(), finding->could_also_be.begin(),
+                        finding->could_also_be.end());
   next.stddev_now = std::sqrt(now.variance());
   next.stddev_expected = std::sqrt(with(now, chosen).variance());
   // What no pose tells apart needs something else, as the finding's action says.

@@ -21,14 +21,17 @@ constexpr int kMostRounds = 20;       // of sides and play by turns: each lowers
 std::string listed(std::vector<std::string> ids) {
   const std::size_t more = ids.size() - std::min(ids.size(), kMostIds);
   ids.resize(ids.size() - more);
-  return fmt::format("{}{}", fmt::join(ids, ", "), more > 0 ? fmt::format(" and {} more", more) : "");
+  return fmt::format("{}{}", fmt::join(ids, ", "),
+                     more > 0 ? fmt::format(" and {} more", more) : "");
 }
 
 /// What single poses would fit as.
 class Misread {
  public:
   explicit Misread(const Explained& explained)
-      : model_(explained.after.model()), noise_(explained.after.noise()), all_(explained.found.all.measurements) {
+      : model_(explained.after.model()),
+        noise_(explained.after.noise()),
+        all_(explained.found.all.measurements) {
     for (const Accepted& one : explained.found.accepted) {
       if (one.is_outlier()) out_.push_back(measured_at(one.pose));
     }
@@ -46,12 +49,15 @@ class Misread {
     return text;
   }
   /// Pose ids by what was found of them, `poses that ...`.
-  [[nodiscard]] const std::map<std::string, std::vector<std::string>>& groups() const { return groups_; }
+  [[nodiscard]] const std::map<std::string, std::vector<std::string>>& groups() const {
+    return groups_;
+  }
 
  private:
   [[nodiscard]] const Measurement* measured_at(const SuspectedPose& pose) const {
-    const auto found = std::find_if(
-        all_.begin(), all_.end(), [&](const Measurement& m) { return m.row == pose.row && m.pose_id == pose.pose_id; });
+    const auto found = std::find_if(all_.begin(), all_.end(), [&](const Measurement& m) {
+      return m.row == pose.row && m.pose_id == pose.pose_id;
+    });
     return found == all_.end() ? nullptr : &*found;
   }
   [[nodiscard]] double distance(const Measurement& m, const PoseContext& context) const {
@@ -60,7 +66,8 @@ class Misread {
   /// Whether `m` fits that context, and its own far worse.
   [[nodiscard]] bool fits(const Measurement& m, const PoseContext& context) const {
     const double other = distance(m, context);
-    return other < thresholds::kFitsOtherwise * noise_ && other < thresholds::kFitsBetter * distance(m, m.context);
+    return other < thresholds::kFitsOtherwise * noise_ &&
+           other < thresholds::kFitsBetter * distance(m, m.context);
   }
   std::string noted(const std::string& group, const Measurement& m, std::string reason) {
     groups_[group].push_back(m.pose_id);
@@ -105,15 +112,17 @@ class Misread {
     };
     for (const Measurement* other : out_) {
       if (has_joints_of(*other))
-        return noted("poses that were measured with the joints of another row", m,
-                     fmt::format("was measured with the joints of row {} ({}): were rows exchanged?", other->row,
-                                 other->pose_id));
+        return noted(
+            "poses that were measured with the joints of another row", m,
+            fmt::format("was measured with the joints of row {} ({}): were rows exchanged?",
+                        other->row, other->pose_id));
     }
     const auto other = std::find_if(all_.begin(), all_.end(), has_joints_of);
     if (other == all_.end()) return "";
-    return noted("poses that were measured with the joints of another row", m,
-                 fmt::format("was measured with the joints of row {} ({}): was it copied or shifted?", other->row,
-                             other->pose_id));
+    return noted(
+        "poses that were measured with the joints of another row", m,
+        fmt::format("was measured with the joints of row {} ({}): was it copied or shifted?",
+                    other->row, other->pose_id));
   }
 
   const PhysicalModel& model_;
@@ -123,7 +132,8 @@ class Misread {
   std::map<std::string, std::vector<std::string>> groups_;
 };
 
-/// Sides of approach, +1 as marked or -1 from the other side, found together with the play that they make.
+/// Sides of approach, +1 as marked or -1 from the other side, found together with the play that
+/// they make.
 class Sides {
  public:
   Sides(const LinearProblem& problem, const Background& all, const std::string& source)
@@ -142,8 +152,8 @@ class Sides {
       if (!turn_sides()) break;
     }
   }
-  /// Places of the poses that came from the other side, beyond doubt; none where more than half did, which is the sign
-  /// of all marks.
+  /// Places of the poses that came from the other side, beyond doubt; none where more than half
+  /// did, which is the sign of all marks.
   [[nodiscard]] std::vector<Index> marked_wrongly() const {
     std::vector<Index> wrong;
     const double noise = left_.squaredNorm() / static_cast<double>(left_.size());
@@ -202,7 +212,8 @@ bool are_one(const Explained& explained, const Measurement& m, const std::string
 }
 
 /// Doubts the findings of `record`, of that joint.
-void doubt(Diagnosis& diagnosis, const CauseRecord& record, const Cause& rival, const std::string& action) {
+void doubt(Diagnosis& diagnosis, const CauseRecord& record, const Cause& rival,
+           const std::string& action) {
   for (Finding& finding : diagnosis.findings) {
     if (&record_of(finding.cause) != &record || finding.cause.joint != rival.joint) continue;
     auto& others = finding.could_also_be;
@@ -228,17 +239,22 @@ void tell_wrong_sides(const Explained& explained, Diagnosis& diagnosis) {
           {.pose_id = m.pose_id,
            .row = m.row,
            .distance = problem.positions(problem.residual()).col(i).norm(),
-           .reason = fmt::format("came from the other side of joint {} than dir{} says", joint, joint)});
+           .reason =
+               fmt::format("came from the other side of joint {} than dir{} says", joint, joint)});
     }
-    const std::string what = fmt::format("{} of {} poses came from the other side of joint {} than dir{} says",
-                                         wrong.size(), problem.poses(), joint, joint);
+    const std::string what =
+        fmt::format("{} of {} poses came from the other side of joint {} than dir{} says",
+                    wrong.size(), problem.poses(), joint, joint);
     diagnosis.limits.push_back(fmt::format("{}: {}", what, listed(std::move(ids))));
     doubt(diagnosis, record_of(one.cause), unknown_cause(one.cause.joint),
-          what + ": correct the marks and diagnose again, for the size of the play is not to be trusted");
+          what +
+              ": correct the marks and diagnose again, for the size of the play is not to be "
+              "trusted");
   }
 }
 
-/// Tools that are two in the cell and one by what was found: then the rows of the rarer one may have the wrong name.
+/// Tools that are two in the cell and one by what was found: then the rows of the rarer one may
+/// have the wrong name.
 void tell_tools_that_are_one(const Explained& explained, Diagnosis& diagnosis) {
   const auto& rows = explained.found.batch.measurements;
   std::map<std::string, std::vector<const Measurement*>> by_tool;
@@ -249,12 +265,14 @@ void tell_tools_that_are_one(const Explained& explained, Diagnosis& diagnosis) {
       std::vector<std::string> ids;
       for (const Measurement* m : own) {
         ids.push_back(m->pose_id);
-        diagnosis.suspects.push_back({.pose_id = m->pose_id,
-                                      .row = m->row,
-                                      .reason = fmt::format("fits tool '{}': is its tool_id wrong?", usual)});
+        diagnosis.suspects.push_back(
+            {.pose_id = m->pose_id,
+             .row = m->row,
+             .reason = fmt::format("fits tool '{}': is its tool_id wrong?", usual)});
       }
       diagnosis.limits.push_back(
-          fmt::format("tool '{}' is found where tool '{}' is: are these tool_ids wrong? {}", rare, usual, listed(ids)));
+          fmt::format("tool '{}' is found where tool '{}' is: are these tool_ids wrong? {}", rare,
+                      usual, listed(ids)));
       doubt(diagnosis, cause_correcting(causes::Part::kTool), unknown_cause(),
             fmt::format("see whether the rows of tool '{}' were measured with '{}'", rare, usual));
     }
@@ -264,15 +282,16 @@ void tell_tools_that_are_one(const Explained& explained, Diagnosis& diagnosis) {
 void tell_times(const MeasurementBatch& recorded, Diagnosis& diagnosis) {
   const std::vector<std::size_t> against = rows_against_time(recorded);
   const auto& rows = recorded.measurements;
-  if (against.empty() ||
-      static_cast<double>(against.size()) > thresholds::kMostOutliers * static_cast<double>(rows.size()))
+  if (against.empty() || static_cast<double>(against.size()) >
+                             thresholds::kMostOutliers * static_cast<double>(rows.size()))
     return;
   std::vector<std::string> ids;
   for (const std::size_t i : against) {
     ids.push_back(rows[i].pose_id);
-    diagnosis.suspects.push_back({.pose_id = rows[i].pose_id,
-                                  .row = rows[i].row,
-                                  .reason = "its time_s falls behind the row before, or runs ahead of the next"});
+    diagnosis.suspects.push_back(
+        {.pose_id = rows[i].pose_id,
+         .row = rows[i].row,
+         .reason = "its time_s falls behind the row before, or runs ahead of the next"});
   }
   diagnosis.limits.push_back(
       fmt::format("time_s does not rise at {}: are these times or rows exchanged?", listed(ids)));
@@ -287,8 +306,9 @@ std::vector<std::size_t> rows_against_time(const MeasurementBatch& batch) {
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     if (!batch.measurements[i].context.time) continue;
     known.push_back(i);
-    const auto place = std::upper_bound(tails.begin(), tails.end(), time(i),
-                                        [&](double t, std::size_t other) { return t < time(other); });
+    const auto place =
+        std::upper_bound(tails.begin(), tails.end(), time(i),
+                         [&](double t, std::size_t other) { return t < time(other); });
     before[i] = place == tails.begin() ? i : *std::prev(place);
     if (place == tails.end()) {
       tails.push_back(i);
@@ -297,17 +317,22 @@ std::vector<std::size_t> rows_against_time(const MeasurementBatch& batch) {
     }
   }
   std::vector<bool> rises(batch.measurements.size(), false);
-  for (std::size_t i = tails.empty() ? 0 : tails.back(), k = tails.size(); k > 0; --k, i = before[i]) rises[i] = true;
+  for (std::size_t i = tails.empty() ? 0 : tails.back(), k = tails.size(); k > 0;
+       --k, i = before[i])
+    rises[i] = true;
   std::erase_if(known, [&](std::size_t i) { return rises[i]; });
   return known;
 }
 
-void tell_row_mistakes(const Explained& explained, const MeasurementBatch& unsorted, Diagnosis& diagnosis) {
+void tell_row_mistakes(const Explained& explained, const MeasurementBatch& unsorted,
+                       Diagnosis& diagnosis) {
   Misread misread(explained);
   for (SuspectedPose& suspect : diagnosis.suspects) {
-    if (std::string reason = misread.reason(suspect); !reason.empty()) suspect.reason = std::move(reason);
+    if (std::string reason = misread.reason(suspect); !reason.empty())
+      suspect.reason = std::move(reason);
   }
-  for (const auto& [what, ids] : misread.groups()) diagnosis.limits.push_back(fmt::format("{}: {}", what, listed(ids)));
+  for (const auto& [what, ids] : misread.groups())
+    diagnosis.limits.push_back(fmt::format("{}: {}", what, listed(ids)));
   tell_wrong_sides(explained, diagnosis);
   tell_tools_that_are_one(explained, diagnosis);
   tell_times(unsorted, diagnosis);

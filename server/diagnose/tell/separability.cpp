@@ -17,7 +17,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostSingles = 8;  // parameters of a cause that are asked about one by one; a map has a hundred
+constexpr Index kMostSingles =
+    8;  // parameters of a cause that are asked about one by one; a map has a hundred
 
 /// A family's effect, on average over the sizes that its priors allow.
 struct Average {
@@ -29,7 +30,8 @@ struct Average {
   double rms = 0;       // m
 };
 
-Average average_of(const LinearProblem& problem, const MatrixXd& columns, const Background& background) {
+Average average_of(const LinearProblem& problem, const MatrixXd& columns,
+                   const Background& background) {
   Average average{columns, background.project(columns), {}, 0, 0, 0};
   MatrixXd information = transposed_product(average.columns, average.projected);
   average.strength = std::max(0.0, information.trace());
@@ -73,10 +75,12 @@ std::optional<Cause> absorbing(const LinearProblem& problem, const VectorXd& eff
 }
 
 /// Once a pair, in whichever order it is met.
-void add_pair(std::vector<Inseparable>& pairs, const Cause& one, const Cause& other, double correlation) {
+void add_pair(std::vector<Inseparable>& pairs, const Cause& one, const Cause& other,
+              double correlation) {
   for (Inseparable& known : pairs) {
     const auto& causes = known.causes;
-    if (causes != std::vector<Cause>{one, other} && causes != std::vector<Cause>{other, one}) continue;
+    if (causes != std::vector<Cause>{one, other} && causes != std::vector<Cause>{other, one})
+      continue;
     known.correlation = std::max(known.correlation, correlation);
     return;
   }
@@ -84,8 +88,9 @@ void add_pair(std::vector<Inseparable>& pairs, const Cause& one, const Cause& ot
 }
 
 /// Single numbers of a cause that the model's own parameters take over whole.
-void add_absorbed(const LinearProblem& problem, const Background& background, const MatrixXd& columns,
-                  const Cause& cause, std::vector<Inseparable>& inseparable) {
+void add_absorbed(const LinearProblem& problem, const Background& background,
+                  const MatrixXd& columns, const Cause& cause,
+                  std::vector<Inseparable>& inseparable) {
   if (columns.cols() > kMostSingles) return;
   for (Index k = 0; k < columns.cols(); ++k) {
     const VectorXd column = columns.col(k);
@@ -93,14 +98,15 @@ void add_absorbed(const LinearProblem& problem, const Background& background, co
     const double left = column.dot(background.project(column).col(0)) / whole;
     if (left > thresholds::kAbsorbed * thresholds::kAbsorbed) continue;
     const std::optional<Cause> absorber = absorbing(problem, column);
-    if (absorber) add_pair(inseparable, cause, *absorber, std::sqrt(1 - std::clamp(left, 0.0, 1.0)));
+    if (absorber)
+      add_pair(inseparable, cause, *absorber, std::sqrt(1 - std::clamp(left, 0.0, 1.0)));
   }
 }
 
 }  // namespace
 
-Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
-                    const Chance& chance) {
+Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                    const Background& background, const Chance& chance) {
   Blindness result;
   std::vector<std::size_t> places;
   std::vector<Average> averages;
@@ -128,21 +134,27 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
       if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
       const double correlation = imitation(own, averages[j]);
       imitated = std::max(imitated, correlation);
-      if (correlation > thresholds::kSameEffect) add_pair(result.inseparable, cause, other, correlation);
+      if (correlation > thresholds::kSameEffect)
+        add_pair(result.inseparable, cause, other, correlation);
     }
     const int freedom = std::max(1, families[places[i]]->typical().freedom);
     const double needed = std::pow(
-        std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) + thresholds::kPower,
+        std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) +
+            thresholds::kPower,
         2);
-    const auto size_for = [&](double strength) { return own.rms * std::sqrt(strength / own.strength); };
+    const auto size_for = [&](double strength) {
+      return own.rms * std::sqrt(strength / own.strength);
+    };
     unseen.detectable = size_for(needed);
     if (imitated < thresholds::kSameEffect)
-      unseen.identifiable = size_for(std::max(needed, thresholds::kToldApart / (1 - imitated * imitated)));
+      unseen.identifiable =
+          size_for(std::max(needed, thresholds::kToldApart / (1 - imitated * imitated)));
     else
       unseen.needs = what_it_needs(cause);
-    const bool partly = std::any_of(result.inseparable.begin(), result.inseparable.end(),
-                                    [&](const Inseparable& pair) { return pair.causes.front() == cause; }) ||
-                        imitated > thresholds::kSameEffect;
+    const bool partly =
+        std::any_of(result.inseparable.begin(), result.inseparable.end(),
+                    [&](const Inseparable& pair) { return pair.causes.front() == cause; }) ||
+        imitated > thresholds::kSameEffect;
     if (partly && unseen.needs.empty()) unseen.needs = what_it_needs(cause);
     result.unseen.push_back(std::move(unseen));
   }

@@ -12,10 +12,12 @@ struct Blindness {
   std::vector<Inseparable> inseparable;
 };
 
-/// For every named family: the share of its effect outside the model's own parameters, the smallest effect that passes
-/// `limit` (nat) in nine of ten batches, and the smallest that is told from its closest imitator. Effects that the
-/// model's own parameters, or another cause, take over are listed as inseparable.
-[[nodiscard]] Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+/// For every named family: the share of its effect outside the model's own parameters, the smallest
+/// effect that passes `limit` (nat) in nine of ten batches, and the smallest that is told from its
+/// closest imitator. Effects that the model's own parameters, or another cause, take over are
+/// listed as inseparable.
+[[nodiscard]] Blindness blindness(const LinearProblem& problem,
+                                  const std::vector<FamilyPtr>& families,
                                   const Background& background, const Chance& chance);
 
 }  // namespace trammel::cause_search

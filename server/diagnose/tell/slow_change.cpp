@@ -39,7 +39,8 @@ std::vector<Mover> movers_of(const SearchResult& found, Index nuisance) {
   for (const Unnamed& one : found.unnamed) {
     const Index first = std::exchange(next, next + one.columns.cols());
     if (one.wanderer.empty()) continue;
-    auto mover = std::find_if(movers.begin(), movers.end(), [&](const Mover& m) { return m.what == one.wanderer; });
+    auto mover = std::find_if(movers.begin(), movers.end(),
+                              [&](const Mover& m) { return m.what == one.wanderer; });
     if (mover == movers.end()) mover = movers.insert(mover, {one.wanderer, joint_of(one), {}});
     for (Index k = first; k < next; ++k) mover->columns.push_back(k);
   }
@@ -47,8 +48,8 @@ std::vector<Mover> movers_of(const SearchResult& found, Index nuisance) {
 }
 
 /// The strength that a step along `always` from each pose on explains; none at the first.
-VectorXd explained_from(const LinearProblem& problem, const VectorXd& always, const Background& rest,
-                        const VectorXd& data) {
+VectorXd explained_from(const LinearProblem& problem, const VectorXd& always,
+                        const Background& rest, const VectorXd& data) {
   const VectorXd projected = rest.project(data);
   VectorXd explained = VectorXd::Zero(problem.poses());
   VectorXd shared = VectorXd::Zero(rest.root().cols());
@@ -72,9 +73,11 @@ double size_of(const LinearProblem& problem, const Mover& mover, const VectorXd&
   double low = 0;
   double high = 0;
   for (Index i = 0; i < problem.poses(); ++i) {
-    const auto way = problem.by_joint().col(mover.joint).segment(problem.first_row(i), problem.row_count(i));
+    const auto way =
+        problem.by_joint().col(mover.joint).segment(problem.first_row(i), problem.row_count(i));
     if (!(way.squaredNorm() > 0)) continue;
-    const double gone = way.dot(effect.segment(problem.first_row(i), problem.row_count(i))) / way.squaredNorm();
+    const double gone =
+        way.dot(effect.segment(problem.first_row(i), problem.row_count(i))) / way.squaredNorm();
     low = std::min(low, gone);
     high = std::max(high, gone);
   }
@@ -82,7 +85,8 @@ double size_of(const LinearProblem& problem, const Mover& mover, const VectorXd&
 }
 
 std::string size_said(const Mover& mover, double size) {
-  return mover.joint < 0 ? fmt::format("{:.2g} mm", to_mm(size)) : fmt::format("{:.2g} mrad", 1e3 * size);
+  return mover.joint < 0 ? fmt::format("{:.2g} mm", to_mm(size))
+                         : fmt::format("{:.2g} mrad", 1e3 * size);
 }
 
 bool is_more_than_warmth(const Mover& mover, double size) {
@@ -90,36 +94,48 @@ bool is_more_than_warmth(const Mover& mover, double size) {
 }
 
 /// One mover in words, by its course and its size.
-std::string said(const LinearProblem& problem, const Background& all, const Mover& mover, double size) {
+std::string said(const LinearProblem& problem, const Background& all, const Mover& mover,
+                 double size) {
   if (mover.joint >= 0) {
     std::vector<Index> others;
     for (Index k = 0; k < all.columns().cols(); ++k) {
-      if (std::find(mover.columns.begin(), mover.columns.end(), k) == mover.columns.end()) others.push_back(k);
+      if (std::find(mover.columns.begin(), mover.columns.end(), k) == mover.columns.end())
+        others.push_back(k);
     }
     const Background rest(all.columns()(Eigen::all, others));
-    const VectorXd always = problem.by_joint().col(mover.joint);  // per rad: nothing is expected of its size
+    const VectorXd always =
+        problem.by_joint().col(mover.joint);  // per rad: nothing is expected of its size
     const VectorXd& data = problem.residual();
-    const auto steps = steps_along(problem, always, rest, data, data.dot(VectorXd(all.project(data))));
+    const auto steps =
+        steps_along(problem, always, rest, data, data.dot(VectorXd(all.project(data))));
     std::vector<std::string> poses;
-    for (const Index i : steps) poses.push_back(problem.batch().measurements[static_cast<std::size_t>(i)].pose_id);
+    for (const Index i : steps)
+      poses.push_back(problem.batch().measurements[static_cast<std::size_t>(i)].pose_id);
     if (!poses.empty())
-      return fmt::format("{} moved in steps, by {} in all, from pose{} {} on: it slips, as brakes and couplings do",
-                         mover.what, size_said(mover, size), poses.size() > 1 ? "s" : "", fmt::join(poses, ", "));
+      return fmt::format(
+          "{} moved in steps, by {} in all, from pose{} {} on: it slips, as brakes and couplings "
+          "do",
+          mover.what, size_said(mover, size), poses.size() > 1 ? "s" : "", fmt::join(poses, ", "));
   }
   if (is_more_than_warmth(mover, size))
-    return fmt::format("{} moved by {} while the batch was measured, which is more than parts move that warm up",
-                       mover.what, size_said(mover, size));
-  return fmt::format("{} moved slowly while the batch was measured, by {}, as parts do that warm up", mover.what,
-                     size_said(mover, size));
+    return fmt::format(
+        "{} moved by {} while the batch was measured, which is more than parts move that warm up",
+        mover.what, size_said(mover, size));
+  return fmt::format(
+      "{} moved slowly while the batch was measured, by {}, as parts do that warm up", mover.what,
+      size_said(mover, size));
 }
 
 }  // namespace
 
-std::vector<Index> steps_along(const LinearProblem& problem, const VectorXd& always, const Background& rest,
-                               const VectorXd& data, double smooth_leaves) {
+std::vector<Index> steps_along(const LinearProblem& problem, const VectorXd& always,
+                               const Background& rest, const VectorXd& data, double smooth_leaves) {
   // Twice the log likelihood, by what is left: how large noise is, is asked of the data as well.
-  const auto gain = [&](double from, double to) { return static_cast<double>(data.size()) * std::log(from / to); };
-  const double price = 2 * std::log(static_cast<double>(problem.poses())) + 2 * thresholds::kUnnamedMargin;
+  const auto gain = [&](double from, double to) {
+    return static_cast<double>(data.size()) * std::log(from / to);
+  };
+  const double price =
+      2 * std::log(static_cast<double>(problem.poses())) + 2 * thresholds::kUnnamedMargin;
   MatrixXd columns = rest.columns();
   double left = data.dot(VectorXd(rest.project(data)));
   std::vector<Index> steps;
@@ -144,12 +160,13 @@ std::vector<Index> steps_along(const LinearProblem& problem, const VectorXd& alw
   return steps;
 }
 
-std::string what_moves(const SearchResult& found, const LinearProblem& problem, const Background& all,
-                       const Surrogates& unrecorded) {
+std::string what_moves(const SearchResult& found, const LinearProblem& problem,
+                       const Background& all, const Surrogates& unrecorded) {
   const VectorXd numbers = all.estimate(problem.residual());
   std::vector<std::string> said_of;
   for (const Mover& mover : movers_of(found, problem.nuisance().cols())) {
-    const VectorXd effect = all.columns()(Eigen::all, mover.columns) * VectorXd(numbers(mover.columns));
+    const VectorXd effect =
+        all.columns()(Eigen::all, mover.columns) * VectorXd(numbers(mover.columns));
     said_of.push_back(said(problem, all, mover, size_of(problem, mover, effect)));
   }
   if (said_of.empty()) return "";

@@ -36,14 +36,19 @@ std::string beginning_said(const Finding& finding) {
                      finding.may_begin_at.back().pose_id);
 }
 
-bool is_single_pose(const Finding& finding) { return record_of(finding.cause).search == causes::SearchFamily::kPose; }
+bool is_single_pose(const Finding& finding) {
+  return record_of(finding.cause).search == causes::SearchFamily::kPose;
+}
 
 std::string name_of(const Finding& finding) {
-  const std::string order = finding.cause.order ? fmt::format(", {:.2f} cycles a turn", *finding.cause.order) : "";
+  const std::string order =
+      finding.cause.order ? fmt::format(", {:.2f} cycles a turn", *finding.cause.order) : "";
   return in_words(finding.cause) + beginning_said(finding) + order;
 }
 
-std::string size_of(const Finding& finding) { return fmt::format("{:.0f} um rms", 1e6 * finding.effect_rms); }
+std::string size_of(const Finding& finding) {
+  return fmt::format("{:.0f} um rms", 1e6 * finding.effect_rms);
+}
 
 std::string said(const Finding& finding) {
   if (is_single_pose(finding))
@@ -60,26 +65,30 @@ std::vector<Cause> candidates_of(const Finding& finding) {
   return all;
 }
 
-/// `tracker drift or thermal growth (20 um rms)`, `perhaps tracker drift (20 um rms)` where no other cause is known.
+/// `tracker drift or thermal growth (20 um rms)`, `perhaps tracker drift (20 um rms)` where no
+/// other cause is known.
 std::string said_in_doubt(const Finding& finding) {
   std::vector<std::string> names = {name_of(finding)};
   for (const Cause& other : candidates_of(finding)) {
     if (!(other == finding.cause)) names.push_back(in_words(other));
   }
-  return fmt::format("{}{} ({})", names.size() > 1 ? "" : "perhaps ", fmt::join(names, " or "), size_of(finding));
+  return fmt::format("{}{} ({})", names.size() > 1 ? "" : "perhaps ", fmt::join(names, " or "),
+                     size_of(finding));
 }
 
 }  // namespace
 
 std::string action_for(const Cause& cause, const std::vector<Cause>& others) {
   if (others.empty()) return std::string(record_of(cause).action);
-  return fmt::format("decide first which it is: {}", what_would_separate(cause.cause, others.front().cause));
+  return fmt::format("decide first which it is: {}",
+                     what_would_separate(cause.cause, others.front().cause));
 }
 
 std::string what_it_needs(const Cause& cause) { return std::string(record_of(cause).shown_by); }
 
 bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
-  return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
+  return !unseen.detectable &&
+         cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
 }
 
 std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded) {
@@ -92,18 +101,21 @@ std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded) {
 
 bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause) {
   const auto& unseen = diagnosis.could_not_have_seen;
-  return std::any_of(unseen.begin(), unseen.end(),
-                     [&](const Unseen& one) { return one.cause == cause && !one.detectable && !one.needs.empty(); });
+  return std::any_of(unseen.begin(), unseen.end(), [&](const Unseen& one) {
+    return one.cause == cause && !one.detectable && !one.needs.empty();
+  });
 }
 
 std::string noise_name(double noise, double instrument) {
-  return noise > cause_search::thresholds::kMoreThanNoise * instrument ? "what stays unexplained of a pose"
-                                                                       : "noise of one measurement";
+  return noise > cause_search::thresholds::kMoreThanNoise * instrument
+             ? "what stays unexplained of a pose"
+             : "noise of one measurement";
 }
 
 std::string why_no_next_poses(const std::vector<Finding>& findings) {
-  const auto doubt = std::find_if(findings.begin(), findings.end(),
-                                  [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  const auto doubt = std::find_if(findings.begin(), findings.end(), [](const Finding& finding) {
+    return !finding.could_also_be.empty();
+  });
   if (doubt == findings.end()) return "no cause that was found is in doubt";
   return fmt::format("no poses of this cell tell {} from {}; {}", in_words(doubt->cause),
                      in_words(doubt->could_also_be.front()), doubt->action);
@@ -128,50 +140,53 @@ Told told(const std::vector<Finding>& findings) {
                   : !finding.whole                ? all.parts
                   : finding.could_also_be.empty() ? all.sure
                                                   : all.doubtful;
-    const bool again = &group == &all.doubtful && std::any_of(group.begin(), group.end(), [&](const Finding* other) {
-      return are_the_same_doubt(*other, finding);
-    });
+    const bool again = &group == &all.doubtful &&
+                       std::any_of(group.begin(), group.end(), [&](const Finding* other) {
+                         return are_the_same_doubt(*other, finding);
+                       });
     if (!again) group.push_back(&finding);
   }
   return all;
 }
 
 /// The first few, and how many more there are.
-std::vector<std::string> clauses_of(const std::vector<const Finding*>& findings, std::string (*words)(const Finding&)) {
+std::vector<std::string> clauses_of(const std::vector<const Finding*>& findings,
+                                    std::string (*words)(const Finding&)) {
   const bool too_many = findings.size() > kMostNamed;
   std::vector<std::string> clauses;
   for (std::size_t k = 0; k < (too_many ? kMostNamed - 1 : findings.size()); ++k)
     clauses.push_back(words(*findings[k]));
   if (too_many)
-    clauses.push_back(fmt::format("{} smaller ones, which the findings list", findings.size() - clauses.size()));
+    clauses.push_back(
+        fmt::format("{} smaller ones, which the findings list", findings.size() - clauses.size()));
   return clauses;
 }
 
 std::string bad_poses_said(const std::vector<const Finding*>& findings) {
   std::vector<std::string> poses;
   for (const Finding* finding : findings) poses.push_back(said(*finding));
-  const bool may_be_missing = std::any_of(findings.begin(), findings.end(),
-                                          [](const Finding* finding) { return !finding->could_also_be.empty(); });
+  const bool may_be_missing =
+      std::any_of(findings.begin(), findings.end(),
+                  [](const Finding* finding) { return !finding->could_also_be.empty(); });
   if (may_be_missing)
-    return listed(poses) + (poses.size() > 1 ? " fit none of the others: bad measurements, or poses at which something "
-                                               "is large that the simulation lacks: measure them and their neighbours "
-                                               "again"
-                                             : " fits none of the others: a bad measurement, or a pose at which "
-                                               "something is large that the simulation lacks: measure it and its "
-                                               "neighbours again");
-  return listed(poses) + (poses.size() > 1
-                              ? " fit none of the others, and single poses do not tell why: measure them and their "
-                                "neighbours again"
-                              : " fits none of the others, and a single pose does not tell why: measure it and its "
-                                "neighbours again");
+    return listed(poses) +
+           (poses.size() > 1
+                ? " fit none of the others: bad measurements, or poses at which something is large "
+                  "that the simulation lacks: measure them and their neighbours again"
+                : " fits none of the others: a bad measurement, or a pose at which something is "
+                  "large that the simulation lacks: measure it and its neighbours again");
+  return listed(poses) + (poses.size() > 1 ? " fit none of the others, and single poses do not "
+                                             "tell why: measure them and their neighbours again"
+                                           : " fits none of the others, and a single pose does not "
+                                             "tell why: measure it and its neighbours again");
 }
 
 /// What the error is before and after all that goes into the model; empty where that is nothing.
 std::string gain_said(const Diagnosis& d, const Told& all) {
   if (all.sure.empty() && all.parts.empty()) return "";
   if (!(d.after.rms < d.before.rms)) return "";
-  return fmt::format("With that corrected, the error falls from {:.0f} to {:.0f} um rms", 1e6 * d.before.rms,
-                     1e6 * d.after.rms);
+  return fmt::format("With that corrected, the error falls from {:.0f} to {:.0f} um rms",
+                     1e6 * d.before.rms, 1e6 * d.after.rms);
 }
 
 /// What is done about the largest finding.
@@ -185,17 +200,20 @@ std::string advice_said(const Diagnosis& d) {
 std::string unexplained_said(const Unexplained& left, bool beside_findings) {
   if (!left.present || left.depends_on.empty()) return "";
   return fmt::format("{} error changes with {} ({:.0f} um rms), as it would by no known cause",
-                     beside_findings ? "Besides, the" : "The", circumstances_in_words(left.depends_on), 1e6 * left.rms);
+                     beside_findings ? "Besides, the" : "The",
+                     circumstances_in_words(left.depends_on), 1e6 * left.rms);
 }
 
 /// Poses held out that fit neither model; empty where there are none.
 std::string held_out_said(const std::vector<SuspectedPose>& suspects) {
   std::vector<std::string> poses;
   for (const SuspectedPose& pose : suspects) {
-    if (pose.held_out) poses.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
+    if (pose.held_out)
+      poses.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
   }
   if (poses.empty()) return "";
-  return fmt::format("Of the poses held out, {} {} neither model", listed(poses), poses.size() > 1 ? "fit" : "fits");
+  return fmt::format("Of the poses held out, {} {} neither model", listed(poses),
+                     poses.size() > 1 ? "fit" : "fits");
 }
 
 }  // namespace
@@ -211,13 +229,16 @@ std::string circumstances_in_words(const std::vector<std::string>& on) {
       others.push_back(one == "time" ? one : "the " + one);
     }
   }
-  const auto of_joints = [](const char* one, const char* several, const std::vector<std::string>& numbers) {
+  const auto of_joints = [](const char* one, const char* several,
+                            const std::vector<std::string>& numbers) {
     return numbers.size() > 1 ? fmt::format("the {} of joints {}", several, listed(numbers))
                               : fmt::format("the {} of joint {}", one, numbers.front());
   };
-  if (!sides.empty()) others.insert(others.begin(), of_joints("side of approach", "sides of approach", sides));
+  if (!sides.empty())
+    others.insert(others.begin(), of_joints("side of approach", "sides of approach", sides));
   if (!joints.empty()) others.insert(others.begin(), of_joints("position", "positions", joints));
-  return others.size() == 2 && joints.size() > 1 ? others[0] + ", and " + others[1] : listed(others);
+  return others.size() == 2 && joints.size() > 1 ? others[0] + ", and " + others[1]
+                                                 : listed(others);
 }
 
 std::string what_it_changes_with(const std::vector<std::string>& on) {
@@ -232,11 +253,14 @@ std::string sentence_for(const Diagnosis& d) {
   const auto add = [&](const std::string& sentence) {
     if (!sentence.empty()) text += (text.empty() ? "" : " ") + as_sentence(sentence);
   };
-  if (!all.sure.empty()) add("Missing from the simulation: " + listed_clauses(clauses_of(all.sure, said)));
+  if (!all.sure.empty())
+    add("Missing from the simulation: " + listed_clauses(clauses_of(all.sure, said)));
   if (!all.parts.empty())
-    add("These known causes explain part of the error, not all of it: " + listed_clauses(clauses_of(all.parts, said)));
+    add("These known causes explain part of the error, not all of it: " +
+        listed_clauses(clauses_of(all.parts, said)));
   if (!all.doubtful.empty())
-    add("Found, but these poses leave open what it is: " + listed_clauses(clauses_of(all.doubtful, said_in_doubt)));
+    add("Found, but these poses leave open what it is: " +
+        listed_clauses(clauses_of(all.doubtful, said_in_doubt)));
   add(gain_said(d, all));
   if (!all.bad_poses.empty()) add(bad_poses_said(all.bad_poses));
   add(unexplained_said(d.unexplained, found || !all.bad_poses.empty()));
@@ -244,10 +268,11 @@ std::string sentence_for(const Diagnosis& d) {
   if (d.unexplained.present && d.unexplained.depends_on.empty()) add(what_it_changes_with({}));
   add(held_out_said(d.suspects));
   if (!found && !d.unexplained.present) {
-    const std::string nothing =
-        fmt::format("Nothing {} found in {} poses: ", all.bad_poses.empty() ? "was" : "else was", d.poses);
+    const std::string nothing = fmt::format(
+        "Nothing {} found in {} poses: ", all.bad_poses.empty() ? "was" : "else was", d.poses);
     const auto computed = computed_not_measured(d.before.rms, d.instrument, d.poses);
-    add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise", 1e6 * d.after.rms)));
+    add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise",
+                                                1e6 * d.after.rms)));
   }
   add(advice_said(d));
   return text;
@@ -255,7 +280,8 @@ std::string sentence_for(const Diagnosis& d) {
 
 std::string as_sentence(std::string text) {
   if (text.empty()) return text;
-  if (text.front() >= 'a' && text.front() <= 'z') text.front() = static_cast<char>(text.front() - 'a' + 'A');
+  if (text.front() >= 'a' && text.front() <= 'z')
+    text.front() = static_cast<char>(text.front() - 'a' + 'A');
   if (text.back() != '.' && text.back() != '?') text += '.';
   return text;
 }
@@ -263,7 +289,8 @@ std::string as_sentence(std::string text) {
 std::string uncertain_by(double share_of_effect) {
   if (share_of_effect >= 1) return "more than the effect itself";
   const double percent = 100 * share_of_effect;
-  return percent < 10 ? fmt::format("{:.2g} % of the effect", percent) : fmt::format("{:.0f} % of the effect", percent);
+  return percent < 10 ? fmt::format("{:.2g} % of the effect", percent)
+                      : fmt::format("{:.0f} % of the effect", percent);
 }
 
 }  // namespace trammel

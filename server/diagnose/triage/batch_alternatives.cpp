@@ -11,11 +11,12 @@ using causes::Part;
 using causes::Scope;
 
 bool is_of_the_arm(const CauseRecord& record) {
-  return record.lasting == Lasting::kAlways && (record.scope == Scope::kArm || record.scope == Scope::kJoint);
+  return record.lasting == Lasting::kAlways &&
+         (record.scope == Scope::kArm || record.scope == Scope::kJoint);
 }
 
-/// The source that a step of `joint` is when it acts at all poses: that of the whole, or the step itself where it is
-/// but one of the whole's numbers.
+/// The source that a step of `joint` is when it acts at all poses: that of the whole, or the step
+/// itself where it is but one of the whole's numbers.
 std::string as_a_whole(const CauseRecord& record, int joint) {
   const causes::Rival& whole = *whole_of(record);
   if (whole.parameter.empty()) return std::string(whole.cause);
@@ -77,7 +78,8 @@ std::vector<Alternative> Alternatives::from(int first, const std::string& pose_i
   for (const CauseRecord* record : all_causes()) {
     if (record->lasting != Lasting::kFromAPose || (record->needs.payload && !carries())) continue;
     const bool of_joint = record->scope == Scope::kJoint;
-    for (int joint = of_joint ? 0 : -1; joint < (of_joint ? physics_.cell->robot.size() : 0); ++joint)
+    for (int joint = of_joint ? 0 : -1; joint < (of_joint ? physics_.cell->robot.size() : 0);
+         ++joint)
       add(cause_at(*record, joint), as_a_whole(*record, joint), record->whole_batch->harmful);
   }
   if (first == 0) add_drift(all);
@@ -88,7 +90,8 @@ std::vector<Alternative> Alternatives::with_the_tracker() const {
   std::vector<Alternative> all = from(0, "");
   std::erase_if(all, [](const Alternative& one) { return moves_base(record_of(one.cause)); });
   for (Alternative& one : all) {
-    one.tracker_elsewhere = set_free(one, std::string(cause_correcting(Part::kBase).spelling), one.base);
+    one.tracker_elsewhere =
+        set_free(one, std::string(cause_correcting(Part::kBase).spelling), one.base);
     one.model.X_WB = X_WB_;
   }
   return all;
@@ -101,7 +104,8 @@ bool Alternatives::carries() const {
 }
 
 void Alternatives::add_drift(std::vector<Alternative>& all) const {
-  Alternative one = started(cause_at(cause_that_stands_for(causes::StandsFor::kArmNotAsModelled)), physics_);
+  Alternative one =
+      started(cause_at(cause_that_stands_for(causes::StandsFor::kArmNotAsModelled)), physics_);
   Eigen::Index first = 0;
   bool any = false;
   for (const ErrorSourcePtr& source : physics_.sources) {

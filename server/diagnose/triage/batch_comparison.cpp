@@ -14,10 +14,13 @@ namespace trammel::batch_triage {
 namespace {
 
 constexpr int kMostIterations = 30;
-constexpr double kDone = 1e-4;        // last step, in units of the parameters' own scales
-constexpr double kFarthest = 9;       // times the median of |residual|^2: annealing towards the final limit
-constexpr double kGoodMisfit = 2.25;  // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
-constexpr double kWeakPrior = 1e-8;   // of what an alternative sets free, per squared scale of the parameter
+constexpr double kDone = 1e-4;  // last step, in units of the parameters' own scales
+constexpr double kFarthest =
+    9;  // times the median of |residual|^2: annealing towards the final limit
+constexpr double kGoodMisfit =
+    2.25;  // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
+constexpr double kWeakPrior =
+    1e-8;  // of what an alternative sets free, per squared scale of the parameter
 
 /// Directions of the free parameters that the poses show: more of them than the prior does.
 int shown_directions(const Alternative& alternative, const Eigen::MatrixXd& information) {
@@ -53,36 +56,41 @@ Comparison::Comparison(const CompensatedModel& model, const MeasurementBatch& ba
 
 void Comparison::expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors) {
   const auto& training = model_.parts().training.orientation;
-  const auto& held_out = model_.parts().validation ? model_.parts().validation->orientation : std::nullopt;
+  const auto& held_out =
+      model_.parts().validation ? model_.parts().validation->orientation : std::nullopt;
   if (!training || errors.calibrated.cols() == 0) return;
   const double shown = std::max(training->compensated, held_out ? held_out->compensated : 0);
   Eigen::Matrix3Xd stddev = errors.stddev;
-  if (stddev.cols() == 0) stddev.setConstant(3, errors.calibrated.cols(), model_.cell().tracker.sigma_rotation);
-  stddev *= std::max(1.0, shown / std::sqrt(stddev.squaredNorm() / static_cast<double>(stddev.cols())));
+  if (stddev.cols() == 0)
+    stddev.setConstant(3, errors.calibrated.cols(), model_.cell().tracker.sigma_rotation);
+  stddev *=
+      std::max(1.0, shown / std::sqrt(stddev.squaredNorm() / static_cast<double>(stddev.cols())));
   Eigen::Index next = 0;
   for (int i = 0; i < poses(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (!batch_.measurements[at].R_WT) continue;
     is_turned_[at] = true;
     deviation_.col(i).tail<3>() = stddev.col(next);
-    rotation_bias_B_[at] =
-        rotation_exp(errors.compensated.col(next)).transpose() * rotation_exp(errors.calibrated.col(next));
+    rotation_bias_B_[at] = rotation_exp(errors.compensated.col(next)).transpose() *
+                           rotation_exp(errors.calibrated.col(next));
     ++next;
   }
 }
 
 double Comparison::all_rows() const {
-  return 3.0 * poses() + 3.0 * static_cast<double>(std::count(is_turned_.begin(), is_turned_.end(), true));
+  return 3.0 * poses() +
+         3.0 * static_cast<double>(std::count(is_turned_.begin(), is_turned_.end(), true));
 }
 
-void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Eigen::VectorXd& r,
-                          Eigen::MatrixXd& jacobian) const {
+void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose,
+                          Eigen::VectorXd& r, Eigen::MatrixXd& jacobian) const {
   Eigen::VectorXd here = values;
   const bool begun = pose >= alternative.first;
   for (Eigen::Index k = 0; !begun && k < here.size(); ++k) {
     if (alternative.free[static_cast<std::size_t>(k)]) here(k) = alternative.known(k);
   }
-  const Pose X_WT = alternative.model.pose_W(contexts_[static_cast<std::size_t>(pose)], here, &jacobian);
+  const Pose X_WT =
+      alternative.model.pose_W(contexts_[static_cast<std::size_t>(pose)], here, &jacobian);
   const Matrix3 R_BW = alternative.model.X_WB.linear().transpose();
   const Measurement& m = batch_.measurements[static_cast<std::size_t>(pose)];
   r.resize(rows(pose));
@@ -100,8 +108,10 @@ void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd&
   }
 }
 
-/// Of all parameters in units of their scales: the model's own as calibration left them, those set free hardly any.
-Eigen::MatrixXd Comparison::prior_precision(const Alternative& alternative, const Eigen::VectorXd& scale) const {
+/// Of all parameters in units of their scales: the model's own as calibration left them, those set
+/// free hardly any.
+Eigen::MatrixXd Comparison::prior_precision(const Alternative& alternative,
+                                            const Eigen::VectorXd& scale) const {
   constexpr double kRounding = 1e-10;  // a covariance may be flat: what is known for certain
   const Eigen::Index p = scale.size();
   std::vector<Eigen::Index> held, held_in_model;
@@ -122,7 +132,8 @@ Eigen::MatrixXd Comparison::prior_precision(const Alternative& alternative, cons
   const Eigen::VectorXd inverse = scale(held).cwiseInverse();
   covariance = inverse.asDiagonal() * covariance * inverse.asDiagonal();
   covariance.diagonal().array() += kRounding;
-  const Eigen::MatrixXd known = covariance.llt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
+  const Eigen::MatrixXd known =
+      covariance.llt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
   precision(held, held) = known;
   return precision;
 }
@@ -142,9 +153,10 @@ struct Fitting {
   Eigen::VectorXd scale, values;          ///< of the parameters, SI
   Eigen::MatrixXd prior;                  ///< precision, in units of scale
   std::vector<Eigen::VectorXd> residual;  ///< of each pose, m and rad
-  std::vector<Eigen::MatrixXd> rows;      ///< as many x P a pose: derivative over expected deviation, in units of scale
-  std::vector<double> square;             ///< |residual over expected deviation|^2
-  Eigen::MatrixXd information;            ///< of the poses that count
+  std::vector<Eigen::MatrixXd>
+      rows;  ///< as many x P a pose: derivative over expected deviation, in units of scale
+  std::vector<double> square;   ///< |residual over expected deviation|^2
+  Eigen::MatrixXd information;  ///< of the poses that count
 };
 
 Fitting Comparison::begun(const Alternative& alternative) const {
@@ -175,21 +187,24 @@ void Comparison::linearise(const Alternative& alternative, Fitting& fitting) con
 }
 
 /// The next step in units of scale, from the poses that are not farther off than `farthest`.
-Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest, Fitting& fitting) const {
+Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest,
+                                 Fitting& fitting) const {
   const Eigen::VectorXd off = (fitting.values - alternative.known).cwiseQuotient(fitting.scale);
   Eigen::VectorXd gradient = -fitting.prior * off;
-  Eigen::MatrixXd counted(off.size(), static_cast<Eigen::Index>(all_rows()));  // one column a row that counts
+  Eigen::MatrixXd counted(off.size(),
+                          static_cast<Eigen::Index>(all_rows()));  // one column a row that counts
   Eigen::Index filled = 0;
   for (int i = 0; i < poses(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (fitting.square[at] > farthest) continue;
     counted.middleCols(filled, rows(i)) = fitting.rows[at].transpose();
     filled += rows(i);
-    gradient.noalias() +=
-        fitting.rows[at].transpose() * fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
+    gradient.noalias() += fitting.rows[at].transpose() *
+                          fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
   }
   fitting.information.setZero(off.size(), off.size());
-  if (filled > 0) fitting.information.selfadjointView<Eigen::Lower>().rankUpdate(counted.leftCols(filled));
+  if (filled > 0)
+    fitting.information.selfadjointView<Eigen::Lower>().rankUpdate(counted.leftCols(filled));
   fitting.information = Eigen::MatrixXd(fitting.information.selfadjointView<Eigen::Lower>());
   return (fitting.information + fitting.prior).llt().solve(gradient);
 }
@@ -221,12 +236,14 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   const auto outliers = static_cast<double>(fit.outliers.size());
   const int k = shown_directions(alternative, fitting.information);
   const int places = alternative.first > 0 ? 2 : 0;  // where it begins was chosen
-  fit.score = inside + bad + off.dot(fitting.prior * off) + k * std::log(all_rows()) + places * std::log(n);
+  fit.score =
+      inside + bad + off.dot(fitting.prior * off) + k * std::log(all_rows()) + places * std::log(n);
   const double freedom = judged_rows - k;
   fit.misfit = freedom > 0 ? inside / freedom : inside;
   fit.misfit_all = all / std::max(all_rows() - k, 1.0);
-  fit.explains = freedom > 0 && fit.misfit <= kGoodMisfit &&
-                 outliers <= std::max<double>(kFewOutliers, cause_search::thresholds::kMostOutliers * n);
+  fit.explains =
+      freedom > 0 && fit.misfit <= kGoodMisfit &&
+      outliers <= std::max<double>(kFewOutliers, cause_search::thresholds::kMostOutliers * n);
   return fit;
 }
 
@@ -234,10 +251,12 @@ Fit Comparison::fit(const Alternative& alternative) const {
   Fitting fitting = begun(alternative);
   for (int iteration = 0;; ++iteration) {
     linearise(alternative, fitting);
-    // First all poses, so that what has begun is followed; then only those that are not much farther off than others.
+    // First all poses, so that what has begun is followed; then only those that are not much
+    // farther off than others.
     const auto changed = fitting.square.begin() + alternative.first;
-    const double farthest = iteration == 0 ? std::numeric_limits<double>::infinity()
-                                           : std::max(limit(6), kFarthest * median({changed, fitting.square.end()}));
+    const double farthest =
+        iteration == 0 ? std::numeric_limits<double>::infinity()
+                       : std::max(limit(6), kFarthest * median({changed, fitting.square.end()}));
     const Eigen::VectorXd next = step(alternative, farthest, fitting);
     if (iteration >= kMostIterations || !(next.norm() > kDone)) return judged(alternative, fitting);
     fitting.values += next.cwiseProduct(fitting.scale);

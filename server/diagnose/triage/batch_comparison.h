@@ -45,7 +45,8 @@ class Comparison {
   [[nodiscard]] const CompensatedModel& model() const { return model_; }
 
   [[nodiscard]] Fit fit(const Alternative& alternative) const;
-  /// Where the base would have to stand for the batch as it is; where it stands in `model` when that cannot be told.
+  /// Where the base would have to stand for the batch as it is; where it stands in `model` when
+  /// that cannot be told.
   [[nodiscard]] Pose located_base(const PhysicalModel& model) const;
 
  private:
@@ -55,10 +56,13 @@ class Comparison {
     if (!context.temperature) context.temperature = model_.parts().temperature_mean;
     return context;
   }
-  /// Deviations of the orientations that the model expects; none are judged where it was never told any.
+  /// Deviations of the orientations that the model expects; none are judged where it was never told
+  /// any.
   void expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors);
   /// How many numbers are judged: of a pose, 6 or 3 without an orientation; of all.
-  [[nodiscard]] Eigen::Index rows(int pose) const { return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3; }
+  [[nodiscard]] Eigen::Index rows(int pose) const {
+    return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3;
+  }
   [[nodiscard]] double all_rows() const;
   /// What a pose may cost before it is a bad one.
   [[nodiscard]] double limit(Eigen::Index rows) const {
@@ -66,12 +70,14 @@ class Comparison {
   }
   [[nodiscard]] Fitting begun(const Alternative& alternative) const;
   void linearise(const Alternative& alternative, Fitting& fitting) const;
-  [[nodiscard]] Eigen::VectorXd step(const Alternative& alternative, double farthest, Fitting& fitting) const;
+  [[nodiscard]] Eigen::VectorXd step(const Alternative& alternative, double farthest,
+                                     Fitting& fitting) const;
   [[nodiscard]] Fit judged(const Alternative& alternative, const Fitting& fitting) const;
   /// Measured - predicted in B (m; rad), and minus its derivative; rows(pose) of both.
-  void residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Eigen::VectorXd& r,
-                Eigen::MatrixXd& jacobian) const;
-  [[nodiscard]] Eigen::MatrixXd prior_precision(const Alternative& alternative, const Eigen::VectorXd& scale) const;
+  void residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose,
+                Eigen::VectorXd& r, Eigen::MatrixXd& jacobian) const;
+  [[nodiscard]] Eigen::MatrixXd prior_precision(const Alternative& alternative,
+                                                const Eigen::VectorXd& scale) const;
 
   const CompensatedModel& model_;
   const MeasurementBatch& batch_;

@@ -14,18 +14,22 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kShared = 0.2;  // of a joint's range: poses nearer than that share what the model leaves over
-constexpr double kOfJoints =
-    0.5;  // of the variance that a model leaves over: as errors of joints, the rest in any direction
-constexpr double kFarOff = 6;      // times the median: a pose that does not say where the base stands
+constexpr double kShared =
+    0.2;  // of a joint's range: poses nearer than that share what the model leaves over
+constexpr double kOfJoints = 0.5;  // of the variance that a model leaves over: as errors of joints,
+                                   // the rest in any direction
+constexpr double kFarOff = 6;  // times the median: a pose that does not say where the base stands
 constexpr int kLocalisations = 4;  // without the poses that were far off the last time
-constexpr double kThin = 0.02;     // of how far the poses are away: within less of a line they turn the base anyhow
-constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
-constexpr double kUnmoved = 0.02;  // of how far the poses are away: a zero of a degree moves them no farther
+constexpr double kThin =
+    0.02;  // of how far the poses are away: within less of a line they turn the base anyhow
+constexpr double kJitter = 1e-6;  // of the instrument's variance: what is certain is so to rounding
+constexpr double kUnmoved =
+    0.02;  // of how far the poses are away: a zero of a degree moves them no farther
 constexpr double kTurned = 0.002;  // rad: of a base that is turned as the model has it
 
 /// Where the base stands by the positions, those left out that are much farther off than others.
-Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions) {
+Result<Pose> located(const MeasurementBatch& batch,
+                     const std::vector<ErrorPrediction>& predictions) {
   const std::size_t n = predictions.size();
   std::vector<std::size_t> used(n);
   for (std::size_t i = 0; i < n; ++i) used[i] = i;
@@ -41,7 +45,9 @@ Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPredi
     X_WB = std::move(next);
     std::vector<double> off;
     for (std::size_t i = 0; i < n; ++i)
-      off.push_back((X_WB->inverse() * batch.measurements[i].p_W - predictions[i].X_BT_predicted.translation()).norm());
+      off.push_back((X_WB->inverse() * batch.measurements[i].p_W -
+                     predictions[i].X_BT_predicted.translation())
+                        .norm());
     const double far_off = kFarOff * median(off);
     used.clear();
     for (std::size_t i = 0; i < n; ++i)
@@ -63,13 +69,15 @@ bool are_thin(const std::vector<ErrorPrediction>& predictions) {
 }
 
 /// Where the base stands by orientations, and by the mean of the positions.
-Pose turned_by_orientations(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions) {
+Pose turned_by_orientations(const MeasurementBatch& batch,
+                            const std::vector<ErrorPrediction>& predictions) {
   Matrix3 turned = Matrix3::Zero();
   Vector3 measured_W = Vector3::Zero(), predicted_B = Vector3::Zero();
   const auto n = static_cast<double>(predictions.size());
   for (std::size_t i = 0; i < predictions.size(); ++i) {
     const Pose& X_BT = predictions[i].X_BT_predicted;
-    if (batch.measurements[i].R_WT) turned += *batch.measurements[i].R_WT * X_BT.linear().transpose();
+    if (batch.measurements[i].R_WT)
+      turned += *batch.measurements[i].R_WT * X_BT.linear().transpose();
     measured_W += batch.measurements[i].p_W / n;
     predicted_B += X_BT.translation() / n;
   }
@@ -77,8 +85,10 @@ Pose turned_by_orientations(const MeasurementBatch& batch, const std::vector<Err
   return make_pose(R_WB, measured_W - R_WB * predicted_B);
 }
 
-/// Where the base stands if it is turned as in `X_WB`, by the mean of the positions; empty: it stands elsewhere.
-std::optional<Pose> turned_as_before(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
+/// Where the base stands if it is turned as in `X_WB`, by the mean of the positions; empty: it
+/// stands elsewhere.
+std::optional<Pose> turned_as_before(const MeasurementBatch& batch,
+                                     const std::vector<ErrorPrediction>& predictions,
                                      const Pose& X_WB) {
   Vector3 shift_W = Vector3::Zero();
   double away = 0;
@@ -97,36 +107,44 @@ struct Stand {
   bool turns = true;  ///< otherwise the base is turned as in the model
 };
 
-Result<Stand> base_of(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
-                      bool by_orientations, const Pose& X_WB_of_model) {
+Result<Stand> base_of(const MeasurementBatch& batch,
+                      const std::vector<ErrorPrediction>& predictions, bool by_orientations,
+                      const Pose& X_WB_of_model) {
   constexpr std::size_t kFewest = 3;  // poses
   if (predictions.size() < kFewest || !are_thin(predictions))
     return located(batch, predictions).map([](const Pose& X_WB) { return Stand{X_WB}; });
   if (by_orientations) return Stand{turned_by_orientations(batch, predictions)};
-  if (const auto X_WB = turned_as_before(batch, predictions, X_WB_of_model)) return Stand{*X_WB, false};
+  if (const auto X_WB = turned_as_before(batch, predictions, X_WB_of_model))
+    return Stand{*X_WB, false};
   return refused(
-      "all of them are at about one place or on one line, so that any error turns the base, and the instrument stands "
-      "elsewhere than in the model: measure poses that are spread over the workspace (`trammel plan --check`)");
+      "all of them are at about one place or on one line, so that any error turns the base, and "
+      "the instrument stands elsewhere than in the model: measure poses that are spread over the "
+      "workspace (`trammel plan --check`)");
 }
 
-/// The base is no more turned than by kTurned, about the mean of where the poses were measured: its place is refitted.
+/// The base is no more turned than by kTurned, about the mean of where the poses were measured: its
+/// place is refitted.
 void hold_turn(CheckRows& rows) {
   const auto measured_B = [&](std::size_t i) {
     return Vector3(rows.predicted[i].translation() + rows.residual.segment<3>(rows.first[i]));
   };
   Vector3 mean = Vector3::Zero();
-  for (std::size_t i = 0; i < rows.poses(); ++i) mean += measured_B(i) / static_cast<double>(rows.poses());
+  for (std::size_t i = 0; i < rows.poses(); ++i)
+    mean += measured_B(i) / static_cast<double>(rows.poses());
   Eigen::MatrixXd by_turn(rows.residual.size(), 3);
-  for (std::size_t i = 0; i < rows.poses(); ++i) by_turn.middleRows<3>(rows.first[i]) = -skew(measured_B(i) - mean);
+  for (std::size_t i = 0; i < rows.poses(); ++i)
+    by_turn.middleRows<3>(rows.first[i]) = -skew(measured_B(i) - mean);
   rows.covariance += kTurned * kTurned * by_turn * by_turn.transpose();
   rows.by_base = Eigen::MatrixXd(rows.by_base.leftCols<3>());
 }
 
-/// Standard deviation of one axis of an orientation that the model shows on its own poses; 0: it knows none.
+/// Standard deviation of one axis of an orientation that the model shows on its own poses; 0: it
+/// knows none.
 double rotation_shown(const ModelParts& parts) {
   if (!parts.training.orientation) return 0;
   const auto& held_out = parts.validation ? parts.validation->orientation : std::nullopt;
-  return std::max(parts.training.orientation->compensated, held_out ? held_out->compensated : 0) / std::sqrt(3.0);
+  return std::max(parts.training.orientation->compensated, held_out ? held_out->compensated : 0) /
+         std::sqrt(3.0);
 }
 
 /// How much two poses share of what the model leaves over.
@@ -139,7 +157,8 @@ double shared(const PoseContext& one, const PoseContext& other, const JointVecto
   return std::exp(-0.5 * square);
 }
 
-/// Standard deviations of each row: the measurement's noise, and what the model leaves over beyond its parameters.
+/// Standard deviations of each row: the measurement's noise, and what the model leaves over beyond
+/// its parameters.
 struct RowDeviations {
   Eigen::VectorXd noise, left;
   Eigen::MatrixXd J;  ///< R x P: by the parameters, as far as they count
@@ -152,21 +171,26 @@ void add_position(const ErrorPrediction& prediction, const Measurement& m, doubl
   const Vector3 variance = (prediction.covariance_B.diagonal().array() - sigma * sigma).max(0.0);
   auto J = rows.J.middleRows<3>(first);
   const Vector3 identified = (J * covariance * J.transpose()).diagonal();
-  // A bias corrects part of what the parameters leave uncertain: they count no more than the model says in all.
-  const double counts = identified.sum() > 0 ? std::min(1.0, variance.sum() / identified.sum()) : 0.0;
+  // A bias corrects part of what the parameters leave uncertain: they count no more than the model
+  // says in all.
+  const double counts =
+      identified.sum() > 0 ? std::min(1.0, variance.sum() / identified.sum()) : 0.0;
   J *= std::sqrt(counts);
   rows.noise.segment<3>(first).setConstant(noise);
   rows.left.segment<3>(first) = (variance - counts * identified).cwiseMax(0.0).cwiseSqrt();
 }
 
-void add_rotation(double sigma, double shown, const Eigen::MatrixXd& covariance, Index first, RowDeviations& rows) {
+void add_rotation(double sigma, double shown, const Eigen::MatrixXd& covariance, Index first,
+                  RowDeviations& rows) {
   auto J = rows.J.middleRows<3>(first);
   const double identified = (J * covariance * J.transpose()).trace() / 3;
   rows.noise.segment<3>(first).setConstant(sigma);
-  rows.left.segment<3>(first).setConstant(std::sqrt(std::max(shown * shown - sigma * sigma - identified, 0.0)));
+  rows.left.segment<3>(first).setConstant(
+      std::sqrt(std::max(shown * shown - sigma * sigma - identified, 0.0)));
 }
 
-Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviations, const ModelParts& parts) {
+Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviations,
+                              const ModelParts& parts) {
   Eigen::MatrixXd S = deviations.J * parts.covariance * deviations.J.transpose();
   const JointVector range = parts.q_max - parts.q_min;
   for (std::size_t i = 0; i < rows.poses(); ++i) {
@@ -183,11 +207,11 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
   return 0.5 * (S + S.transpose());
 }
 
-/// What the model leaves over as an error of each joint's own angle by any function of it, all joints alike and
-/// together as large as what is left over: R x R. Gears that the model does not know look like that, and not alike in
-/// all axes.
-Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations, const CauseEffects& effects,
-                               const JointVector& range) {
+/// What the model leaves over as an error of each joint's own angle by any function of it, all
+/// joints alike and together as large as what is left over: R x R. Gears that the model does not
+/// know look like that, and not alike in all axes.
+Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations,
+                               const CauseEffects& effects, const JointVector& range) {
   const Index R = rows.residual.size();
   std::map<int, Index> columns;  // by joint
   for (const CauseEffects::Entry& entry : effects.causes())
@@ -204,7 +228,8 @@ Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& devia
     moved *= std::sqrt(power(deviations.left) / power(moved) / static_cast<double>(columns.size()));
     for (std::size_t i = 0; i < rows.poses(); ++i) {
       for (std::size_t k = 0; k < rows.poses(); ++k) {
-        const double apart = (rows.contexts[i].q(joint) - rows.contexts[k].q(joint)) / (kShared * range(joint) + 1e-9);
+        const double apart = (rows.contexts[i].q(joint) - rows.contexts[k].q(joint)) /
+                             (kShared * range(joint) + 1e-9);
         S.block(rows.first[i], rows.first[k], rows.count[i], rows.count[k]) +=
             std::exp(-0.5 * apart * apart) * moved.segment(rows.first[i], rows.count[i]) *
             moved.segment(rows.first[k], rows.count[k]).transpose();
@@ -218,7 +243,8 @@ Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& devia
 double held_out_factor(const CheckRows& rows, const ModelParts& parts) {
   if (!parts.validation || parts.validation->poses == 0) return 1;
   double expected = 0;
-  for (std::size_t i = 0; i < rows.poses(); ++i) expected += rows.covariance.diagonal().segment<3>(rows.first[i]).sum();
+  for (std::size_t i = 0; i < rows.poses(); ++i)
+    expected += rows.covariance.diagonal().segment<3>(rows.first[i]).sum();
   expected = std::sqrt(expected / static_cast<double>(rows.poses()));
   return std::max(1.0, parts.validation->compensated.rms / expected);
 }
@@ -243,8 +269,9 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
   rows.contexts = contexts_of(model, batch);
   const std::vector<ErrorPrediction> predictions = model.predict_all(rows.contexts);
   const double shown = rotation_shown(parts);
-  const bool has_orientation = std::any_of(batch.measurements.begin(), batch.measurements.end(),
-                                           [&](const Measurement& m) { return m.R_WT && shown > 0; });
+  const bool has_orientation =
+      std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                  [&](const Measurement& m) { return m.R_WT && shown > 0; });
   const Stand stand = TRY(base_of(batch, predictions, has_orientation, parts.physics.X_WB));
   const Pose& X_WB = stand.X_WB;
   Index next = 0;
@@ -275,12 +302,13 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
     deviations.J.middleRows<3>(first) = R_BW * J_W.topRows<3>();
     add_position(predictions[i], m, tracker.sigma, parts.covariance, first, deviations);
     if (rows.count[i] == 3) continue;
-    rows.residual.segment<3>(first + 3) = rotation_log(X_WB.linear().transpose() * *m.R_WT * X_BT.linear().transpose());
+    rows.residual.segment<3>(first + 3) =
+        rotation_log(X_WB.linear().transpose() * *m.R_WT * X_BT.linear().transpose());
     deviations.J.middleRows<3>(first + 3) = R_BW * J_W.bottomRows<3>();
     add_rotation(tracker.sigma_rotation, shown, parts.covariance, first + 3, deviations);
   }
-  rows.covariance =
-      covariance_of(rows, deviations, parts) + left_in_joints(rows, deviations, effects, parts.q_max - parts.q_min);
+  rows.covariance = covariance_of(rows, deviations, parts) +
+                    left_in_joints(rows, deviations, effects, parts.q_max - parts.q_min);
   const double factor = held_out_factor(rows, parts);
   rows.covariance *= factor * factor;
   if (!stand.turns) hold_turn(rows);

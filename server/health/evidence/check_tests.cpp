@@ -33,14 +33,18 @@ double disturbance(int freedom, SeededRandom& random) {
 
 }  // namespace
 
-CheckTests::CheckTests(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& refitted, const Questions& questions)
+CheckTests::CheckTests(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& refitted,
+                       const Questions& questions)
     : rows_(covariance, refitted), causes_(questions.causes) {
-  for (const Hypothesis& one : questions.hypotheses) directions_.push_back(rows_.directions(one.columns));
+  for (const Hypothesis& one : questions.hypotheses)
+    directions_.push_back(rows_.directions(one.columns));
 }
 
 double CheckTests::p_value(std::size_t hypothesis, const Eigen::VectorXd& left) const {
   const Eigen::MatrixXd& own = directions_[hypothesis];
-  return own.cols() == 0 ? 1 : chi_square_tail((own.transpose() * left).squaredNorm(), static_cast<int>(own.cols()));
+  return own.cols() == 0 ? 1
+                         : chi_square_tail((own.transpose() * left).squaredNorm(),
+                                           static_cast<int>(own.cols()));
 }
 
 double CheckTests::whole_p(const Eigen::VectorXd& left) const {
@@ -58,12 +62,13 @@ std::vector<double> CheckTests::scores(const Eigen::VectorXd& left) const {
   const double price = std::log(static_cast<double>(left.size()));
   std::vector<double> scores;
   for (const Eigen::MatrixXd& own : directions_)
-    scores.push_back((own.transpose() * left).squaredNorm() - price * static_cast<double>(own.cols()));
+    scores.push_back((own.transpose() * left).squaredNorm() -
+                     price * static_cast<double>(own.cols()));
   return scores;
 }
 
-HealthyChecks::HealthyChecks(const CheckRows& rows, Eigen::MatrixXd frames, const Questions& questions,
-                             int tail_freedom, std::uint64_t seed)
+HealthyChecks::HealthyChecks(const CheckRows& rows, Eigen::MatrixXd frames,
+                             const Questions& questions, int tail_freedom, std::uint64_t seed)
     : rows_(rows),
       frames_(std::move(frames)),
       questions_(questions),
@@ -92,7 +97,8 @@ const CheckTests& HealthyChecks::tests(const std::vector<int>& bad) {
   if (known != tests_.end()) return known->second;
   Eigen::MatrixXd refitted = frames_;
   for (const int pose : key) {
-    const Eigen::MatrixXd& own = questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns;
+    const Eigen::MatrixXd& own =
+        questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns;
     Eigen::MatrixXd more(refitted.rows(), refitted.cols() + own.cols());
     more << refitted, own;
     refitted = std::move(more);
@@ -114,7 +120,8 @@ double HealthyChecks::smallest_p(const Beside& beside, const Seen& left) const {
   double smallest = chi_square_tail(left.square, beside.whole_freedom());
   for (std::size_t h = 0; h < questions_.causes; ++h) {
     const int freedom = beside.freedom(h);
-    if (freedom > 0) smallest = std::min(smallest, chi_square_tail(beside.explained(h, left), freedom));
+    if (freedom > 0)
+      smallest = std::min(smallest, chi_square_tail(beside.explained(h, left), freedom));
   }
   return smallest;
 }
@@ -128,8 +135,8 @@ std::size_t HealthyChecks::most_explained(const Beside& beside, const Seen& left
 }
 
 Sifted HealthyChecks::sifted(const Eigen::VectorXd& residual) {
-  const auto most =
-      std::max<std::size_t>(1, static_cast<std::size_t>(kBadPoseShare * static_cast<double>(rows_.poses())));
+  const auto most = std::max<std::size_t>(
+      1, static_cast<std::size_t>(kBadPoseShare * static_cast<double>(rows_.poses())));
   const Seen seen = beside_poses_.seen(tests({}).rows().left(residual));
   Sifted sifted;
   while (true) {

@@ -19,11 +19,14 @@ struct Questions {
 /// The tests of a check, beside what is refitted.
 class CheckTests {
  public:
-  CheckTests(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& refitted, const Questions& questions);
+  CheckTests(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& refitted,
+             const Questions& questions);
 
   [[nodiscard]] const RefittedRows& rows() const { return rows_; }
   /// Numbers that the test of a hypothesis looks at.
-  [[nodiscard]] int freedom(std::size_t hypothesis) const { return static_cast<int>(directions_[hypothesis].cols()); }
+  [[nodiscard]] int freedom(std::size_t hypothesis) const {
+    return static_cast<int>(directions_[hypothesis].cols());
+  }
   /// R x k, orthonormal: what each hypothesis can explain.
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& directions() const { return directions_; }
   /// Chance of explaining as much of `left` (R, whitened, refitted) where nothing is.
@@ -47,15 +50,16 @@ struct Sifted {
   double smallest_p = 1;
 };
 
-/// How healthy robots look at these very poses: simulated checks, with the tails that the model's own errors have, from
-/// which bad poses are taken out as from a real one.
+/// How healthy robots look at these very poses: simulated checks, with the tails that the model's
+/// own errors have, from which bad poses are taken out as from a real one.
 class HealthyChecks {
  public:
   /// `frames`: R x f, refitted in any case. `tail_freedom`: of Student's t; 0: normal.
-  HealthyChecks(const CheckRows& rows, Eigen::MatrixXd frames, const Questions& questions, int tail_freedom,
-                std::uint64_t seed);
+  HealthyChecks(const CheckRows& rows, Eigen::MatrixXd frames, const Questions& questions,
+                int tail_freedom, std::uint64_t seed);
 
-  /// Takes out poses while something is beyond chance and a single pose explains it best; at most a sixth of them.
+  /// Takes out poses while something is beyond chance and a single pose explains it best; at most a
+  /// sixth of them.
   [[nodiscard]] Sifted sifted(const Eigen::VectorXd& residual);
   /// With these poses refitted as well, each by itself.
   [[nodiscard]] const CheckTests& tests(const std::vector<int>& bad);
@@ -68,7 +72,8 @@ class HealthyChecks {
   using Seen = TestsBesidePoses::Seen;
   using Beside = TestsBesidePoses::Beside;
   [[nodiscard]] Eigen::VectorXd simulated(const Eigen::MatrixXd& root, std::uint64_t seed) const;
-  /// The tests beside these poses. Valid until the next call: sets are kept only while they take little room.
+  /// The tests beside these poses. Valid until the next call: sets are kept only while they take
+  /// little room.
   [[nodiscard]] const Beside& beside(std::vector<int> bad);
   [[nodiscard]] double smallest_p(const Beside& beside, const Seen& left) const;
   [[nodiscard]] std::size_t most_explained(const Beside& beside, const Seen& left) const;
@@ -85,8 +90,8 @@ class HealthyChecks {
   std::vector<double> smallest_;  // p-values of simulated checks, rising
 };
 
-/// Student's degrees of freedom of the errors of `poses` poses whose 99.7 % quantile is so many times their rms; 0:
-/// they are normal, or too few to say.
+/// Student's degrees of freedom of the errors of `poses` poses whose 99.7 % quantile is so many
+/// times their rms; 0: they are normal, or too few to say.
 [[nodiscard]] int tail_freedom_of(double p997_over_rms, int poses);
 
 }  // namespace trammel::health

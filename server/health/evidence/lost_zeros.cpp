@@ -29,12 +29,17 @@ void take_out(const MatrixXd& free, MatrixXd& J, VectorXd& residual) {
 
 }  // namespace
 
-ZerosSearch::ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std::vector<std::size_t> zeros,
-                         bool new_tool)
-    : effects_(effects), rows_(rows), zeros_(std::move(zeros)), new_tool_(new_tool), factor_(rows.covariance) {
+ZerosSearch::ZerosSearch(const CauseEffects& effects, const CheckRows& rows,
+                         std::vector<std::size_t> zeros, bool new_tool)
+    : effects_(effects),
+      rows_(rows),
+      zeros_(std::move(zeros)),
+      new_tool_(new_tool),
+      factor_(rows.covariance) {
   for (const PoseContext& context : rows.contexts) physics_.push_back(effects.at(context).X_BT);
   const RefittedRows refitted(rows.covariance, rows.by_base);
-  tool_numbers_ = static_cast<int>(refitted.directions(rows.by_cause(Eigen::all, effects.tool_columns())).cols());
+  tool_numbers_ = static_cast<int>(
+      refitted.directions(rows.by_cause(Eigen::all, effects.tool_columns())).cols());
 }
 
 ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB, bool warmth) const {
@@ -42,19 +47,21 @@ ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB, bo
              MatrixXd(rows_.by_cause.rows(), rows_.by_cause.cols())};
   for (std::size_t i = 0; i < rows_.poses(); ++i) {
     const Index first = rows_.first[i], count = rows_.count[i];
-    const PoseEffects there =
-        warmth ? effects_.at(rows_.contexts[i], at) : effects_.without_warmth(rows_.contexts[i], at);
+    const PoseEffects there = warmth ? effects_.at(rows_.contexts[i], at)
+                                     : effects_.without_warmth(rows_.contexts[i], at);
     now.by_base.middleRows(first, count) = there.by_base.topLeftCorner(count, now.by_base.cols());
     now.by_cause.middleRows(first, count) = there.by_cause.topRows(count);
     // The model's bias moves with the arm.
     const Pose& was = rows_.predicted[i];
     const Vector3 p_B = was.translation() + there.X_BT.translation() - physics_[i].translation();
-    const Vector3 measured_B = X_BB.inverse() * (was.translation() + rows_.residual.segment<3>(first));
+    const Vector3 measured_B =
+        X_BB.inverse() * (was.translation() + rows_.residual.segment<3>(first));
     now.residual.segment<3>(first) = measured_B - p_B;
     if (count == 3) continue;
     const Matrix3 R_B = there.X_BT.linear() * physics_[i].linear().transpose() * was.linear();
     const Matrix3 measured_R = rotation_exp(rows_.residual.segment<3>(first + 3)) * was.linear();
-    now.residual.segment<3>(first + 3) = rotation_log(X_BB.linear().transpose() * measured_R * R_B.transpose());
+    now.residual.segment<3>(first + 3) =
+        rotation_log(X_BB.linear().transpose() * measured_R * R_B.transpose());
   }
   return now;
 }
@@ -112,7 +119,8 @@ void ZerosSearch::fit(ZerosFit& one) const {
     const Vector3 turn = rows_.base_turns() ? Vector3(by.segment<3>(3)) : Vector3::Zero();
     double farthest = turn.cwiseAbs().maxCoeff();
     for (std::size_t z = 0; z < one.zeros.size(); ++z)
-      farthest = std::max(farthest, std::abs(by(b + static_cast<Index>(z))) * effects_.scale(one.columns[z]));
+      farthest = std::max(farthest,
+                          std::abs(by(b + static_cast<Index>(z))) * effects_.scale(one.columns[z]));
     const bool is_settled = (J * by).squaredNorm() < kSettled;
     one.left = is_settled ? (residual - J * by).squaredNorm() : residual.squaredNorm();
     const double part = std::min(1.0, kFarthestTurn / std::max(farthest, kFarthestTurn));

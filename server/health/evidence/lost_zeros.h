@@ -4,11 +4,12 @@
 
 #include "server/health/evidence/check_rows.h"
 
-/// Zeros that several joints lost at once, as in a robot that was mastered anew, and beside them perhaps a tool that
-/// sits elsewhere: one explanation of a check.
+/// Zeros that several joints lost at once, as in a robot that was mastered anew, and beside them
+/// perhaps a tool that sits elsewhere: one explanation of a check.
 ///
-/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by Gauss-Newton steps.
-/// Each number has a prior width, the most that it can be off; it bounds what the poses do not tell.
+/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by
+/// Gauss-Newton steps. Each number has a prior width, the most that it can be off; it bounds what
+/// the poses do not tell.
 namespace trammel::health {
 
 /// One set of zeros, with or without the tool, as the poses have it.
@@ -28,11 +29,12 @@ struct ZerosFit {
 class ZerosSearch {
  public:
   /// `zeros`: causes that may be among them. `new_tool`: the tool is refitted in any case.
-  ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std::vector<std::size_t> zeros, bool new_tool);
+  ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std::vector<std::size_t> zeros,
+              bool new_tool);
 
   [[nodiscard]] const std::vector<std::size_t>& causes() const { return zeros_; }
-  /// Each set of zeros, without and with the tool, and the tool alone. Empty of arms with so many joints that they are
-  /// too many. `bad`: poses that do not count.
+  /// Each set of zeros, without and with the tool, and the tool alone. Empty of arms with so many
+  /// joints that they are too many. `bad`: poses that do not count.
   [[nodiscard]] std::vector<ZerosFit> all(const std::vector<int>& bad = {}) const;
   /// The check's rows, linear around the fit: what its numbers do there included.
   [[nodiscard]] CheckRows around(const ZerosFit& fit) const;

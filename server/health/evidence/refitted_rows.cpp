@@ -18,11 +18,14 @@ Eigen::MatrixXd span_of(Eigen::MatrixXd columns, const Eigen::VectorXd& before) 
   return svd.matrixU().leftCols(rank);
 }
 
-Eigen::VectorXd lengths(const Eigen::MatrixXd& columns) { return columns.colwise().norm().transpose(); }
+Eigen::VectorXd lengths(const Eigen::MatrixXd& columns) {
+  return columns.colwise().norm().transpose();
+}
 
 /// One column a pose: a function of the joint's angle may be anything at each.
 Eigen::MatrixXd by_pose(const CheckRows& rows, Index column) {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows.residual.size(), static_cast<Index>(rows.poses()));
+  Eigen::MatrixXd columns =
+      Eigen::MatrixXd::Zero(rows.residual.size(), static_cast<Index>(rows.poses()));
   for (std::size_t i = 0; i < rows.poses(); ++i) {
     columns.col(static_cast<Index>(i)).segment(rows.first[i], rows.count[i]) =
         rows.by_cause.col(column).segment(rows.first[i], rows.count[i]);
@@ -39,8 +42,9 @@ std::vector<Hypothesis> cause_hypotheses(const CauseEffects& effects, const Chec
     if (!all.empty() && all.back().cause == signal.cause) continue;
     const CauseEffects::Entry& entry = effects.causes()[signal.cause];
     all.push_back({signal.cause, -1,
-                   entry.cause.any_function ? by_pose(rows, entry.columns.front())
-                                            : Eigen::MatrixXd(rows.by_cause(Eigen::all, entry.columns))});
+                   entry.cause.any_function
+                       ? by_pose(rows, entry.columns.front())
+                       : Eigen::MatrixXd(rows.by_cause(Eigen::all, entry.columns))});
   }
   return all;
 }
@@ -59,10 +63,12 @@ Estimate estimate(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, doubl
   Eigen::MatrixXd information = own.transpose() * own;
   information.diagonal().array() += 1 / (widest * widest);
   const Eigen::LLT<Eigen::MatrixXd> factor(information);
-  return {factor.solve(own.transpose() * left), factor.solve(Eigen::MatrixXd::Identity(own.cols(), own.cols()))};
+  return {factor.solve(own.transpose() * left),
+          factor.solve(Eigen::MatrixXd::Identity(own.cols(), own.cols()))};
 }
 
-RefittedRows::RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance) : factor_(covariance) {
+RefittedRows::RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance)
+    : factor_(covariance) {
   const Eigen::MatrixXd columns = whitened(nuisance);
   nuisance_ = span_of(columns, lengths(columns));
 }
@@ -80,11 +86,13 @@ Eigen::MatrixXd RefittedRows::directions(const Eigen::MatrixXd& columns) const {
   return span_of(left(columns), lengths(whitened(columns)));
 }
 
-Eigen::MatrixXd RefittedRows::unwhitened(const Eigen::MatrixXd& left) const { return factor_.matrixL() * left; }
+Eigen::MatrixXd RefittedRows::unwhitened(const Eigen::MatrixXd& left) const {
+  return factor_.matrixL() * left;
+}
 
 Eigen::MatrixXd RefittedRows::unwhitened_covariance() const {
-  const Eigen::MatrixXd all =
-      Eigen::MatrixXd::Identity(nuisance_.rows(), nuisance_.rows()) - nuisance_ * nuisance_.transpose();
+  const Eigen::MatrixXd all = Eigen::MatrixXd::Identity(nuisance_.rows(), nuisance_.rows()) -
+                              nuisance_ * nuisance_.transpose();
   const Eigen::MatrixXd half = factor_.matrixL() * all;
   return half * half.transpose();
 }

@@ -11,8 +11,9 @@ namespace trammel::health {
 /// Share of a column: less that is left of it is rounding, or made up for.
 inline constexpr double kLeastLeft = 1e-3;
 
-/// How far numbers of a cause can be off at all, in units of their prior scales (standard deviations): 20 mm and 50
-/// mrad of links and tools, 0.1 rad of a zero, 2 mrad of an error that goes with the angle.
+/// How far numbers of a cause can be off at all, in units of their prior scales (standard
+/// deviations): 20 mm and 50 mrad of links and tools, 0.1 rad of a zero, 2 mrad of an error that
+/// goes with the angle.
 inline constexpr double kWidest = 10, kWidestZero = 50, kWidestFunction = 1;
 
 /// Numbers fitted to residuals: what these do not tell is not known beyond the prior.
@@ -21,7 +22,8 @@ struct Estimate {
   Eigen::MatrixXd covariance;
 };
 /// `own`: R x k, `left`: R, both whitened and refitted. `widest`: in units of the numbers.
-[[nodiscard]] Estimate estimate(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double widest);
+[[nodiscard]] Estimate estimate(const Eigen::MatrixXd& own, const Eigen::VectorXd& left,
+                                double widest);
 
 /// Something that may explain the residuals: columns of R rows.
 struct Hypothesis {
@@ -30,7 +32,8 @@ struct Hypothesis {
   Eigen::MatrixXd columns = {};  ///< R x k
 };
 /// A hypothesis for every cause that has a signal.
-[[nodiscard]] std::vector<Hypothesis> cause_hypotheses(const CauseEffects& effects, const CheckRows& rows,
+[[nodiscard]] std::vector<Hypothesis> cause_hypotheses(const CauseEffects& effects,
+                                                       const CheckRows& rows,
                                                        const std::vector<CauseSignal>& signals);
 /// For every pose.
 [[nodiscard]] std::vector<Hypothesis> pose_hypotheses(const CheckRows& rows);
@@ -42,18 +45,24 @@ class RefittedRows {
   RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance);
 
   [[nodiscard]] Eigen::Index size() const { return nuisance_.rows(); }
-  [[nodiscard]] int freedom() const { return static_cast<int>(nuisance_.rows() - nuisance_.cols()); }
+  [[nodiscard]] int freedom() const {
+    return static_cast<int>(nuisance_.rows() - nuisance_.cols());
+  }
   /// R x k of R x k.
   [[nodiscard]] Eigen::MatrixXd left(const Eigen::MatrixXd& columns) const;
   /// The same of what is whitened already.
   [[nodiscard]] Eigen::VectorXd refitted(const Eigen::VectorXd& whitened) const {
     return whitened - nuisance_ * (nuisance_.transpose() * whitened);
   }
-  /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up for are none.
+  /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up
+  /// for are none.
   [[nodiscard]] Eigen::MatrixXd directions(const Eigen::MatrixXd& columns) const;
   /// R x r, in their own units: columns that span the same as those.
-  [[nodiscard]] Eigen::MatrixXd kept(const Eigen::MatrixXd& columns) const { return unwhitened(directions(columns)); }
-  /// R x k: residuals, or columns, as a generalised least-squares fit of the nuisance leaves them, in their own units.
+  [[nodiscard]] Eigen::MatrixXd kept(const Eigen::MatrixXd& columns) const {
+    return unwhitened(directions(columns));
+  }
+  /// R x k: residuals, or columns, as a generalised least-squares fit of the nuisance leaves them,
+  /// in their own units.
   [[nodiscard]] Eigen::MatrixXd unwhitened(const Eigen::MatrixXd& left) const;
   /// R x R: their covariance.
   [[nodiscard]] Eigen::MatrixXd unwhitened_covariance() const;

@@ -14,7 +14,8 @@ using Spectrum = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
 }  // namespace
 
-TestsBesidePoses::TestsBesidePoses(const std::vector<Eigen::MatrixXd>& directions, std::size_t causes, int freedom)
+TestsBesidePoses::TestsBesidePoses(const std::vector<Eigen::MatrixXd>& directions,
+                                   std::size_t causes, int freedom)
     : causes_(causes), freedom_(freedom), first_{0} {
   for (const Eigen::MatrixXd& own : directions) first_.push_back(first_.back() + own.cols());
   directions_.resize(directions.empty() ? 0 : directions.front().rows(), first_.back());
@@ -62,7 +63,8 @@ TestsBesidePoses::Beside::Part TestsBesidePoses::part_of(const Eigen::MatrixXd& 
   part.freedom = static_cast<int>(M.rows());
   if (M.size() == 0) return part;
   const bool is_tall = M.rows() > M.cols();
-  const Spectrum spectrum(is_tall ? Eigen::MatrixXd(M.transpose() * M) : Eigen::MatrixXd(M * M.transpose()));
+  const Spectrum spectrum(is_tall ? Eigen::MatrixXd(M.transpose() * M)
+                                  : Eigen::MatrixXd(M * M.transpose()));
   part.turn = spectrum.eigenvectors().transpose();
   if (is_tall) part.turn = part.turn * M.transpose();
   part.weight = Eigen::VectorXd::Zero(spectrum.eigenvalues().size());

@@ -7,14 +7,16 @@
 
 namespace trammel::health {
 
-/// What the tests of a check see once some of its poses are refitted as bad, found without touching its R rows again.
+/// What the tests of a check see once some of its poses are refitted as bad, found without touching
+/// its R rows again.
 ///
-/// With D_h the orthonormal directions of hypothesis h beside the frames, and l the residuals whitened and refitted
-/// with the frames, everything follows from D_h' l and D_h' D_g: bad poses with the orthonormal directions Z leave of l
-/// the part (I - Z Z') l, and of h the columns (I - Z Z') D_h. With M = D_h' Z and v = D_h' (I - Z Z') l it explains
+/// With D_h the orthonormal directions of hypothesis h beside the frames, and l the residuals
+/// whitened and refitted with the frames, everything follows from D_h' l and D_h' D_g: bad poses
+/// with the orthonormal directions Z leave of l the part (I - Z Z') l, and of h the columns (I - Z
+/// Z') D_h. With M = D_h' Z and v = D_h' (I - Z Z') l it explains
 ///   v' (I - M M')^+ v,
-/// and loses the directions that Z makes up for. A set of bad poses costs a few matrices as small as h and Z, whatever
-/// the number of rows; a check of 60 poses looks at thousands of sets.
+/// and loses the directions that Z makes up for. A set of bad poses costs a few matrices as small
+/// as h and Z, whatever the number of rows; a check of 60 poses looks at thousands of sets.
 class TestsBesidePoses {
  public:
   /// Of one check's residuals.
@@ -51,8 +53,8 @@ class TestsBesidePoses {
     int whole_freedom_ = 0;
   };
 
-  /// `directions`: of each hypothesis beside the frames; those from `causes` on are of single poses. `freedom`: of the
-  /// residuals there.
+  /// `directions`: of each hypothesis beside the frames; those from `causes` on are of single
+  /// poses. `freedom`: of the residuals there.
   TestsBesidePoses(const std::vector<Eigen::MatrixXd>& directions, std::size_t causes, int freedom);
 
   /// `left`: R, whitened, refitted with the frames.

@@ -13,15 +13,18 @@ constexpr int kLargestDraw = 64;  // times as many where most are outside the wo
 bool inside(const Cell& cell, const PhysicalModel& physics, const PoseContext& context) {
   if (!cell.workspace) return true;
   const Vector3 p = (physics.X_WB.inverse() * physics.nominal_pose_W(context)).translation();
-  return (p.array() >= cell.workspace->lower.array()).all() && (p.array() <= cell.workspace->upper.array()).all();
+  return (p.array() >= cell.workspace->lower.array()).all() &&
+         (p.array() <= cell.workspace->upper.array()).all();
 }
 
 }  // namespace
 
-std::vector<PoseContext> working_poses(const CompensatedModel& model, const PoseContext& like, std::uint64_t seed) {
+std::vector<PoseContext> working_poses(const CompensatedModel& model, const PoseContext& like,
+                                       std::uint64_t seed) {
   const ModelParts& parts = model.parts();
   JointRanges ranges;
-  for (Eigen::Index j = 0; j < parts.q_min.size(); ++j) ranges.emplace_back(parts.q_min(j), parts.q_max(j));
+  for (Eigen::Index j = 0; j < parts.q_min.size(); ++j)
+    ranges.emplace_back(parts.q_min(j), parts.q_max(j));
   std::vector<PoseContext> poses;
   for (int draw = 1; draw <= kLargestDraw && static_cast<int>(poses.size()) < kPoses; draw *= 4) {
     const Eigen::MatrixXd q = latin_hypercube(ranges, draw * kPoses, seed);

@@ -25,13 +25,15 @@ std::string because_of(const DriftRate& rate, double since) {
   constexpr double kMonth = 30 * kDay;
   if (rate.checks == 1) {
     return fmt::format(
-        "since the model was measured, {:.0f} days before, the arm has drifted by at most {:.3f} mm rms (95 %)",
+        "since the model was measured, {:.0f} days before, the arm has drifted by at most {:.3f} "
+        "mm rms (95 %)",
         since / kDay, 2 * to_mm(DriftRate::after(rate.most, since)));
   }
   return fmt::format(
-      "by {} checks over {:.0f} days the arm drifts by {:.3f} mm rms in 30 days ({:.3f} to {:.3f}, 95 %)", rate.checks,
-      rate.span / kDay, to_mm(DriftRate::after(rate.best, kMonth)), to_mm(DriftRate::after(rate.least, kMonth)),
-      to_mm(DriftRate::after(rate.most, kMonth)));
+      "by {} checks over {:.0f} days the arm drifts by {:.3f} mm rms in 30 days ({:.3f} to {:.3f}, "
+      "95 %)",
+      rate.checks, rate.span / kDay, to_mm(DriftRate::after(rate.best, kMonth)),
+      to_mm(DriftRate::after(rate.least, kMonth)), to_mm(DriftRate::after(rate.most, kMonth)));
 }
 
 }  // namespace
@@ -58,8 +60,9 @@ void tell_due(const HealthOptions& options, const CheckTimes& times,
     return;
   }
   if (!times.model || !times.check || static_cast<double>(*times.check - *times.model) < kDay) {
-    check.due_because = times.model && times.check ? "the model's own measurements are less than a day older"
-                                                   : "it is not known when the model and the check were measured";
+    check.due_because = times.model && times.check
+                            ? "the model's own measurements are less than a day older"
+                            : "it is not known when the model and the check were measured";
     return;
   }
   check.drift = DriftSeen{*times.model, *times.check, misfits()};
@@ -69,7 +72,8 @@ void tell_due(const HealthOptions& options, const CheckTimes& times,
   const DriftRate& rate = *check.drift_rate;
   if (rate.checks < kFewestChecks) {
     check.due_because = fmt::format(
-        "{}; a date needs {} checks of different days, so far there {} {}: until then check at the usual interval",
+        "{}; a date needs {} checks of different days, so far there {} {}: until then check at the "
+        "usual interval",
         because_of(rate, static_cast<double>(*times.check - *times.model)), kFewestChecks,
         rate.checks > 1 ? "are" : "is", rate.checks);
     return;

@@ -15,12 +15,15 @@ struct CheckTimes {
   std::optional<std::int64_t> model, check;
 };
 
-/// How likely each of drift_variances() is, by the residuals: the effects of all single causes are normal, alike.
-/// `drift`: R x S, what signals of 1 m rms do at the check's poses. Both whitened and refitted.
-[[nodiscard]] std::vector<double> misfits_of_drift(Eigen::MatrixXd drift, const Eigen::VectorXd& residual);
+/// How likely each of drift_variances() is, by the residuals: the effects of all single causes are
+/// normal, alike. `drift`: R x S, what signals of 1 m rms do at the check's poses. Both whitened
+/// and refitted.
+[[nodiscard]] std::vector<double> misfits_of_drift(Eigen::MatrixXd drift,
+                                                   const Eigen::VectorXd& residual);
 
-/// The effect of the drift may be above the tolerance (95 %) when it has grown that large at the highest rate that all
-/// checks together leave likely (95 %). `misfits`: misfits_of_drift(), asked for where times are known.
+/// The effect of the drift may be above the tolerance (95 %) when it has grown that large at the
+/// highest rate that all checks together leave likely (95 %). `misfits`: misfits_of_drift(), asked
+/// for where times are known.
 void tell_due(const HealthOptions& options, const CheckTimes& times,
               const std::function<std::vector<double>()>& misfits, HealthCheck& check);
 

@@ -15,8 +15,9 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other)
   return both;
 }
 
-Examination::Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working,
-                         CheckRows rows, int tail_freedom, const Chain& robot)
+Examination::Examination(const HealthOptions& options, const CauseEffects& effects,
+                         const WorkingPoses& working, CheckRows rows, int tail_freedom,
+                         const Chain& robot)
     : options_(options),
       effects_(effects),
       working_(working),
@@ -33,7 +34,8 @@ HealthCheck Examination::result(const CheckTimes& times) {
   check_.not_asked = effects_.not_asked();
   sifted_ = healthy_.sifted(rows_.residual);
   const std::optional<ZerosFit> zeros = lost_zeros();
-  for (const int pose : sifted_.bad) check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(pose)]);
+  for (const int pose : sifted_.bad)
+    check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(pose)]);
   check_.p_value = healthy_.chance_of(sifted_.smallest_p);
   const CheckTests& tests = healthy_.tests(sifted_.bad);
   if (zeros) {
@@ -43,12 +45,15 @@ HealthCheck Examination::result(const CheckTimes& times) {
   }
   tell_rms(tests.rows());
   tell_smallest(tests);
-  const auto misfits = [&] { return misfits_of_drift(drift(tests.rows()), tests.rows().left(rows_.residual)); };
+  const auto misfits = [&] {
+    return misfits_of_drift(drift(tests.rows()), tests.rows().left(rows_.residual));
+  };
   tell_due(options_, times, misfits, check_);
   tell_verdict(options_, doubt_, check_);
   if (!rows_.base_turns())
     check_.sentence +=
-        "; poses at one place do not say which way the base is turned: it is taken to be turned as in the model";
+        "; poses at one place do not say which way the base is turned: it is taken to be turned as "
+        "in the model";
   return std::move(check_);
 }
 
@@ -92,7 +97,8 @@ void Examination::tell_rms(const RefittedRows& refitted) {
     square += left.segment<3>(rows_.first[i]).squaredNorm();
     expected_square += expected.diagonal().segment<3>(rows_.first[i]).sum();
   }
-  const auto count = static_cast<double>(std::max<std::size_t>(rows_.poses() - check_.suspects.size(), 1));
+  const auto count =
+      static_cast<double>(std::max<std::size_t>(rows_.poses() - check_.suspects.size(), 1));
   check_.rms = std::sqrt(square / count);
   check_.expected_rms = std::sqrt(expected_square / count);
 }
@@ -127,14 +133,16 @@ void Examination::tell_smallest(const CheckTests& tests) {
   bool all_seen = tests.rows().freedom() >= 1 && questions_.causes > 0;
   for (std::size_t h = 0; h < questions_.causes; ++h) {
     const std::size_t cause = questions_.hypotheses[h].cause;
-    const auto rms = smallest_seen(strengths(cause, tests.rows()), tests.freedom(h), limit, options_.power);
+    const auto rms =
+        smallest_seen(strengths(cause, tests.rows()), tests.freedom(h), limit, options_.power);
     all_seen = all_seen && rms.has_value();
     check_.smallest.push_back({effects_.causes()[cause].cause, rms});
   }
-  std::stable_sort(check_.smallest.begin(), check_.smallest.end(), [](const auto& a, const auto& b) {
-    constexpr double kUnseen = 1e9;
-    return a.rms.value_or(kUnseen) > b.rms.value_or(kUnseen);
-  });
+  std::stable_sort(check_.smallest.begin(), check_.smallest.end(),
+                   [](const auto& a, const auto& b) {
+                     constexpr double kUnseen = 1e9;
+                     return a.rms.value_or(kUnseen) > b.rms.value_or(kUnseen);
+                   });
   if (all_seen) check_.would_have_seen = check_.smallest.front().rms;
 }
 

@@ -13,10 +13,11 @@
 #include "server/health/examination/verdict.h"
 #include "server/health/health_verdict.h"
 
-/// A check's residuals are tested for each single cause beside base (and tool), for single bad poses, and as a whole.
-/// What explains most for its number of parameters (Schwarz's price, log R for each) is taken: a bad pose is refitted
-/// with the base, a cause is a change, and the rest is tested again. Effects are linear in the cause. Zeros of several
-/// joints come first, as one explanation of all poses, and are not linear.
+/// A check's residuals are tested for each single cause beside base (and tool), for single bad
+/// poses, and as a whole. What explains most for its number of parameters (Schwarz's price, log R
+/// for each) is taken: a bad pose is refitted with the base, a cause is a change, and the rest is
+/// tested again. Effects are linear in the cause. Zeros of several joints come first, as one
+/// explanation of all poses, and are not linear.
 namespace trammel::health {
 
 inline constexpr double kAlike = 6;  ///< of scores: odds of e^3
@@ -24,8 +25,8 @@ inline constexpr double kAlike = 6;  ///< of scores: odds of e^3
 /// One check, while it is looked through.
 class Examination {
  public:
-  Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working, CheckRows rows,
-              int tail_freedom, const Chain& robot);
+  Examination(const HealthOptions& options, const CauseEffects& effects,
+              const WorkingPoses& working, CheckRows rows, int tail_freedom, const Chain& robot);
   [[nodiscard]] HealthCheck result(const CheckTimes& times);
 
  private:
@@ -42,10 +43,12 @@ class Examination {
   [[nodiscard]] std::vector<std::size_t> zeros_of(const Chain& robot) const;
   /// Refitted in any case, at `there`: frames, and bad poses.
   [[nodiscard]] Eigen::MatrixXd always_at(const CheckRows& there) const;
-  /// Zeros that several joints lost, or one by much, where nothing simpler explains all poses as well and they leave
-  /// nothing beyond chance. Where they do not, a bad pose or two are looked for beside them.
+  /// Zeros that several joints lost, or one by much, where nothing simpler explains all poses as
+  /// well and they leave nothing beyond chance. Where they do not, a bad pose or two are looked for
+  /// beside them.
   [[nodiscard]] std::optional<ZerosFit> lost_zeros();
-  /// The likeliest of `fits_`, which leave these poses out; empty where it is not what the poses show.
+  /// The likeliest of `fits_`, which leave these poses out; empty where it is not what the poses
+  /// show.
   [[nodiscard]] std::optional<ZerosFit> likeliest_zeros(const std::vector<int>& bad);
   /// The pose that fits all zeros and the tool together worst, beyond its price.
   [[nodiscard]] std::optional<int> pose_that_fits_no_zeros(const std::vector<int>& bad) const;
@@ -62,10 +65,11 @@ class Examination {
   [[nodiscard]] bool are_bad_poses(double score);
   void tell_zeros(const ZerosFit& fit);
   void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
-  /// Adds to a tool the zeros whose effect it makes up for at any poses: `beside_tool` leaves nothing of them, `before`
-  /// does. `named`: zeros that are not asked.
-  void tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before, const RefittedRows& beside_tool,
-                          const std::vector<std::size_t>& named, SeenChange& change);
+  /// Adds to a tool the zeros whose effect it makes up for at any poses: `beside_tool` leaves
+  /// nothing of them, `before` does. `named`: zeros that are not asked.
+  void tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before,
+                          const RefittedRows& beside_tool, const std::vector<std::size_t>& named,
+                          SeenChange& change);
   void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
   /// Adds the causes that explain as much as this one does beside `others`.
   void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
@@ -80,13 +84,17 @@ class Examination {
   [[nodiscard]] bool is_tool(std::size_t hypothesis) const;
   /// Whether a cause was found, and the rest is to be looked at again.
   bool look_once(const CheckTests& tests);
-  /// Each cause once more beside the others: one that they make needless goes, one that now fits better comes.
+  /// Each cause once more beside the others: one that they make needless goes, one that now fits
+  /// better comes.
   void look_back();
   /// The cause that explains most for its price; empty: none explains anything.
-  [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const;
-  [[nodiscard]] bool may_be_named(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
+  [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests,
+                                                     const Eigen::VectorXd& left) const;
+  [[nodiscard]] bool may_be_named(std::size_t hypothesis, const CheckTests& tests,
+                                  const Eigen::VectorXd& left) const;
   /// The likeliest, though its size may be far beyond what these poses show.
-  [[nodiscard]] std::size_t most_explained(const CheckTests& tests, const Eigen::VectorXd& left) const;
+  [[nodiscard]] std::size_t most_explained(const CheckTests& tests,
+                                           const Eigen::VectorXd& left) const;
   /// Refitted besides: all that were named but the one at `k`.
   [[nodiscard]] CheckTests beside_others(std::size_t k) const;
   void refit_named();
@@ -94,17 +102,20 @@ class Examination {
   /// Over the working poses.
   [[nodiscard]] Size size(std::size_t hypothesis, const Estimate& found) const;
   /// The squared effect of these columns at the check's poses: k x k, m².
-  [[nodiscard]] Eigen::MatrixXd square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const;
+  [[nodiscard]] Eigen::MatrixXd square_here(const Eigen::MatrixXd& columns,
+                                            const RefittedRows& refitted) const;
   /// `over`, or where it is more than the poses are off by, what they show of it.
-  void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here, SeenChange& change) const;
+  void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here,
+                SeenChange& change) const;
   /// Whether it would do far more elsewhere than these poses are off by: they do not show it.
   [[nodiscard]] bool is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const;
   void tell_change(const Named& named, const CheckTests& tests);
-  void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
-                   SeenChange& change) const;
+  void tell_rivals(std::size_t hypothesis, const CheckTests& tests,
+                   const std::vector<double>& scores, SeenChange& change) const;
   [[nodiscard]] std::vector<bool> credible(const std::vector<double>& scores) const;
   /// True where all residuals being larger alike explains as much as the best of all causes does.
-  [[nodiscard]] bool is_scatter(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
+  [[nodiscard]] bool is_scatter(std::size_t hypothesis, const CheckTests& tests,
+                                const Eigen::VectorXd& left) const;
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
   void tell_rms(const RefittedRows& refitted);
   /// R: what it does at the check's poses.
@@ -112,7 +123,8 @@ class Examination {
   /// R x S: of all signals, refitted.
   [[nodiscard]] Eigen::MatrixXd drift(const RefittedRows& refitted) const;
   /// lambda of each signal of a cause, of 1 m rms.
-  [[nodiscard]] std::vector<double> strengths(std::size_t cause, const RefittedRows& refitted) const;
+  [[nodiscard]] std::vector<double> strengths(std::size_t cause,
+                                              const RefittedRows& refitted) const;
   void tell_smallest(const CheckTests& tests);
 
   const HealthOptions& options_;

@@ -10,12 +10,13 @@ namespace trammel::health {
 
 namespace {
 
-constexpr double kCredible = 0.99;  // of all single causes' odds: those that could be it have it together
+constexpr double kCredible =
+    0.99;  // of all single causes' odds: those that could be it have it together
 
 }  // namespace
 
-void Examination::tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
-                                     SeenChange& change) const {
+void Examination::tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others,
+                                     std::size_t cause, SeenChange& change) const {
   const Questions questions{cause_hypotheses(effects_, there, signals_), questions_.causes};
   const CheckTests tests(rows_.covariance, others, questions);
   const auto own = std::find_if(questions.hypotheses.begin(), questions.hypotheses.end(),
@@ -25,13 +26,16 @@ void Examination::tell_rivals_beside(const CheckRows& there, const Eigen::Matrix
               tests.scores(tests.rows().left(there.residual)), change);
 }
 
-/// The most likely single causes that together have kCredible of the odds: many that are each unlikely may hold the
-/// true one.
+/// The most likely single causes that together have kCredible of the odds: many that are each
+/// unlikely may hold the true one.
 std::vector<bool> Examination::credible(const std::vector<double>& scores) const {
   std::vector<std::size_t> order(questions_.causes);
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
-  const auto odds = [&](std::size_t h) { return std::exp(0.5 * (scores[h] - scores[order.front()])); };
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
+  const auto odds = [&](std::size_t h) {
+    return std::exp(0.5 * (scores[h] - scores[order.front()]));
+  };
   double left = 0;
   for (const std::size_t h : order) left += odds(h);
   const double missed = (1 - kCredible) * left;
@@ -44,15 +48,17 @@ std::vector<bool> Examination::credible(const std::vector<double>& scores) const
   return likely;
 }
 
-void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
-                              SeenChange& change) const {
-  // What a cause explains whatever it costs: one with more numbers may be the true one all the same.
+void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests,
+                              const std::vector<double>& scores, SeenChange& change) const {
+  // What a cause explains whatever it costs: one with more numbers may be the true one all the
+  // same.
   const auto explained = [&](std::size_t h) { return scores[h] + price(tests.freedom(h)); };
   const std::vector<bool> likely = credible(scores);
   for (std::size_t h = 0; h < questions_.causes; ++h) {
     const SingleCause& other = effects_.causes()[questions_.hypotheses[h].cause].cause;
     const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
-    if (h != hypothesis && (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike)) add_rival(other, change);
+    if (h != hypothesis && (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike))
+      add_rival(other, change);
   }
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {

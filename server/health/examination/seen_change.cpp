@@ -21,13 +21,14 @@ void add_rival(const SingleCause& rival, SeenChange& change) {
 }
 
 void tell_instrument(std::vector<SeenChange>& changed) {
-  const auto grew = std::find_if(changed.begin(), changed.end(),
-                                 [](const SeenChange& change) { return change.cause.record->needs.temperature; });
+  const auto grew = std::find_if(changed.begin(), changed.end(), [](const SeenChange& change) {
+    return change.cause.record->needs.temperature;
+  });
   if (grew == changed.end()) return;
   for (const CauseRecord* record : all_causes()) {
-    const bool is_rival = std::any_of(record->rivals.begin(), record->rivals.end(), [&](const causes::Rival& rival) {
-      return rival.cause == grew->cause.record->spelling;
-    });
+    const bool is_rival = std::any_of(
+        record->rivals.begin(), record->rivals.end(),
+        [&](const causes::Rival& rival) { return rival.cause == grew->cause.record->spelling; });
     if (!is_rival || record->scope != causes::Scope::kSession || record->needs.time) continue;
     for (SeenChange& change : changed) add_rival({record, -1, {}, false}, change);
   }

@@ -9,7 +9,8 @@ Size size_of(const Estimate& found, const Eigen::MatrixXd& square) {
   const double whole = found.numbers.dot(square * found.numbers);
   const double by_noise = (square * found.covariance).trace();
   const Eigen::VectorXd gradient = square * found.numbers / std::max(std::sqrt(whole), 1e-12);
-  return {std::sqrt(std::max(whole - by_noise, 0.0)), 2 * std::sqrt(gradient.dot(found.covariance * gradient))};
+  return {std::sqrt(std::max(whole - by_noise, 0.0)),
+          2 * std::sqrt(gradient.dot(found.covariance * gradient))};
 }
 
 Size size_of_any(const Estimate& found, double rms) {

@@ -11,7 +11,8 @@ struct Size {
 };
 /// The size of an effect of numbers w whose square is w' `square` w.
 [[nodiscard]] Size size_of(const Estimate& found, const Eigen::MatrixXd& square);
-/// The size where a joint's angle is off by anything at each pose; `rms`: if it is one prior scale everywhere.
+/// The size where a joint's angle is off by anything at each pose; `rms`: if it is one prior scale
+/// everywhere.
 [[nodiscard]] Size size_of_any(const Estimate& found, double rms);
 
 }  // namespace trammel::health

@@ -10,31 +10,38 @@ using Eigen::Index;
 
 namespace {
 
-constexpr double kExtrapolated = 10;  // times what the poses are off by: an effect that large is not seen in them
+constexpr double kExtrapolated =
+    10;  // times what the poses are off by: an effect that large is not seen in them
 
 }  // namespace
 
 bool Examination::is_tool(std::size_t hypothesis) const {
-  return effects_.causes()[questions_.hypotheses[hypothesis].cause].columns == effects_.tool_columns();
+  return effects_.causes()[questions_.hypotheses[hypothesis].cause].columns ==
+         effects_.tool_columns();
 }
 
 Estimate Examination::estimated(std::size_t hypothesis, const RefittedRows& refitted) const {
   const Hypothesis& one = questions_.hypotheses[hypothesis];
   const SingleCause& cause = effects_.causes()[one.cause].cause;
-  const double widest = cause.any_function ? kWidestFunction : is_zero(cause) ? kWidestZero : kWidest;
+  const double widest = cause.any_function ? kWidestFunction
+                        : is_zero(cause)   ? kWidestZero
+                                           : kWidest;
   return estimate(refitted.left(one.columns), refitted.left(rows_.residual), widest);
 }
 
 Size Examination::size(std::size_t hypothesis, const Estimate& found) const {
   const CauseEffects::Entry& entry = effects_.causes()[questions_.hypotheses[hypothesis].cause];
-  return entry.cause.any_function ? size_of_any(found, working_.any_function_rms(entry.columns.front()))
-                                  : size_of(found, working_.left_square(entry.columns));
+  return entry.cause.any_function
+             ? size_of_any(found, working_.any_function_rms(entry.columns.front()))
+             : size_of(found, working_.left_square(entry.columns));
 }
 
-Eigen::MatrixXd Examination::square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const {
+Eigen::MatrixXd Examination::square_here(const Eigen::MatrixXd& columns,
+                                         const RefittedRows& refitted) const {
   const Eigen::MatrixXd all = refitted.unwhitened(refitted.left(columns));
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
-  for (const Index first : rows_.first) square += all.middleRows<3>(first).transpose() * all.middleRows<3>(first);
+  for (const Index first : rows_.first)
+    square += all.middleRows<3>(first).transpose() * all.middleRows<3>(first);
   return square / static_cast<double>(rows_.poses());
 }
 

@@ -18,21 +18,25 @@ std::string joints_in_words(const std::vector<LostZero>& zeros) {
   if (count > 2 && last - first + 1 == count) return fmt::format("{} to {}", first, last);
   std::string text = std::to_string(first);
   for (int k = 1; k < count; ++k)
-    text += fmt::format("{}{}", k + 1 < count ? ", " : " and ", zeros[static_cast<std::size_t>(k)].joint + 1);
+    text += fmt::format("{}{}", k + 1 < count ? ", " : " and ",
+                        zeros[static_cast<std::size_t>(k)].joint + 1);
   return text;
 }
 
-/// `lost zero in joint 2 (by 0.100 +- 0.002 deg)`, `the zeros of joints 2 and 4: was it remastered? (...)`.
+/// `lost zero in joint 2 (by 0.100 +- 0.002 deg)`, `the zeros of joints 2 and 4: was it remastered?
+/// (...)`.
 std::string change_in_words(const SeenChange& change) {
   if (change.zeros.empty()) return in_words(change.cause);
   std::vector<std::string> each;
   for (const LostZero& zero : change.zeros)
-    each.push_back(fmt::format("{}by {:.3f} +- {:.3f} deg",
-                               change.zeros.size() > 1 ? fmt::format("joint {} ", zero.joint + 1) : "", to_deg(zero.by),
-                               to_deg(zero.u95)));
+    each.push_back(
+        fmt::format("{}by {:.3f} +- {:.3f} deg",
+                    change.zeros.size() > 1 ? fmt::format("joint {} ", zero.joint + 1) : "",
+                    to_deg(zero.by), to_deg(zero.u95)));
   const std::string what =
-      change.zeros.size() > 1 ? fmt::format("the zeros of joints {}: was it remastered?", joints_in_words(change.zeros))
-                              : in_words(change.cause);
+      change.zeros.size() > 1
+          ? fmt::format("the zeros of joints {}: was it remastered?", joints_in_words(change.zeros))
+          : in_words(change.cause);
   return fmt::format("{} ({})", what, fmt::join(each, ", "));
 }
 
@@ -43,8 +47,8 @@ std::string rival_in_words(const SingleCause& cause) {
 std::string seen_in_words(const HealthCheck& check) {
   std::string text;
   for (const SeenChange& change : check.changed) {
-    text += fmt::format("{}{}: {:.3f} +- {:.3f} mm rms {}", text.empty() ? "" : "; ", change_in_words(change),
-                        to_mm(change.effect_rms), to_mm(change.u95),
+    text += fmt::format("{}{}: {:.3f} +- {:.3f} mm rms {}", text.empty() ? "" : "; ",
+                        change_in_words(change), to_mm(change.effect_rms), to_mm(change.u95),
                         change.at_these_poses ? "at these poses" : "over the working poses");
     for (const SingleCause& other : change.could_also_be) text += ", or " + rival_in_words(other);
   }
@@ -54,19 +58,22 @@ std::string seen_in_words(const HealthCheck& check) {
 /// What would decide between what was named and what stands beside it.
 std::string what_tells_more(const Doubt& doubt, const HealthCheck& check) {
   const auto is_open = [&](const SingleCause& rival) {
-    return !is_zero(rival) || std::find(doubt.in_tool.begin(), doubt.in_tool.end(), rival.joint) == doubt.in_tool.end();
+    return !is_zero(rival) || std::find(doubt.in_tool.begin(), doubt.in_tool.end(), rival.joint) ==
+                                  doubt.in_tool.end();
   };
-  const bool is_sure = std::all_of(check.changed.begin(), check.changed.end(), [&](const SeenChange& change) {
-    return std::none_of(change.could_also_be.begin(), change.could_also_be.end(), is_open) &&
-           change.cause.record != unknown_cause().record;
-  });
+  const bool is_sure =
+      std::all_of(check.changed.begin(), check.changed.end(), [&](const SeenChange& change) {
+        return std::none_of(change.could_also_be.begin(), change.could_also_be.end(), is_open) &&
+               change.cause.record != unknown_cause().record;
+      });
   std::string text;
-  if (!is_sure) text += fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check.poses);
+  if (!is_sure)
+    text +=
+        fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check.poses);
   for (const int joint : doubt.in_tool) {
     text += fmt::format(
-        "; no poses tell a tool that sits elsewhere from a lost zero of joint {0}, alone or beside it: look at the "
-        "mark "
-        "of joint {0}, or check with another tool",
+        "; no poses tell a tool that sits elsewhere from a lost zero of joint {0}, alone or beside "
+        "it: look at the mark of joint {0}, or check with another tool",
         joint + 1);
   }
   return text;
@@ -74,7 +81,8 @@ std::string what_tells_more(const Doubt& doubt, const HealthCheck& check) {
 
 /// Far beyond anything expected is never chance, whatever the tails of the model's errors are.
 bool is_far_beyond(const HealthCheck& check) {
-  return check.changed.empty() && check.rms > std::max(kFarOff, kNeverExpected * check.expected_rms);
+  return check.changed.empty() &&
+         check.rms > std::max(kFarOff, kNeverExpected * check.expected_rms);
 }
 
 }  // namespace
@@ -83,40 +91,42 @@ void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck&
   const double tolerance = to_mm(options.tolerance);
   if (doubt.is_too_far || is_far_beyond(check)) {
     check.sentence = fmt::format(
-        "the poses are off by {:.1f} mm rms, which no small change explains: was the file read as it was meant "
-        "(measurements, "
-        "not targets; no rows or columns exchanged), is it this robot, is it this tool? `diagnose` says more",
+        "the poses are off by {:.1f} mm rms, which no small change explains: was the file read as "
+        "it was meant (measurements, not targets; no rows or columns exchanged), is it this robot, "
+        "is it this tool? `diagnose` says more",
         to_mm(check.rms));
   } else if (!check.changed.empty()) {
     check.verdict = HealthVerdict::kChanged;
-    check.sentence = "the robot is not as its model has it; " + seen_in_words(check) + what_tells_more(doubt, check);
+    check.sentence = "the robot is not as its model has it; " + seen_in_words(check) +
+                     what_tells_more(doubt, check);
   } else if (doubt.scatter > 0) {
     check.sentence = fmt::format(
-        "the poses are off by {:.1f} times as much as a healthy robot's, and no change explains that better than noise "
-        "does: the instrument measured worse than its sigma says, or several things changed; measure again, or more "
-        "poses (`trammel plan --check {}`)",
+        "the poses are off by {:.1f} times as much as a healthy robot's, and no change explains "
+        "that better than noise does: the instrument measured worse than its sigma says, or "
+        "several things changed; measure again, or more poses (`trammel plan --check {}`)",
         doubt.scatter, 2 * check.poses);
   } else if (check.p_value < kDoubtful) {
     check.sentence = fmt::format(
-        "these poses are less like the model than {:.1f} % of healthy checks are, which may be chance: measure again",
+        "these poses are less like the model than {:.1f} % of healthy checks are, which may be "
+        "chance: measure again",
         100 * (1 - check.p_value));
   } else if (!check.would_have_seen) {
     check.sentence = "these poses are too few, or too much alike, to show every change";
   } else if (*check.would_have_seen > options.tolerance) {
-    check.sentence = fmt::format("these poses could hide {} of {:.3f} mm, the tolerance is {:.3f} mm",
-                                 in_words(check.smallest.front().cause), to_mm(*check.would_have_seen), tolerance);
+    check.sentence = fmt::format(
+        "these poses could hide {} of {:.3f} mm, the tolerance is {:.3f} mm",
+        in_words(check.smallest.front().cause), to_mm(*check.would_have_seen), tolerance);
   } else if (!check.suspects.empty()) {
     check.sentence = fmt::format(
-        "pose {} fits neither the model nor the other poses, which are as the model has them: it was measured wrongly, "
-        "or "
-        "something changed that shows only there; measure it again",
+        "pose {} fits neither the model nor the other poses, which are as the model has them: it "
+        "was measured wrongly, or something changed that shows only there; measure it again",
         fmt::join(check.suspects, ", "));
     return;
   } else {
     check.verdict = HealthVerdict::kHealthy;
     check.sentence = fmt::format(
-        "as its model has it; a change of {:.3f} mm would have been seen, the tolerance is "
-        "{:.3f} mm",
+        "as its model has it; a change of {:.3f} mm would have been seen, the tolerance is {:.3f} "
+        "mm",
         to_mm(*check.would_have_seen), tolerance);
   }
   if (!check.suspects.empty())

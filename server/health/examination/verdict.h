@@ -14,8 +14,10 @@ inline constexpr double kFarOff = kNeverOff;
 /// What keeps a check from naming a change, or from being sure of it.
 struct Doubt {
   bool is_too_far = false;  ///< the poses are off by more than a small change makes
-  double scatter = 0;       ///< times a healthy robot's residuals, where nothing explains them better than noise; or 0
-  std::vector<int> in_tool{};  ///< joints (0-based) whose zeros a tool that was named makes up for at any poses
+  double scatter = 0;  ///< times a healthy robot's residuals, where nothing explains them better
+                       ///< than noise; or 0
+  std::vector<int>
+      in_tool{};  ///< joints (0-based) whose zeros a tool that was named makes up for at any poses
 };
 /// Of a check whose other members are told.
 void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck& check);

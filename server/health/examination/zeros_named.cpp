@@ -12,9 +12,12 @@ using Eigen::Index;
 
 namespace {
 
-constexpr double kZeroGains = 10;    // beyond its price: a zero that is named beside others is so once in 5000
-constexpr double kMadeUpFor = 0.01;  // of an effect: so little left of it is not told from what makes up for it
-constexpr std::size_t kMostBadBeside = 2, kPosesToOneBad = 6;  // bad poses that are looked for beside zeros
+constexpr double kZeroGains =
+    10;  // beyond its price: a zero that is named beside others is so once in 5000
+constexpr double kMadeUpFor =
+    0.01;  // of an effect: so little left of it is not told from what makes up for it
+constexpr std::size_t kMostBadBeside = 2,
+                      kPosesToOneBad = 6;  // bad poses that are looked for beside zeros
 
 }  // namespace
 
@@ -25,8 +28,8 @@ void Examination::tell_several_zeros(double left, int numbers, SeenChange& chang
     return std::find(fit.zeros.begin(), fit.zeros.end(), cause) != fit.zeros.end();
   };
   for (const ZerosFit& fit : fits_) {
-    const bool is_more_of_it =
-        std::all_of(named_.begin(), named_.end(), [&](const Named& named) { return is_in(named, fit); });
+    const bool is_more_of_it = std::all_of(named_.begin(), named_.end(),
+                                           [&](const Named& named) { return is_in(named, fit); });
     const bool is_likelier = fit.left + price(fit.numbers) < left + price(numbers);
     if (fit.zeros.empty() || (is_more_of_it ? !is_likelier : fit.left > left + kAlike)) continue;
     SingleCause zeros = effects_.causes()[fit.zeros.front()].cause;
@@ -38,14 +41,16 @@ void Examination::tell_several_zeros(double left, int numbers, SeenChange& chang
 Eigen::MatrixXd Examination::always_at(const CheckRows& there) const {
   Eigen::MatrixXd always = frames_of(there);
   for (const int pose : sifted_.bad)
-    always = joined(always, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+    always = joined(
+        always, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
   return always;
 }
 
 std::optional<ZerosFit> Examination::lost_zeros() {
   const CheckTests& tests = healthy_.tests({});
   off_ = distance_of(tests.rows());
-  if (tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm)) return std::nullopt;
+  if (tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm))
+    return std::nullopt;
   fits_ = zeros_.all();
   if (fits_.empty()) return std::nullopt;
   if (auto found = likeliest_zeros({})) return found;
@@ -66,18 +71,22 @@ std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad
   constexpr int kFewestLeft = 3;  // numbers that can speak against it
   const double limit = healthy_.limit(options_.false_alarm);
   const auto cost = [&](const ZerosFit& fit) {
-    return fit.left + price(fit.numbers) + kZeroGains * (static_cast<double>(fit.zeros.size()) + (fit.tool ? 1 : 0));
+    return fit.left + price(fit.numbers) +
+           kZeroGains * (static_cast<double>(fit.zeros.size()) + (fit.tool ? 1 : 0));
   };
-  const ZerosFit& best = *std::min_element(fits_.begin(), fits_.end(),
-                                           [&](const ZerosFit& a, const ZerosFit& b) { return cost(a) < cost(b); });
+  const ZerosFit& best =
+      *std::min_element(fits_.begin(), fits_.end(),
+                        [&](const ZerosFit& a, const ZerosFit& b) { return cost(a) < cost(b); });
   const CheckTests& tests = healthy_.tests(bad);
   const CheckTests& of_all = healthy_.tests({});
   const double off = distance_of(tests.rows());
   const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off < kFarOff;
   const int freedom = tests.rows().freedom() - best.numbers;
-  if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft || chi_square_tail(best.left, freedom) < limit)
+  if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft ||
+      chi_square_tail(best.left, freedom) < limit)
     return std::nullopt;
-  const Eigen::VectorXd left = tests.rows().left(rows_.residual), all_left = of_all.rows().left(rows_.residual);
+  const Eigen::VectorXd left = tests.rows().left(rows_.residual),
+                        all_left = of_all.rows().left(rows_.residual);
   const double of_bad = price(of_all.rows().freedom() - tests.rows().freedom());
   const double score = score_of(best, all_left.squaredNorm()) - of_bad;
   if (has_simpler(of_all, score) || are_bad_poses(score)) return std::nullopt;
@@ -89,16 +98,20 @@ std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad
 
 std::optional<int> Examination::pose_that_fits_no_zeros(const std::vector<int>& bad) const {
   const CheckRows there = zeros_.around(fits_.back());
-  Eigen::MatrixXd refitted = joined(frames_of(there), there.by_cause(Eigen::all, fits_.back().columns));
+  Eigen::MatrixXd refitted =
+      joined(frames_of(there), there.by_cause(Eigen::all, fits_.back().columns));
   for (const int pose : bad)
-    refitted = joined(refitted, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+    refitted =
+        joined(refitted,
+               questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
   const RefittedRows beside(rows_.covariance, refitted);
   const Eigen::VectorXd left = beside.left(there.residual);
   std::optional<int> worst;
   double most = 0;
   for (std::size_t h = questions_.causes; h < questions_.hypotheses.size(); ++h) {
     const Eigen::MatrixXd own = beside.directions(questions_.hypotheses[h].columns);
-    const double score = (own.transpose() * left).squaredNorm() - price(static_cast<int>(own.cols()));
+    const double score =
+        (own.transpose() * left).squaredNorm() - price(static_cast<int>(own.cols()));
     if (score <= most) continue;
     most = score;
     worst = questions_.hypotheses[h].pose;
@@ -109,8 +122,8 @@ std::optional<int> Examination::pose_that_fits_no_zeros(const std::vector<int>& 
 bool Examination::has_simpler(const CheckTests& tests, double score) const {
   const std::vector<double> scores = tests.scores(tests.rows().left(rows_.residual));
   for (std::size_t h = 0; h < scores.size(); ++h) {
-    const bool is_flexible =
-        h < questions_.causes && effects_.causes()[questions_.hypotheses[h].cause].cause.any_function;
+    const bool is_flexible = h < questions_.causes &&
+                             effects_.causes()[questions_.hypotheses[h].cause].cause.any_function;
     if (scores[h] > score + (is_flexible ? kAlike : 0)) return true;
   }
   return false;
@@ -119,8 +132,8 @@ bool Examination::has_simpler(const CheckTests& tests, double score) const {
 bool Examination::are_bad_poses(double score) {
   const CheckTests& tests = healthy_.tests({});
   const RefittedRows& without_bad = healthy_.tests(sifted_.bad).rows();
-  const double by_bad =
-      tests.rows().left(rows_.residual).squaredNorm() - without_bad.left(rows_.residual).squaredNorm();
+  const double by_bad = tests.rows().left(rows_.residual).squaredNorm() -
+                        without_bad.left(rows_.residual).squaredNorm();
   return by_bad - price(tests.rows().freedom() - without_bad.freedom()) > score;
 }
 
@@ -135,16 +148,20 @@ void Examination::tell_zeros(const ZerosFit& fit) {
   for (Index k = 0; k < count; ++k) {
     const double scale = effects_.scale(columns[static_cast<std::size_t>(k)]);
     change.zeros.push_back({effects_.causes()[fit.zeros[static_cast<std::size_t>(k)]].cause.joint,
-                            scale * found.numbers(k), 2 * scale * std::sqrt(found.covariance(k, k))});
+                            scale * found.numbers(k),
+                            2 * scale * std::sqrt(found.covariance(k, k))});
   }
   if (count > 1) change.cause.joint = -1;
   set_size(size_of(found, working_.left_square(columns)), found,
-           square_here(there.by_cause(Eigen::all, columns), RefittedRows(rows_.covariance, always_at(there))), change);
+           square_here(there.by_cause(Eigen::all, columns),
+                       RefittedRows(rows_.covariance, always_at(there))),
+           change);
   tell_other_sets(fit, change);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     std::vector<Index> others = fit.columns;
     std::erase(others, columns[k]);
-    tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, others)), fit.zeros[k], change);
+    tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, others)),
+                       fit.zeros[k], change);
   }
   check_.changed.push_back(std::move(change));
   if (fit.tool) tell_tool_beside(fit, there);
@@ -157,8 +174,9 @@ void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) 
   const std::vector<Index> zeros(fit.columns.begin(), fit.columns.end() - count);
   const Estimate found{fit.at(columns), fit.covariance.bottomRightCorner(count, count)};
   const auto& causes = effects_.causes();
-  const auto tool = std::find_if(causes.begin(), causes.end(),
-                                 [&](const CauseEffects::Entry& entry) { return entry.columns == columns; });
+  const auto tool =
+      std::find_if(causes.begin(), causes.end(),
+                   [&](const CauseEffects::Entry& entry) { return entry.columns == columns; });
   SeenChange change;
   change.cause = tool->cause;
   change.p_value = check_.p_value;
@@ -167,14 +185,15 @@ void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) 
            square_here(there.by_cause(Eigen::all, columns), beside_base), change);
   tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, zeros)),
                      static_cast<std::size_t>(tool - causes.begin()), change);
-  const RefittedRows beside_all(rows_.covariance, joined(always_at(there), there.by_cause(Eigen::all, fit.columns)));
+  const RefittedRows beside_all(rows_.covariance,
+                                joined(always_at(there), there.by_cause(Eigen::all, fit.columns)));
   tell_zeros_in_tool(there, beside_base, beside_all, fit.zeros, change);
   check_.changed.push_back(std::move(change));
 }
 
 void Examination::tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before,
-                                     const RefittedRows& beside_tool, const std::vector<std::size_t>& named,
-                                     SeenChange& change) {
+                                     const RefittedRows& beside_tool,
+                                     const std::vector<std::size_t>& named, SeenChange& change) {
   for (const Hypothesis& one : questions_.hypotheses) {
     if (one.pose >= 0 || std::find(named.begin(), named.end(), one.cause) != named.end()) continue;
     const CauseEffects::Entry& entry = effects_.causes()[one.cause];
@@ -189,18 +208,21 @@ void Examination::tell_zeros_in_tool(const CheckRows& there, const RefittedRows&
 void Examination::tell_other_sets(const ZerosFit& fit, SeenChange& change) const {
   const double whole = 0;  // of all alike
   for (const ZerosFit& other : fits_) {
-    const bool is_more = std::includes(other.zeros.begin(), other.zeros.end(), fit.zeros.begin(), fit.zeros.end()) &&
-                         (other.tool || !fit.tool);
+    const bool is_more =
+        std::includes(other.zeros.begin(), other.zeros.end(), fit.zeros.begin(), fit.zeros.end()) &&
+        (other.tool || !fit.tool);
     const double ahead = score_of(other, whole) - score_of(fit, whole);
     const bool as_likely = ahead > (is_more ? 0 : -kAlike);
-    const bool as_much = !is_more && other.zeros.size() <= fit.zeros.size() && other.left < fit.left + kAlike;
+    const bool as_much =
+        !is_more && other.zeros.size() <= fit.zeros.size() && other.left < fit.left + kAlike;
     if (!as_likely && !as_much) continue;
     for (const std::size_t zero : other.zeros) {
       const bool is_named = std::find(fit.zeros.begin(), fit.zeros.end(), zero) != fit.zeros.end();
       if (!is_named) add_rival(effects_.causes()[zero].cause, change);
     }
     for (const CauseEffects::Entry& entry : effects_.causes())
-      if (other.tool && !fit.tool && entry.columns == effects_.tool_columns()) add_rival(entry.cause, change);
+      if (other.tool && !fit.tool && entry.columns == effects_.tool_columns())
+        add_rival(entry.cause, change);
   }
 }
 

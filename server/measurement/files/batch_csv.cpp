@@ -17,9 +17,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPositionLimitMm = 1e6;            // beyond the range of any tracker
-constexpr double kSigmaLimitMm = 5;                 // no instrument is worse, and micrometres read as millimetres are
-constexpr std::size_t kMostMeasurements = 100'000;  // of one file: five times what one training takes
+constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
+constexpr double kSigmaLimitMm =
+    5;  // no instrument is worse, and micrometres read as millimetres are
+constexpr std::size_t kMostMeasurements =
+    100'000;  // of one file: five times what one training takes
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
 const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
@@ -70,8 +72,8 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   for (const std::size_t column : columns.pose.used()) used[column] = true;
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
-  for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance, columns.touch,
-                             columns.anchor, columns.minus_pose}) {
+  for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance,
+                             columns.touch, columns.anchor, columns.minus_pose}) {
     if (column) used[*column] = true;
   }
   for (std::size_t column = 0; column < used.size(); ++column) {
@@ -90,7 +92,8 @@ bool says(const CsvTable& table, std::size_t row, const std::optional<std::size_
   return column && !table.field(row, *column).empty();
 }
 
-Status read_position(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
+Status read_position(const CsvTable& table, std::size_t row, const BatchColumns& columns,
+                     Measurement& measurement) {
   for (std::size_t k = 0; k < 3; ++k) {
     const double value = TRY(table.number(row, columns.position[k], kPositionLimitMm));
     measurement.p_W(static_cast<Eigen::Index>(k)) = from_mm(value);
@@ -106,36 +109,48 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
   const bool distance = says(table, row, columns.distance);
   const char* name = distance ? "distance_mm" : "touch_mm";
   if (distance && says(table, row, columns.touch))
-    return table.refuse(row, "distance_mm and touch_mm in one row").of("touch_mm").next("write a row for each");
+    return table.refuse(row, "distance_mm and touch_mm in one row")
+        .of("touch_mm")
+        .next("write a row for each");
   if (says(table, row, columns.position) || says(table, row, columns.quaternion))
     return table.refuse(row, "{} beside a position", name).of(name).next("write a row for each");
   Gauge gauge;
   gauge.kind = distance ? Gauge::Kind::kDistance : Gauge::Kind::kTouch;
-  const double value = TRY(table.number(row, distance ? *columns.distance : *columns.touch, kPositionLimitMm));
+  const double value =
+      TRY(table.number(row, distance ? *columns.distance : *columns.touch, kPositionLimitMm));
   gauge.value = from_mm(value);
   if (says(table, row, columns.anchor)) {
     std::string anchor = TRY(table.name(row, *columns.anchor));
     gauge.anchor = std::move(anchor);
   }
-  if (says(table, row, columns.minus_pose)) gauge.minus_pose = table.field(row, *columns.minus_pose);
+  if (says(table, row, columns.minus_pose))
+    gauge.minus_pose = table.field(row, *columns.minus_pose);
   if (distance && gauge.minus_pose.empty() && gauge.value <= 0)
-    return table.refuse(row, "distance_mm is {:g}, must be above 0", value).of(name).beyond(value, 0);
+    return table.refuse(row, "distance_mm is {:g}, must be above 0", value)
+        .of(name)
+        .beyond(value, 0);
   return gauge;
 }
 
-Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
+Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& columns,
+                  Measurement& measurement) {
   if (!says(table, row, columns.sigma)) return {};
   const double sigma = TRY(table.number(row, *columns.sigma, kSigmaLimitMm));
-  if (sigma <= 0) return table.refuse(row, "sigma_mm is {:g}, must be above 0", sigma).of("sigma_mm").beyond(sigma, 0);
+  if (sigma <= 0)
+    return table.refuse(row, "sigma_mm is {:g}, must be above 0", sigma)
+        .of("sigma_mm")
+        .beyond(sigma, 0);
   measurement.sigma = from_mm(sigma);
   return {};
 }
 
 /// What was measured: a gauge, or a position.
-Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
+Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns,
+                     Measurement& measurement) {
   const bool gauged = says(table, row, columns.distance) || says(table, row, columns.touch);
   if (!gauged && says(table, row, columns.minus_pose))
-    return table.refuse(row, "minus_pose_id is told, but neither distance_mm nor touch_mm").of("minus_pose_id");
+    return table.refuse(row, "minus_pose_id is told, but neither distance_mm nor touch_mm")
+        .of("minus_pose_id");
   if (gauged) {
     Gauge gauge = TRY(read_gauge(table, row, columns));
     measurement.gauge = std::move(gauge);
@@ -148,15 +163,19 @@ Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns&
   return read_sigma(table, row, columns, measurement);
 }
 
-Result<MeasurementSet> read_set(const CsvTable& table, std::size_t row, const std::optional<std::size_t>& column) {
+Result<MeasurementSet> read_set(const CsvTable& table, std::size_t row,
+                                const std::optional<std::size_t>& column) {
   const std::string name = column ? table.field(row, *column) : "";
   if (name.empty()) return MeasurementSet::kUnassigned;
   if (name == "train") return MeasurementSet::kTrain;
   if (name == "validation") return MeasurementSet::kValidation;
-  return table.refuse(row, "set is '{}', expected train or validation", name).of("set").with_text(name);
+  return table.refuse(row, "set is '{}', expected train or validation", name)
+      .of("set")
+      .with_text(name);
 }
 
-Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
+Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
+                                     const BatchColumns& columns) {
   Measurement measurement;
   PoseContext context = TRY(columns.pose.read(table, row));
   measurement.context = std::move(context);
@@ -167,20 +186,26 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   const MeasurementSet set = TRY(read_set(table, row, columns.set));
   measurement.set = set;
   if (columns.session) measurement.session_id = table.field(row, *columns.session);
-  for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
+  for (const std::size_t column : columns.extra)
+    measurement.extra.push_back(table.field(row, column));
   return measurement;
 }
 
-/// Gives the gauges that are told against another pose that pose, and takes out the rows that tell nothing themselves.
-/// Refuses one that is not there, and a row that tells nothing and that nobody names.
+/// Gives the gauges that are told against another pose that pose, and takes out the rows that tell
+/// nothing themselves. Refuses one that is not there, and a row that tells nothing and that nobody
+/// names.
 Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& line_of_pose) {
   std::map<std::string, std::shared_ptr<const PoseContext>> named;
   for (Measurement& m : batch.measurements) {
     if (!m.gauge || m.gauge->minus_pose.empty()) continue;
     const std::string& other = m.gauge->minus_pose;
-    const auto fail = [&](Failure why) { return std::move(why).in(batch.where).at_row(m.row).of("minus_pose_id"); };
-    if (!line_of_pose.contains(other)) return fail(refused("no row has the pose_id '{}'", other).with_text(other));
-    if (other == m.pose_id) return fail(refused("pose '{}' is told against itself", other).with_text(other));
+    const auto fail = [&](Failure why) {
+      return std::move(why).in(batch.where).at_row(m.row).of("minus_pose_id");
+    };
+    if (!line_of_pose.contains(other))
+      return fail(refused("no row has the pose_id '{}'", other).with_text(other));
+    if (other == m.pose_id)
+      return fail(refused("pose '{}' is told against itself", other).with_text(other));
     auto& context = named[other];
     if (context == nullptr) {
       const auto row = std::find_if(batch.measurements.begin(), batch.measurements.end(),
@@ -191,14 +216,19 @@ Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& 
   }
   for (const Measurement& m : batch.measurements) {
     if (m.gauge || m.p_W.allFinite() || named.contains(m.pose_id)) continue;
-    return refused("neither a position nor distance_mm nor touch_mm").in(batch.where).at_row(m.row).of("distance_mm");
+    return refused("neither a position nor distance_mm nor touch_mm")
+        .in(batch.where)
+        .at_row(m.row)
+        .of("distance_mm");
   }
-  std::erase_if(batch.measurements, [](const Measurement& m) { return !m.gauge && !m.p_W.allFinite(); });
+  std::erase_if(batch.measurements,
+                [](const Measurement& m) { return !m.gauge && !m.p_W.allFinite(); });
   return {};
 }
 
 /// The rows of a table whose columns have our names.
-Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::string& text, const std::string& where) {
+Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::string& text,
+                                  const std::string& where) {
   if (!table) return tl::make_unexpected(table.error());
   const BatchColumns columns = TRY(find_columns(*table));
   if (table->size() == 0)
@@ -208,13 +238,16 @@ Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::stri
   batch.where = where;
   batch.joint_types = columns.pose.joint_types();
   batch.source_text = text;
-  for (const std::size_t column : columns.extra) batch.extra_columns.push_back(table->columns()[column]);
+  for (const std::size_t column : columns.extra)
+    batch.extra_columns.push_back(table->columns()[column]);
   std::map<std::string, int> line_of_pose;
   for (std::size_t row = 0; row < table->size(); ++row) {
     Measurement measurement = TRY(read_measurement(*table, row, columns));
     const auto [earlier, is_new] = line_of_pose.emplace(measurement.pose_id, measurement.row);
     if (!is_new) {
-      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id, earlier->second)
+      return table
+          ->refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id,
+                   earlier->second)
           .of("pose_id")
           .with_text(measurement.pose_id);
     }
@@ -234,7 +267,8 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
 
 namespace {
 
-/// A column of a table that has no header: our name of it, and by what its numbers are to be multiplied.
+/// A column of a table that has no header: our name of it, and by what its numbers are to be
+/// multiplied.
 struct ToldColumn {
   std::string name;  ///< empty: passed over
   double scale = 1;
@@ -244,7 +278,9 @@ struct ToldColumn {
 ToldColumn told_column(const std::string& name) {
   if (name == "skip" || name == "-" || name.empty()) return {};
   const auto in = [&](std::string_view unit) {
-    return name.size() > unit.size() && name.ends_with(unit) ? name.substr(0, name.size() - unit.size()) : "";
+    return name.size() > unit.size() && name.ends_with(unit)
+               ? name.substr(0, name.size() - unit.size())
+               : "";
   };
   if (const std::string stem = in("_rad"); !stem.empty()) return {stem + "_deg", to_deg(1)};
   if (const std::string stem = in("_m"); !stem.empty()) return {stem + "_mm", to_mm(1)};
@@ -253,7 +289,8 @@ ToldColumn told_column(const std::string& name) {
 
 /// The rows as the columns say: in our units, without those that are passed over.
 Result<std::vector<CsvTable::Row>> told_rows(const std::vector<CsvTable::Row>& rows,
-                                             const std::vector<ToldColumn>& columns, const std::string& where) {
+                                             const std::vector<ToldColumn>& columns,
+                                             const std::string& where) {
   std::vector<CsvTable::Row> all;
   for (const CsvTable::Row& row : rows) {
     if (row.fields.size() != columns.size())
@@ -283,7 +320,8 @@ Result<std::vector<CsvTable::Row>> told_rows(const std::vector<CsvTable::Row>& r
 
 }  // namespace
 
-Result<MeasurementBatch> parse_batch_table(const std::string& text, const std::vector<std::string>& columns,
+Result<MeasurementBatch> parse_batch_table(const std::string& text,
+                                           const std::vector<std::string>& columns,
                                            const std::string& where) {
   const std::vector<TextLine> lines = TRY(text_lines(text, where));
   const std::vector<TextLine> first = first_lines(text, 1);
@@ -296,13 +334,15 @@ Result<MeasurementBatch> parse_batch_table(const std::string& text, const std::v
     if (!told.back().name.empty()) header.fields.push_back(told.back().name);
   }
   const std::vector<CsvTable::Row> kept = TRY(told_rows(rows, told, where));
-  return batch_of(CsvTable::from_rows(where, header, kept, separator), "", where).map([](MeasurementBatch batch) {
-    batch.source_text = to_csv(batch);
-    return batch;
-  });
+  return batch_of(CsvTable::from_rows(where, header, kept, separator), "", where)
+      .map([](MeasurementBatch batch) {
+        batch.source_text = to_csv(batch);
+        return batch;
+      });
 }
 
-Result<MeasurementBatch> read_batch_table(const std::string& path, const std::vector<std::string>& columns) {
+Result<MeasurementBatch> read_batch_table(const std::string& path,
+                                          const std::vector<std::string>& columns) {
   return read_text_file(path)
       .and_then([&](const std::string& text) { return parse_batch_table(text, columns, path); })
       .map([&](MeasurementBatch batch) { return dated(std::move(batch), written_at(path)); });
@@ -328,12 +368,15 @@ std::string optional_field(const std::optional<double>& value, double scale = 1)
 
 void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
   columns.push_back({"pose_id", [](const Measurement& m) { return csv_field(m.pose_id); }});
-  const Eigen::Index joints = batch.measurements.empty() ? 0 : batch.measurements.front().context.q.size();
+  const Eigen::Index joints =
+      batch.measurements.empty() ? 0 : batch.measurements.front().context.q.size();
   for (Eigen::Index j = 0; j < joints; ++j) {
     const auto at = static_cast<std::size_t>(j);
-    const JointType type = at < batch.joint_types.size() ? batch.joint_types[at] : JointType::kRevolute;
-    columns.push_back({joint_column(static_cast<int>(j), type),
-                       [j, type](const Measurement& m) { return csv_number(joint_to_column(m.context.q(j), type)); }});
+    const JointType type =
+        at < batch.joint_types.size() ? batch.joint_types[at] : JointType::kRevolute;
+    columns.push_back({joint_column(static_cast<int>(j), type), [j, type](const Measurement& m) {
+                         return csv_number(joint_to_column(m.context.q(j), type));
+                       }});
   }
   for (int k = 0; k < 3; ++k) {
     columns.push_back({kPositionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) {
@@ -341,49 +384,63 @@ void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>&
                        }});
   }
   for (int k = 0; k < 4; ++k) {
-    columns.push_back({kQuaternionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) -> std::string {
-                         if (!m.R_WT) return "";
-                         const Eigen::Quaterniond R(*m.R_WT);
-                         return csv_number(k == 0 ? R.w() : R.vec()(k - 1));
-                       }});
+    columns.push_back(
+        {kQuaternionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) -> std::string {
+           if (!m.R_WT) return "";
+           const Eigen::Quaterniond R(*m.R_WT);
+           return csv_number(k == 0 ? R.w() : R.vec()(k - 1));
+         }});
   }
 }
 
 void add_gauge_columns(std::vector<WrittenColumn>& columns) {
   const auto add = [&](const char* name, Gauge::Kind kind) {
     columns.push_back({name, [kind](const Measurement& m) {
-                         return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value)) : "";
+                         return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value))
+                                                                 : "";
                        }});
   };
   add("distance_mm", Gauge::Kind::kDistance);
   add("touch_mm", Gauge::Kind::kTouch);
-  columns.push_back({"anchor_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->anchor) : ""; }});
-  columns.push_back(
-      {"minus_pose_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->minus_pose) : ""; }});
+  columns.push_back({"anchor_id", [](const Measurement& m) {
+                       return m.gauge ? csv_field(m.gauge->anchor) : "";
+                     }});
+  columns.push_back({"minus_pose_id", [](const Measurement& m) {
+                       return m.gauge ? csv_field(m.gauge->minus_pose) : "";
+                     }});
 }
 
 void add_circumstance_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
-  columns.push_back({"sigma_mm", [](const Measurement& m) { return optional_field(m.sigma, to_mm(1)); }});
   columns.push_back(
-      {"time_s", [](const Measurement& m) { return m.context.time ? fmt::format("{:.15g}", *m.context.time) : ""; }});
-  columns.push_back({"temperature_c", [](const Measurement& m) { return optional_field(m.context.temperature); }});
+      {"sigma_mm", [](const Measurement& m) { return optional_field(m.sigma, to_mm(1)); }});
+  columns.push_back({"time_s", [](const Measurement& m) {
+                       return m.context.time ? fmt::format("{:.15g}", *m.context.time) : "";
+                     }});
+  columns.push_back({"temperature_c",
+                     [](const Measurement& m) { return optional_field(m.context.temperature); }});
   columns.push_back({"tool_id", [](const Measurement& m) { return csv_field(m.context.tool); }});
-  columns.push_back({"payload_id", [](const Measurement& m) { return csv_field(m.context.payload); }});
+  columns.push_back(
+      {"payload_id", [](const Measurement& m) { return csv_field(m.context.payload); }});
   std::size_t directions = 0;
-  for (const Measurement& m : batch.measurements) directions = std::max(directions, m.context.direction.size());
+  for (const Measurement& m : batch.measurements)
+    directions = std::max(directions, m.context.direction.size());
   for (std::size_t j = 0; j < directions; ++j) {
     columns.push_back({fmt::format("dir{}", j + 1), [j](const Measurement& m) {
-                         return j < m.context.direction.size() ? fmt::format("{}", m.context.direction[j]) : "";
+                         return j < m.context.direction.size()
+                                    ? fmt::format("{}", m.context.direction[j])
+                                    : "";
                        }});
   }
   columns.push_back({"session_id", [](const Measurement& m) { return csv_field(m.session_id); }});
-  columns.push_back(
-      {"set", [](const Measurement& m) {
-         return m.set == MeasurementSet::kUnassigned ? "" : m.set == MeasurementSet::kTrain ? "train" : "validation";
-       }});
+  columns.push_back({"set", [](const Measurement& m) {
+                       return m.set == MeasurementSet::kUnassigned ? ""
+                              : m.set == MeasurementSet::kTrain    ? "train"
+                                                                   : "validation";
+                     }});
   for (std::size_t k = 0; k < batch.extra_columns.size(); ++k) {
-    columns.push_back({batch.extra_columns[k],
-                       [k](const Measurement& m) { return k < m.extra.size() ? csv_field(m.extra[k]) : ""; }});
+    columns.push_back({batch.extra_columns[k], [k](const Measurement& m) {
+                         return k < m.extra.size() ? csv_field(m.extra[k]) : "";
+                       }});
   }
 }
 
@@ -391,7 +448,8 @@ void add_circumstance_columns(const MeasurementBatch& batch, std::vector<Written
 
 namespace {
 
-/// The batch with the poses that gauges are told against and that tell nothing themselves, which are no measurements.
+/// The batch with the poses that gauges are told against and that tell nothing themselves, which
+/// are no measurements.
 MeasurementBatch with_named_poses(MeasurementBatch batch) {
   std::map<std::string, const PoseContext*> missing;
   for (const Measurement& m : batch.measurements) {

@@ -39,7 +39,8 @@ BatchKind recognise_batch(const std::string& text) {
   if (any_of(first, is_first_joint)) {
     return any_of(first, is_ours) ? BatchKind::kTrammel : BatchKind::kRoboDk;
   }
-  const bool names_above = lines.size() > 1 && std::all_of(first.begin(), first.end(), is_text) && separator != ' ';
+  const bool names_above =
+      lines.size() > 1 && std::all_of(first.begin(), first.end(), is_text) && separator != ' ';
   if (names_above) {
     const std::vector<std::string> second = split_fields(lines[1].text, separator);
     const bool numbers = std::all_of(second.begin(), second.end(), [&](const std::string& field) {
@@ -60,7 +61,9 @@ Result<MeasurementBatch> parse_batch(const std::string& text, const std::string&
       return refused("measured points without the joints that were commanded")
           .in(where)
           .of("q1_deg")
-          .next("join them with the plan by pose_id first: trammel convert --points POINTS --joints PLAN -o BATCH");
+          .next(
+              "join them with the plan by pose_id first: trammel convert --points POINTS --joints "
+              "PLAN -o BATCH");
     case BatchKind::kTrammel:
       break;
   }

@@ -15,7 +15,8 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr std::array kSeparators = {',', ';', '\t'};
-constexpr const char* kExport = "export it as text: Save As, \"CSV UTF-8\", in Excel; \"Text CSV\" in LibreOffice";
+constexpr const char* kExport =
+    "export it as text: Save As, \"CSV UTF-8\", in Excel; \"Text CSV\" in LibreOffice";
 
 std::string_view without_mark(std::string_view text) {
   return text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text;
@@ -62,16 +63,21 @@ std::size_t count_of(char separator, std::string_view record) {
   return count;
 }
 
-std::string spelled(char separator) { return separator == '\t' ? "a tab" : fmt::format("'{}'", separator); }
+std::string spelled(char separator) {
+  return separator == '\t' ? "a tab" : fmt::format("'{}'", separator);
+}
 
 /// `sep=;` and its end; nothing where the text does not begin so.
 std::optional<CsvStart> said(std::string_view text) {
-  if (text.size() < 5 || lower(text[0]) != 's' || lower(text[1]) != 'e' || lower(text[2]) != 'p' || text[3] != '=')
+  if (text.size() < 5 || lower(text[0]) != 's' || lower(text[1]) != 'e' || lower(text[2]) != 'p' ||
+      text[3] != '=')
     return std::nullopt;
-  const bool known = std::find(kSeparators.begin(), kSeparators.end(), text[4]) != kSeparators.end();
+  const bool known =
+      std::find(kSeparators.begin(), kSeparators.end(), text[4]) != kSeparators.end();
   const std::size_t end = text.find('\n');
   const bool alone =
-      text.substr(5, end == std::string_view::npos ? end : end - 5).find_first_not_of(" \r") == std::string_view::npos;
+      text.substr(5, end == std::string_view::npos ? end : end - 5).find_first_not_of(" \r") ==
+      std::string_view::npos;
   if (!known || !alone || end == std::string_view::npos) return std::nullopt;
   return CsvStart{text[4], end + 1, 2};
 }
@@ -80,7 +86,9 @@ std::optional<CsvStart> said(std::string_view text) {
 
 Status check_is_text(std::string_view text, const std::string& where) {
   if (text.starts_with("PK\x03\x04"sv))
-    return refused("not text but a spreadsheet (.xlsx, .ods) or an archive").in(where).next(kExport);
+    return refused("not text but a spreadsheet (.xlsx, .ods) or an archive")
+        .in(where)
+        .next(kExport);
   if (text.starts_with("\xD0\xCF\x11\xE0"sv))
     return refused("not text but a spreadsheet (.xls)").in(where).next(kExport);
   if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv))
@@ -114,14 +122,18 @@ Result<CsvStart> start_of_csv(std::string_view text, const std::string& where) {
   if (found.size() > 1) {
     std::vector<char> even;
     for (const char separator : found) {
-      if (count_of(separator, header.text) == count_of(separator, row.text)) even.push_back(separator);
+      if (count_of(separator, header.text) == count_of(separator, row.text))
+        even.push_back(separator);
     }
     if (even.size() != 1 && is_utf8(header.text)) {
       const auto line = std::count(text.data(), header.text.data(), '\n') + 1;
-      return refused("{} and {} both stand between the names of columns", spelled(found[0]), spelled(found[1]))
+      return refused("{} and {} both stand between the names of columns", spelled(found[0]),
+                     spelled(found[1]))
           .in(where)
           .at_row(line)
-          .next("put names that hold one of them in double quotes, or say by a first line sep=; which one separates");
+          .next(
+              "put names that hold one of them in double quotes, or say by a first line sep=; "
+              "which one separates");
     }
     if (even.size() == 1) found = even;
   }
@@ -130,10 +142,12 @@ Result<CsvStart> start_of_csv(std::string_view text, const std::string& where) {
 }
 
 bool holds_quantities(std::string_view column) {
-  constexpr std::array kUnits = {"_mm"sv, "_m"sv, "_in"sv, "_deg"sv, "_rad"sv, "_s"sv, "_c"sv, "_n"sv, "_kg"sv};
-  constexpr std::array kBare = {"qw"sv,  "qx"sv, "qy"sv, "qz"sv, "x"sv,  "y"sv,      "z"sv,    "r"sv,     "theta"sv,
-                                "phi"sv, "ux"sv, "uy"sv, "uz"sv, "ur"sv, "utheta"sv, "uphi"sv, "sigma"sv, "rx"sv,
-                                "ry"sv,  "rz"sv, "a"sv,  "b"sv,  "c"sv,  "w"sv,      "p"sv};
+  constexpr std::array kUnits = {"_mm"sv, "_m"sv, "_in"sv, "_deg"sv, "_rad"sv,
+                                 "_s"sv,  "_c"sv, "_n"sv,  "_kg"sv};
+  constexpr std::array kBare = {"qw"sv,     "qx"sv,    "qy"sv,    "qz"sv, "x"sv,  "y"sv,  "z"sv,
+                                "r"sv,      "theta"sv, "phi"sv,   "ux"sv, "uy"sv, "uz"sv, "ur"sv,
+                                "utheta"sv, "uphi"sv,  "sigma"sv, "rx"sv, "ry"sv, "rz"sv, "a"sv,
+                                "b"sv,      "c"sv,     "w"sv,     "p"sv};
   std::string name;
   for (const char c : column) name += lower(c);
   if (name.find_first_of("([{") != std::string::npos) return true;  // a unit in brackets
@@ -142,9 +156,11 @@ bool holds_quantities(std::string_view column) {
   if (std::find(kBare.begin(), kBare.end(), name) != kBare.end()) return true;
   const auto digits = name.find_first_of("0123456789");
   const std::string_view stem = std::string_view(name).substr(0, digits);
-  const bool numbered = digits != std::string::npos &&
-                        std::all_of(name.begin() + static_cast<std::ptrdiff_t>(digits), name.end(), is_digit);
-  return numbered && (stem == "j" || stem == "q" || stem == "a" || stem == "joint" || stem == "joint ");
+  const bool numbered =
+      digits != std::string::npos &&
+      std::all_of(name.begin() + static_cast<std::ptrdiff_t>(digits), name.end(), is_digit);
+  return numbered &&
+         (stem == "j" || stem == "q" || stem == "a" || stem == "joint" || stem == "joint ");
 }
 
 std::optional<char> decimal_sign(std::string_view field) {
@@ -160,7 +176,8 @@ std::optional<char> decimal_sign(std::string_view field) {
   if (lower(rest.front()) != 'e') return std::nullopt;
   rest.remove_prefix(1);
   if (rest.starts_with('+') || rest.starts_with('-')) rest.remove_prefix(1);
-  return !rest.empty() && std::all_of(rest.begin(), rest.end(), is_digit) ? std::optional(sign) : std::nullopt;
+  return !rest.empty() && std::all_of(rest.begin(), rest.end(), is_digit) ? std::optional(sign)
+                                                                          : std::nullopt;
 }
 
 std::string with_decimal_point(std::string_view field) {

@@ -6,11 +6,12 @@
 
 #include "server/base/result.h"
 
-/// What spreadsheets make of a table: which character separates values, and which one stands before decimals. What the
-/// text does not decide is refused, never guessed.
+/// What spreadsheets make of a table: which character separates values, and which one stands before
+/// decimals. What the text does not decide is refused, never guessed.
 namespace trammel {
 
-/// Refuses what is no text: a spreadsheet (.xlsx, .ods, .xls), UTF-16, an archive. The error says how to export it.
+/// Refuses what is no text: a spreadsheet (.xlsx, .ods, .xls), UTF-16, an archive. The error says
+/// how to export it.
 [[nodiscard]] Status check_is_text(std::string_view text, const std::string& where);
 
 /// Where a table begins, and what separates its values.
@@ -20,16 +21,18 @@ struct CsvStart {
   int line = 1;                   ///< of the first byte that is not skipped
 };
 
-/// `,`, `;` or tab: what stands between the names of the header line. Where several of them do, the one that the first
-/// row has as often; `sep=;` as the first line says it. Characters in double quotes do not count, nor do tabs beside
-/// another separator, which are blanks. Refuses a header and a first row that leave several.
+/// `,`, `;` or tab: what stands between the names of the header line. Where several of them do, the
+/// one that the first row has as often; `sep=;` as the first line says it. Characters in double
+/// quotes do not count, nor do tabs beside another separator, which are blanks. Refuses a header
+/// and a first row that leave several.
 [[nodiscard]] Result<CsvStart> start_of_csv(std::string_view text, const std::string& where);
 
-/// Whether a column of this name holds quantities, as tables of measurements call them: `x_mm`, `Q1_DEG`, `Rx [deg]`,
-/// `qw`.
+/// Whether a column of this name holds quantities, as tables of measurements call them: `x_mm`,
+/// `Q1_DEG`, `Rx [deg]`, `qw`.
 [[nodiscard]] bool holds_quantities(std::string_view column);
 
-/// What stands before the decimals of a number: `,`, `.`, or nothing where it has none or is no number.
+/// What stands before the decimals of a number: `,`, `.`, or nothing where it has none or is no
+/// number.
 [[nodiscard]] std::optional<char> decimal_sign(std::string_view field);
 
 /// `1,5` as `1.5`; what has no decimal comma stays.

@@ -22,8 +22,10 @@ constexpr double kQuaternionLimit = 1e-3;
 constexpr std::size_t kMostValueBytes = 65'536;  // of one value
 constexpr const char* kSaveAsUtf8 = "save it as UTF-8: \"CSV UTF-8\" in Excel";
 constexpr const char* kTwoCommas =
-    "write decimal points, or separate values by ';' or tabs: a comma that does both may be read in two ways";
-constexpr const char* kThousands = "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
+    "write decimal points, or separate values by ';' or tabs: a comma that does both may be read "
+    "in two ways";
+constexpr const char* kThousands =
+    "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
 
 /// Whether the values of a row may stand in a table.
 Status check_values(const CsvTable::Row& row, const std::string& where) {
@@ -34,11 +36,13 @@ Status check_values(const CsvTable::Row& row, const std::string& where) {
         .beyond(row.fields.size(), CsvTable::kMostColumns);
   for (const std::string& field : row.fields) {
     if (field.size() > kMostValueBytes)
-      return failure(ErrorCode::kTooLarge, "a value of {} bytes, limit {}", field.size(), kMostValueBytes)
+      return failure(ErrorCode::kTooLarge, "a value of {} bytes, limit {}", field.size(),
+                     kMostValueBytes)
           .in(where)
           .at_row(row.line)
           .beyond(field.size(), kMostValueBytes);
-    if (!is_utf8(field)) return refused("not UTF-8 text").in(where).at_row(row.line).next(kSaveAsUtf8);
+    if (!is_utf8(field))
+      return refused("not UTF-8 text").in(where).at_row(row.line).next(kSaveAsUtf8);
     if (!is_plain_lines(field))
       return refused("'{}' has control characters", shown_short(field)).in(where).at_row(row.line);
   }
@@ -107,18 +111,23 @@ class Scanner {
     while (!text_.empty()) {
       const char c = text_.front();
       text_.remove_prefix(1);
-      if (c == '"' && !text_.starts_with('"')) return rest_after_quote(first_line, std::move(field));
+      if (c == '"' && !text_.starts_with('"'))
+        return rest_after_quote(first_line, std::move(field));
       if (c == '"') text_.remove_prefix(1);
       if (c == '\n') ++line_;
       field += c;
     }
-    return refused("a quote is not closed").in(where_).at_row(first_line).next("close it in the same value");
+    return refused("a quote is not closed")
+        .in(where_)
+        .at_row(first_line)
+        .next("close it in the same value");
   }
 
   Result<std::string> rest_after_quote(int first_line, std::string field) {
     const std::size_t end = std::min(text_.find_first_of(ends_), text_.size());
     if (const std::string_view rest = trimmed(text_.substr(0, end)); !rest.empty()) {
-      return refused("'{}' after a closing quote, expected '{}'", shown_short(rest), shown_short({&separator_, 1}))
+      return refused("'{}' after a closing quote, expected '{}'", shown_short(rest),
+                     shown_short({&separator_, 1}))
           .in(where_)
           .at_row(first_line)
           .next("a quote inside a value is written twice");
@@ -136,14 +145,17 @@ class Scanner {
 
 bool says_nothing(const CsvTable::Row& row) {
   return row.fields.size() > 1 &&
-         std::all_of(row.fields.begin(), row.fields.end(), [](const std::string& field) { return field.empty(); });
+         std::all_of(row.fields.begin(), row.fields.end(),
+                     [](const std::string& field) { return field.empty(); });
 }
 
 /// Whether most of the row's values are numbers with a point, as measured ones are.
 bool is_numbers(const CsvTable::Row& row) {
-  const auto numbers = std::count_if(row.fields.begin(), row.fields.end(), [](const std::string& field) {
-    return field.find('.') != std::string::npos && field.find_first_not_of("+-.0123456789eE ") == std::string::npos;
-  });
+  const auto numbers =
+      std::count_if(row.fields.begin(), row.fields.end(), [](const std::string& field) {
+        return field.find('.') != std::string::npos &&
+               field.find_first_not_of("+-.0123456789eE ") == std::string::npos;
+      });
   return 2 * static_cast<std::size_t>(numbers) > row.fields.size();
 }
 
@@ -179,8 +191,9 @@ Status CsvTable::set_columns(Row header) {
 
 Status CsvTable::add_row(Row row) {
   if (row.fields.size() != columns_.size()) {
-    const bool pointless = std::all_of(row.fields.begin(), row.fields.end(),
-                                       [](const std::string& field) { return field.find('.') == std::string::npos; });
+    const bool pointless =
+        std::all_of(row.fields.begin(), row.fields.end(),
+                    [](const std::string& field) { return field.find('.') == std::string::npos; });
     const bool commas = separator_ == ',' && row.fields.size() > columns_.size() && pointless;
     return refused("{} values, the header has {} columns", row.fields.size(), columns_.size())
         .in(where_)
@@ -227,8 +240,8 @@ Result<CsvTable> CsvTable::parse(std::string_view text, std::string where, std::
   return table;
 }
 
-Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const std::vector<Row>& rows,
-                                     char separator) {
+Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header,
+                                     const std::vector<Row>& rows, char separator) {
   CsvTable table;
   table.where_ = std::move(where);
   table.separator_ = separator;
@@ -259,8 +272,8 @@ Status CsvTable::settle_decimals() {
   points_ = point.field != nullptr;
   if (comma.field == nullptr) return {};
   if (separator_ == ',') {
-    return refuse(comma.row, "{} is '{}', with a comma where values are separated by commas", columns_[comma.column],
-                  shown_short(*comma.field))
+    return refuse(comma.row, "{} is '{}', with a comma where values are separated by commas",
+                  columns_[comma.column], shown_short(*comma.field))
         .of(columns_[comma.column])
         .with_text(shown_short(*comma.field))
         .next(kTwoCommas);
@@ -269,7 +282,8 @@ Status CsvTable::settle_decimals() {
     const Met& later = comma.row < point.row ? point : comma;
     const Met& earlier = comma.row < point.row ? comma : point;
     return refuse(later.row, "{} is '{}', and row {} has '{}': a point and a comma before decimals",
-                  columns_[later.column], shown_short(*later.field), line(earlier.row), shown_short(*earlier.field))
+                  columns_[later.column], shown_short(*later.field), line(earlier.row),
+                  shown_short(*earlier.field))
         .of(columns_[later.column])
         .with_text(shown_short(*later.field))
         .next("write all numbers of the file with the same one, and none for thousands");
@@ -284,29 +298,37 @@ Status CsvTable::settle_decimals() {
 std::optional<std::size_t> CsvTable::find(std::string_view column) const {
   const auto at = std::find(columns_.begin(), columns_.end(), column);
   if (at != columns_.end()) return static_cast<std::size_t>(at - columns_.begin());
-  const auto alike = [wanted = lower(column)](const std::string& name) { return lower(name) == wanted; };
+  const auto alike = [wanted = lower(column)](const std::string& name) {
+    return lower(name) == wanted;
+  };
   const auto other = std::find_if(columns_.begin(), columns_.end(), alike);
-  if (other == columns_.end() || std::find_if(other + 1, columns_.end(), alike) != columns_.end()) return std::nullopt;
+  if (other == columns_.end() || std::find_if(other + 1, columns_.end(), alike) != columns_.end())
+    return std::nullopt;
   return static_cast<std::size_t>(other - columns_.begin());
 }
 
 namespace {
 
-/// A column that was meant, by its spelling or by what stands before its unit; empty where none looks like it.
+/// A column that was meant, by its spelling or by what stands before its unit; empty where none
+/// looks like it.
 std::string meant_by(const std::string& column, const std::vector<std::string>& columns) {
   std::vector<std::string> names;
   for (const std::string& name : columns) names.push_back(lower(name));
   const auto spelled = [&](const std::string& name) -> const std::string& {
-    return *std::find_if(columns.begin(), columns.end(), [&](const std::string& one) { return lower(one) == name; });
+    return *std::find_if(columns.begin(), columns.end(),
+                         [&](const std::string& one) { return lower(one) == name; });
   };
-  const auto stem = [](const std::string& name) { return name.substr(0, name.find_first_of("_ ([")); };
+  const auto stem = [](const std::string& name) {
+    return name.substr(0, name.find_first_of("_ (["));
+  };
   for (const std::string& name : names) {
     if (stem(name) == stem(column) && column.find('_') != std::string::npos) return spelled(name);
   }
   // `x_mm` and `y_mm`, `q1_deg` and `q2_deg` are near to each other and mean different things.
   constexpr std::size_t kTellsNothing = 2;
   std::erase_if(names, [&](const std::string& name) {
-    return stem(name) != stem(column) && (stem(name).size() <= kTellsNothing || stem(column).size() <= kTellsNothing);
+    return stem(name) != stem(column) &&
+           (stem(name).size() <= kTellsNothing || stem(column).size() <= kTellsNothing);
   });
   const std::string near = near_miss(column, names);
   return near.empty() ? "" : spelled(near);
@@ -322,12 +344,14 @@ Result<std::size_t> CsvTable::require(std::string_view column) const {
   return refused("missing column {}", wanted)
       .in(where_)
       .of(wanted)
-      .next(meant.empty() ? fmt::format("the header has: {}; trammel help formats tells them all", names)
-                          : fmt::format("is it column {}? then call it {}, with its values in that unit",
-                                        shown_short(meant), wanted));
+      .next(meant.empty()
+                ? fmt::format("the header has: {}; trammel help formats tells them all", names)
+                : fmt::format("is it column {}? then call it {}, with its values in that unit",
+                              shown_short(meant), wanted));
 }
 
-Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::string>& columns) const {
+Result<std::vector<std::size_t>> CsvTable::all_or_none(
+    const std::vector<std::string>& columns) const {
   std::vector<std::size_t> found;
   std::vector<std::string> missing;
   for (const std::string& column : columns) {
@@ -364,14 +388,19 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc::result_out_of_range) {
-    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown_short(field(row, column)), limit)
+    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown_short(field(row, column)),
+                  limit)
         .of(columns_[column])
         .with_text(shown_short(field(row, column)))
-        .beyond(std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1), limit);
+        .beyond(
+            std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1),
+            limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
-    const bool comma = text.find(',') != std::string_view::npos, point = text.find('.') != std::string_view::npos;
-    return refuse(row, "{} is '{}', expected a number", columns_[column], shown_short(field(row, column)))
+    const bool comma = text.find(',') != std::string_view::npos,
+               point = text.find('.') != std::string_view::npos;
+    return refuse(row, "{} is '{}', expected a number", columns_[column],
+                  shown_short(field(row, column)))
         .of(columns_[column])
         .with_text(shown_short(field(row, column)))
         .next(comma && point ? kThousands
@@ -402,15 +431,17 @@ Result<int> CsvTable::integer(std::size_t row, std::size_t column, int lowest, i
   return static_cast<int>(value);
 }
 
-Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<std::size_t>& wxyz) const {
+Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row,
+                                           const std::vector<std::size_t>& wxyz) const {
   Eigen::Vector4d values;
   for (std::size_t k = 0; k < 4; ++k) {
     const double value = TRY(number(row, wxyz[k]));
     values(static_cast<Eigen::Index>(k)) = value;
   }
   if (std::abs(values.norm() - 1) > kQuaternionLimit) {
-    return refuse(row, "quaternion {},{},{},{} has length {:.6g}, expected 1 (limit {:g})", columns_[wxyz[0]],
-                  columns_[wxyz[1]], columns_[wxyz[2]], columns_[wxyz[3]], values.norm(), kQuaternionLimit)
+    return refuse(row, "quaternion {},{},{},{} has length {:.6g}, expected 1 (limit {:g})",
+                  columns_[wxyz[0]], columns_[wxyz[1]], columns_[wxyz[2]], columns_[wxyz[3]],
+                  values.norm(), kQuaternionLimit)
         .of(columns_[wxyz[0]])
         .beyond(values.norm(), 1);
   }
@@ -419,8 +450,8 @@ Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<st
 }
 
 std::string csv_field(std::string_view text) {
-  const bool bare =
-      text.find_first_of(",;\t\"\n\r") == std::string_view::npos && trimmed(text) == text && !text.starts_with('#');
+  const bool bare = text.find_first_of(",;\t\"\n\r") == std::string_view::npos &&
+                    trimmed(text) == text && !text.starts_with('#');
   if (bare) return std::string(text);
   std::string quoted = "\"";
   for (const char c : text) {

@@ -16,7 +16,8 @@ Result<JointList> parse_joint_csv(const std::string& text, const std::string& wh
   const CsvTable table = TRY(CsvTable::parse(text, where));
   const PoseColumns columns = TRY(PoseColumns::find(table));
   TRY(columns.require_joints(table));
-  if (table.size() == 0) return refused("no poses below the header, at least 1 is needed").in(where).beyond(0, 1);
+  if (table.size() == 0)
+    return refused("no poses below the header, at least 1 is needed").in(where).beyond(0, 1);
   JointList list{where, columns.joint_types(), {}};
   for (std::size_t row = 0; row < table.size(); ++row) {
     PoseContext context = TRY(columns.read(table, row));
@@ -27,17 +28,23 @@ Result<JointList> parse_joint_csv(const std::string& text, const std::string& wh
 }
 
 Result<JointList> read_joint_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_joint_csv(text, path); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_joint_csv(text, path); });
 }
 
 std::string to_csv(const JointList& list) {
-  const auto any = [&](const auto& has) { return std::any_of(list.poses.begin(), list.poses.end(), has); };
-  const bool directions = any([](const CommandedPose& pose) { return !pose.context.direction.empty(); });
+  const auto any = [&](const auto& has) {
+    return std::any_of(list.poses.begin(), list.poses.end(), has);
+  };
+  const bool directions =
+      any([](const CommandedPose& pose) { return !pose.context.direction.empty(); });
   const bool tools = any([](const CommandedPose& pose) { return !pose.context.tool.empty(); });
-  const bool payloads = any([](const CommandedPose& pose) { return !pose.context.payload.empty(); });
+  const bool payloads =
+      any([](const CommandedPose& pose) { return !pose.context.payload.empty(); });
   const std::size_t n = list.joint_types.size();
   std::string text = "pose_id";
-  for (std::size_t j = 0; j < n; ++j) text += ',' + joint_column(static_cast<int>(j), list.joint_types[j]);
+  for (std::size_t j = 0; j < n; ++j)
+    text += ',' + joint_column(static_cast<int>(j), list.joint_types[j]);
   for (std::size_t j = 0; directions && j < n; ++j) text += fmt::format(",dir{}", j + 1);
   if (tools) text += ",tool_id";
   if (payloads) text += ",payload_id";
@@ -46,7 +53,8 @@ std::string to_csv(const JointList& list) {
     const PoseContext& context = pose.context;
     text += csv_field(pose.pose_id);
     for (std::size_t j = 0; j < n; ++j) {
-      text += ',' + csv_number(joint_to_column(context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
+      text += ',' + csv_number(joint_to_column(context.q(static_cast<Eigen::Index>(j)),
+                                               list.joint_types[j]));
     }
     for (std::size_t j = 0; directions && j < n; ++j) {
       text += context.direction.empty() ? "," : fmt::format(",{}", context.direction[j]);
@@ -60,22 +68,26 @@ std::string to_csv(const JointList& list) {
 
 namespace {
 
-/// Refuses a list whose joints look like radians: all of them small, and many of them turned by several degrees.
+/// Refuses a list whose joints look like radians: all of them small, and many of them turned by
+/// several degrees.
 Status check_degrees(const JointList& list, const Chain& robot) {
   constexpr std::size_t kFewestPoses = 6;
-  constexpr int kFewestTurned = 4;  // joints: an arm with so many has no pose where all of them are near zero
-  constexpr double kTurned = 1;     // rad, or deg as read
+  constexpr int kFewestTurned =
+      4;  // joints: an arm with so many has no pose where all of them are near zero
+  constexpr double kTurned = 1;  // rad, or deg as read
   if (list.poses.size() < kFewestPoses) return {};
   int turned = 0;
   for (int j = 0; j < robot.size(); ++j) {
     if (robot.joint(j).type != JointType::kRevolute) continue;
     double largest = 0;
-    for (const CommandedPose& pose : list.poses) largest = std::max(largest, std::abs(to_deg(pose.context.q(j))));
+    for (const CommandedPose& pose : list.poses)
+      largest = std::max(largest, std::abs(to_deg(pose.context.q(j))));
     if (largest > kMostRadians) return {};
     turned += largest > kTurned ? 1 : 0;
   }
   if (turned < kFewestTurned) return {};
-  return refused("all joints of {} poses are within {:g} deg of zero", list.poses.size(), kMostRadians)
+  return refused("all joints of {} poses are within {:g} deg of zero", list.poses.size(),
+                 kMostRadians)
       .in(list.where)
       .of("q1_deg")
       .next("are the joints radians? They must be degrees");

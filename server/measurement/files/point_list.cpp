@@ -35,19 +35,24 @@ std::string last_component(const std::string& name) {
 /// Of a moment as programs write it, taken for UTC; nothing where it may be read in two ways.
 std::optional<double> unix_time_of(const std::string& text) {
   if (is_number(text)) return std::stod(text);
-  static const std::regex kYearFirst(R"((\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?)Z?)");
-  static const std::regex kDayFirst(R"((\d\d)\.(\d\d)\.(\d{4}) (\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?))");
+  static const std::regex kYearFirst(
+      R"((\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?)Z?)");
+  static const std::regex kDayFirst(
+      R"((\d\d)\.(\d\d)\.(\d{4}) (\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?))");
   std::smatch part;
   const bool year_first = text.size() < kLongestTime && std::regex_match(text, part, kYearFirst);
-  if (!year_first && !(text.size() < kLongestTime && std::regex_match(text, part, kDayFirst))) return std::nullopt;
+  if (!year_first && !(text.size() < kLongestTime && std::regex_match(text, part, kDayFirst)))
+    return std::nullopt;
   const auto number = [&](int k) { return std::stoi(part[static_cast<std::size_t>(k)].str()); };
-  const std::chrono::year_month_day day{std::chrono::year(number(year_first ? 1 : 3)),
-                                        std::chrono::month(static_cast<unsigned>(number(2))),
-                                        std::chrono::day(static_cast<unsigned>(number(year_first ? 3 : 1)))};
+  const std::chrono::year_month_day day{
+      std::chrono::year(number(year_first ? 1 : 3)),
+      std::chrono::month(static_cast<unsigned>(number(2))),
+      std::chrono::day(static_cast<unsigned>(number(year_first ? 3 : 1)))};
   if (!day.ok() || number(4) > 23 || number(5) > 59) return std::nullopt;
   const double seconds = std::stod(with_decimal_point(part[6].str()));
   const auto midnight = std::chrono::sys_days(day).time_since_epoch();
-  return static_cast<double>(std::chrono::seconds(midnight).count()) + 3600 * number(4) + 60 * number(5) + seconds;
+  return static_cast<double>(std::chrono::seconds(midnight).count()) + 3600 * number(4) +
+         60 * number(5) + seconds;
 }
 
 /// Reads rows of a table whose columns have our names.
@@ -63,7 +68,8 @@ class PointReader {
 
   [[nodiscard]] Status find_columns() {
     name_ = *table_.find("name");
-    for (const std::string& column : coordinate_columns(coordinates_)) position_.push_back(*table_.find(column));
+    for (const std::string& column : coordinate_columns(coordinates_))
+      position_.push_back(*table_.find(column));
     const CoordinateNames wanted = uncertainty_columns(coordinates_);
     auto uncertainties = TRY(table_.all_or_none({wanted.begin(), wanted.end()}));
     auto angles = TRY(table_.all_or_none({"rx", "ry", "rz"}));
@@ -155,10 +161,11 @@ class PointReader {
                                            Coordinates coordinates, double length_limit) const {
     Vector3 values;
     for (std::size_t k = 0; k < 3; ++k) {
-      const bool angle =
-          (k == 1 && coordinates != Coordinates::kCartesian) || (k == 2 && coordinates == Coordinates::kSpherical);
+      const bool angle = (k == 1 && coordinates != Coordinates::kCartesian) ||
+                         (k == 2 && coordinates == Coordinates::kSpherical);
       const double scale = angle ? angle_ : length_;
-      const double value = TRY(table_.number(row, columns[k], (angle ? from_deg(kAngleLimit) : length_limit) / scale));
+      const double value = TRY(
+          table_.number(row, columns[k], (angle ? from_deg(kAngleLimit) : length_limit) / scale));
       values(static_cast<Eigen::Index>(k)) = value * scale;
     }
     return values;
@@ -167,15 +174,18 @@ class PointReader {
   [[nodiscard]] Vector3 cartesian(const Vector3& native) const {
     const double r = native.x();
     const double theta = native.y();
-    if (coordinates_ == Coordinates::kCylindrical) return {r * std::cos(theta), r * std::sin(theta), native.z()};
+    if (coordinates_ == Coordinates::kCylindrical)
+      return {r * std::cos(theta), r * std::sin(theta), native.z()};
     if (coordinates_ == Coordinates::kCartesian) return native;
     const double phi = native.z();
-    return {r * std::sin(phi) * std::cos(theta), r * std::sin(phi) * std::sin(theta), r * std::cos(phi)};
+    return {r * std::sin(phi) * std::cos(theta), r * std::sin(phi) * std::sin(theta),
+            r * std::cos(phi)};
   }
 
   [[nodiscard]] Status read_rotation(std::size_t row, NamedPoint& point) const {
-    const bool turned = std::any_of(quaternion_.begin(), quaternion_.end(),
-                                    [&](std::size_t column) { return !table_.field(row, column).empty(); });
+    const bool turned =
+        std::any_of(quaternion_.begin(), quaternion_.end(),
+                    [&](std::size_t column) { return !table_.field(row, column).empty(); });
     if (turned) {
       const Eigen::Matrix3d R_W = TRY(table_.rotation(row, quaternion_));
       point.R_W = R_W;
@@ -194,7 +204,10 @@ class PointReader {
   [[nodiscard]] Status read_sigma(std::size_t row, const Vector3& native, NamedPoint& point) const {
     if (sigma_ && !table_.field(row, *sigma_).empty()) {
       const double sigma = TRY(table_.number(row, *sigma_, kUncertaintyLimit / length_));
-      if (sigma <= 0) return table_.refuse(row, "sigma is {:g}, must be above 0", sigma).of("sigma").beyond(sigma, 0);
+      if (sigma <= 0)
+        return table_.refuse(row, "sigma is {:g}, must be above 0", sigma)
+            .of("sigma")
+            .beyond(sigma, 0);
       point.sigma = sigma * length_;
     }
     if (uncertainties_.empty()) return {};
@@ -202,7 +215,9 @@ class PointReader {
     for (Eigen::Index k = 0; k < 3; ++k) {
       if ((read)(k) >= 0) continue;
       const std::size_t column = uncertainties_[static_cast<std::size_t>(k)];
-      return table_.refuse(row, "{} is {}, must not be below 0", table_.columns()[column], table_.field(row, column))
+      return table_
+          .refuse(row, "{} is {}, must not be below 0", table_.columns()[column],
+                  table_.field(row, column))
           .of(table_.columns()[column])
           .with_text(table_.field(row, column));
     }
@@ -231,7 +246,8 @@ class PointReader {
 
 }  // namespace
 
-Result<PointList> parse_points(const std::string& text, const std::string& where, const PointFileOptions& options) {
+Result<PointList> parse_points(const std::string& text, const std::string& where,
+                               const PointFileOptions& options) {
   if (!(options.coverage > 0))
     return refused("coverage factor {:g}, must be above 0", options.coverage)
         .in(where)
@@ -246,10 +262,13 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
     NamedPoint point = TRY(reader.read(row));
     const auto [earlier, is_new] = row_of_name.emplace(point.name, point.row);
     if (!is_new) {
-      return parts.table.refuse(row, "name '{}' is already that of row {}", point.name, earlier->second)
+      return parts.table
+          .refuse(row, "name '{}' is already that of row {}", point.name, earlier->second)
           .of("name")
           .with_text(point.name)
-          .next("names count without their collection and group: export one group, or rename the point");
+          .next(
+              "names count without their collection and group: export one group, or rename the "
+              "point");
     }
     list.points.push_back(std::move(point));
   }
@@ -257,7 +276,8 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
 }
 
 Result<PointList> read_points(const std::string& path, const PointFileOptions& options) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_points(text, path, options); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_points(text, path, options); });
 }
 
 namespace {
@@ -280,8 +300,9 @@ Measurement measured_at(const CommandedPose& pose, const NamedPoint& point, int 
 Status check_as_long(const PointList& points, const JointList& commanded) {
   const std::size_t n = points.points.size(), poses = commanded.poses.size();
   if (n == poses) return {};
-  return refused("{} points for the {} poses of {}: which belong together in their order is not known", n, poses,
-                 commanded.where)
+  return refused(
+             "{} points for the {} poses of {}: which belong together in their order is not known",
+             n, poses, commanded.where)
       .in(points.where)
       .beyond(n, poses)
       .next("name the points as the poses, and join them by name");
@@ -289,8 +310,10 @@ Status check_as_long(const PointList& points, const JointList& commanded) {
 
 }  // namespace
 
-Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded, bool in_order) {
-  if (points.points.empty()) return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
+Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded,
+                                     bool in_order) {
+  if (points.points.empty())
+    return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
   TRY(in_order ? check_as_long(points, commanded) : Status());
   std::map<std::string, const CommandedPose*> pose_of_id;
   for (const CommandedPose& pose : commanded.poses) {
@@ -310,7 +333,8 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
   for (const NamedPoint& point : points.points) {
     const auto index = static_cast<int>(batch.measurements.size());
     if (in_order) {
-      batch.measurements.push_back(measured_at(commanded.poses[batch.measurements.size()], point, index));
+      batch.measurements.push_back(
+          measured_at(commanded.poses[batch.measurements.size()], point, index));
       continue;
     }
     const auto pose = pose_of_id.find(point.name);

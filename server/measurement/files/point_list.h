@@ -8,7 +8,8 @@
 #include "server/measurement/files/point_options.h"
 #include "server/measurement/measurement.h"
 
-/// Points and frames that the software of a tracker exports: positions without the commanded joints.
+/// Points and frames that the software of a tracker exports: positions without the commanded
+/// joints.
 namespace trammel {
 
 struct NamedPoint {
@@ -28,59 +29,68 @@ struct PointList {
       {};  ///< what the software of a tracker recorded beside: the air, time stamps
 };
 
-/// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points", "Export Frames"), and
-/// any list of named points with a header line, `name,x_mm,y_mm,z_mm` among them.
+/// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points",
+/// "Export Frames"), and any list of named points with a header line, `name,x_mm,y_mm,z_mm` among
+/// them.
 ///
-/// Lines: one point each; empty lines are passed over, `//` and `#` start comments. Fields are separated by `;`, tab,
-/// `,` or blanks, by the first of these that is in the first line of data; a name with a separator in it stands in
-/// double quotes, and of a name with its collection and group, `Collection::Group::p1`, the last component counts.
-/// Between `;`, tabs or blanks a number may have a decimal comma; where commas separate values without a header and no
-/// number has a decimal point, the file is refused. Time stamps at the end of a line (fields with `/` or `:`, AM, PM,
-/// an ISO date) are passed over.
+/// Lines: one point each; empty lines are passed over, `//` and `#` start comments. Fields are
+/// separated by `;`, tab,
+/// `,` or blanks, by the first of these that is in the first line of data; a name with a separator
+/// in it stands in double quotes, and of a name with its collection and group,
+/// `Collection::Group::p1`, the last component counts. Between `;`, tabs or blanks a number may
+/// have a decimal comma; where commas separate values without a header and no number has a decimal
+/// point, the file is refused. Time stamps at the end of a line (fields with `/` or `:`, AM, PM, an
+/// ISO date) are passed over.
 ///
 /// Layouts without a header line, told by the number of fields, the same in every line:
 ///
 ///     [[collection] group] target  c1 c2 c3                 4 to 6 fields
-///     [[collection] group] target  c1 c2 c3  u1 u2 u3       7 to 9 fields: coordinate uncertainties
+///     [[collection] group] target  c1 c2 c3  u1 u2 u3       7 to 9 fields: coordinate
+///     uncertainties
 ///     [[collection] group] frame   c1 c2 c3  rx ry rz       7 to 9 fields: fixed XYZ angles, deg
 ///     [[collection] group] frame   c1 c2 c3  rz ry rx       7 to 9 fields: Euler ZYX angles, deg
 ///
-/// With 7 to 9 fields a comment (`fixed XYZ`, `XYZ fixed`, `fixed angles`, `Euler ZYX`, `ZYX Euler`, `uncertainties`)
-/// or `options.behind` must say which of the three it is. A number with a decimal point where a name belongs is
-/// refused.
+/// With 7 to 9 fields a comment (`fixed XYZ`, `XYZ fixed`, `fixed angles`, `Euler ZYX`, `ZYX
+/// Euler`, `uncertainties`) or `options.behind` must say which of the three it is. A number with a
+/// decimal point where a name belongs is refused.
 ///
-/// Layouts with a header (the first line of data, or a comment of as many fields that names a point and three
-/// coordinates), columns in any order, found by name without regard to case, blanks and underscores: `name` (`point`,
-/// `target`, `frame`, each also with `name`), `x y z`, `r theta z` or `r theta phi`; optional `ux uy uz` (`ur utheta
-/// uz`, `ur utheta uphi`), `sigma`, `rx ry rz` (in this order or as `rz ry rx`). Others are passed over. Units may
-/// stand in brackets or behind an underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines above the header, in
-/// which a program tells of itself, are passed over.
+/// Layouts with a header (the first line of data, or a comment of as many fields that names a point
+/// and three coordinates), columns in any order, found by name without regard to case, blanks and
+/// underscores: `name` (`point`, `target`, `frame`, each also with `name`), `x y z`, `r theta z` or
+/// `r theta phi`; optional `ux uy uz` (`ur utheta uz`, `ur utheta uphi`), `sigma`, `rx ry rz` (in
+/// this order or as `rz ry rx`). Others are passed over. Units may stand in brackets or behind an
+/// underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines above the header, in which a program
+/// tells of itself, are passed over.
 ///
-/// Of Leica Tracker Pilot, also `pointid`; `u95` of the point (k = 2, of its three axes together: sigma of one axis is
-/// U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx qy qz` or `q0 q1 q2 q3`, active W <- frame; a
-/// `timestamp` (`2026-11-22 10:11:12.3`, `22.11.2026 10:11:12`, taken for UTC, or Unix time), which else stays as text;
-/// `temperature`, `pressure`, `humidity` of the air, which are kept as `air_temperature_c`, `air_pressure_hpa`,
-/// `air_humidity_percent`.
+/// Of Leica Tracker Pilot, also `pointid`; `u95` of the point (k = 2, of its three axes together:
+/// sigma of one axis is U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx qy qz` or
+/// `q0 q1 q2 q3`, active W <- frame; a `timestamp` (`2026-11-22 10:11:12.3`, `22.11.2026 10:11:12`,
+/// taken for UTC, or Unix time), which else stays as text; `temperature`, `pressure`, `humidity` of
+/// the air, which are kept as `air_temperature_c`, `air_pressure_hpa`, `air_humidity_percent`.
 ///
-/// Coordinates: cartesian; cylindrical R, theta (from +x about +z), z; spherical R, theta (the same), phi (from +z). A
-/// comment with `cylindric`, `spherical` or `polar` says so. Angles are deg unless `Angular units: rad` or the header
-/// says otherwise. Lengths are mm unless a comment `Units: inches`, the header or `options.unit` says m or inch.
-/// Rotation of a frame: Rz(rz) Ry(ry) Rx(rx), which both kinds of angles mean. Uncertainties become one sigma of an
-/// axis: the root mean square of the three, in metres, over `options.coverage`; three zeros mean that none was
+/// Coordinates: cartesian; cylindrical R, theta (from +x about +z), z; spherical R, theta (the
+/// same), phi (from +z). A comment with `cylindric`, `spherical` or `polar` says so. Angles are deg
+/// unless `Angular units: rad` or the header says otherwise. Lengths are mm unless a comment
+/// `Units: inches`, the header or `options.unit` says m or inch. Rotation of a frame: Rz(rz) Ry(ry)
+/// Rx(rx), which both kinds of angles mean. Uncertainties become one sigma of an axis: the root
+/// mean square of the three, in metres, over `options.coverage`; three zeros mean that none was
 /// recorded.
 ///
-/// Refuses, naming file, row, column, value and limit: no points, another number of fields, a number that is none or
-/// too large (1 km), a negative radius or uncertainty, a name twice, other Euler angles, statements that contradict.
+/// Refuses, naming file, row, column, value and limit: no points, another number of fields, a
+/// number that is none or too large (1 km), a negative radius or uncertainty, a name twice, other
+/// Euler angles, statements that contradict.
 [[nodiscard]] Result<PointList> parse_points(const std::string& text, const std::string& where,
                                              const PointFileOptions& options = {});
-[[nodiscard]] Result<PointList> read_points(const std::string& path, const PointFileOptions& options = {});
+[[nodiscard]] Result<PointList> read_points(const std::string& path,
+                                            const PointFileOptions& options = {});
 
-/// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the name of the point
-/// (of both the last component counts). With `in_order` the first point measures the first pose, and so on: names do
-/// not count, and both lists must be as long.
-/// The batch has the order of the points, which is the order in time. Poses without a point are left out. Refuses a
+/// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the
+/// name of the point (of both the last component counts). With `in_order` the first point measures
+/// the first pose, and so on: names do not count, and both lists must be as long. The batch has the
+/// order of the points, which is the order in time. Poses without a point are left out. Refuses a
 /// point without a pose, a pose_id twice, and lists without a point.
-[[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded,
+[[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points,
+                                                   const JointList& commanded,
                                                    bool in_order = false);
 
 }  // namespace trammel

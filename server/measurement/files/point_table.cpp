@@ -16,21 +16,28 @@ namespace {
 
 constexpr std::size_t kLeastFields = 4;
 constexpr std::size_t kMostFields = 9;
-constexpr std::size_t kLongestLineOfPoints = 1000;  // bytes: regular expressions recurse once for each
-constexpr std::size_t kMostComments = 500;          // each is searched for statements
+constexpr std::size_t kLongestLineOfPoints =
+    1000;                                   // bytes: regular expressions recurse once for each
+constexpr std::size_t kMostComments = 500;  // each is searched for statements
 
 template <typename T>
 Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
-  if (known && *known != said) return refused("two different statements of the {}", what).in(where).of(what);
+  if (known && *known != said)
+    return refused("two different statements of the {}", what).in(where).of(what);
   known = said;
   return {};
 }
 
 Result<LengthUnit> length_unit(const std::string& word, const std::string& where, int line) {
   if (word == "mm" || word.starts_with("millimet")) return LengthUnit::kMillimetre;
-  if (word == "m" || word.starts_with("meter") || word.starts_with("metre")) return LengthUnit::kMetre;
+  if (word == "m" || word.starts_with("meter") || word.starts_with("metre"))
+    return LengthUnit::kMetre;
   if (word == "in" || word.starts_with("inch")) return LengthUnit::kInch;
-  return refused("unit is '{}', expected mm, m or inch", word).in(where).at_row(line).of("unit").with_text(word);
+  return refused("unit is '{}', expected mm, m or inch", word)
+      .in(where)
+      .at_row(line)
+      .of("unit")
+      .with_text(word);
 }
 
 Result<bool> is_radian(const std::string& word, const std::string& where, int line) {
@@ -43,9 +50,12 @@ Result<bool> is_radian(const std::string& word, const std::string& where, int li
       .with_text(word);
 }
 
-bool contains(const std::string& text, const std::regex& pattern) { return std::regex_search(text, pattern); }
+bool contains(const std::string& text, const std::regex& pattern) {
+  return std::regex_search(text, pattern);
+}
 
-/// In lower case, with one blank between words: the time to search would grow with the square of a run of blanks.
+/// In lower case, with one blank between words: the time to search would grow with the square of a
+/// run of blanks.
 std::string words_of(std::string_view text) {
   std::string words;
   for (const char c : text) {
@@ -56,9 +66,12 @@ std::string words_of(std::string_view text) {
   return words;
 }
 
-Status read_unit_statements(const std::string& comment, const std::string& where, int line, Statements& statements) {
-  static const std::regex kUnits(R"((angular|angle)?\s*\bunits?\s*(?:[:=]|\bare\b|\bin\b)\s*([a-z]+))");
-  for (auto at = std::sregex_iterator(comment.begin(), comment.end(), kUnits); at != std::sregex_iterator(); ++at) {
+Status read_unit_statements(const std::string& comment, const std::string& where, int line,
+                            Statements& statements) {
+  static const std::regex kUnits(
+      R"((angular|angle)?\s*\bunits?\s*(?:[:=]|\bare\b|\bin\b)\s*([a-z]+))");
+  for (auto at = std::sregex_iterator(comment.begin(), comment.end(), kUnits);
+       at != std::sregex_iterator(); ++at) {
     if ((*at)[1].matched) {
       const bool radians = TRY(is_radian((*at)[2], where, line));
       TRY(state(statements.radians, radians, where, "angular unit"));
@@ -71,12 +84,15 @@ Status read_unit_statements(const std::string& comment, const std::string& where
 }
 
 Status read_statements(const TextLine& line, const std::string& where, Statements& statements) {
-  static const std::regex kCylindric("cylindric"), kSpherical("spherical|\\bpolar"), kCartesian("cartesian");
-  static const std::regex kZyx(R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)"), kEuler(R"(\beuler\b)");
-  static const std::regex kFixed(R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)"), kUncertain("\\buncertaint");
+  static const std::regex kCylindric("cylindric"), kSpherical("spherical|\\bpolar"),
+      kCartesian("cartesian");
+  static const std::regex kZyx(R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)"),
+      kEuler(R"(\beuler\b)");
+  static const std::regex kFixed(R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)"),
+      kUncertain("\\buncertaint");
   const std::string comment = words_of(line.text);
   TRY(read_unit_statements(comment, where, line.number, statements));
-  const auto coordinates = contains(comment, kCylindric)   ? std::optional(Coordinates::kCylindrical)
+  const auto coordinates = contains(comment, kCylindric) ? std::optional(Coordinates::kCylindrical)
                            : contains(comment, kSpherical) ? std::optional(Coordinates::kSpherical)
                            : contains(comment, kCartesian) ? std::optional(Coordinates::kCartesian)
                                                            : std::nullopt;
@@ -91,10 +107,11 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
         .of("angles")
         .next("expected Euler ZYX or fixed XYZ");
   }
-  const auto behind = zyx                             ? std::optional(BehindCoordinates::kEulerZyx)
-                      : contains(comment, kFixed)     ? std::optional(BehindCoordinates::kFixedXyz)
-                      : contains(comment, kUncertain) ? std::optional(BehindCoordinates::kUncertainties)
-                                                      : std::nullopt;
+  const auto behind = zyx                         ? std::optional(BehindCoordinates::kEulerZyx)
+                      : contains(comment, kFixed) ? std::optional(BehindCoordinates::kFixedXyz)
+                      : contains(comment, kUncertain)
+                          ? std::optional(BehindCoordinates::kUncertainties)
+                          : std::nullopt;
   if (!behind) return {};
   return state(statements.behind, *behind, where, "columns behind the coordinates");
 }
@@ -149,7 +166,8 @@ std::optional<Coordinates> coordinates_of(const std::vector<std::string>& column
 
 /// Whether the unit of the column is neither that of lengths nor that of angles.
 bool has_no_length(const std::string& column) {
-  return column == kTimeStamp || std::find(kWeather.begin(), kWeather.end(), column) != kWeather.end() ||
+  return column == kTimeStamp ||
+         std::find(kWeather.begin(), kWeather.end(), column) != kWeather.end() ||
          (column.size() == 2 && column.starts_with('q')) || column == "name";
 }
 
@@ -160,7 +178,8 @@ struct Header {
 };
 
 Header header_of(std::string_view line, char separator) {
-  static const std::regex kTwoWords("(point|target|frame|group|collection)\\s+name", std::regex::icase);
+  static const std::regex kTwoWords("(point|target|frame|group|collection)\\s+name",
+                                    std::regex::icase);
   const std::string text = std::regex_replace(std::string(line), kTwoWords, "$1");
   const std::vector<std::string> fields = split_fields(text, separator);
   std::vector<std::string> names;
@@ -169,20 +188,25 @@ Header header_of(std::string_view line, char separator) {
   Header header;
   for (std::size_t k = 0; k < fields.size(); ++k) {
     const bool of_quaternion = numbered_quaternion && names[k].size() == 2 && names[k][0] == 'q';
-    const std::string known =
-        of_quaternion && names[k][1] <= '3' ? fmt::format("q{}", "wxyz"[names[k][1] - '0']) : known_column(names[k]);
-    header.columns.push_back(known.empty() ? fmt::format("({}) {}", header.columns.size() + 1, fields[k]) : known);
-    header.units.push_back(known.empty() || has_no_length(known) ? "" : column_name(fields[k]).unit);
+    const std::string known = of_quaternion && names[k][1] <= '3'
+                                  ? fmt::format("q{}", "wxyz"[names[k][1] - '0'])
+                                  : known_column(names[k]);
+    header.columns.push_back(
+        known.empty() ? fmt::format("({}) {}", header.columns.size() + 1, fields[k]) : known);
+    header.units.push_back(known.empty() || has_no_length(known) ? ""
+                                                                 : column_name(fields[k]).unit);
   }
   if (!has_all(header.columns, {"name"}) || !coordinates_of(header.columns)) return {};
   return header;
 }
 
 bool is_angle(const std::string& column) {
-  return column.ends_with("theta") || column.ends_with("phi") || (column.size() == 2 && column.starts_with('r'));
+  return column.ends_with("theta") || column.ends_with("phi") ||
+         (column.size() == 2 && column.starts_with('r'));
 }
 
-Status read_header_units(const Header& header, const std::string& where, int line, Statements& statements) {
+Status read_header_units(const Header& header, const std::string& where, int line,
+                         Statements& statements) {
   for (std::size_t k = 0; k < header.units.size(); ++k) {
     if (header.units[k].empty()) continue;
     if (is_angle(header.columns[k])) {
@@ -199,18 +223,21 @@ Status read_header_units(const Header& header, const std::string& where, int lin
 /// Removes time stamps and empty fields from the end.
 void drop_time_stamp(std::vector<std::string>& fields) {
   static const std::regex kStamp(R"(.*[/:].*|[AaPp]\.?[Mm]\.?|\d{4}-\d{2}-\d{2}.*)");
-  while (fields.size() > kLeastFields && (fields.back().empty() || std::regex_match(fields.back(), kStamp))) {
+  while (fields.size() > kLeastFields &&
+         (fields.back().empty() || std::regex_match(fields.back(), kStamp))) {
     fields.pop_back();
   }
 }
 
 /// The columns of a file without a header line, from its first row.
-Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, const Statements& statements,
+Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row,
+                                                    const Statements& statements,
                                                     const std::string& where) {
   const std::size_t count = row.fields.size();
   if (count < kLeastFields || count > kMostFields) {
     return refused(
-               "{} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 uncertainties or angles]",
+               "{} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 "
+               "uncertainties or angles]",
                count, kLeastFields, kMostFields)
         .in(where)
         .at_row(row.line)
@@ -219,16 +246,19 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
   const bool more_behind = count > kLeastFields + 2;
   if (more_behind && !statements.behind) {
     return refused(
-               "3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ or Euler "
-               "ZYX angles")
+               "3 values behind the coordinates, and nothing says whether they are uncertainties, "
+               "fixed XYZ or Euler ZYX angles")
         .in(where)
         .at_row(row.line)
         .of("columns behind the coordinates");
   }
   std::vector<std::string> columns = {"collection", "group", "name"};
-  columns.erase(columns.begin(), columns.begin() + 2 - static_cast<std::ptrdiff_t>((count - kLeastFields) % 3));
+  columns.erase(columns.begin(),
+                columns.begin() + 2 - static_cast<std::ptrdiff_t>((count - kLeastFields) % 3));
   const Coordinates coordinates = statements.coordinates.value_or(Coordinates::kCartesian);
-  const auto append = [&](const CoordinateNames& names) { columns.insert(columns.end(), names.begin(), names.end()); };
+  const auto append = [&](const CoordinateNames& names) {
+    columns.insert(columns.end(), names.begin(), names.end());
+  };
   append(coordinate_columns(coordinates));
   if (!more_behind) return columns;
   switch (*statements.behind) {
@@ -245,11 +275,13 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
   return columns;
 }
 
-/// Refuses positions without any decimal point between commas: they may be fewer numbers with decimal commas.
+/// Refuses positions without any decimal point between commas: they may be fewer numbers with
+/// decimal commas.
 Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& where) {
   for (const CsvTable::Row& row : rows) {
     const auto name = std::find_if_not(row.fields.rbegin(), row.fields.rend(), is_number);
-    const bool no_more_than_needed = row.fields.size() <= kLeastFields || name - row.fields.rbegin() <= 3;
+    const bool no_more_than_needed =
+        row.fields.size() <= kLeastFields || name - row.fields.rbegin() <= 3;
     const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
     if (no_more_than_needed || std::any_of(row.fields.rbegin(), name, pointed)) return {};
   }
@@ -259,8 +291,8 @@ Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& w
       .next("name the columns in a first line (name,x,y,z), or separate values by ';'");
 }
 
-/// The header where there is one among the first lines, whatever a program wrote above it of itself; else the first
-/// line of data.
+/// The header where there is one among the first lines, whatever a program wrote above it of
+/// itself; else the first line of data.
 std::vector<TextLine>::const_iterator first_of_table(const std::vector<TextLine>& lines) {
   constexpr int kMostAbove = 30;
   const auto is_data = [](const TextLine& line) { return !line.comment; };
@@ -297,12 +329,14 @@ CoordinateNames uncertainty_columns(Coordinates coordinates) {
   return {"ux", "uy", "uz"};
 }
 
-Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
+Result<PointTable> take_apart(const std::string& text, const std::string& where,
+                              const PointFileOptions& options) {
   const std::vector<TextLine> read = TRY(text_lines(text, where, kLongestLineOfPoints));
   const std::vector<TextLine>& lines = read;
   TRY(check_comments(lines, where));
   const auto first = first_of_table(lines);
-  if (first == lines.end()) return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
+  if (first == lines.end())
+    return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
   const char separator = separator_of(first->text);
   PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
   std::vector<CsvTable::Row> data = TRY(data_rows({first, lines.end()}, separator, where));
@@ -322,11 +356,13 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
       return tl::make_unexpected(said.error());
     }
   }
-  if (rows.empty()) return refused("no points below the header, at least 1 is needed").in(where).beyond(0, 1);
+  if (rows.empty())
+    return refused("no points below the header, at least 1 is needed").in(where).beyond(0, 1);
   parts.positional = header.columns.empty();
   if (parts.positional) {
     for (CsvTable::Row& row : rows) drop_time_stamp(row.fields);
-    std::vector<std::string> columns = TRY(positional_columns(rows.front(), parts.statements, where));
+    std::vector<std::string> columns =
+        TRY(positional_columns(rows.front(), parts.statements, where));
     for (const CsvTable::Row& row : rows) {
       if (row.fields.size() == columns.size()) continue;
       return refused("{} values, the rows before have {}", row.fields.size(), columns.size())
@@ -339,7 +375,8 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
     }
     header.columns = std::move(columns);
     header_line = rows.front().line;
-  } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
+  } else if (const Status units = read_header_units(header, where, header_line, parts.statements);
+             !units) {
     return tl::make_unexpected(units.error());
   }
   TRY(state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates"));

@@ -10,12 +10,14 @@
 /// Finds the layout of a list of points.
 namespace trammel {
 
-/// Our names of columns that the software of trackers writes beside coordinates: expanded uncertainties (U95, k = 2) of
-/// the point and of its axes, when it was measured, and the air. Brackets say that they hold numbers.
+/// Our names of columns that the software of trackers writes beside coordinates: expanded
+/// uncertainties (U95, k = 2) of the point and of its axes, when it was measured, and the air.
+/// Brackets say that they hold numbers.
 inline const std::string kU95 = "u95 [point]";
 inline const std::array<std::string, 3> kU95Axes = {"u95x [axis]", "u95y [axis]", "u95z [axis]"};
 inline const std::string kTimeStamp = "timestamp";
-inline const std::array<std::string, 3> kWeather = {"air_temperature [c]", "air_pressure [hpa]", "air_humidity [%]"};
+inline const std::array<std::string, 3> kWeather = {"air_temperature [c]", "air_pressure [hpa]",
+                                                    "air_humidity [%]"};
 
 /// What the file and the caller state about the layout.
 struct Statements {
@@ -25,15 +27,16 @@ struct Statements {
   std::optional<bool> radians;
 };
 
-/// The file as a table with our column names (those of parse_points()), and what it says about itself.
+/// The file as a table with our column names (those of parse_points()), and what it says about
+/// itself.
 struct PointTable {
   CsvTable table;
   Statements statements;
   bool positional = false;  ///< had no header line
 };
 
-/// Refuses files without a point, rows of another length, and statements that are unknown or contradict `options` or
-/// each other.
+/// Refuses files without a point, rows of another length, and statements that are unknown or
+/// contradict `options` or each other.
 [[nodiscard]] Result<PointTable> take_apart(const std::string& text, const std::string& where,
                                             const PointFileOptions& options);
 

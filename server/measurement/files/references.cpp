@@ -13,8 +13,8 @@ namespace {
 constexpr Eigen::Index kLeastReflectors = 3;
 
 const NamedPoint* find_point(const PointList& list, const std::string& name) {
-  const auto at =
-      std::find_if(list.points.begin(), list.points.end(), [&](const NamedPoint& p) { return p.name == name; });
+  const auto at = std::find_if(list.points.begin(), list.points.end(),
+                               [&](const NamedPoint& p) { return p.name == name; });
   return at == list.points.end() ? nullptr : &*at;
 }
 
@@ -60,8 +60,8 @@ Result<ReferenceCheck> check_references(const PointList& references, const Point
     ++count;
   }
   if (count < kLeastReflectors) {
-    return refused("{} of the reference reflectors in {}, at least {} are needed", count, references.where,
-                   kLeastReflectors)
+    return refused("{} of the reference reflectors in {}, at least {} are needed", count,
+                   references.where, kLeastReflectors)
         .in(measured.where)
         .beyond(count, kLeastReflectors);
   }
@@ -73,7 +73,8 @@ Result<ReferenceCheck> check_references(const PointList& references, const Point
   const Eigen::Matrix3Xd remaining = ((X_WV->linear() * p_V).colwise() + X_WV->translation()) - p_W;
   Eigen::Index worst = 0;
   remaining.colwise().norm().maxCoeff(&worst);
-  for (Eigen::Index i = 0; i < count; ++i) check.residuals[static_cast<std::size_t>(i)].remaining_W = remaining.col(i);
+  for (Eigen::Index i = 0; i < count; ++i)
+    check.residuals[static_cast<std::size_t>(i)].remaining_W = remaining.col(i);
   check.worst = check.residuals[static_cast<std::size_t>(worst)].name;
   check.rms = rms(p_V - p_W);
   check.rms_remaining = rms(remaining);

@@ -58,8 +58,8 @@ std::size_t joint_number(std::string_view name) {
 Result<ScaledColumn> scaled(const CsvTable& table, std::size_t column, std::string unit) {
   if (const std::string said = column_name(table.columns()[column]).unit; !said.empty()) {
     const bool angle = unit == "deg" || unit == "rad";
-    const bool fits =
-        angle ? said == "deg" || said == "rad" || said == "mm" : said == "mm" || said == "m" || said == "in";
+    const bool fits = angle ? said == "deg" || said == "rad" || said == "mm"
+                            : said == "mm" || said == "m" || said == "in";
     if (!fits) {
       return refused("column {}: unit '{}', expected {}", table.columns()[column], said,
                      angle ? "deg or rad, of a rail mm" : "mm, m or in")
@@ -114,14 +114,15 @@ class NamedColumns {
       if (number == 0) continue;
       const auto [earlier, is_new] = column_of_joint.emplace(number, column);
       if (is_new) continue;
-      return refused("two columns for joint {}: {} and {}", number, table_.columns()[earlier->second],
-                     table_.columns()[column])
+      return refused("two columns for joint {}: {} and {}", number,
+                     table_.columns()[earlier->second], table_.columns()[column])
           .in(table_.where())
           .of(table_.columns()[column]);
     }
     for (const auto& [number, column] : column_of_joint) {
       if (number != found_.joints.size() + 1) {
-        return refused("missing column J{} before {}", found_.joints.size() + 1, table_.columns()[column])
+        return refused("missing column J{} before {}", found_.joints.size() + 1,
+                       table_.columns()[column])
             .in(table_.where())
             .of(fmt::format("J{}", found_.joints.size() + 1));
       }
@@ -179,7 +180,8 @@ class NamedColumns {
     }
     if (found_.quaternion.empty()) return {};
     if (found_.quaternion.size() != 4) {
-      return refused("{} of the columns qw, qx, qy, qz; they come all together or not at all", found_.quaternion.size())
+      return refused("{} of the columns qw, qx, qy, qz; they come all together or not at all",
+                     found_.quaternion.size())
           .in(table_.where())
           .of("qw")
           .beyond(found_.quaternion.size(), 4);
@@ -211,21 +213,25 @@ std::vector<std::string> positional_names(std::size_t count) {
   for (std::size_t j = 1; j <= kPositionalJoints; ++j) names.push_back(fmt::format("J{}", j));
   const bool full_pose = count == 18;
   const auto append = [&](const std::string& prefix) {
-    for (const char* axis : {"x", "y", "z"}) names.push_back(fmt::format("{}{}{}", prefix, axis, "_mm"));
+    for (const char* axis : {"x", "y", "z"})
+      names.push_back(fmt::format("{}{}{}", prefix, axis, "_mm"));
     if (!full_pose) return;
-    for (const char* axis : {"rx", "ry", "rz"}) names.push_back(fmt::format("{}{}{}", prefix, axis, "_rad"));
+    for (const char* axis : {"rx", "ry", "rz"})
+      names.push_back(fmt::format("{}{}{}", prefix, axis, "_rad"));
   };
   append("");
   if (count != 9) append("tcp_");
   return names.size() == count ? names : std::vector<std::string>{};
 }
 
-/// Refuses numbers without any decimal point between commas: of half as many numbers with decimal commas they cannot be
-/// told.
+/// Refuses numbers without any decimal point between commas: of half as many numbers with decimal
+/// commas they cannot be told.
 Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& where) {
   for (const CsvTable::Row& row : rows) {
     const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
-    if (row.fields.size() <= kFewestColumns || std::any_of(row.fields.begin(), row.fields.end(), pointed)) return {};
+    if (row.fields.size() <= kFewestColumns ||
+        std::any_of(row.fields.begin(), row.fields.end(), pointed))
+      return {};
   }
   return refused("commas between all values and no decimal point: they may stand in numbers, too")
       .in(where)
@@ -243,22 +249,27 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
   const std::vector<TextLine> first = first_lines(text, 1);
   if (first.empty()) return refused("empty file, expected joints and measured positions").in(where);
   const char separator = separator_of(first.front().text);
-  std::vector<CsvTable::Row> read = TRY(text_lines(text, where).and_then([&](const std::vector<TextLine>& lines) {
-    return data_rows(lines, separator, where);
-  }));
+  std::vector<CsvTable::Row> read =
+      TRY(text_lines(text, where).and_then([&](const std::vector<TextLine>& lines) {
+        return data_rows(lines, separator, where);
+      }));
   std::vector<CsvTable::Row>& rows = read;
   CsvTable::Row header = rows.front();
-  const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), [&](const std::string& field) {
-    return is_number(separator == ',' ? field : with_decimal_point(field));
-  });
+  const bool has_header =
+      !std::all_of(header.fields.begin(), header.fields.end(), [&](const std::string& field) {
+        return is_number(separator == ',' ? field : with_decimal_point(field));
+      });
   if (has_header) rows.erase(rows.begin());
-  if (rows.empty()) return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
-  const bool named = std::any_of(header.fields.begin(), header.fields.end(),
-                                 [](const std::string& field) { return joint_number(column_name(field).name) > 0; });
+  if (rows.empty())
+    return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
+  const bool named = std::any_of(
+      header.fields.begin(), header.fields.end(),
+      [](const std::string& field) { return joint_number(column_name(field).name) > 0; });
   if (!named) {
     header.fields = positional_names(header.fields.size());
     if (header.fields.empty()) {
-      return refused("{} columns and none named J1; without names expected 9, 12 or 18", rows.front().fields.size())
+      return refused("{} columns and none named J1; without names expected 9, 12 or 18",
+                     rows.front().fields.size())
           .in(where)
           .of("J1")
           .with_value(rows.front().fields.size())
@@ -280,12 +291,16 @@ Result<RoboDkColumns> find_columns(const RoboDkTable& parts) {
   return columns;
 }
 
-Result<double> read_scaled(const CsvTable& table, std::size_t row, const ScaledColumn& column, double angle_limit) {
+Result<double> read_scaled(const CsvTable& table, std::size_t row, const ScaledColumn& column,
+                           double angle_limit) {
   const double limit = column.angle ? angle_limit : kPositionLimit;
-  return table.number(row, column.column, limit / column.scale).map([&](double value) { return value * column.scale; });
+  return table.number(row, column.column, limit / column.scale).map([&](double value) {
+    return value * column.scale;
+  });
 }
 
-Result<Vector3> read_three(const CsvTable& table, std::size_t row, const std::vector<ScaledColumn>& columns) {
+Result<Vector3> read_three(const CsvTable& table, std::size_t row,
+                           const std::vector<ScaledColumn>& columns) {
   Vector3 values;
   for (std::size_t k = 0; k < 3; ++k) {
     const double value = TRY(read_scaled(table, row, columns[k], 2 * kPi));
@@ -296,19 +311,26 @@ Result<Vector3> read_three(const CsvTable& table, std::size_t row, const std::ve
 
 Matrix3 turn(int axis, double angle) { return rotation_exp(angle * Vector3::Unit(axis)); }
 
-Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
+Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t row,
+                                             const RoboDkColumns& columns) {
   if (columns.orientation == Orientation::kNone) return std::optional<Matrix3>();
   if (columns.orientation == Orientation::kQuaternion) {
-    return table.rotation(row, columns.quaternion).map([](const Matrix3& R) { return std::optional(R); });
+    return table.rotation(row, columns.quaternion).map([](const Matrix3& R) {
+      return std::optional(R);
+    });
   }
-  return read_three(table, row, columns.angles).map([&](const Vector3& angles) -> std::optional<Matrix3> {
-    if (columns.orientation == Orientation::kAbc) return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
-    if (columns.orientation == Orientation::kWpr) return turn(2, angles(2)) * turn(1, angles(1)) * turn(0, angles(0));
-    return turn(0, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
-  });
+  return read_three(table, row, columns.angles)
+      .map([&](const Vector3& angles) -> std::optional<Matrix3> {
+        if (columns.orientation == Orientation::kAbc)
+          return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
+        if (columns.orientation == Orientation::kWpr)
+          return turn(2, angles(2)) * turn(1, angles(1)) * turn(0, angles(0));
+        return turn(0, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
+      });
 }
 
-Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
+Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
+                                     const RoboDkColumns& columns) {
   Measurement measurement;
   measurement.row = table.line(row);
   std::string pose_id = TRY(columns.pose_id ? table.name(row, *columns.pose_id) : std::string());
@@ -323,12 +345,14 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   measurement.p_W = position;
   std::optional<Matrix3> rotation = TRY(read_rotation(table, row, columns));
   measurement.R_WT = rotation;
-  for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
+  for (const std::size_t column : columns.extra)
+    measurement.extra.push_back(table.field(row, column));
   return measurement;
 }
 
 /// Names a tool for each TCP if there are several.
-Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, MeasurementBatch& batch) {
+Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp,
+                  MeasurementBatch& batch) {
   std::map<std::vector<double>, std::size_t> tools;
   for (std::size_t row = 0; row < table.size(); ++row) {
     std::vector<double> tool;
@@ -362,7 +386,9 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
     Measurement measurement = TRY(read_measurement(parts.table, row, columns));
     const auto [earlier, is_new] = row_of_pose.emplace(measurement.pose_id, measurement.row);
     if (!is_new) {
-      return parts.table.refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id, earlier->second)
+      return parts.table
+          .refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id,
+                  earlier->second)
           .of("pose_id")
           .with_text(measurement.pose_id);
     }
@@ -373,7 +399,8 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
 }
 
 Result<MeasurementBatch> read_robodk_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_robodk_csv(text, path); });
+  return read_text_file(path).and_then(
+      [&](const std::string& text) { return parse_robodk_csv(text, path); });
 }
 
 }  // namespace trammel

@@ -18,11 +18,13 @@ constexpr std::size_t kMostDataLines = 100'000;
 
 /// Where the field at the start of `line` ends.
 std::size_t field_end(std::string_view line, char separator) {
-  const std::string_view ends = separator == ' ' ? std::string_view(" \t") : std::string_view(&separator, 1);
+  const std::string_view ends =
+      separator == ' ' ? std::string_view(" \t") : std::string_view(&separator, 1);
   const auto start = line.find_first_not_of(kBlanks);
   const bool quoted = start != std::string_view::npos && line[start] == '"';
   const auto closing = quoted ? line.find('"', start + 1) : std::string_view::npos;
-  return std::min(line.find_first_of(ends, closing == std::string_view::npos ? 0 : closing), line.size());
+  return std::min(line.find_first_of(ends, closing == std::string_view::npos ? 0 : closing),
+                  line.size());
 }
 
 std::string_view unquoted(std::string_view field) {
@@ -58,19 +60,22 @@ class LineReader {
 
 }  // namespace
 
-Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where, std::size_t longest) {
+Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where,
+                                         std::size_t longest) {
   TRY(check_is_text(text, where));
   std::vector<TextLine> lines;
   std::size_t data = 0;
   for (LineReader reader(text); const auto line = reader.next();) {
     if (line->text.size() > longest)
-      return failure(ErrorCode::kTooLarge, "a line of {} bytes, limit {}", line->text.size(), longest)
+      return failure(ErrorCode::kTooLarge, "a line of {} bytes, limit {}", line->text.size(),
+                     longest)
           .in(where)
           .at_row(line->number)
           .beyond(line->text.size(), longest);
     data += line->comment ? 0 : 1;
     if (lines.size() == kMostLines || data > kMostDataLines)
-      return failure(ErrorCode::kTooLarge, "more than {} lines, of data {}", kMostLines, kMostDataLines)
+      return failure(ErrorCode::kTooLarge, "more than {} lines, of data {}", kMostLines,
+                     kMostDataLines)
           .in(where)
           .beyond(lines.size() + 1, data > kMostDataLines ? kMostDataLines : kMostLines);
     lines.push_back(*line);
@@ -140,7 +145,8 @@ ColumnName column_name(std::string_view field) {
     if (column.unit.starts_with(unit)) column.unit = unit;
   }
   std::string_view name = trimmed(field.substr(0, bracket));
-  if (const auto underscore = name.rfind('_'); column.unit.empty() && underscore != std::string_view::npos) {
+  if (const auto underscore = name.rfind('_');
+      column.unit.empty() && underscore != std::string_view::npos) {
     std::string last;
     for (const char c : name.substr(underscore + 1)) last += lower(c);
     for (const std::string_view unit : {"mm", "m", "in", "deg", "rad", "s"}) {

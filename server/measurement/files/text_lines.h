@@ -18,23 +18,27 @@ struct TextLine {
   bool comment = false;  ///< starts with `//` or `#`; `text` is then what follows
 };
 
-/// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order mark. Refuses
-/// what is no text; as kTooLarge more than a million lines, 100,000 lines of data, and a line longer than `longest`
-/// bytes.
-[[nodiscard]] Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where,
+/// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order
+/// mark. Refuses what is no text; as kTooLarge more than a million lines, 100,000 lines of data,
+/// and a line longer than `longest` bytes.
+[[nodiscard]] Result<std::vector<TextLine>> text_lines(std::string_view text,
+                                                       const std::string& where,
                                                        std::size_t longest = kLongestLine);
 /// The first lines of data, `count` at most, without comments.
 [[nodiscard]] std::vector<TextLine> first_lines(std::string_view text, std::size_t count);
 
-/// `;`, tab or `,`, whichever of them comes first in this list and is in the line; ' ' where none is.
+/// `;`, tab or `,`, whichever of them comes first in this list and is in the line; ' ' where none
+/// is.
 [[nodiscard]] char separator_of(std::string_view line);
 
-/// The fields of a line, without blanks around them; `' '` separates by any run of blanks. A field in double quotes may
-/// hold separators.
+/// The fields of a line, without blanks around them; `' '` separates by any run of blanks. A field
+/// in double quotes may hold separators.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);
 
-/// The lines of data as rows. Refuses as kTooLarge more values than a table may hold, while it splits.
-[[nodiscard]] Result<std::vector<CsvTable::Row>> data_rows(const std::vector<TextLine>& lines, char separator,
+/// The lines of data as rows. Refuses as kTooLarge more values than a table may hold, while it
+/// splits.
+[[nodiscard]] Result<std::vector<CsvTable::Row>> data_rows(const std::vector<TextLine>& lines,
+                                                           char separator,
                                                            const std::string& where);
 
 [[nodiscard]] bool is_number(std::string_view field);

@@ -53,7 +53,8 @@ class Layout {
     int k = 0;
     for (auto& [tool, place] : tools_) {
       place = k++;
-      tool_stddev_.push_back(cell.tools.at(tool) && points == ToolPoints::kAsDrawn ? kToolPoint : kToolLength);
+      tool_stddev_.push_back(cell.tools.at(tool) && points == ToolPoints::kAsDrawn ? kToolPoint
+                                                                                   : kToolLength);
     }
     const int n = robot_.size();
     stddev_ = Eigen::VectorXd::Zero(6 * n);
@@ -70,8 +71,12 @@ class Layout {
   }
 
   [[nodiscard]] const std::map<std::string, int>& tools() const { return tools_; }
-  [[nodiscard]] double tool_stddev(int tool) const { return tool_stddev_[static_cast<std::size_t>(tool)]; }
-  [[nodiscard]] int tool_at(const std::string& tool) const { return kBaseParameters + 3 * tools_.at(tool); }
+  [[nodiscard]] double tool_stddev(int tool) const {
+    return tool_stddev_[static_cast<std::size_t>(tool)];
+  }
+  [[nodiscard]] int tool_at(const std::string& tool) const {
+    return kBaseParameters + 3 * tools_.at(tool);
+  }
   [[nodiscard]] int arm_at() const { return kBaseParameters + 3 * static_cast<int>(tools_.size()); }
   [[nodiscard]] int arm_size() const { return static_cast<int>(stddev_.size()); }
   [[nodiscard]] int size() const { return arm_at() + arm_size(); }
@@ -113,7 +118,8 @@ void give_way(ArmState& state, const ArmFit& fit, JointArray* torque) {
   *torque = ArmKinematics(state).gravity_torque();
   const JointArray turned = state.chain->bars() * fit.arm.segment(5 * n, n).cwiseProduct(*torque);
   for (int j = 0; j < n; ++j) {
-    if (state.chain->joint(j).type == JointType::kRevolute) state.links[static_cast<std::size_t>(j)].theta += turned(j);
+    if (state.chain->joint(j).type == JointType::kRevolute)
+      state.links[static_cast<std::size_t>(j)].theta += turned(j);
   }
 }
 
@@ -124,8 +130,12 @@ class Prediction {
       : cell_(cell), state_(state_of(*table.from[row], table.joints(row), cell, fit)) {
     give_way(state_, fit, &torque_);
   }
-  [[nodiscard]] Vector3 position() const { return ArmKinematics(state_).tool_pose_W().translation(); }
-  [[nodiscard]] Pose flange() const { return ArmKinematics(state_).tool_pose_W() * state_.X_FT.inverse(); }
+  [[nodiscard]] Vector3 position() const {
+    return ArmKinematics(state_).tool_pose_W().translation();
+  }
+  [[nodiscard]] Pose flange() const {
+    return ArmKinematics(state_).tool_pose_W() * state_.X_FT.inverse();
+  }
   /// 3 x layout.size().
   [[nodiscard]] Eigen::Matrix3Xd jacobian(const Layout& layout, const std::string& tool) const {
     const StateMatrix<6> by_state = ArmKinematics(state_).pose_jacobian();
@@ -183,7 +193,8 @@ class Fitting {
   void assess(ArmFit& fit) const {
     std::size_t count = 0;
     fit.off = counted_rms(distances(table_, cell_, fit), &count);
-    fit.quality = std::sqrt(fit.off * fit.off + kUnmodelled * kUnmodelled * strain(fit) / static_cast<double>(count));
+    fit.quality = std::sqrt(fit.off * fit.off +
+                            kUnmodelled * kUnmodelled * strain(fit) / static_cast<double>(count));
   }
   /// Adds how well zeros and tool points are known.
   void add_uncertainty(ArmFit& fit) const {
@@ -191,13 +202,17 @@ class Fitting {
     const double scale = std::max(1.0, fit.off * fit.off / (kUnmodelled * kUnmodelled));
     const Eigen::MatrixXd covariance =
         information.ldlt().solve(Eigen::MatrixXd::Identity(layout_.size(), layout_.size())) * scale;
-    fit.stddev_of_zeros = covariance.diagonal().segment(layout_.arm_at(), cell_.robot.size()).cwiseMax(0).cwiseSqrt();
+    fit.stddev_of_zeros =
+        covariance.diagonal().segment(layout_.arm_at(), cell_.robot.size()).cwiseMax(0).cwiseSqrt();
     const int frames = layout_.arm_at();
-    const Eigen::MatrixXd given_arm =
-        information.topLeftCorner(frames, frames).ldlt().solve(Eigen::MatrixXd::Identity(frames, frames)) * scale;
+    const Eigen::MatrixXd given_arm = information.topLeftCorner(frames, frames)
+                                          .ldlt()
+                                          .solve(Eigen::MatrixXd::Identity(frames, frames)) *
+                                      scale;
     fit.base_turn_stddev = std::sqrt(std::max(0.0, given_arm.diagonal().segment<3>(3).maxCoeff()));
     for (const auto& [tool, place] : layout_.tools())
-      fit.tool_covariance[tool] = covariance.block<3, 3>(layout_.tool_at(tool), layout_.tool_at(tool));
+      fit.tool_covariance[tool] =
+          covariance.block<3, 3>(layout_.tool_at(tool), layout_.tool_at(tool));
   }
 
  private:
@@ -212,7 +227,8 @@ class Fitting {
       if (layout_.stddev()(k) > 0) sum += std::pow(fit.arm(k) / layout_.stddev()(k), 2);
     }
     for (const auto& [tool, place] : layout_.tools())
-      sum += (fit.tools.at(tool).translation() - drawn(tool)).squaredNorm() / std::pow(layout_.tool_stddev(place), 2);
+      sum += (fit.tools.at(tool).translation() - drawn(tool)).squaredNorm() /
+             std::pow(layout_.tool_stddev(place), 2);
     return sum;
   }
   /// Normal matrix and right side of a step.
@@ -224,12 +240,14 @@ class Fitting {
     for (std::size_t i = 0; i < table_.size(); ++i) {
       if (off[i] > limit) continue;
       const Prediction prediction(table_, i, cell_, fit);
-      const Eigen::Matrix3Xd J = prediction.jacobian(layout_, table_.from[i]->context.tool) / kUnmodelled;
+      const Eigen::Matrix3Xd J =
+          prediction.jacobian(layout_, table_.from[i]->context.tool) / kUnmodelled;
       A.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
       b += J.transpose() * (table_.position(i) - prediction.position()) / kUnmodelled;
     }
     A = Eigen::MatrixXd(A.selfadjointView<Eigen::Lower>());
-    A.diagonal().head(kBaseParameters).array() += 1e-2;  // a base that no pose shows stays where it is
+    A.diagonal().head(kBaseParameters).array() +=
+        1e-2;  // a base that no pose shows stays where it is
     for (const auto& [tool, place] : layout_.tools()) {
       const double weight = std::pow(layout_.tool_stddev(place), -2);
       const int at = layout_.tool_at(tool);
@@ -258,7 +276,8 @@ class Fitting {
     const auto [A, b] = normal(fit);
     const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::VectorXd step =
-        scale.asDiagonal() * (scale.asDiagonal() * A * scale.asDiagonal()).ldlt().solve(scale.asDiagonal() * b);
+        scale.asDiagonal() *
+        (scale.asDiagonal() * A * scale.asDiagonal()).ldlt().solve(scale.asDiagonal() * b);
     if (!step.allFinite()) return std::nullopt;
     ArmFit moved = fit;
     moved.X_WB.translation() += step.head<3>();
@@ -276,17 +295,18 @@ class Fitting {
 };
 
 /// Where nominal joints put the tool points, in B.
-Eigen::Matrix3Xd nominal_points(const NumberTable& table, const Cell& cell, const std::map<std::string, Pose>& tools) {
+Eigen::Matrix3Xd nominal_points(const NumberTable& table, const Cell& cell,
+                                const std::map<std::string, Pose>& tools) {
   Eigen::Matrix3Xd p_B(3, static_cast<Eigen::Index>(table.size()));
   for (std::size_t i = 0; i < table.size(); ++i)
-    p_B.col(static_cast<Eigen::Index>(i)) =
-        cell.robot.flange_pose(table.joints(i)) * tools.at(table.from[i]->context.tool).translation();
+    p_B.col(static_cast<Eigen::Index>(i)) = cell.robot.flange_pose(table.joints(i)) *
+                                            tools.at(table.from[i]->context.tool).translation();
   return p_B;
 }
 
 /// The base that most rows of `begin` to `end` agree on.
-std::optional<Pose> base_from(const Eigen::Matrix3Xd& p_W, const Eigen::Matrix3Xd& p_B, std::size_t begin,
-                              std::size_t end) {
+std::optional<Pose> base_from(const Eigen::Matrix3Xd& p_W, const Eigen::Matrix3Xd& p_B,
+                              std::size_t begin, std::size_t end) {
   Indices rows(end - begin);
   std::iota(rows.begin(), rows.end(), begin);
   std::optional<Pose> X_WB;
@@ -322,7 +342,8 @@ ArmFit located(const NumberTable& table, const Cell& cell, ToolPoints points) {
   const Fitting fitting(table, cell, points, false);
   const std::size_t n = table.size();
   std::optional<ArmFit> best;
-  // All rows; then thirds of them, of which one at least is likely to be without the mistake of a block.
+  // All rows; then thirds of them, of which one at least is likely to be without the mistake of a
+  // block.
   for (const auto& [begin, end] : {std::pair(std::size_t{0}, n), std::pair(std::size_t{0}, n / 3),
                                    std::pair(n / 3, 2 * n / 3), std::pair(2 * n / 3, n)}) {
     const auto X_WB = base_from(table.p_W, p_B, begin, end);

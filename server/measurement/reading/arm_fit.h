@@ -11,16 +11,17 @@ namespace trammel::reading {
 
 /// An arm as it may have been built, mounted and mastered, and how the positions of a table fit it.
 ///
-/// The model: p_W = X_WB X_BF(q + zeros; links, compliance) p_FT. The base is free. A known tool is off by 5 mm, each
-/// zero by 3 deg, each length by 3 mm, each twist by 0.3 deg, each compliance by 3e-9 rad/Nmm (standard deviations); an
-/// unknown tool lies within a metre. Every position is off by 1 mm besides.
+/// The model: p_W = X_WB X_BF(q + zeros; links, compliance) p_FT. The base is free. A known tool is
+/// off by 5 mm, each zero by 3 deg, each length by 3 mm, each twist by 0.3 deg, each compliance by
+/// 3e-9 rad/Nmm (standard deviations); an unknown tool lies within a metre. Every position is off
+/// by 1 mm besides.
 struct ArmFit {
   Pose X_WB = Pose::Identity();
-  std::map<std::string, Pose> tools;               ///< X_FT; the rotations are the cell's, or identity
-  Eigen::VectorXd arm;                             ///< deviations of the arm, SI: zeros first, one a joint
-  double off = 0;                                  ///< m, rms distance of the positions that fit best, seven of ten
-  double quality = 0;                              ///< m, the same with the price of deviations that are hardly likely
-  double base_turn_stddev = 0;                     ///< rad, of the base's rotation about its worst axis, for this arm
+  std::map<std::string, Pose> tools;  ///< X_FT; the rotations are the cell's, or identity
+  Eigen::VectorXd arm;                ///< deviations of the arm, SI: zeros first, one a joint
+  double off = 0;               ///< m, rms distance of the positions that fit best, seven of ten
+  double quality = 0;           ///< m, the same with the price of deviations that are hardly likely
+  double base_turn_stddev = 0;  ///< rad, of the base's rotation about its worst axis, for this arm
   Eigen::VectorXd stddev_of_zeros;                 ///< rad (m), a joint
   std::map<std::string, Matrix3> tool_covariance;  ///< m2, of the tool points
 };
@@ -31,17 +32,22 @@ enum class ToolPoints {
 };
 
 /// Base and tools alone, by closed forms that a third of bad rows does not mislead.
-[[nodiscard]] ArmFit located(const NumberTable& table, const Cell& cell, ToolPoints points = ToolPoints::kAsDrawn);
+[[nodiscard]] ArmFit located(const NumberTable& table, const Cell& cell,
+                             ToolPoints points = ToolPoints::kAsDrawn);
 /// The same with all of the arm, from `start`.
 [[nodiscard]] ArmFit fitted(const NumberTable& table, const Cell& cell, const ArmFit& start,
                             ToolPoints points = ToolPoints::kAsDrawn);
 
-/// The same of positions at one place, which do not tell how the base is turned: from several turns, the best fit.
-[[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell, const ArmFit& start);
+/// The same of positions at one place, which do not tell how the base is turned: from several
+/// turns, the best fit.
+[[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell,
+                                           const ArmFit& start);
 
 /// m, of every row: how far the position is from where the joints lead.
-[[nodiscard]] std::vector<double> distances(const NumberTable& table, const Cell& cell, const ArmFit& fit);
+[[nodiscard]] std::vector<double> distances(const NumberTable& table, const Cell& cell,
+                                            const ArmFit& fit);
 /// X_WF of a row.
-[[nodiscard]] Pose flange_pose_W(const NumberTable& table, std::size_t row, const Cell& cell, const ArmFit& fit);
+[[nodiscard]] Pose flange_pose_W(const NumberTable& table, std::size_t row, const Cell& cell,
+                                 const ArmFit& fit);
 
 }  // namespace trammel::reading

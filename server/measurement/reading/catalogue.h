@@ -18,12 +18,13 @@ struct Reading {
   std::function<NumberTable(NumberTable)> apply;
 };
 
-/// Everything that may be wrong in joint columns: two exchanged, the other sign, another unit, another zero, a joint
-/// that was counted with its neighbour.
+/// Everything that may be wrong in joint columns: two exchanged, the other sign, another unit,
+/// another zero, a joint that was counted with its neighbour.
 [[nodiscard]] std::vector<Reading> joint_readings(const NumberTable& table, const Chain& robot);
 /// Likewise of the measured positions; of a batch with orientations also a left-handed frame.
 [[nodiscard]] std::vector<Reading> position_readings(const NumberTable& table);
-/// Rows whose joints stand in other rows: those next to it, or whatever the distances from pose to pose suggest.
+/// Rows whose joints stand in other rows: those next to it, or whatever the distances from pose to
+/// pose suggest.
 [[nodiscard]] std::vector<Reading> row_readings(const NumberTable& table, const Cell& cell);
 
 }  // namespace trammel::reading

@@ -17,15 +17,19 @@ constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
 
 constexpr std::array<double, 3> kTurns = {90, -90, 180};
 
-Reading of_joints(std::string name, std::string columns, std::function<void(Eigen::MatrixXd&)> change) {
-  return {std::move(name), std::move(columns), false, [change = std::move(change)](NumberTable table) {
+Reading of_joints(std::string name, std::string columns,
+                  std::function<void(Eigen::MatrixXd&)> change) {
+  return {std::move(name), std::move(columns), false,
+          [change = std::move(change)](NumberTable table) {
             change(table.q);
             return table;
           }};
 }
 
-Reading of_positions(std::string name, std::string columns, std::function<void(Eigen::Matrix3Xd&)> change) {
-  return {std::move(name), std::move(columns), false, [change = std::move(change)](NumberTable table) {
+Reading of_positions(std::string name, std::string columns,
+                     std::function<void(Eigen::Matrix3Xd&)> change) {
+  return {std::move(name), std::move(columns), false,
+          [change = std::move(change)](NumberTable table) {
             change(table.p_W);
             return table;
           }};
@@ -56,7 +60,9 @@ class JointReadings {
  private:
   [[nodiscard]] std::string name(int j) const { return joint_column(j, robot_.joint(j).type); }
   [[nodiscard]] bool turns(int j) const { return robot_.joint(j).type == JointType::kRevolute; }
-  [[nodiscard]] bool small(int j) const { return table_.q.row(j).cwiseAbs().maxCoeff() <= from_deg(kMostRadians); }
+  [[nodiscard]] bool small(int j) const {
+    return table_.q.row(j).cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
+  }
   void add(std::string name, std::string columns, std::function<void(Eigen::MatrixXd&)> change) {
     all_.push_back(of_joints(std::move(name), std::move(columns), std::move(change)));
   }
@@ -72,9 +78,11 @@ class JointReadings {
   }
   void units(int j) {
     if (small(j)) {
-      add(fmt::format("with {} in radians", name(j)), name(j), [j](Eigen::MatrixXd& q) { q.row(j) *= 180 / kPi; });
+      add(fmt::format("with {} in radians", name(j)), name(j),
+          [j](Eigen::MatrixXd& q) { q.row(j) *= 180 / kPi; });
     }
-    add(fmt::format("with {} in gon", name(j)), name(j), [j](Eigen::MatrixXd& q) { q.row(j) *= kGon; });
+    add(fmt::format("with {} in gon", name(j)), name(j),
+        [j](Eigen::MatrixXd& q) { q.row(j) *= kGon; });
   }
   void unit_of_all(const char* unit, double factor) {
     std::vector<int> turning;
@@ -83,11 +91,13 @@ class JointReadings {
       if (factor > 1 && !small(j)) return;
       turning.push_back(j);
     }
-    add(fmt::format("with all joints in {}", unit), "q1_deg", [turning, factor](Eigen::MatrixXd& q) {
-      for (const int j : turning) q.row(j) *= factor;
-    });
+    add(fmt::format("with all joints in {}", unit), "q1_deg",
+        [turning, factor](Eigen::MatrixXd& q) {
+          for (const int j : turning) q.row(j) *= factor;
+        });
   }
-  /// A controller that reports a joint together with one that drives it, or the joint file without it.
+  /// A controller that reports a joint together with one that drives it, or the joint file without
+  /// it.
   void couplings() {
     for (int j = 1; j < robot_.size(); ++j) {
       for (int by = std::max(0, j - 2); by < j; ++by) {
@@ -112,7 +122,8 @@ class JointReadings {
 };
 
 Reading left_handed(int axis) {
-  return {fmt::format("as of a left-handed frame (mirrored {} axis)", kAxes[static_cast<std::size_t>(axis)][0]),
+  return {fmt::format("as of a left-handed frame (mirrored {} axis)",
+                      kAxes[static_cast<std::size_t>(axis)][0]),
           std::string(kAllAxes) + ",qw,qx,qy,qz", false, [axis](NumberTable table) {
             Matrix3 mirror = Matrix3::Identity();
             mirror(axis, axis) = -1;
@@ -134,15 +145,18 @@ std::vector<Reading> position_readings(const NumberTable& table) {
   std::vector<Reading> all;
   for (int k = 0; k < 3; ++k) {
     const std::string name = kAxes[static_cast<std::size_t>(k)];
-    all.push_back(of_positions("with the other sign of " + name, name, [k](Eigen::Matrix3Xd& p) { p.row(k) *= -1; }));
+    all.push_back(of_positions("with the other sign of " + name, name,
+                               [k](Eigen::Matrix3Xd& p) { p.row(k) *= -1; }));
   }
   for (const auto& [i, j] : {std::pair(0, 1), std::pair(1, 2), std::pair(0, 2)}) {
     const std::string one = kAxes[static_cast<std::size_t>(i)];
     const std::string other = kAxes[static_cast<std::size_t>(j)];
-    all.push_back(of_positions(fmt::format("with {} and {} exchanged", one, other), one + "," + other,
+    all.push_back(of_positions(fmt::format("with {} and {} exchanged", one, other),
+                               one + "," + other,
                                [i = i, j = j](Eigen::Matrix3Xd& p) { p.row(i).swap(p.row(j)); }));
   }
-  if (std::any_of(table.R_WT.begin(), table.R_WT.end(), [](const auto& R) { return R.has_value(); })) {
+  if (std::any_of(table.R_WT.begin(), table.R_WT.end(),
+                  [](const auto& R) { return R.has_value(); })) {
     for (const int axis : {1, 0, 2}) all.push_back(left_handed(axis));
   }
   for (const UnitOfLength& unit : kUnitsOfLength) {

@@ -1,7 +1,8 @@
-// Which rows belong together. The distance from one measured position to the next does not depend on where the tracker
-// stands, and is that of the nominal arm but for millimetres. Where the joints of a block of rows stand `shift` rows
-// away, its distances are those of the nominal arm `shift` rows away: the block with the largest gain is found for each
-// shift in one pass, then the next one beside it.
+// Which rows belong together. The distance from one measured position to the next does not depend
+// on where the tracker stands, and is that of the nominal arm but for millimetres. Where the joints
+// of a block of rows stand `shift` rows away, its distances are those of the nominal arm `shift`
+// rows away: the block with the largest gain is found for each shift in one pass, then the next one
+// beside it.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -30,12 +31,15 @@ struct Block {
 std::string place(Shift shift) {
   if (shift == 1) return "of the next row";
   if (shift == -1) return "of the row before";
-  return shift > 0 ? fmt::format("of {} rows later", shift) : fmt::format("of {} rows before", -shift);
+  return shift > 0 ? fmt::format("of {} rows later", shift)
+                   : fmt::format("of {} rows before", -shift);
 }
 
-/// Each row with the joints of the row that `joints_of` says; rows whose joints are not there are left out.
+/// Each row with the joints of the row that `joints_of` says; rows whose joints are not there are
+/// left out.
 Reading reread(std::string name, std::vector<std::optional<std::size_t>> joints_of) {
-  return {std::move(name), "rows", true, [joints_of = std::move(joints_of)](const NumberTable& table) {
+  return {std::move(name), "rows", true,
+          [joints_of = std::move(joints_of)](const NumberTable& table) {
             std::vector<std::size_t> rows, joints;
             for (std::size_t i = 0; i < joints_of.size(); ++i) {
               if (!joints_of[i]) continue;
@@ -48,7 +52,8 @@ Reading reread(std::string name, std::vector<std::optional<std::size_t>> joints_
 
 class Rows {
  public:
-  Rows(const NumberTable& table, const Cell& cell) : table_(table), n_(table.size()), joints_of_(n_) {
+  Rows(const NumberTable& table, const Cell& cell)
+      : table_(table), n_(table.size()), joints_of_(n_) {
     for (std::size_t i = 0; i < n_; ++i) joints_of_[i] = i;
     std::vector<Vector3> nominal;
     for (std::size_t i = 0; i < n_; ++i) {
@@ -99,8 +104,9 @@ class Rows {
   [[nodiscard]] double gain(std::size_t step, Shift shift) const {
     const auto there = at(step, shift, nominal_.size());
     if (!there) return -most_;
-    return std::clamp(std::abs(measured_[step] - expected_[step]) - std::abs(measured_[step] - nominal_[*there]),
-                      -most_, most_);
+    return std::clamp(
+        std::abs(measured_[step] - expected_[step]) - std::abs(measured_[step] - nominal_[*there]),
+        -most_, most_);
   }
   /// The block whose distances gain most by one shift.
   [[nodiscard]] std::optional<Block> best() const {
@@ -113,7 +119,8 @@ class Rows {
       for (std::size_t step = 0; step < measured_.size(); ++step) {
         if (sum <= 0) sum = 0, begin = step;
         sum += gain(step, shift);
-        if (sum > best.gain && step + 1 - begin >= kLeastSteps) best = {begin, step + 2, shift, sum};
+        if (sum > best.gain && step + 1 - begin >= kLeastSteps)
+          best = {begin, step + 2, shift, sum};
       }
     }
     if (best.gain == 0) return std::nullopt;
@@ -122,7 +129,8 @@ class Rows {
   void take(const Block& block) {
     for (std::size_t i = block.begin; i < block.end; ++i) joints_of_[i] = at(i, block.shift, n_);
     for (std::size_t step = block.begin; step + 1 < block.end; ++step) {
-      if (const auto there = at(step, block.shift, nominal_.size())) expected_[step] = nominal_[*there];
+      if (const auto there = at(step, block.shift, nominal_.size()))
+        expected_[step] = nominal_[*there];
     }
   }
 
@@ -136,6 +144,8 @@ class Rows {
 
 }  // namespace
 
-std::vector<Reading> row_readings(const NumberTable& table, const Cell& cell) { return Rows(table, cell).all(); }
+std::vector<Reading> row_readings(const NumberTable& table, const Cell& cell) {
+  return Rows(table, cell).all();
+}
 
 }  // namespace trammel::reading

@@ -2,7 +2,8 @@
 
 #include "server/numerics/numerics_table.h"
 
-/// One build for each instruction set, for numerics() to choose from and for the test that holds them equal.
+/// One build for each instruction set, for numerics() to choose from and for the test that holds
+/// them equal.
 namespace trammel {
 
 [[nodiscard]] const Numerics& numerics_baseline();  ///< SSE2, every x86-64

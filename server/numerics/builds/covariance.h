@@ -2,7 +2,8 @@
 
 #include "server/numerics/builds/vectors.h"
 
-/// Covariances that depend on a scaled distance alone: tiles of them, sums of them, and their slopes.
+/// Covariances that depend on a scaled distance alone: tiles of them, sums of them, and their
+/// slopes.
 namespace trammel {
 namespace {
 
@@ -29,12 +30,13 @@ struct Matern52 {
   }
 };
 
-// r²/2 = |z|²/2 + |z'|²/2 - z·z' for kCount vectors of rows at once; rounding may make it a little negative.
+// r²/2 = |z|²/2 + |z'|²/2 - z·z' for kCount vectors of rows at once; rounding may make it a little
+// negative.
 constexpr Index kUnroll = 4;
 
 template <Index kCount>
-[[gnu::always_inline]] inline void half_square_distance(Index dims, const double* a, Index lda, const double* b,
-                                                        Index ldb, Vec* h) {
+[[gnu::always_inline]] inline void half_square_distance(Index dims, const double* a, Index lda,
+                                                        const double* b, Index ldb, Vec* h) {
   const Vec half_b = broadcast(b[dims * ldb]);
   for (Index u = 0; u < kCount; ++u) h[u] = load(a + dims * lda + u * kLanes) + half_b;
   for (Index d = 0; d < dims; ++d) {
@@ -44,15 +46,16 @@ template <Index kCount>
 }
 
 template <typename Shape, Index kCount>
-inline void tile_rows(Index dims, const double* a, Index lda, const double* b, Index ldb, double* k) {
+inline void tile_rows(Index dims, const double* a, Index lda, const double* b, Index ldb,
+                      double* k) {
   Vec h[kCount];
   half_square_distance<kCount>(dims, a, lda, b, ldb, h);
   for (Index u = 0; u < kCount; ++u) store(k + u * kLanes, Shape::value(h[u]));
 }
 
 template <typename Shape>
-void tile(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb, double* k,
-          Index ldk) {
+void tile(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
+          Index ldb, double* k, Index ldk) {
   const Index end = round_up(rows, kLanes);
   for (Index j = 0; j < cols; ++j) {
     Index i = 0;
@@ -63,8 +66,8 @@ void tile(Index dims, Index rows, const double* a, Index lda, Index cols, const 
 }
 
 template <typename Shape, Index kCount>
-[[gnu::always_inline]] inline Vec weighted_rows(Index dims, const double* a, Index lda, const double* b, Index ldb,
-                                                const double* weights) {
+[[gnu::always_inline]] inline Vec weighted_rows(Index dims, const double* a, Index lda,
+                                                const double* b, Index ldb, const double* weights) {
   Vec h[kCount];
   half_square_distance<kCount>(dims, a, lda, b, ldb, h);
   Vec total = {};
@@ -74,8 +77,9 @@ template <typename Shape, Index kCount>
 
 // Rows in chunks that stay in the first-level cache while every column passes over them.
 template <typename Shape>
-[[gnu::always_inline]] inline void weighted_sum_of(Index dims, Index rows, const double* a, Index lda, Index cols,
-                                                   const double* b, Index ldb, const double* weights, double* out) {
+[[gnu::always_inline]] inline void weighted_sum_of(Index dims, Index rows, const double* a,
+                                                   Index lda, Index cols, const double* b,
+                                                   Index ldb, const double* weights, double* out) {
   constexpr Index kChunk = 512;
   for (Index j = 0; j < cols; ++j) out[j] = 0;
   const Index end = round_up(rows, kLanes);
@@ -86,7 +90,8 @@ template <typename Shape>
       Index i = start;
       for (; i + kUnroll * kLanes <= stop; i += kUnroll * kLanes)
         total += weighted_rows<Shape, kUnroll>(dims, a + i, lda, b + j, ldb, weights + i);
-      for (; i < stop; i += kLanes) total += weighted_rows<Shape, 1>(dims, a + i, lda, b + j, ldb, weights + i);
+      for (; i < stop; i += kLanes)
+        total += weighted_rows<Shape, 1>(dims, a + i, lda, b + j, ldb, weights + i);
       out[j] += sum(total);
     }
   }
@@ -94,16 +99,17 @@ template <typename Shape>
 
 // The loop over six joints is unrolled.
 template <typename Shape>
-void weighted_sum(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
-                  const double* weights, double* out) {
+void weighted_sum(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
+                  Index ldb, const double* weights, double* out) {
   if (dims == 6) return weighted_sum_of<Shape>(6, rows, a, lda, cols, b, ldb, weights, out);
   weighted_sum_of<Shape>(dims, rows, a, lda, cols, b, ldb, weights, out);
 }
 
-// With the number of joints known at compile time (kDims > 0) the squared differences and the totals stay in registers.
+// With the number of joints known at compile time (kDims > 0) the squared differences and the
+// totals stay in registers.
 template <typename Shape, Index kDims>
-void gradient_fixed(Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb, const double* g,
-                    Index ldg, double* gradient) {
+void gradient_fixed(Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
+                    const double* g, Index ldg, double* gradient) {
   Vec total[kDims] = {};
   const Index end = round_up(rows, kLanes);
   for (Index j = 0; j < cols; ++j) {
@@ -125,8 +131,8 @@ void gradient_fixed(Index rows, const double* a, Index lda, Index cols, const do
 }
 
 template <typename Shape>
-void gradient_any(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
-                  const double* g, Index ldg, double* gradient) {
+void gradient_any(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
+                  Index ldb, const double* g, Index ldg, double* gradient) {
   const Index end = round_up(rows, kLanes);
   for (Index j = 0; j < cols; ++j) {
     for (Index i = 0; i < end; i += kLanes) {
@@ -145,8 +151,8 @@ void gradient_any(Index dims, Index rows, const double* a, Index lda, Index cols
 }
 
 template <typename Shape>
-void gradient_tile(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
-                   const double* g, Index ldg, double* gradient) {
+void gradient_tile(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
+                   Index ldb, const double* g, Index ldg, double* gradient) {
   switch (dims) {
     case 6:
       return gradient_fixed<Shape, 6>(rows, a, lda, cols, b, ldb, g, ldg, gradient);
@@ -157,8 +163,8 @@ void gradient_tile(Index dims, Index rows, const double* a, Index lda, Index col
   }
 }
 
-void radial_tile(RadialShape shape, Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
-                 Index ldb, double* k, Index ldk) {
+void radial_tile(RadialShape shape, Index dims, Index rows, const double* a, Index lda, Index cols,
+                 const double* b, Index ldb, double* k, Index ldk) {
   switch (shape) {
     case RadialShape::kSquaredExponential:
       return tile<SquaredExponential>(dims, rows, a, lda, cols, b, ldb, k, ldk);
@@ -169,8 +175,9 @@ void radial_tile(RadialShape shape, Index dims, Index rows, const double* a, Ind
   }
 }
 
-void radial_gradient(RadialShape shape, Index dims, Index rows, const double* a, Index lda, Index cols, const double* b,
-                     Index ldb, const double* g, Index ldg, double* gradient) {
+void radial_gradient(RadialShape shape, Index dims, Index rows, const double* a, Index lda,
+                     Index cols, const double* b, Index ldb, const double* g, Index ldg,
+                     double* gradient) {
   switch (shape) {
     case RadialShape::kSquaredExponential:
       return gradient_tile<SquaredExponential>(dims, rows, a, lda, cols, b, ldb, g, ldg, gradient);
@@ -181,8 +188,9 @@ void radial_gradient(RadialShape shape, Index dims, Index rows, const double* a,
   }
 }
 
-void radial_weighted_sum(RadialShape shape, Index dims, Index rows, const double* a, Index lda, Index cols,
-                         const double* b, Index ldb, const double* weights, double* out) {
+void radial_weighted_sum(RadialShape shape, Index dims, Index rows, const double* a, Index lda,
+                         Index cols, const double* b, Index ldb, const double* weights,
+                         double* out) {
   switch (shape) {
     case RadialShape::kSquaredExponential:
       return weighted_sum<SquaredExponential>(dims, rows, a, lda, cols, b, ldb, weights, out);
@@ -193,8 +201,8 @@ void radial_weighted_sum(RadialShape shape, Index dims, Index rows, const double
   }
 }
 
-void weight_column(Index rows, double scale, const double* a, Index outputs, const double* alpha, Index ld_alpha,
-                   const double* c, double* g) {
+void weight_column(Index rows, double scale, const double* a, Index outputs, const double* alpha,
+                   Index ld_alpha, const double* c, double* g) {
   for (Index i = 0; i < rows; ++i) g[i] = scale * a[i];
   for (Index d = 0; d < outputs; ++d)
     for (Index i = 0; i < rows; ++i) g[i] -= c[d] * alpha[i + d * ld_alpha];

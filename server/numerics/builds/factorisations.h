@@ -6,15 +6,16 @@
 namespace trammel {
 namespace {
 
-// A diagonal block of `size` <= kMaxBlock, factored: lower-triangular inverse and its transpose, zero-padded to
-// kMaxBlock columns so that they can be packed.
+// A diagonal block of `size` <= kMaxBlock, factored: lower-triangular inverse and its transpose,
+// zero-padded to kMaxBlock columns so that they can be packed.
 struct Block {
   alignas(64) double inverse[kMaxBlock * kMaxBlock];    // W = L⁻¹, column-major
   alignas(64) double transpose[kMaxBlock * kMaxBlock];  // Wᵀ, column-major
   alignas(64) double packed[kMaxBlock * kMaxBlock];
 };
 
-// `lower`, leading dimension kMaxBlock, becomes its Cholesky factor. False where it is not positive definite.
+// `lower`, leading dimension kMaxBlock, becomes its Cholesky factor. False where it is not positive
+// definite.
 bool factorise(Index size, double* lower, double* log_det) {
   const Index end = round_up(size, kLanes);
   for (Index j = 0; j < size; ++j) {
@@ -49,7 +50,8 @@ void invert(Index size, const double* lower, Block* block) {
     for (Index c = k + 1; c < size; ++c) {
       const Vec factor = broadcast(lower[c + k * kMaxBlock]);
       double* target = wt + c * kMaxBlock;
-      for (Index i = 0; i < stop; i += kLanes) store(target + i, load(target + i) - factor * load(row + i));
+      for (Index i = 0; i < stop; i += kLanes)
+        store(target + i, load(target + i) - factor * load(row + i));
     }
   }
   for (Index j = 0; j < size; ++j) {
@@ -61,26 +63,27 @@ bool factor_block(Index size, const double* a, Index ld, Block* block, double* l
   alignas(64) double lower[kMaxBlock * kMaxBlock];
   const Index end = round_up(size, kLanes);
   for (Index j = 0; j < size; ++j) {
-    for (Index i = 0; i < end; ++i) lower[i + j * kMaxBlock] = i < size && i >= j ? a[i + j * ld] : 0.0;
+    for (Index i = 0; i < end; ++i)
+      lower[i + j * kMaxBlock] = i < size && i >= j ? a[i + j * ld] : 0.0;
   }
   if (!factorise(size, lower, log_det)) return false;
   invert(size, lower, block);
   return true;
 }
 
-// out (rows x size) = packed_a (rows x size) * B, where `t` is Bᵀ with leading dimension kMaxBlock; B is upper or lower
-// triangular, and the zero half is not multiplied.
+// out (rows x size) = packed_a (rows x size) * B, where `t` is Bᵀ with leading dimension kMaxBlock;
+// B is upper or lower triangular, and the zero half is not multiplied.
 template <bool kUpper>
-void multiply_block(Index rows, Index size, const double* packed_a, const double* t, double* packed_b, double* out,
-                    Index ldo) {
+void multiply_block(Index rows, Index size, const double* packed_a, const double* t,
+                    double* packed_b, double* out, Index ldo) {
   const Index columns = round_up(size, kTileColumns);
   pack_columns_transposed(columns, size, t, kMaxBlock, packed_b);
   for (Index i = 0; i < rows; i += kTileRows) {
     for (Index j = 0; j < columns; j += kTileColumns) {
       const Index first = kUpper ? 0 : j;
       const Index depth = kUpper ? least(size, j + kTileColumns) : size - j;
-      micro_tile<false>(depth, packed_a + i * size + first * kTileRows, packed_b + j * size + first * kTileColumns, 1.0,
-                        out + i + j * ldo, ldo);
+      micro_tile<false>(depth, packed_a + i * size + first * kTileRows,
+                        packed_b + j * size + first * kTileColumns, 1.0, out + i + j * ldo, ldo);
     }
   }
 }
@@ -101,8 +104,8 @@ struct Workspace {
 
 Index work_size(Index rows) { return 4 * kMaxBlock * padded_rows(rows); }
 
-// Columns k to k + size of the symmetric matrix whose lower triangle is `a`, into the panel; zero in the rows of the
-// block itself, so that the update leaves it alone.
+// Columns k to k + size of the symmetric matrix whose lower triangle is `a`, into the panel; zero
+// in the rows of the block itself, so that the update leaves it alone.
 void gather_columns(Index k, Index size, const double* a, Index ld, const Workspace& w) {
   const Index below = k + size;
   for (Index i = 0; i < k; ++i) {
@@ -115,11 +118,13 @@ void gather_columns(Index k, Index size, const double* a, Index ld, const Worksp
   }
 }
 
-// a -= A B of the packed panels, in the lower triangle from row `first` on: A holds rows from there, B all columns.
+// a -= A B of the packed panels, in the lower triangle from row `first` on: A holds rows from
+// there, B all columns.
 void subtract_product(Index first, Index size, const Workspace& w, double* a, Index ld) {
   for (Index i = first; i < w.rows; i += kTileRows) {
     for (Index j = 0; j < i + kTileRows; j += kTileColumns)
-      micro_tile<true>(size, w.packed_a + (i - first) * size, w.packed_b + j * size, -1.0, a + i + j * ld, ld);
+      micro_tile<true>(size, w.packed_a + (i - first) * size, w.packed_b + j * size, -1.0,
+                       a + i + j * ld, ld);
   }
 }
 
@@ -133,15 +138,16 @@ void put_swept(Index k, Index size, const Block& block, const Workspace& w, doub
            static_cast<size_t>(w.rows - k - size) * sizeof(double));
     for (Index i = c; i < size; ++i) {
       double total = 0;
-      for (Index m = i; m < size; ++m) total += block.inverse[m + i * kMaxBlock] * block.inverse[m + c * kMaxBlock];
+      for (Index m = i; m < size; ++m)
+        total += block.inverse[m + i * kMaxBlock] * block.inverse[m + c * kMaxBlock];
       a[k + i + (k + c) * ld] = -total;
     }
   }
 }
 
-// The block sweep operator: with D = A_kk⁻¹, A_ij -= A_ik D A_kj, A_ik <- A_ik D, A_kk <- -D. After all blocks the
-// swept part holds -M⁻¹. Each block costs one symmetric update of rank `size`, n³ flops in all. The extra rows come out
-// as Y M⁻¹ without a solve.
+// The block sweep operator: with D = A_kk⁻¹, A_ij -= A_ik D A_kj, A_ik <- A_ik D, A_kk <- -D. After
+// all blocks the swept part holds -M⁻¹. Each block costs one symmetric update of rank `size`, n³
+// flops in all. The extra rows come out as Y M⁻¹ without a solve.
 bool sweep(Index n, Index extra, double* a, Index ld, double* work, double* log_det) {
   const Index rows = padded_rows(n + extra);
   const Index step = block_size(n);
@@ -153,29 +159,34 @@ bool sweep(Index n, Index extra, double* a, Index ld, double* work, double* log_
     if (!factor_block(size, a + k + k * ld, ld, &block, log_det)) return false;
     gather_columns(k, size, a, ld, w);
     pack_rows(rows, size, w.panel, rows, w.packed_a);
-    multiply_block<true>(rows, size, w.packed_a, block.inverse, block.packed, w.factor, rows);  // T = A_:k L⁻ᵀ
+    multiply_block<true>(rows, size, w.packed_a, block.inverse, block.packed, w.factor,
+                         rows);  // T = A_:k L⁻ᵀ
     pack_rows(rows, size, w.factor, rows, w.packed_a);
     pack_columns_transposed(rows, size, w.factor, rows, w.packed_b);
     subtract_product(0, size, w, a, ld);
-    multiply_block<false>(rows, size, w.packed_a, block.transpose, block.packed, w.panel, rows);  // A_:k D = T L⁻¹
+    multiply_block<false>(rows, size, w.packed_a, block.transpose, block.packed, w.panel,
+                          rows);  // A_:k D = T L⁻¹
     put_swept(k, size, block, w, a, ld);
   }
   return true;
 }
 
-// Rows k to k + size of the inverse root into `a`. Column j of the factor is row j of the update: L_kk⁻¹ X_kj = W_kj
-// before k, L_kk⁻¹ of the identity in k, T_j = A_jk L_kk⁻ᵀ after k.
-void put_rows_of_root(Index k, Index size, const Block& block, const Workspace& w, double* a, Index ld) {
+// Rows k to k + size of the inverse root into `a`. Column j of the factor is row j of the update:
+// L_kk⁻¹ X_kj = W_kj before k, L_kk⁻¹ of the identity in k, T_j = A_jk L_kk⁻ᵀ after k.
+void put_rows_of_root(Index k, Index size, const Block& block, const Workspace& w, double* a,
+                      Index ld) {
   const Index below = k + size;
   for (Index c = 0; c < size; ++c) {
-    memcpy(w.factor + k + c * w.rows, block.transpose + c * kMaxBlock, static_cast<size_t>(size) * sizeof(double));
+    memcpy(w.factor + k + c * w.rows, block.transpose + c * kMaxBlock,
+           static_cast<size_t>(size) * sizeof(double));
     for (Index i = 0; i <= k + c; ++i) a[k + c + i * ld] = w.factor[i + c * w.rows];
     memset(a + below + (k + c) * ld, 0, static_cast<size_t>(w.rows - below) * sizeof(double));
   }
 }
 
-// Forward elimination of [M | I] in place. What would be the identity's columns takes the place of the eliminated ones,
-// so the lower triangle ends as L⁻¹. Rows above k are finished: only rows below are updated.
+// Forward elimination of [M | I] in place. What would be the identity's columns takes the place of
+// the eliminated ones, so the lower triangle ends as L⁻¹. Rows above k are finished: only rows
+// below are updated.
 bool inverse_root(Index n, Index extra, double* a, Index ld, double* work, double* log_det) {
   const Index rows = padded_rows(n + extra);
   const Index step = block_size(n);

@@ -6,10 +6,11 @@
 namespace trammel {
 namespace {
 
-// Panels: `a` holds kTileRows consecutive rows, depth after depth; `b` kTileColumns consecutive columns likewise.
-// c(kTileRows x kTileColumns) = kKeep * c + sign * a b.
+// Panels: `a` holds kTileRows consecutive rows, depth after depth; `b` kTileColumns consecutive
+// columns likewise. c(kTileRows x kTileColumns) = kKeep * c + sign * a b.
 template <bool kKeep>
-inline void micro_tile(Index depth, const double* a, const double* b, double sign, double* c, Index ldc) {
+inline void micro_tile(Index depth, const double* a, const double* b, double sign, double* c,
+                       Index ldc) {
   Vec total[kTileColumns][kTileVectors] = {};
   if constexpr (kKeep) {
     for (Index j = 0; j < kTileColumns; ++j) {
@@ -48,7 +49,8 @@ inline void micro_tile(Index depth, const double* a, const double* b, double sig
 void pack_rows(Index rows, Index depth, const double* a, Index lda, double* packed) {
   for (Index i = 0; i < rows; i += kTileRows) {
     for (Index k = 0; k < depth; ++k, packed += kTileRows) {
-      for (Index v = 0; v < kTileVectors; ++v) store(packed + v * kLanes, load(a + i + v * kLanes + k * lda));
+      for (Index v = 0; v < kTileVectors; ++v)
+        store(packed + v * kLanes, load(a + i + v * kLanes + k * lda));
     }
   }
 }
@@ -62,10 +64,13 @@ void pack_columns_transposed(Index cols, Index depth, const double* t, Index ldt
   }
 }
 
-Index multiply_work_size(Index rows, Index cols) { return kMaxBlock * (padded_rows(rows) + padded_rows(cols)); }
+Index multiply_work_size(Index rows, Index cols) {
+  return kMaxBlock * (padded_rows(rows) + padded_rows(cols));
+}
 
-void multiply_transposed(Index rows, Index cols, Index depth, double sign, const double* a, Index lda, const double* b,
-                         Index ldb, bool lower_only, double* c, Index ldc, double* work) {
+void multiply_transposed(Index rows, Index cols, Index depth, double sign, const double* a,
+                         Index lda, const double* b, Index ldb, bool lower_only, double* c,
+                         Index ldc, double* work) {
   const Index row_end = round_up(rows, kTileRows);
   const Index col_end = round_up(cols, kTileColumns);
   double* packed_a = work;
@@ -77,19 +82,23 @@ void multiply_transposed(Index rows, Index cols, Index depth, double sign, const
     for (Index i = 0; i < row_end; i += kTileRows) {
       const Index stop = lower_only ? least(col_end, i + kTileRows) : col_end;
       for (Index j = 0; j < stop; j += kTileColumns)
-        micro_tile<true>(size, packed_a + i * size, packed_b + j * size, sign, c + i + j * ldc, ldc);
+        micro_tile<true>(size, packed_a + i * size, packed_b + j * size, sign, c + i + j * ldc,
+                         ldc);
     }
   }
 }
 
-// ---- of columns: c(i, j) = Σ_r a(r, i) b(r, j) ------------------------------------------------------------------
+// ---- of columns: c(i, j) = Σ_r a(r, i) b(r, j)
+// ------------------------------------------------------------------
 
 constexpr Index kColumnBlock = 4;  // columns of either side that are in registers together
-constexpr Index kStrip = 1024;     // rows at a time, so that eight columns stay in the first-level cache
+constexpr Index kStrip =
+    1024;  // rows at a time, so that eight columns stay in the first-level cache
 
 // c += AᵀB for M columns of a, N of b and `rows` rows.
 template <Index M, Index N>
-inline void add_column_block(Index rows, const double* a, Index lda, const double* b, Index ldb, double* c, Index ldc) {
+inline void add_column_block(Index rows, const double* a, Index lda, const double* b, Index ldb,
+                             double* c, Index ldc) {
   Vec sums[M][N] = {};
   Index r = 0;
   for (; r + kLanes <= rows; r += kLanes) {
@@ -110,16 +119,16 @@ inline void add_column_block(Index rows, const double* a, Index lda, const doubl
 }
 
 template <Index M>
-inline void add_column_blocks(Index rows, const double* a, Index lda, Index n, const double* b, Index ldb, double* c,
-                              Index ldc) {
+inline void add_column_blocks(Index rows, const double* a, Index lda, Index n, const double* b,
+                              Index ldb, double* c, Index ldc) {
   Index j = 0;
   for (; j + kColumnBlock <= n; j += kColumnBlock)
     add_column_block<M, kColumnBlock>(rows, a, lda, b + j * ldb, ldb, c + j * ldc, ldc);
   for (; j < n; ++j) add_column_block<M, 1>(rows, a, lda, b + j * ldb, ldb, c + j * ldc, ldc);
 }
 
-void transposed_product(Index k, Index m, const double* a, Index lda, Index n, const double* b, Index ldb, double* c,
-                        Index ldc) {
+void transposed_product(Index k, Index m, const double* a, Index lda, Index n, const double* b,
+                        Index ldb, double* c, Index ldc) {
   for (Index j = 0; j < n; ++j) {
     for (Index i = 0; i < m; ++i) c[i + j * ldc] = 0;
   }
@@ -127,8 +136,10 @@ void transposed_product(Index k, Index m, const double* a, Index lda, Index n, c
     const Index rows = least(k - first, kStrip);
     Index i = 0;
     for (; i + kColumnBlock <= m; i += kColumnBlock)
-      add_column_blocks<kColumnBlock>(rows, a + i * lda + first, lda, n, b + first, ldb, c + i, ldc);
-    for (; i < m; ++i) add_column_blocks<1>(rows, a + i * lda + first, lda, n, b + first, ldb, c + i, ldc);
+      add_column_blocks<kColumnBlock>(rows, a + i * lda + first, lda, n, b + first, ldb, c + i,
+                                      ldc);
+    for (; i < m; ++i)
+      add_column_blocks<1>(rows, a + i * lda + first, lda, n, b + first, ldb, c + i, ldc);
   }
 }
 

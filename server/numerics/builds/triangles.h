@@ -14,7 +14,8 @@ Index packed_size(Index n) {
 
 void pack_lower(Index n, Index first, const double* a, Index ld, double* packed) {
   for (Index k = 0; k < least(n, first + kTileRows); ++k, packed += kTileRows) {
-    for (Index r = 0; r < kTileRows; ++r) packed[r] = first + r < n && first + r >= k ? a[first + r + k * ld] : 0.0;
+    for (Index r = 0; r < kTileRows; ++r)
+      packed[r] = first + r < n && first + r >= k ? a[first + r + k * ld] : 0.0;
   }
 }
 

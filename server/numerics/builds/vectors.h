@@ -2,18 +2,19 @@
 
 /// One vector of doubles: how it is loaded and stored, its square root and its exponential.
 ///
-/// Every header of this folder is compiled once for each build, behind the build's target pragma and with
-/// TRAMMEL_VECTOR_LANES (doubles in a vector) and TRAMMEL_TILE_COLUMNS defined. See numerics_table.h for why nothing
-/// here may have external linkage.
+/// Every header of this folder is compiled once for each build, behind the build's target pragma
+/// and with TRAMMEL_VECTOR_LANES (doubles in a vector) and TRAMMEL_TILE_COLUMNS defined. See
+/// numerics_table.h for why nothing here may have external linkage.
 namespace trammel {
 namespace {
 
 using Index = ptrdiff_t;
 
 constexpr Index kLanes = TRAMMEL_VECTOR_LANES;
-constexpr Index kTileVectors = 3;                     // micro-tile rows, in vectors
-constexpr Index kTileRows = kTileVectors * kLanes;    // 24, 12, 6: all divide kRowPadding
-constexpr Index kTileColumns = TRAMMEL_TILE_COLUMNS;  // 8, 4, 4: accumulators fill the register file
+constexpr Index kTileVectors = 3;                   // micro-tile rows, in vectors
+constexpr Index kTileRows = kTileVectors * kLanes;  // 24, 12, 6: all divide kRowPadding
+constexpr Index kTileColumns =
+    TRAMMEL_TILE_COLUMNS;  // 8, 4, 4: accumulators fill the register file
 constexpr Index kMaxBlock = 96;
 
 typedef double Vec __attribute__((vector_size(kLanes * sizeof(double))));
@@ -23,7 +24,9 @@ typedef long long Bits __attribute__((vector_size(kLanes * sizeof(double))));
 typedef float Single __attribute__((vector_size(kLanes * sizeof(float)), aligned(4), may_alias));
 
 inline Vec load(const double* p) { return *reinterpret_cast<const Loose*>(p); }
-inline Vec load(const float* p) { return __builtin_convertvector(*reinterpret_cast<const Single*>(p), Vec); }
+inline Vec load(const float* p) {
+  return __builtin_convertvector(*reinterpret_cast<const Single*>(p), Vec);
+}
 inline void store(double* p, Vec v) { *reinterpret_cast<Loose*>(p) = v; }
 inline Vec broadcast(double x) { return Vec{} + x; }
 // Masked: the plain AVX-512 intrinsics make GCC 12 warn of an operand that they leave undefined.
@@ -47,13 +50,15 @@ inline Index round_up(Index n, Index step) { return (n + step - 1) / step * step
 
 #if TRAMMEL_VECTOR_LANES == 8
 
-// e^x for x <= 0, 1e-15 + |x| 1e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n/8 ln 2
-// + r, |r| <= ln 2 / 16: 2^(n/8) is one permutation of eight doubles and an integer addition, e^r a Chebyshev
-// polynomial of degree 6. Adding 1.5 * 2^52 leaves n in the low bits of the mantissa; the table has n mod 8 taken off
-// where n << 49 puts it.
+// e^x for x <= 0, 1e-15 + |x| 1e-16 relative; below -708 it stays at e^-708, which is 0 for any sum
+// here. x = n/8 ln 2
+// + r, |r| <= ln 2 / 16: 2^(n/8) is one permutation of eight doubles and an integer addition, e^r a
+// Chebyshev polynomial of degree 6. Adding 1.5 * 2^52 leaves n in the low bits of the mantissa; the
+// table has n mod 8 taken off where n << 49 puts it.
 inline Vec exp_of_negative(Vec x) {
-  constexpr Bits kPowers = {0x3ff0000000000000, 0x3fef72b83c7d517b, 0x3fef06fe0a31b715, 0x3feebfdad5362a27,
-                            0x3feea09e667f3bcd, 0x3feeace5422aa0db, 0x3feee89f995ad3ad, 0x3fef5818dcfba487};
+  constexpr Bits kPowers = {0x3ff0000000000000, 0x3fef72b83c7d517b, 0x3fef06fe0a31b715,
+                            0x3feebfdad5362a27, 0x3feea09e667f3bcd, 0x3feeace5422aa0db,
+                            0x3feee89f995ad3ad, 0x3fef5818dcfba487};
   constexpr double kShift = 0x1.8p52;
   x = largest(x, broadcast(-708.0));
   const Vec shifted = x * 0x1.71547652b82fep+3 + kShift;
@@ -70,14 +75,16 @@ inline Vec exp_of_negative(Vec x) {
                 r * (0x1.0000000000287p+0 +
                      r * (0x1.0000000000172p-1 +
                           r * (0x1.555555404e1f0p-3 +
-                               r * (0x1.5555554650340p-5 + r * (0x1.111689121f9ffp-7 + r * 0x1.6c1d016b94860p-10)))));
+                               r * (0x1.5555554650340p-5 +
+                                    r * (0x1.111689121f9ffp-7 + r * 0x1.6c1d016b94860p-10)))));
   return p * power;
 }
 
 #else
 
-// e^x for x <= 0, 4e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n ln 2 + r, |r| <=
-// ln 2 / 2, Chebyshev polynomial of degree 10 in r; adding 1.5 * 2^52 leaves n in the low bits of the mantissa.
+// e^x for x <= 0, 4e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n
+// ln 2 + r, |r| <= ln 2 / 2, Chebyshev polynomial of degree 10 in r; adding 1.5 * 2^52 leaves n in
+// the low bits of the mantissa.
 inline Vec exp_of_negative(Vec x) {
   x = largest(x, broadcast(-708.0));
   constexpr double kShift = 0x1.8p52;

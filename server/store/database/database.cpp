@@ -4,7 +4,8 @@ namespace trammel {
 namespace {
 
 std::string spoken(const DatabaseError& error) {
-  return error.code().empty() ? std::string(error.what()) : fmt::format("{} ({})", error.what(), error.code());
+  return error.code().empty() ? std::string(error.what())
+                              : fmt::format("{} ({})", error.what(), error.code());
 }
 
 }  // namespace
@@ -17,9 +18,12 @@ Failure failure_of(const DatabaseError& error, const std::string& place) {
           .in(place)
           .next("it is tried again by itself; ask again later");
     case Kind::kAgain:
-      return failure(ErrorCode::kBusy, "others change the same: {}", spoken(error)).in(place).next("ask again");
+      return failure(ErrorCode::kBusy, "others change the same: {}", spoken(error))
+          .in(place)
+          .next("ask again");
     case Kind::kUnknown:
-      return failure(ErrorCode::kBusy, "whether the change was made is not known: {}", spoken(error))
+      return failure(ErrorCode::kBusy, "whether the change was made is not known: {}",
+                     spoken(error))
           .in(place)
           .next("ask again under the same id, on any server");
     case Kind::kRefused:

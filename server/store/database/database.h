@@ -16,18 +16,20 @@
 
 #include "server/base/result.h"
 
-/// What the store asks of a database: one text of SQL for SQLite and for PostgreSQL, values bound to $1, $2..., rows,
-/// transactions, errors. Where the two differ it is said here and nowhere else: is_shared() and schema_text.h.
+/// What the store asks of a database: one text of SQL for SQLite and for PostgreSQL, values bound
+/// to $1, $2..., rows, transactions, errors. Where the two differ it is said here and nowhere else:
+/// is_shared() and schema_text.h.
 namespace trammel {
 
-/// A statement that failed. The text holds no bound value. It does not leave this room: failure_of() makes an Error.
+/// A statement that failed. The text holds no bound value. It does not leave this room:
+/// failure_of() makes an Error.
 class DatabaseError : public std::runtime_error {
  public:
   enum class Kind {
-    kAway,      ///< the database cannot be reached, or cannot be written now; it is tried again
-    kAgain,     ///< others changed the same at the same time, or hold it locked: nothing was changed
-    kUnknown,   ///< the connection was lost during a commit: whether it was made is not known
-    kRefused,   ///< this database is not for us: no rights, a wrong password, no such database
+    kAway,     ///< the database cannot be reached, or cannot be written now; it is tried again
+    kAgain,    ///< others changed the same at the same time, or hold it locked: nothing was changed
+    kUnknown,  ///< the connection was lost during a commit: whether it was made is not known
+    kRefused,  ///< this database is not for us: no rights, a wrong password, no such database
     kBadValue,  ///< a value that the database does not take
     kOther
   };
@@ -42,7 +44,8 @@ class DatabaseError : public std::runtime_error {
   std::string code_;
 };
 
-/// The failure for a caller. kBusy: nothing was changed, or that is not known, and it may work later.
+/// The failure for a caller. kBusy: nothing was changed, or that is not known, and it may work
+/// later.
 [[nodiscard]] Failure failure_of(const DatabaseError& error, const std::string& place);
 
 /// A value that is bound. Texts are not copied: they live until the statement is made.
@@ -82,7 +85,9 @@ class Rows {
   bool next() { return source_->next(); }
   [[nodiscard]] bool is_null(int column) const { return source_->is_null(column); }
   [[nodiscard]] std::int64_t integer64(int column) const { return source_->integer64(column); }
-  [[nodiscard]] int integer(int column) const { return static_cast<int>(source_->integer64(column)); }
+  [[nodiscard]] int integer(int column) const {
+    return static_cast<int>(source_->integer64(column));
+  }
   [[nodiscard]] bool truth(int column) const { return source_->integer64(column) != 0; }
   [[nodiscard]] double number(int column) const { return source_->number(column); }
   /// Bytes as they are; a number as it is written.
@@ -100,7 +105,8 @@ class Database {
 
   /// Statements without values, one after the other.
   virtual void execute(const std::string& statements) = 0;
-  /// A statement that has rows, also one that changes something and returns rows: that is made with the first next().
+  /// A statement that has rows, also one that changes something and returns rows: that is made with
+  /// the first next().
   [[nodiscard]] virtual Rows run(const char* sql, Values values) = 0;
   [[nodiscard]] Rows run(const char* sql, std::initializer_list<SqlValue> values) {
     return run(sql, Values(values.begin(), values.size()));
@@ -111,18 +117,20 @@ class Database {
     return change(sql, Values(values.begin(), values.size()));
   }
   [[nodiscard]] virtual bool has_table(const std::string& name) = 0;
-  /// Several processes write it at a time: what a decision rests on is locked row by row, and there are roles.
+  /// Several processes write it at a time: what a decision rests on is locked row by row, and there
+  /// are roles.
   [[nodiscard]] virtual bool is_shared() const = 0;
-  /// The open transaction is of a size of its own (a whole store is read or written): it may take its time, also
-  /// between two statements.
+  /// The open transaction is of a size of its own (a whole store is read or written): it may take
+  /// its time, also between two statements.
   virtual void take_long() {}
 
-  /// The server that writes, for the audit trail; empty: one that has the store alone, or a command.
+  /// The server that writes, for the audit trail; empty: one that has the store alone, or a
+  /// command.
   void written_by(std::string server) { writer_ = std::move(server); }
   [[nodiscard]] const std::string& writer() const { return writer_; }
 
-  /// Work that the open transaction does as its last, just before it is committed: what everybody waits for is locked
-  /// for as short as can be, and always in the same order.
+  /// Work that the open transaction does as its last, just before it is committed: what everybody
+  /// waits for is locked for as short as can be, and always in the same order.
   void at_end(std::function<void(Database&)> work) { last_.push_back(std::move(work)); }
 
  private:

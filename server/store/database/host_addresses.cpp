@@ -39,7 +39,8 @@ class Asked {
     ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
     std::string program = kProgram, what = "ahosts", name = host;
     std::array<char*, 4> arguments = {program.data(), what.data(), name.data(), nullptr};
-    if (::posix_spawn(&child_, kProgram, &actions, nullptr, arguments.data(), environ) != 0) child_ = -1;
+    if (::posix_spawn(&child_, kProgram, &actions, nullptr, arguments.data(), environ) != 0)
+      child_ = -1;
     ::posix_spawn_file_actions_destroy(&actions);
     ::close(ends[1]);
   }
@@ -58,7 +59,8 @@ class Asked {
     std::string text;
     std::array<char, 4096> buffer{};
     for (;;) {
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
       pollfd one{output_, POLLIN, 0};
       const int ready = left <= 0 ? 0 : ::poll(&one, 1, static_cast<int>(left));
       if (ready < 0 && errno == EINTR) continue;
@@ -74,7 +76,8 @@ class Asked {
   pid_t child_ = -1;
 };
 
-/// The first word of each line, once each: a line is an address, a kind of socket and perhaps the name.
+/// The first word of each line, once each: a line is an address, a kind of socket and perhaps the
+/// name.
 std::vector<std::string> addresses_in(const std::string& lines) {
   std::vector<std::string> addresses;
   std::istringstream in(lines);
@@ -88,16 +91,21 @@ std::vector<std::string> addresses_in(const std::string& lines) {
 
 }  // namespace
 
-Result<std::vector<std::string>> addresses_of(const std::string& host, std::chrono::milliseconds limit) {
+Result<std::vector<std::string>> addresses_of(const std::string& host,
+                                              std::chrono::milliseconds limit) {
   if (is_address(host)) return std::vector<std::string>{host};
   const Asked asked(host);
-  if (!asked.is_there()) return failure(ErrorCode::kInternal, "{} cannot be started to look up {}", kProgram, host);
+  if (!asked.is_there())
+    return failure(ErrorCode::kInternal, "{} cannot be started to look up {}", kProgram, host);
   const auto said = asked.answer(Clock::now() + limit);
   constexpr const char* kNext = "see that its name is spelled as it is known here: getent ahosts";
   if (!said)
-    return failure(ErrorCode::kUnreachable, "the name {} was not found within {} ms", host, limit.count()).next(kNext);
+    return failure(ErrorCode::kUnreachable, "the name {} was not found within {} ms", host,
+                   limit.count())
+        .next(kNext);
   auto addresses = addresses_in(*said);
-  if (addresses.empty()) return failure(ErrorCode::kUnreachable, "nobody knows a host {}", host).next(kNext);
+  if (addresses.empty())
+    return failure(ErrorCode::kUnreachable, "nobody knows a host {}", host).next(kNext);
   return addresses;
 }
 

@@ -24,8 +24,8 @@ constexpr milliseconds kCommit{10000};  // it may wait for a standby
 constexpr milliseconds kLongWork{600000};
 constexpr int kOldestServer = 130000;  // gen_random_uuid()
 constexpr const char* kLimits =
-    "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; "
-    "SET LOCAL idle_in_transaction_session_timeout = '10s'";
+    "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; SET LOCAL "
+    "idle_in_transaction_session_timeout = '10s'";
 
 constexpr std::string_view kWarning = "01000", kReadOnly = "25006";
 
@@ -33,7 +33,8 @@ constexpr std::string_view kWarning = "01000", kReadOnly = "25006";
 constexpr Oid kBool = 16, kInt8 = 20, kInt2 = 21, kInt4 = 23, kFloat8 = 701;
 
 bool begins_with_one_of(std::string_view code, std::initializer_list<std::string_view> beginnings) {
-  return std::any_of(beginnings.begin(), beginnings.end(), [&](auto one) { return code.starts_with(one); });
+  return std::any_of(beginnings.begin(), beginnings.end(),
+                     [&](auto one) { return code.starts_with(one); });
 }
 
 Kind kind_of(std::string_view code) {
@@ -54,7 +55,9 @@ DatabaseError error_of(const PGresult* answer) {
   if (code == nullptr) return {Kind::kAway, first_line(::PQresultErrorMessage(answer))};
   const Kind kind = kind_of(code);
   const char* said = ::PQresultErrorField(answer, PG_DIAG_MESSAGE_PRIMARY);
-  return {kind, kind == Kind::kBadValue ? "a value that a text or a number of the database cannot hold" : said,
+  return {kind,
+          kind == Kind::kBadValue ? "a value that a text or a number of the database cannot hold"
+                                  : said,
           fmt::format("PostgreSQL error {}", code)};
 }
 
@@ -69,10 +72,13 @@ Number from_wire(const char* bytes) {
 
 class PostgresRows final : public Rows::Source {
  public:
-  explicit PostgresRows(std::unique_ptr<PGresult, void (*)(PGresult*)> answer) : answer_(std::move(answer)) {}
+  explicit PostgresRows(std::unique_ptr<PGresult, void (*)(PGresult*)> answer)
+      : answer_(std::move(answer)) {}
 
   bool next() override { return ++row_ < ::PQntuples(answer_.get()); }
-  bool is_null(int column) const override { return ::PQgetisnull(answer_.get(), row_, column) != 0; }
+  bool is_null(int column) const override {
+    return ::PQgetisnull(answer_.get(), row_, column) != 0;
+  }
   std::int64_t integer64(int column) const override {
     if (is_null(column)) return 0;
     switch (::PQftype(answer_.get(), column)) {
@@ -101,13 +107,16 @@ class PostgresRows final : public Rows::Source {
   }
 
  private:
-  [[nodiscard]] const char* bytes(int column) const { return ::PQgetvalue(answer_.get(), row_, column); }
+  [[nodiscard]] const char* bytes(int column) const {
+    return ::PQgetvalue(answer_.get(), row_, column);
+  }
 
   std::unique_ptr<PGresult, void (*)(PGresult*)> answer_;
   int row_ = -1;
 };
 
-/// Values as libpq takes them. Texts go as bytes with a length: as a C string they would end at the first NUL.
+/// Values as libpq takes them. Texts go as bytes with a length: as a C string they would end at the
+/// first NUL.
 class Bound {
  public:
   explicit Bound(Database::Values values) {
@@ -125,7 +134,8 @@ class Bound {
       return add(text->empty() ? "" : text->data(), text->size(), 1);
     if (std::holds_alternative<std::nullptr_t>(value)) return add(nullptr, 0, 0);
     const auto* integer = std::get_if<std::int64_t>(&value);
-    spelled_.push_back(integer != nullptr ? std::to_string(*integer) : fmt::format("{:.17g}", std::get<double>(value)));
+    spelled_.push_back(integer != nullptr ? std::to_string(*integer)
+                                          : fmt::format("{:.17g}", std::get<double>(value)));
     add(spelled_.back().c_str(), spelled_.back().size(), 0);
   }
   void add(const char* start, std::size_t length, int format) {
@@ -153,29 +163,36 @@ bool is_ready(int socket, short events, std::chrono::steady_clock::time_point de
 /// Takes the steps of connecting; empty: it is connected. libpq knows no deadline here.
 std::string why_not_connected(PGconn* connection) {
   const auto deadline = std::chrono::steady_clock::now() + kPerHost;
-  for (auto state = PGRES_POLLING_WRITING; state != PGRES_POLLING_OK; state = ::PQconnectPoll(connection)) {
+  for (auto state = PGRES_POLLING_WRITING; state != PGRES_POLLING_OK;
+       state = ::PQconnectPoll(connection)) {
     if (state == PGRES_POLLING_FAILED || ::PQstatus(connection) == CONNECTION_BAD)
       return first_line(::PQerrorMessage(connection));
-    if (!is_ready(::PQsocket(connection), state == PGRES_POLLING_READING ? POLLIN : POLLOUT, deadline))
+    if (!is_ready(::PQsocket(connection), state == PGRES_POLLING_READING ? POLLIN : POLLOUT,
+                  deadline))
       return fmt::format("{} did not answer within {} ms", ::PQhost(connection), kPerHost.count());
   }
   return "";
 }
 
-/// Certificates and keys do not mend themselves. Of a line that breaks during the handshake none of this is said.
+/// Certificates and keys do not mend themselves. Of a line that breaks during the handshake none of
+/// this is said.
 bool is_of_certificates(const std::string& told) {
-  constexpr std::array kWords = {"certificate", "private key", "alert unknown ca", "does not support SSL"};
+  constexpr std::array kWords = {"certificate", "private key", "alert unknown ca",
+                                 "does not support SSL"};
   return std::any_of(kWords.begin(), kWords.end(),
                      [&](const char* word) { return told.find(word) != std::string::npos; });
 }
 
-/// A server that answered and lets nobody in now will do so later; any other refusal is for good. Of a connection that
-/// is not there libpq has no SQLSTATE, so these are the server's own words, and libpq's.
+/// A server that answered and lets nobody in now will do so later; any other refusal is for good.
+/// Of a connection that is not there libpq has no SQLSTATE, so these are the server's own words,
+/// and libpq's.
 bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
   const std::size_t at = told.find("FATAL:");
   if (at == std::string::npos) return is_of_certificates(told);
-  const auto says = [answer = told.substr(at)](const char* text) { return answer.find(text) != std::string::npos; };
+  const auto says = [answer = told.substr(at)](const char* text) {
+    return answer.find(text) != std::string::npos;
+  };
   // The last four are a pooler's, whose server is away.
   constexpr std::array kForNow = {
       "starting up", "not yet accepting", "shutting down",      "recovery",       "too many",
@@ -188,7 +205,9 @@ bool is_read_only(PGconn* connection, Database& database) {
   const char* standby = ::PQparameterStatus(connection, "in_hot_standby");
   if (standby == nullptr) return integer_of(database, "SELECT pg_is_in_recovery()") != 0;
   const char* by_default = ::PQparameterStatus(connection, "default_transaction_read_only");
-  const auto is_on = [](const char* setting) { return setting != nullptr && std::string_view(setting) == "on"; };
+  const auto is_on = [](const char* setting) {
+    return setting != nullptr && std::string_view(setting) == "on";
+  };
   return is_on(standby) || is_on(by_default);
 }
 
@@ -199,8 +218,8 @@ PostgresDatabase::PostgresDatabase(Connection connection) : connection_(std::mov
   ::PQsetnonblocking(connection_.get(), 1);
 }
 
-Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const PostgresSettings& settings,
-                                                                           Session session) {
+Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(
+    const PostgresSettings& settings, Session session) {
   std::vector<const char*> keys, values;
   for (const auto& [key, value] : settings) {
     keys.push_back(key.c_str());
@@ -213,7 +232,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const
   if (const std::string why = why_not_connected(connection.get()); !why.empty()) {
     const bool for_good = is_refused_for_good(connection.get(), why);
     return failure(for_good ? ErrorCode::kRefused : ErrorCode::kUnreachable, "{}", why)
-        .next(for_good ? "mend the URL, or what the database allows" : "see that PostgreSQL runs there");
+        .next(for_good ? "mend the URL, or what the database allows"
+                       : "see that PostgreSQL runs there");
   }
   if (const int version = ::PQserverVersion(connection.get()); version < kOldestServer)
     return refused("PostgreSQL {} is too old, limit {}", version / 10000, kOldestServer / 10000)
@@ -221,7 +241,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const
   std::unique_ptr<PostgresDatabase> made(new PostgresDatabase(std::move(connection)));
   try {
     if (session == Session::kWrites && is_read_only(made->connection_.get(), *made))
-      return failure(ErrorCode::kUnreachable, "{} is a read-only standby", ::PQhost(made->connection_.get()))
+      return failure(ErrorCode::kUnreachable, "{} is a read-only standby",
+                     ::PQhost(made->connection_.get()))
           .next("name the primary, or all hosts of the cluster");
   } catch (const DatabaseError& error) {
     return failure(ErrorCode::kUnreachable, "{}", error.what());
@@ -229,7 +250,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const
   return made;
 }
 
-Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::string& url, Session session) {
+Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::string& url,
+                                                                    Session session) {
   auto hosts = TRY(settings_of(url));
   std::shuffle(hosts.begin(), hosts.end(), std::mt19937_64(std::random_device{}()));
   std::optional<Error> why;
@@ -253,7 +275,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::s
 
 void PostgresDatabase::note_warning(void* self, const PGresult* warning) {
   const char* code = ::PQresultErrorField(warning, PG_DIAG_SQLSTATE);
-  if (code != nullptr && std::string_view(code) == kWarning) static_cast<PostgresDatabase*>(self)->warned_ = true;
+  if (code != nullptr && std::string_view(code) == kWarning)
+    static_cast<PostgresDatabase*>(self)->warned_ = true;
 }
 
 void PostgresDatabase::lose(const std::string& why) {
@@ -266,7 +289,8 @@ void PostgresDatabase::check_sent(int sent) {
 }
 
 void PostgresDatabase::wait(short events, Deadline deadline) {
-  if (!is_ready(::PQsocket(connection_.get()), events, deadline)) lose("the database does not answer");
+  if (!is_ready(::PQsocket(connection_.get()), events, deadline))
+    lose("the database does not answer");
 }
 
 PostgresDatabase::Answer PostgresDatabase::answer(Deadline deadline) {
@@ -287,19 +311,21 @@ PostgresDatabase::Answer PostgresDatabase::answer(Deadline deadline) {
     const bool failed = last && ::PQresultStatus(last.get()) == PGRES_FATAL_ERROR;
     if (!failed) last = std::move(next);
   }
-  if (!last || ::PQstatus(connection) == CONNECTION_BAD) lose(first_line(::PQerrorMessage(connection)));
+  if (!last || ::PQstatus(connection) == CONNECTION_BAD)
+    lose(first_line(::PQerrorMessage(connection)));
   const auto status = ::PQresultStatus(last.get());
   if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK) return last;
   const char* code = ::PQresultErrorField(last.get(), PG_DIAG_SQLSTATE);
-  if (code != nullptr && std::string_view(code) == kReadOnly) lost_ = true;  // another host takes changes now
+  if (code != nullptr && std::string_view(code) == kReadOnly)
+    lost_ = true;  // another host takes changes now
   throw error_of(last.get());
 }
 
 PostgresDatabase::Answer PostgresDatabase::ask(const char* sql, Values values) {
   if (lost_) lose("");
   const Bound bound(values);
-  check_sent(::PQsendQueryParams(connection_.get(), sql, bound.size(), nullptr, bound.starts(), bound.lengths(),
-                                 bound.formats(), 1));
+  check_sent(::PQsendQueryParams(connection_.get(), sql, bound.size(), nullptr, bound.starts(),
+                                 bound.lengths(), bound.formats(), 1));
   return answer(by_when(kAnswer));
 }
 
@@ -351,7 +377,8 @@ bool PostgresDatabase::has_table(const std::string& name) {
 
 void PostgresDatabase::begin(bool writes) {
   takes_long_ = false;
-  static_cast<void>(take_words());  // of a session that listened before a pooler gave it to this one
+  static_cast<void>(
+      take_words());  // of a session that listened before a pooler gave it to this one
   execute(fmt::format("BEGIN ISOLATION LEVEL {}; {}",
                       writes ? "READ COMMITTED READ WRITE" : "REPEATABLE READ READ ONLY", kLimits));
 }
@@ -366,11 +393,13 @@ void PostgresDatabase::commit() {
       throw DatabaseError(Kind::kAgain, "the transaction was rolled back");
   } catch (const DatabaseError& error) {
     // Nobody knows whether the server had made it by then, or goes on to make it.
-    if (error.kind() == Kind::kAway) throw DatabaseError(Kind::kUnknown, error.what(), error.code());
+    if (error.kind() == Kind::kAway)
+      throw DatabaseError(Kind::kUnknown, error.what(), error.code());
     throw;
   }
   // It is a success for the server, and on this host alone: the wait for the standby was ended.
-  if (warned_) throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
+  if (warned_)
+    throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
 }
 
 void PostgresDatabase::roll_back() noexcept {

@@ -10,15 +10,18 @@
 
 namespace trammel {
 
-/// A connection to PostgreSQL. Every call has a deadline of its own: a server that is stopped and not dead answers no
-/// other timeout. Statements are unnamed and settings are those of a transaction, so that a pooler may stand between.
+/// A connection to PostgreSQL. Every call has a deadline of its own: a server that is stopped and
+/// not dead answers no other timeout. Statements are unnamed and settings are those of a
+/// transaction, so that a pooler may stand between.
 class PostgresDatabase final : public Database {
  public:
   enum class Session { kMayBeReadOnly, kWrites };
 
-  /// Asks the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if none answers,
-  /// (kRefused) if one lets nobody in, or if all that answer are read-only and `session` is to write.
-  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url, Session session);
+  /// Asks the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if none
+  /// answers, (kRefused) if one lets nobody in, or if all that answer are read-only and `session`
+  /// is to write.
+  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url,
+                                                                         Session session);
 
   using Database::change;
   using Database::run;

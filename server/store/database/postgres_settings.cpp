@@ -12,12 +12,13 @@ namespace trammel {
 namespace {
 
 /// What a connection is told where the URL says nothing else: a line that is dead is noticed.
-constexpr std::array<std::pair<const char*, const char*>, 6> kDefaults = {{{"application_name", "trammel"},
-                                                                           {"client_encoding", "UTF8"},
-                                                                           {"keepalives_idle", "2"},
-                                                                           {"keepalives_interval", "1"},
-                                                                           {"keepalives_count", "3"},
-                                                                           {"tcp_user_timeout", "3000"}}};
+constexpr std::array<std::pair<const char*, const char*>, 6> kDefaults = {
+    {{"application_name", "trammel"},
+     {"client_encoding", "UTF8"},
+     {"keepalives_idle", "2"},
+     {"keepalives_interval", "1"},
+     {"keepalives_count", "3"},
+     {"tcp_user_timeout", "3000"}}};
 
 std::vector<std::string> parts_of(const std::string& list) {
   std::vector<std::string> parts;
@@ -38,12 +39,14 @@ std::string nth(const std::vector<std::string>& parts, std::size_t index) {
 
 Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
   char* why = nullptr;
-  const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> options(::PQconninfoParse(url.c_str(), &why),
-                                                                               &::PQconninfoFree);
+  const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> options(
+      ::PQconninfoParse(url.c_str(), &why), &::PQconninfoFree);
   if (why != nullptr) ::PQfreemem(why);
   if (!options) {
     return refused("is no URL that PostgreSQL reads")
-        .next("write postgresql://USER@HOST/DATABASE?OPTION=VALUE, and what is special in a name as %XX");
+        .next(
+            "write postgresql://USER@HOST/DATABASE?OPTION=VALUE, and what is special in a name as "
+            "%XX");
   }
   PostgresSettings common;
   std::string hosts, addresses, ports;
@@ -61,7 +64,8 @@ Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
     }
   }
   for (const auto& [key, value] : kDefaults) {
-    if (std::none_of(common.begin(), common.end(), [&, name = key](const auto& one) { return one.first == name; }))
+    if (std::none_of(common.begin(), common.end(),
+                     [&, name = key](const auto& one) { return one.first == name; }))
       common.emplace_back(key, value);
   }
   const auto names = parts_of(hosts), numbers = parts_of(addresses), at = parts_of(ports);
@@ -69,16 +73,19 @@ Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
   for (std::size_t i = 0; i < std::max(names.size(), numbers.size()); ++i) {
     PostgresSettings one = common;
     if (const auto host = nth(names, i); !host.empty()) one.emplace_back("host", host);
-    if (const auto address = nth(numbers, i); !address.empty()) one.emplace_back("hostaddr", address);
+    if (const auto address = nth(numbers, i); !address.empty())
+      one.emplace_back("hostaddr", address);
     if (const auto port = nth(at, i); !port.empty()) one.emplace_back("port", port);
     each.push_back(std::move(one));
   }
   return each;
 }
 
-Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& host, std::chrono::milliseconds limit) {
+Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& host,
+                                                     std::chrono::milliseconds limit) {
   const auto value = [&host](std::string_view key) {
-    const auto found = std::find_if(host.begin(), host.end(), [&](const auto& one) { return one.first == key; });
+    const auto found =
+        std::find_if(host.begin(), host.end(), [&](const auto& one) { return one.first == key; });
     return found == host.end() ? std::string() : found->second;
   };
   const std::string name = value("host");
@@ -86,7 +93,8 @@ Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& hos
   if (is_socket || !value("hostaddr").empty()) return std::vector<PostgresSettings>{host};
   const auto addresses = TRY(addresses_of(name, limit));
   std::vector<PostgresSettings> each;
-  for (const std::string& address : addresses) each.emplace_back(host).emplace_back("hostaddr", address);
+  for (const std::string& address : addresses)
+    each.emplace_back(host).emplace_back("hostaddr", address);
   return each;
 }
 

@@ -46,20 +46,24 @@ class SqliteRows final : public Rows::Source {
   SQLite::Statement statement_;
 };
 
-/// SQLite numbers `$1` as it comes to it, and takes its name for what it is; so values go by their names.
+/// SQLite numbers `$1` as it comes to it, and takes its name for what it is; so values go by their
+/// names.
 void bind(SQLite::Statement& statement, int number, const SqlValue& value) {
   const std::string name = "$" + std::to_string(number);
-  if (const auto* integer = std::get_if<std::int64_t>(&value)) return statement.bind(name, *integer);
+  if (const auto* integer = std::get_if<std::int64_t>(&value))
+    return statement.bind(name, *integer);
   if (const auto* real = std::get_if<double>(&value)) return statement.bind(name, *real);
-  if (const auto* text = std::get_if<std::string_view>(&value)) return statement.bind(name, std::string(*text));
+  if (const auto* text = std::get_if<std::string_view>(&value))
+    return statement.bind(name, std::string(*text));
   statement.bind(name);  // NULL
 }
 
 }  // namespace
 
 DatabaseError error_of(const SQLite::Exception& error) {
-  return {is_of_the_disk(error.getErrorCode()) ? DatabaseError::Kind::kAway : DatabaseError::Kind::kOther, error.what(),
-          fmt::format("SQLite error {}", error.getExtendedErrorCode())};
+  return {is_of_the_disk(error.getErrorCode()) ? DatabaseError::Kind::kAway
+                                               : DatabaseError::Kind::kOther,
+          error.what(), fmt::format("SQLite error {}", error.getExtendedErrorCode())};
 }
 
 SqliteDatabase::SqliteDatabase(const std::string& path, int flags, int busy_ms)

@@ -12,17 +12,21 @@ namespace {
 
 /// Whether a model of one serves the other: the kinematics count, names and priors do not.
 bool same_robot(const Chain& a, const Chain& b) {
-  if (a.size() != b.size() || a.transmission() != b.transmission() || a.drive() != b.drive()) return false;
+  if (a.size() != b.size() || a.transmission() != b.transmission() || a.drive() != b.drive())
+    return false;
   for (int i = 0; i < a.size(); ++i) {
     const Joint& one = a.joint(i);
     const Joint& other = b.joint(i);
-    const auto numbers = [](const LinkGeometry& l) { return std::array{l.theta, l.d, l.a, l.alpha, l.beta}; };
+    const auto numbers = [](const LinkGeometry& l) {
+      return std::array{l.theta, l.d, l.a, l.alpha, l.beta};
+    };
     if (one.type != other.type || numbers(one.link) != numbers(other.link)) return false;
   }
   return true;
 }
 
-/// The tools and payloads that the model was trained with and that are no longer what the cell says they are.
+/// The tools and payloads that the model was trained with and that are no longer what the cell says
+/// they are.
 std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& cell) {
   const auto same_pose = [](const std::optional<Pose>& a, const std::optional<Pose>& b) {
     return a.has_value() == b.has_value() && (!a || a->matrix() == b->matrix());
@@ -48,11 +52,13 @@ std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& 
 
 Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
   if (!same_robot(model.cell().robot, cell.robot)) {
-    return refused("{} was trained for another robot than cell {} has", which, cell.name).of("robot");
+    return refused("{} was trained for another robot than cell {} has", which, cell.name)
+        .of("robot");
   }
   if (const std::vector<std::string> others = other_tools(model, cell); !others.empty()) {
-    return refused("{} was trained with other tools or payloads than cell {} has under these names: {}", which,
-                   cell.name, fmt::join(others, ", "))
+    return refused(
+               "{} was trained with other tools or payloads than cell {} has under these names: {}",
+               which, cell.name, fmt::join(others, ", "))
         .of("tools")
         .with_text(others.front());
   }

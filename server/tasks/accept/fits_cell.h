@@ -6,8 +6,10 @@
 
 namespace trammel {
 
-/// Refuses a model that the cell cannot be served with: of another robot (its kinematics count, names and priors do
-/// not), or trained with tools or payloads that are not what the cell says they are. `which` names it.
-[[nodiscard]] Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which);
+/// Refuses a model that the cell cannot be served with: of another robot (its kinematics count,
+/// names and priors do not), or trained with tools or payloads that are not what the cell says they
+/// are. `which` names it.
+[[nodiscard]] Status check_fits_cell(const CompensatedModel& model, const Cell& cell,
+                                     const std::string& which);
 
 }  // namespace trammel

@@ -17,9 +17,10 @@ namespace {
 
 constexpr double kMedianOfChiSquare = 2.366;  // of 3 degrees of freedom
 constexpr double kStillFits = 2;              // times the expected deviation, of the median pose
-constexpr double kRangeMargin = 0.1;          // of a joint's range: a pose this far outside is still in it
-constexpr int kFewestOutside = 10;            // judges beyond the ranges of the model in force, to gain by them
-constexpr double kUnclear = -1;               // z: a loss that is smaller may be chance
+constexpr double kRangeMargin = 0.1;  // of a joint's range: a pose this far outside is still in it
+constexpr int kFewestOutside =
+    10;                          // judges beyond the ranges of the model in force, to gain by them
+constexpr double kUnclear = -1;  // z: a loss that is smaller may be chance
 
 /// What models leave of the same rows, all sessions one after the other.
 struct Rows {
@@ -30,8 +31,10 @@ struct Rows {
 Rows rows_of(const CompensatedModel& model, const std::vector<JudgingSession>& sessions,
              JudgedLevel level = JudgedLevel::kCompensated) {
   Eigen::Index count = 0;
-  for (const JudgingSession& session : sessions) count += static_cast<Eigen::Index>(session.judges.measurements.size());
-  Rows rows{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), Eigen::VectorXd(count)};
+  for (const JudgingSession& session : sessions)
+    count += static_cast<Eigen::Index>(session.judges.measurements.size());
+  Rows rows{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count),
+            Eigen::VectorXd(count)};
   Eigen::Index at = 0;
   for (const JudgingSession& session : sessions) {
     const LocatedErrors errors = located_errors(model, session, level);
@@ -63,8 +66,8 @@ Columns both_finite(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b, const 
 }
 
 /// `judges`: of all columns.
-PairedGain gain_of(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after, const Columns& among,
-                   const std::vector<const Measurement*>& judges) {
+PairedGain gain_of(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after,
+                   const Columns& among, const std::vector<const Measurement*>& judges) {
   const Columns both = both_finite(before, after, among);
   if (both.empty()) return {};
   std::vector<JointVector> q;
@@ -78,16 +81,18 @@ double rms(const Eigen::VectorXd& values, const Columns& among) {
 
 bool not_worse(const PairedGain& gain, double accept_ratio) {
   if (gain.poses == 0) return true;
-  return gain.rms_after <= accept_ratio * gain.rms_before && (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
+  return gain.rms_after <= accept_ratio * gain.rms_before &&
+         (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
 }
 
-/// Of orientations, beside positions that gain: beyond chance, or by half. What is left of a turn is never held to be
-/// less than the instrument's own `sigma` an axis.
+/// Of orientations, beside positions that gain: beyond chance, or by half. What is left of a turn
+/// is never held to be less than the instrument's own `sigma` an axis.
 bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
   if (turns.poses == 0) return false;
   const double before = std::max(turns.rms_before, std::sqrt(3.0) * sigma);
   const bool beyond_chance = std::min(turns.z_ranks, turns.z_sum) < -PairedGain::kBeyondChance;
-  return is_far_worse(before, turns.rms_after) || (beyond_chance && turns.rms_after > accept_ratio * before);
+  return is_far_worse(before, turns.rms_after) ||
+         (beyond_chance && turns.rms_after > accept_ratio * before);
 }
 
 /// How many different poses these rows are.
@@ -105,15 +110,19 @@ int distinct(const std::vector<const Measurement*>& judges, const Columns& among
 
 /// `version 3`; without a number it is what a candidate would add to.
 std::string name_of(const ServedModel& model) {
-  return model.version > 0 ? fmt::format("version {}", model.version) : "the model without what was found";
+  return model.version > 0 ? fmt::format("version {}", model.version)
+                           : "the model without what was found";
 }
 
 constexpr const char* kAdvice = "activate it if it is wanted";
 
-GateVerdict yes(std::string why, const GateFigures& figures) { return {true, "in force: " + why, false, why, figures}; }
+GateVerdict yes(std::string why, const GateFigures& figures) {
+  return {true, "in force: " + why, false, why, figures};
+}
 
 GateVerdict no(const std::string& why, const GateFigures& figures, const std::string& advice = "") {
-  return {false, "not in force: " + why + (advice.empty() ? "" : "; " + advice), false, why, figures};
+  return {false, "not in force: " + why + (advice.empty() ? "" : "; " + advice), false, why,
+          figures};
 }
 
 GateFigures figures_of(const PairedGain& gain) {
@@ -134,7 +143,8 @@ GateFigures with_limit(GateFigures figures, double limit) {
 /// Candidate and model in force on the rows that both know.
 class Duel {
  public:
-  Duel(const GateQuestion& question, std::vector<JudgingSession> sessions, const GateOptions& options)
+  Duel(const GateQuestion& question, std::vector<JudgingSession> sessions,
+       const GateOptions& options)
       : candidate_(question.candidate),
         present_(*question.in_force),
         served_before_(question.served_before),
@@ -148,7 +158,8 @@ class Duel {
     shared_ = both_finite(before_.position, after_.position, all);
     for (const Eigen::Index i : shared_) (in_ranges(i) ? inside_ : outside_).push_back(i);
     for (const Eigen::Index i : all) {
-      if (!before_.position.col(i).allFinite() && after_.position.col(i).allFinite()) new_tools_.push_back(i);
+      if (!before_.position.col(i).allFinite() && after_.position.col(i).allFinite())
+        new_tools_.push_back(i);
     }
   }
 
@@ -156,8 +167,9 @@ class Duel {
     if (const std::string lost = lost_tools(); !lost.empty())
       return stays(fmt::format("it does not know {}, which {} knows", lost, name_of(present_)));
     if (const double covered = covered_by_candidate(); covered < GateOptions::kLeastCoverage)
-      return stays(fmt::format("it was trained on {:.0f} % of the joint ranges of {}, limit {:.0f} %", 100 * covered,
-                               name_of(present_), 100 * GateOptions::kLeastCoverage));
+      return stays(
+          fmt::format("it was trained on {:.0f} % of the joint ranges of {}, limit {:.0f} %",
+                      100 * covered, name_of(present_), 100 * GateOptions::kLeastCoverage));
     if (!shared_.empty() && apart() < GateOptions::kSame) return of_the_same();
     if (const std::string few = too_few(); !few.empty()) {
       GateVerdict undecided = stays(few, without_limit(figures_of(shared_gain())));
@@ -172,10 +184,13 @@ class Duel {
     const CompensatedModel::Parts& parts = present_.model.parts();
     const JointVector margin = kRangeMargin * (parts.q_max - parts.q_min);
     const JointVector& q = judges_[static_cast<std::size_t>(i)]->context.q;
-    return ((q - parts.q_min + margin).array() >= 0).all() && ((parts.q_max + margin - q).array() >= 0).all();
+    return ((q - parts.q_min + margin).array() >= 0).all() &&
+           ((parts.q_max + margin - q).array() >= 0).all();
   }
   [[nodiscard]] GateVerdict stays(const std::string& why, const GateFigures& figures = {}) const {
-    return no(why, figures, fmt::format("{} stays in force; activate the new one if it is wanted", name_of(present_)));
+    return no(
+        why, figures,
+        fmt::format("{} stays in force; activate the new one if it is wanted", name_of(present_)));
   }
   [[nodiscard]] std::string lost_tools() const {
     std::string lost;
@@ -192,7 +207,8 @@ class Duel {
     double least = 1;
     for (Eigen::Index j = 0; j < before.q_min.size(); ++j) {
       const double range = before.q_max(j) - before.q_min(j);
-      const double both = std::min(before.q_max(j), after.q_max(j)) - std::max(before.q_min(j), after.q_min(j));
+      const double both =
+          std::min(before.q_max(j), after.q_max(j)) - std::max(before.q_min(j), after.q_min(j));
       if (range > 1e-3) least = std::min(least, std::max(0.0, both) / range);
     }
     return least;
@@ -204,20 +220,24 @@ class Duel {
   [[nodiscard]] std::string too_few() const {
     const int poses = distinct(judges_, inside_);
     std::vector<JointVector> q;
-    for (const Eigen::Index i : inside_) q.push_back(judges_[static_cast<std::size_t>(i)]->context.q);
+    for (const Eigen::Index i : inside_)
+      q.push_back(judges_[static_cast<std::size_t>(i)]->context.q);
     const CompensatedModel::Parts& parts = present_.model.parts();
     const double covered = coverage(q, parts.q_min, parts.q_max);
     if (poses >= GateOptions::kFewestJudges && covered >= GateOptions::kLeastCoverage) return "";
     if (poses >= GateOptions::kFewestJudges) {
       return fmt::format(
-          "the {} poses held out to judge by spread over {:.0f} % of the joint ranges of {}, "
-          "limit {:.0f} %",
+          "the {} poses held out to judge by spread over {:.0f} % of the joint ranges of {}, limit "
+          "{:.0f} %",
           poses, 100 * covered, name_of(present_), 100 * GateOptions::kLeastCoverage);
     }
-    return fmt::format("{} poses are held out to judge by in the joint ranges of {}, {} are needed{}", poses,
-                       name_of(present_), GateOptions::kFewestJudges, figures());
+    return fmt::format(
+        "{} poses are held out to judge by in the joint ranges of {}, {} are needed{}", poses,
+        name_of(present_), GateOptions::kFewestJudges, figures());
   }
-  [[nodiscard]] PairedGain shared_gain() const { return gain_of(before_.position, after_.position, shared_, judges_); }
+  [[nodiscard]] PairedGain shared_gain() const {
+    return gain_of(before_.position, after_.position, shared_, judges_);
+  }
   [[nodiscard]] std::string figures() const {
     const PairedGain gain = shared_gain();
     if (gain.poses == 0) return "";
@@ -227,14 +247,14 @@ class Duel {
 
   /// Of a candidate that predicts what the one in force does: it may know one tool more.
   [[nodiscard]] GateVerdict of_the_same() const {
-    const std::string same =
-        fmt::format("it predicts what {} predicts, within {:.4f} mm", name_of(present_), to_mm(apart()));
+    const std::string same = fmt::format("it predicts what {} predicts, within {:.4f} mm",
+                                         name_of(present_), to_mm(apart()));
     if (new_tools_.empty()) return of_the_base(same);
-    const PairedGain gain =
-        gain_of(rows_of(candidate_, sessions_, JudgedLevel::kNominal).position, after_.position, new_tools_, judges_);
+    const PairedGain gain = gain_of(rows_of(candidate_, sessions_, JudgedLevel::kNominal).position,
+                                    after_.position, new_tools_, judges_);
     const std::string text = fmt::format(
-        "{}, and of the tools that {} does not know: held-out rms {:.4f} mm, "
-        "nominal {:.4f} mm, {} poses",
+        "{}, and of the tools that {} does not know: held-out rms {:.4f} mm, nominal {:.4f} mm, {} "
+        "poses",
         same, name_of(present_), to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses);
     const double limit = options_.accept_ratio * gain.rms_before;
     const GateFigures figures = with_limit(figures_of(gain), limit);
@@ -244,13 +264,14 @@ class Duel {
   /// Of a candidate that differs in where the base stands at most.
   [[nodiscard]] GateVerdict of_the_base(const std::string& same) const {
     MeasurementBatch newest = sessions_.back().judges;
-    std::erase_if(newest.measurements,
-                  [&](const Measurement& m) { return !knows(candidate_, m) || !knows(present_.model, m); });
+    std::erase_if(newest.measurements, [&](const Measurement& m) {
+      return !knows(candidate_, m) || !knows(present_.model, m);
+    });
     if (newest.measurements.empty()) return stays(same);
     const PairedGain gain = paired_gain(present_.model, candidate_, newest);
     if (!gain.beyond_chance()) return stays(same, figures_of(gain));
-    return yes(fmt::format("{}, and it knows better where the base stands: held-out rms {:.4f} mm, before {:.4f} mm, "
-                           "{} poses",
+    return yes(fmt::format("{}, and it knows better where the base stands: held-out rms {:.4f} mm, "
+                           "before {:.4f} mm, {} poses",
                            same, to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses),
                figures_of(gain));
   }
@@ -258,7 +279,8 @@ class Duel {
   [[nodiscard]] bool better_by_own_account(const PairedGain& gain) const {
     if (options_.bar == Bar::kBetterBeyondChance) return false;
     return gain.z_sum > 0 && gain.rms_after < gain.rms_before &&
-           rms(after_.expected_truth, inside_) <= GateOptions::kClaimedGain * rms(before_.expected_truth, inside_);
+           rms(after_.expected_truth, inside_) <=
+               GateOptions::kClaimedGain * rms(before_.expected_truth, inside_);
   }
 
   [[nodiscard]] GateVerdict of_another() const {
@@ -268,44 +290,54 @@ class Duel {
     const bool kept = not_worse(gain, options_.accept_ratio);
     std::string why;
     if (gain.beyond_chance()) {
-      why = fmt::format("better beyond chance (z {:.2f}, limit {:.2f})", gain.z(), PairedGain::kBeyondChance);
+      why = fmt::format("better beyond chance (z {:.2f}, limit {:.2f})", gain.z(),
+                        PairedGain::kBeyondChance);
     } else if (better_by_own_account(gain)) {
       why = fmt::format("better, and its own uncertainty is {:.4f} mm against {:.4f} mm",
-                        to_mm(rms(after_.expected_truth, inside_)), to_mm(rms(before_.expected_truth, inside_)));
+                        to_mm(rms(after_.expected_truth, inside_)),
+                        to_mm(rms(before_.expected_truth, inside_)));
     } else if (kept && beyond.poses >= kFewestOutside && beyond.beyond_chance()) {
-      why =
-          fmt::format("not worse, and better beyond chance outside its ranges ({:.4f} mm, before {:.4f} mm, {} poses)",
-                      to_mm(beyond.rms_after), to_mm(beyond.rms_before), beyond.poses);
+      why = fmt::format(
+          "not worse, and better beyond chance outside its ranges ({:.4f} mm, before {:.4f} mm, {} "
+          "poses)",
+          to_mm(beyond.rms_after), to_mm(beyond.rms_before), beyond.poses);
     } else if (kept && turns.beyond_chance()) {
-      why = fmt::format("not worse, and its orientations are better beyond chance ({})", in_words(turns));
+      why = fmt::format("not worse, and its orientations are better beyond chance ({})",
+                        in_words(turns));
     }
-    const std::string text = fmt::format("held-out rms {:.4f} mm before ({}), {:.4f} mm after, on the same {} poses",
-                                         to_mm(gain.rms_before), name_of(present_), to_mm(gain.rms_after), gain.poses);
+    const std::string text =
+        fmt::format("held-out rms {:.4f} mm before ({}), {:.4f} mm after, on the same {} poses",
+                    to_mm(gain.rms_before), name_of(present_), to_mm(gain.rms_after), gain.poses);
     GateFigures figures = figures_of(gain);
     if (why.empty()) {
-      return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text, gain.z(),
-                               PairedGain::kBeyondChance),
+      return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text,
+                               gain.z(), PairedGain::kBeyondChance),
                    figures);
     }
     if (clearly_worse(turns, options_.accept_ratio, candidate_.cell().tracker.sigma_rotation))
-      return stays(fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)), figures);
-    if (const std::string better = better_before(figures); !better.empty()) return stays(text + ": " + better, figures);
+      return stays(
+          fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)),
+          figures);
+    if (const std::string better = better_before(figures); !better.empty())
+      return stays(text + ": " + better, figures);
     return yes(fmt::format("{}: {}", text, why), figures);
   }
 
   static std::string in_words(const PairedGain& turns) {
-    return fmt::format("{:.4f} deg, before {:.4f} deg", to_deg(turns.rms_after), to_deg(turns.rms_before));
+    return fmt::format("{:.4f} deg, before {:.4f} deg", to_deg(turns.rms_after),
+                       to_deg(turns.rms_before));
   }
 
-  /// What was served once and is better than the candidate on the same poses; empty where nothing is. Sets the limit
-  /// that it is.
+  /// What was served once and is better than the candidate on the same poses; empty where nothing
+  /// is. Sets the limit that it is.
   [[nodiscard]] std::string better_before(GateFigures& figures) const {
     for (const ServedModel& other : served_before_) {
-      const PairedGain gain = gain_of(rows_of(other.model, sessions_).position, after_.position, inside_, judges_);
+      const PairedGain gain =
+          gain_of(rows_of(other.model, sessions_).position, after_.position, inside_, judges_);
       if (gain.poses > 0 && gain.rms_after > options_.accept_ratio * gain.rms_before) {
         figures.limit = options_.accept_ratio * gain.rms_before;
-        return fmt::format("{} has {:.4f} mm on them, limit {} x that", name_of(other), to_mm(gain.rms_before),
-                           options_.accept_ratio);
+        return fmt::format("{} has {:.4f} mm on them, limit {} x that", name_of(other),
+                           to_mm(gain.rms_before), options_.accept_ratio);
       }
     }
     return "";
@@ -321,8 +353,8 @@ class Duel {
   Columns shared_, inside_, outside_, new_tools_;
 };
 
-/// The judges whose tools the candidate knows, in its world: each set-up of the instrument from where the candidate
-/// found that it stood.
+/// The judges whose tools the candidate knows, in its world: each set-up of the instrument from
+/// where the candidate found that it stood.
 MeasurementBatch judges_in_world(const GateQuestion& question) {
   MeasurementBatch all = question.sessions.back().judges;
   all.measurements.clear();
@@ -339,8 +371,8 @@ MeasurementBatch judges_in_world(const GateQuestion& question) {
   return all;
 }
 
-/// The first of its cell: it must beat the nominal model as the cell file has it, and not be worse than the nominal arm
-/// in the same place.
+/// The first of its cell: it must beat the nominal model as the cell file has it, and not be worse
+/// than the nominal arm in the same place.
 GateVerdict judge_first(const GateQuestion& question, const GateOptions& options) {
   const MeasurementBatch all = judges_in_world(question);
   if (all.measurements.empty()) return no("no pose that was held out has its tools", {}, kAdvice);
@@ -353,15 +385,18 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   for (Eigen::Index i = 0; i < nominal.position.cols(); ++i) columns.push_back(i);
   const PairedGain arm = gain_of(nominal.position, compensated.position, columns, judges);
   const PairedGain turns = gain_of(nominal.rotation, compensated.rotation, columns, judges);
-  const bool better = options.bar == Bar::kBetterBeyondChance ? gain.beyond_chance() : gain.rms_after < gain.rms_before;
-  const std::string text = fmt::format("held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", to_mm(gain.rms_after),
-                                       to_mm(gain.rms_before), gain.poses);
+  const bool better = options.bar == Bar::kBetterBeyondChance ? gain.beyond_chance()
+                                                              : gain.rms_after < gain.rms_before;
+  const std::string text = fmt::format("held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses",
+                                       to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses);
   const GateFigures figures = figures_of(gain);
   if (!better) return no(text + ": not better", figures, kAdvice);
   if (arm.rms_after > options.accept_ratio * arm.rms_before && arm.z() < kUnclear) {
-    return no(fmt::format("{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)", text,
-                          to_mm(arm.rms_after), to_mm(arm.rms_before)),
-              figures);
+    return no(
+        fmt::format(
+            "{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)",
+            text, to_mm(arm.rms_after), to_mm(arm.rms_before)),
+        figures);
   }
   if (clearly_worse(turns, options.accept_ratio, question.candidate.cell().tracker.sigma_rotation))
     return no(fmt::format("{}: its orientations are worse ({:.4f} deg, nominal {:.4f} deg)", text,
@@ -370,7 +405,8 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   return yes(text, figures);
 }
 
-/// How many times farther off than expected the median judge of the session is; not a number where it knows none.
+/// How many times farther off than expected the median judge of the session is; not a number where
+/// it knows none.
 double misfit(const CompensatedModel& model, const JudgingSession& session) {
   const LocatedErrors errors = located_errors(model, session);
   std::vector<double> squares;
@@ -379,7 +415,9 @@ double misfit(const CompensatedModel& model, const JudgingSession& session) {
       squares.push_back(3 * errors.position.col(i).squaredNorm() / std::pow(errors.expected(i), 2));
   }
   if (squares.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::nth_element(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2), squares.end());
+  std::nth_element(squares.begin(),
+                   squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2),
+                   squares.end());
   return std::sqrt(squares[squares.size() / 2] / kMedianOfChiSquare);
 }
 
@@ -387,11 +425,13 @@ double misfit(const CompensatedModel& model, const JudgingSession& session) {
 
 namespace {
 
-/// The names of the sessions before the last change that the model knows of; none where it knows of none.
+/// The names of the sessions before the last change that the model knows of; none where it knows of
+/// none.
 std::set<std::string> before_last_change(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   std::size_t last = 0;
-  for (const Change& change : parts.changes) last = std::max(last, is_of_one_session(change) ? 0 : change.session);
+  for (const Change& change : parts.changes)
+    last = std::max(last, is_of_one_session(change) ? 0 : change.session);
   std::set<std::string> names;
   for (std::size_t s = 0; s < last; ++s) names.insert(parts.sessions[s].id);
   return names;
@@ -409,14 +449,15 @@ std::set<std::string> measured_apart(const CompensatedModel& model) {
 JudgingSession without(const std::set<std::string>& names, JudgingSession session) {
   const bool divided = has_sessions(session.judges);
   std::erase_if(session.judges.measurements, [&](const Measurement& m) {
-    const std::string& name = divided ? session.judges.sessions[static_cast<std::size_t>(m.session)] : session.batch_id;
+    const std::string& name =
+        divided ? session.judges.sessions[static_cast<std::size_t>(m.session)] : session.batch_id;
     return names.contains(name) || names.contains(session.batch_id + "/" + name);
   });
   return session;
 }
 
-/// What was measured since the arm changed for the last time, by either model: rows before it do not judge, and none
-/// that were measured with a reflector that sat elsewhere.
+/// What was measured since the arm changed for the last time, by either model: rows before it do
+/// not judge, and none that were measured with a reflector that sat elsewhere.
 std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
   std::set<std::string> before = before_last_change(question.candidate);
   std::set<std::string> apart = measured_apart(question.candidate);
@@ -457,7 +498,8 @@ std::vector<JudgingSession> sessions_of_today(const GateQuestion& question) {
   if (since.size() < question.sessions.size() || question.in_force == nullptr) return since;
   const std::vector<JudgingSession>& all = since;
   std::vector<bool> strange;
-  for (const JudgingSession& s : all) strange.push_back(misfit(question.in_force->model, s) > kStillFits);
+  for (const JudgingSession& s : all)
+    strange.push_back(misfit(question.in_force->model, s) > kStillFits);
   std::size_t first = all.size();
   while (first > question.first_new && strange[first - 1]) --first;
   std::vector<JudgingSession> today(all.begin() + static_cast<std::ptrdiff_t>(first), all.end());
@@ -473,8 +515,8 @@ GateVerdict judge(const GateQuestion& question, const GateOptions& options) {
   const std::vector<const Measurement*> judges = judges_in(question.sessions);
   if (judges.empty()) return no("no pose was held out to judge it", {}, kAdvice);
   const Rows rows = rows_of(question.candidate, question.sessions);
-  const bool overflows =
-      std::any_of(judges.begin(), judges.end(), [&, i = Eigen::Index{0}](const Measurement* m) mutable {
+  const bool overflows = std::any_of(
+      judges.begin(), judges.end(), [&, i = Eigen::Index{0}](const Measurement* m) mutable {
         const Eigen::Index at = i++;
         return knows(question.candidate, *m) && !rows.position.col(at).allFinite();
       });

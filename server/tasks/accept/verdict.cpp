@@ -11,26 +11,33 @@ namespace trammel {
 
 namespace {
 
-/// Where among `sessions` those begin that came after `model` was trained: behind its own batches, or, where none of
-/// these is among them, behind all that was measured before it.
+/// Where among `sessions` those begin that came after `model` was trained: behind its own batches,
+/// or, where none of these is among them, behind all that was measured before it.
 std::size_t first_new(const std::vector<JudgingSession>& sessions, const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
   const auto behind = [&](const auto& is_old) {
-    return static_cast<std::size_t>(sessions.rend() - std::find_if(sessions.rbegin(), sessions.rend(), is_old));
+    return static_cast<std::size_t>(sessions.rend() -
+                                    std::find_if(sessions.rbegin(), sessions.rend(), is_old));
   };
-  const std::size_t own = behind([&](const JudgingSession& one) { return one.batch_id == provenance.batch_id; });
+  const std::size_t own =
+      behind([&](const JudgingSession& one) { return one.batch_id == provenance.batch_id; });
   if (own > 0) return own;
   const std::string several = "+" + provenance.batch_id + "+";  // joined by plus signs
-  const std::size_t last =
-      behind([&](const JudgingSession& one) { return several.find("+" + one.batch_id + "+") != std::string::npos; });
+  const std::size_t last = behind([&](const JudgingSession& one) {
+    return several.find("+" + one.batch_id + "+") != std::string::npos;
+  });
   if (last > 0) return last;
   const std::int64_t made_at = provenance.measured_at.value_or(provenance.trained_at);
-  return behind([&](const JudgingSession& session) { return session.training.measured_at.value_or(0) <= made_at; });
+  return behind([&](const JudgingSession& session) {
+    return session.training.measured_at.value_or(0) <= made_at;
+  });
 }
 
-/// Where the version marked in force cannot be asked: against what its own held-out poses said when it was made.
+/// Where the version marked in force cannot be asked: against what its own held-out poses said when
+/// it was made.
 GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInForce& record,
-                            const std::vector<JudgingSession>& sessions, double accept_ratio, GateVerdict otherwise) {
+                            const std::vector<JudgingSession>& sessions, double accept_ratio,
+                            GateVerdict otherwise) {
   double sum = 0;
   Eigen::Index count = 0;
   for (const JudgingSession& session : sessions) {
@@ -44,29 +51,35 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
   const double rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
   if (record.validation_rms == 0 || rms <= accept_ratio * record.validation_rms) return otherwise;
   const std::string why = fmt::format(
-      "held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its own, which is marked in force but "
-      "cannot "
-      "be loaded",
+      "held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its own, which is "
+      "marked in force but cannot be loaded",
       to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version);
   const double limit = accept_ratio * record.validation_rms;
-  return {false, "not in force: " + why + "; activate it if it is wanted", false, why, {{}, rms, limit}};
+  return {false,
+          "not in force: " + why + "; activate it if it is wanted",
+          false,
+          why,
+          {{}, rms, limit}};
 }
 
 /// Whatever the judges say: its notes keep it from being put in force by itself.
 GateVerdict left_to_a_person(const Note& stop, GateFigures figures) {
-  return {false, "not in force: " + stop.text + "; activate it if it is right", true, stop.text, std::move(figures)};
+  return {false, "not in force: " + stop.text + "; activate it if it is right", true, stop.text,
+          std::move(figures)};
 }
 
 }  // namespace
 
 GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
-                       std::vector<ServedModel> served_before, const std::optional<RecordInForce>& record,
+                       std::vector<ServedModel> served_before,
+                       const std::optional<RecordInForce>& record,
                        const std::vector<JudgingSession>& sessions, const GateOptions& options) {
   GateQuestion question{candidate, in_force, std::move(served_before), sessions, 0};
   if (in_force != nullptr) question.first_new = first_new(sessions, in_force->model);
   GateVerdict verdict = judge(question, options);
   if (!verdict.put_in_force) return verdict;
-  if (const auto stop = stop_of(candidate)) return left_to_a_person(*stop, std::move(verdict.figures));
+  if (const auto stop = stop_of(candidate))
+    return left_to_a_person(*stop, std::move(verdict.figures));
   if (!record) return verdict;
   return judge_by_record(candidate, *record, sessions, options.accept_ratio, std::move(verdict));
 }

@@ -12,7 +12,8 @@ namespace trammel {
 /// What the store says of a version that is marked in force and cannot be loaded.
 struct RecordInForce {
   int version = 0;
-  double validation_rms = 0;  ///< m, on its own held-out poses when it was made; 0: nothing was held out
+  double validation_rms =
+      0;  ///< m, on its own held-out poses when it was made; 0: nothing was held out
 };
 
 /// A version of a cell's model as the store has it.
@@ -23,17 +24,22 @@ struct ModelText {
 
 /// What a candidate is held against.
 struct Opponents {
-  std::optional<ModelText> in_force;     ///< none: it is the first model of its cell, or that one cannot be loaded
-  std::vector<ModelText> served_before;  ///< the last one first; those that do not load do not count
-  std::size_t most_before = 0;           ///< of those that load, how many count
-  std::optional<RecordInForce> record;   ///< of a version marked in force that cannot be loaded
+  std::optional<ModelText>
+      in_force;  ///< none: it is the first model of its cell, or that one cannot be loaded
+  std::vector<ModelText>
+      served_before;                    ///< the last one first; those that do not load do not count
+  std::size_t most_before = 0;          ///< of those that load, how many count
+  std::optional<RecordInForce> record;  ///< of a version marked in force that cannot be loaded
 };
 
-/// judge() of the candidate with the sessions that came after `in_force` (null: none) told from those before; and where
-/// the version marked in force cannot be asked, against its record. A model with a stop_of() is
-/// never put in force: it is undecided, a person decides. `sessions`: oldest first.
+/// judge() of the candidate with the sessions that came after `in_force` (null: none) told from
+/// those before; and where the version marked in force cannot be asked, against its record. A model
+/// with a stop_of() is never put in force: it is undecided, a person decides. `sessions`: oldest
+/// first.
 [[nodiscard]] GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
-                                     std::vector<ServedModel> served_before, const std::optional<RecordInForce>& record,
-                                     const std::vector<JudgingSession>& sessions, const GateOptions& options);
+                                     std::vector<ServedModel> served_before,
+                                     const std::optional<RecordInForce>& record,
+                                     const std::vector<JudgingSession>& sessions,
+                                     const GateOptions& options);
 
 }  // namespace trammel

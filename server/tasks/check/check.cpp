@@ -6,8 +6,8 @@
 
 namespace trammel {
 
-Result<HealthCheck> check_robot(const CompensatedModel& model, const Cell& cell, const CheckedBatch& batch,
-                                CheckAsked asked) {
+Result<HealthCheck> check_robot(const CompensatedModel& model, const Cell& cell,
+                                const CheckedBatch& batch, CheckAsked asked) {
   const CellRules rules = TRY(rules_of(cell));
   HealthOptions options;
   options.tolerance = asked.tolerance.value_or(rules.tolerance.value_or(kUsualTolerance));

@@ -14,7 +14,8 @@ struct CheckAsked {
   std::vector<DriftSeen> earlier = {};   ///< what checks before it saw
 };
 
-/// check_health() as every door asks it. The tolerance is that of `cell`: the model's, or as its file is now.
+/// check_health() as every door asks it. The tolerance is that of `cell`: the model's, or as its
+/// file is now.
 [[nodiscard]] Result<HealthCheck> check_robot(const CompensatedModel& model, const Cell& cell,
                                               const CheckedBatch& batch, CheckAsked asked);
 

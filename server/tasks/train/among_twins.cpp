@@ -21,8 +21,8 @@ class Expected final : public ErrorSource {
   int joint() const override { return source_->joint(); }
   std::optional<Search> search() const override { return source_->search(); }
   std::string explanation() const override { return source_->explanation(); }
-  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
-             StateJacobian* jacobian, int first_column) const override {
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
+             ArmState& state, StateJacobian* jacobian, int first_column) const override {
     source_->apply(context, values, state, jacobian, first_column);
   }
   [[nodiscard]] const ErrorSourcePtr& source() const { return source_; }
@@ -52,12 +52,14 @@ void expect(PhysicalModel& model, const std::vector<FleetParameter>& priors) {
 
 void as_drawn(PhysicalModel& model) {
   for (ErrorSourcePtr& source : model.sources) {
-    if (const auto* expected = dynamic_cast<const Expected*>(source.get())) source = ErrorSourcePtr(expected->source());
+    if (const auto* expected = dynamic_cast<const Expected*>(source.get()))
+      source = ErrorSourcePtr(expected->source());
   }
 }
 
 /// Every combination of the forms that the causes have.
-std::vector<std::vector<std::string>> forms_of(const std::vector<std::string>& sources, const Cell& cell) {
+std::vector<std::vector<std::string>> forms_of(const std::vector<std::string>& sources,
+                                               const Cell& cell) {
   std::vector<std::vector<std::string>> all = {{}};
   for (const std::string& spec : sources) {
     std::vector<std::vector<std::string>> longer;
@@ -73,8 +75,10 @@ std::vector<std::vector<std::string>> forms_of(const std::vector<std::string>& s
 }
 
 /// Of the forms the one under which the data are most likely.
-Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                                     const MeasurementBatch& batch, const std::vector<FleetParameter>& priors) {
+Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell,
+                                     const std::vector<std::string>& sources,
+                                     const MeasurementBatch& batch,
+                                     const std::vector<FleetParameter>& priors) {
   std::optional<CalibrationResult> best;
   for (const std::vector<std::string>& forms : forms_of(sources, *cell)) {
     PhysicalModel model = TRY(make_physical_model(cell, forms));
@@ -87,8 +91,8 @@ Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell, co
   return std::move(*best);
 }
 
-/// What the poses by themselves found, drawn towards the twins: linear, so that a prior that is far off shows in full.
-/// Where it was fitted anew, its misfit would be taken for noise.
+/// What the poses by themselves found, drawn towards the twins: linear, so that a prior that is far
+/// off shows in full. Where it was fitted anew, its misfit would be taken for noise.
 struct Drawn {
   std::vector<IdentifiedParameter> parameters;
   Eigen::MatrixXd covariance;
@@ -109,7 +113,9 @@ Drawn drawn_to(const CalibrationResult& alone, const std::vector<FleetParameter>
   Drawn drawn{alone.parameters, {}};
   for (Eigen::Index k = 0; k < P; ++k) {
     IdentifiedParameter& one = drawn.parameters[static_cast<std::size_t>(k)];
-    const auto named = [&](const FleetParameter& prior) { return prior.name == one.parameter.name; };
+    const auto named = [&](const FleetParameter& prior) {
+      return prior.name == one.parameter.name;
+    };
     const auto prior = std::find_if(priors.begin(), priors.end(), named);
     if (prior == priors.end()) continue;
     const double expected = scale(k) * scale(k) / (prior->next_stddev() * prior->next_stddev());
@@ -120,7 +126,8 @@ Drawn drawn_to(const CalibrationResult& alone, const std::vector<FleetParameter>
   }
   const Eigen::LDLT<Eigen::MatrixXd> factor(precision);
   const Eigen::VectorXd mean = factor.solve(weighted);
-  for (Eigen::Index k = 0; k < P; ++k) drawn.parameters[static_cast<std::size_t>(k)].value = mean(k) * scale(k);
+  for (Eigen::Index k = 0; k < P; ++k)
+    drawn.parameters[static_cast<std::size_t>(k)].value = mean(k) * scale(k);
   covariance = factor.solve(Eigen::MatrixXd::Identity(P, P));
   drawn.covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
   return drawn;
@@ -129,7 +136,8 @@ Drawn drawn_to(const CalibrationResult& alone, const std::vector<FleetParameter>
 }  // namespace
 
 Result<CalibrationResult> calibrate_among_twins(const std::shared_ptr<const Cell>& cell,
-                                                const std::vector<std::string>& sources, const MeasurementBatch& batch,
+                                                const std::vector<std::string>& sources,
+                                                const MeasurementBatch& batch,
                                                 const FleetPrior& fleet) {
   Result<CalibrationResult> alone = calibrate(cell, sources, batch, {});
   if (!alone) return alone;
@@ -138,11 +146,13 @@ Result<CalibrationResult> calibrate_among_twins(const std::shared_ptr<const Cell
     const Drawn drawn = drawn_to(*alone, priors);
     const std::vector<Unlike> unlike = unlike_twins(drawn.parameters, drawn.covariance, fleet);
     const auto is_drawn = [&](const Unlike& one) {
-      return std::any_of(priors.begin(), priors.end(), [&](const auto& prior) { return prior.name == one.parameter; });
+      return std::any_of(priors.begin(), priors.end(),
+                         [&](const auto& prior) { return prior.name == one.parameter; });
     };
     const auto odd = std::find_if(unlike.begin(), unlike.end(), is_drawn);
     if (odd != unlike.end()) {
-      std::erase_if(priors, [&](const FleetParameter& prior) { return prior.name == odd->parameter; });
+      std::erase_if(priors,
+                    [&](const FleetParameter& prior) { return prior.name == odd->parameter; });
       continue;
     }
     Result<CalibrationResult> result = calibrated(cell, sources, batch, priors);

@@ -25,17 +25,21 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kMostBlocks = 5;
 constexpr std::size_t kLeastBlocks = 3;
-constexpr std::size_t kLeastRows = 12;  // of a block: the instrument's place takes six numbers of their 36
-constexpr Index kNeighbours = 10;       // rows that count as one for the interval
-constexpr double kPlace = 6;            // numbers that are fitted to each block
+constexpr std::size_t kLeastRows =
+    12;  // of a block: the instrument's place takes six numbers of their 36
+constexpr Index kNeighbours = 10;  // rows that count as one for the interval
+constexpr double kPlace = 6;       // numbers that are fitted to each block
 
 /// Index of each pose at which something began, in order.
-std::vector<int> beginnings_of(const std::vector<std::string>& sources, bool of_the_instrument_too) {
+std::vector<int> beginnings_of(const std::vector<std::string>& sources,
+                               bool of_the_instrument_too) {
   std::vector<int> all;
   for (const std::string& source : sources) {
     const CauseRecord* cause = find_cause(source);
     const std::size_t at = source.find('@');
-    if (cause == nullptr || cause->lasting != causes::Lasting::kFromAPose || at == std::string::npos) continue;
+    if (cause == nullptr || cause->lasting != causes::Lasting::kFromAPose ||
+        at == std::string::npos)
+      continue;
     if (cause->scope == causes::Scope::kSession && !of_the_instrument_too) continue;
     all.push_back(std::atoi(source.c_str() + at + 1) - 1);
   }
@@ -43,14 +47,16 @@ std::vector<int> beginnings_of(const std::vector<std::string>& sources, bool of_
   return all;
 }
 
-/// Number of the block of each row. A block is contiguous within each stretch between two beginnings, and takes the
-/// same share of each: so much as a model has seen of the robot as it is now, it sees in every fold. None goes across
-/// sessions.
-std::vector<std::size_t> blocks_of(const std::vector<Measurement>& rows, const std::vector<int>& beginnings) {
+/// Number of the block of each row. A block is contiguous within each stretch between two
+/// beginnings, and takes the same share of each: so much as a model has seen of the robot as it is
+/// now, it sees in every fold. None goes across sessions.
+std::vector<std::size_t> blocks_of(const std::vector<Measurement>& rows,
+                                   const std::vector<int>& beginnings) {
   const std::size_t n = rows.size();
   const std::size_t most = std::clamp<std::size_t>(n / kLeastRows, 1, kMostBlocks);
   const auto stretch = [&](std::size_t i) {
-    return std::upper_bound(beginnings.begin(), beginnings.end(), rows[i].context.index) - beginnings.begin();
+    return std::upper_bound(beginnings.begin(), beginnings.end(), rows[i].context.index) -
+           beginnings.begin();
   };
   const bool sessions = rows.front().session != rows.back().session;
   std::vector<std::size_t> blocks(n);
@@ -73,9 +79,11 @@ MeasurementBatch without_session(const MeasurementBatch& rows, int session) {
 }
 
 /// As train() does it.
-Result<CalibrationResult> identified(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+Result<CalibrationResult> identified(const std::shared_ptr<const Cell>& cell,
+                                     const std::vector<std::string>& sources,
                                      const MeasurementBatch& train) {
-  return calibrate(cell, with_unknown_tool(sources, *cell), train, {.held = {}, .weigh_links = true});
+  return calibrate(cell, with_unknown_tool(sources, *cell), train,
+                   {.held = {}, .weigh_links = true});
 }
 
 PoseContext as_served(PoseContext context) {
@@ -89,8 +97,8 @@ Vector3 seen_standing(const PhysicalModel& model, const Measurement& m) {
   return X_moved.inverse() * m.p_W;
 }
 
-/// What a model leaves of a block, wherever the instrument stands. Fewer numbers than errors: brought to the size that
-/// rows have which nothing was fitted to.
+/// What a model leaves of a block, wherever the instrument stands. Fewer numbers than errors:
+/// brought to the size that rows have which nothing was fitted to.
 Result<Matrix3Xd> left_of(const PhysicalModel& model, const MeasurementBatch& block) {
   const auto n = static_cast<Index>(block.measurements.size());
   Matrix3Xd measured(3, n);
@@ -113,10 +121,12 @@ DayGain day_gain(const Matrix3Xd& before, const Matrix3Xd& after) {
   const double ratio = day.gain.rms_after / day.gain.rms_before;
   const VectorXd b = before.colwise().squaredNorm();
   const VectorXd a = after.colwise().squaredNorm();
-  const VectorXd influence = 0.5 * (a / a.sum() - b / b.sum());  // of each row, on the logarithm of the ratio
+  const VectorXd influence =
+      0.5 * (a / a.sum() - b / b.sum());  // of each row, on the logarithm of the ratio
   double variance = 0;
   for (Index first = 0; first < influence.size(); first += kNeighbours) {
-    const double sum = influence.segment(first, std::min(kNeighbours, influence.size() - first)).sum();
+    const double sum =
+        influence.segment(first, std::min(kNeighbours, influence.size() - first)).sum();
     variance += sum * sum;
   }
   const double spread = 2 * std::sqrt(variance);
@@ -129,14 +139,17 @@ DayGain day_gain(const Matrix3Xd& before, const Matrix3Xd& after) {
 std::string to_string(const DayGain& day) {
   const auto percent = [](double share) { return std::round(100 * share); };
   return fmt::format(
-      "another day ({} blocks of time held out, instrument set up anew): {:.4f} mm rms, before {:.4f} mm: {:.0f} % "
-      "{}, 95 % between {:.0f} and {:.0f} %",
-      day.blocks, to_mm(day.gain.rms_after), to_mm(day.gain.rms_before), std::abs(percent(day.share)),
-      day.carries() ? "less" : "more", percent(day.lower), percent(day.upper));
+      "another day ({} blocks of time held out, instrument set up anew): {:.4f} mm rms, before "
+      "{:.4f} mm: {:.0f} % {}, 95 % between {:.0f} and {:.0f} %",
+      day.blocks, to_mm(day.gain.rms_after), to_mm(day.gain.rms_before),
+      std::abs(percent(day.share)), day.carries() ? "less" : "more", percent(day.lower),
+      percent(day.upper));
 }
 
-std::optional<AnotherDay> AnotherDay::make(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& rows,
-                                           const std::vector<std::string>& with, const std::set<int>& suspects) {
+std::optional<AnotherDay> AnotherDay::make(const std::shared_ptr<const Cell>& cell,
+                                           const MeasurementBatch& rows,
+                                           const std::vector<std::string>& with,
+                                           const std::set<int>& suspects) {
   if (has_gauges(rows)) return std::nullopt;
   if (rows.measurements.size() < kLeastBlocks * kLeastRows) return std::nullopt;
   const std::vector<std::size_t> block = blocks_of(rows.measurements, beginnings_of(with, true));

@@ -25,20 +25,22 @@ struct DayGain {
   [[nodiscard]] bool carries() const { return gain.rms_after <= kNoWorse * gain.rms_before; }
   static constexpr double kNoWorse = 1.01;  // equal models differ by as much
 };
-/// From the squared errors of the same rows, in their order. Neighbours may share an error: ten rows count as one.
+/// From the squared errors of the same rows, in their order. Neighbours may share an error: ten
+/// rows count as one.
 [[nodiscard]] DayGain day_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after);
-/// `another day (5 blocks of time held out, instrument set up anew): 0.0210 mm rms, before 0.0250 mm: 16 % less, 95 %
-/// between 10 and 21 %`.
+/// `another day (5 blocks of time held out, instrument set up anew): 0.0210 mm rms, before 0.0250
+/// mm: 16 % less, 95 % between 10 and 21 %`.
 [[nodiscard]] std::string to_string(const DayGain& day);
 
-/// Rows of a batch as another day would show them. Blocks of time, or whole sessions, are held out one after the
-/// other; the physics is identified on the rest. A block is judged as a service on another day is: what began at a pose
-/// has begun, earlier rows do not judge, and the instrument stands somewhere else.
+/// Rows of a batch as another day would show them. Blocks of time, or whole sessions, are held out
+/// one after the other; the physics is identified on the rest. A block is judged as a service on
+/// another day is: what began at a pose has begun, earlier rows do not judge, and the instrument
+/// stands somewhere else.
 class AnotherDay {
  public:
-  /// `with`: all that was found, by which the instrument's own motion is taken out of the rows. `suspects`: rows that
-  /// fit no model. Empty where there are too few rows for three blocks, or gauges among them, or no block can be
-  /// predicted.
+  /// `with`: all that was found, by which the instrument's own motion is taken out of the rows.
+  /// `suspects`: rows that fit no model. Empty where there are too few rows for three blocks, or
+  /// gauges among them, or no block can be predicted.
   [[nodiscard]] static std::optional<AnotherDay> make(const std::shared_ptr<const Cell>& cell,
                                                       const MeasurementBatch& rows,
                                                       const std::vector<std::string>& with,

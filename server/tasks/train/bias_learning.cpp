@@ -17,16 +17,20 @@ namespace {
 constexpr double kDomainQuantile = 0.995;  // of the training poses, each left out, count as known
 constexpr int kLeastBiasPoses = 10;
 
-/// A pose counts as known when its posterior-to-prior share is what training poses have when each is left out.
+/// A pose counts as known when its posterior-to-prior share is what training poses have when each
+/// is left out.
 double domain_limit(const BiasModel& bias) {
   Eigen::VectorXd share = bias.leave_one_out_prior_share();
   std::sort(share.begin(), share.end());
-  const auto place = static_cast<Eigen::Index>(kDomainQuantile * static_cast<double>(share.size() - 1));
+  const auto place =
+      static_cast<Eigen::Index>(kDomainQuantile * static_cast<double>(share.size() - 1));
   return share(place);
 }
 
-/// What a bias is learned from: what the physics of `parts` leaves over of `batch`, described as far as `kernel` asks.
-BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBatch& batch, bool described) {
+/// What a bias is learned from: what the physics of `parts` leaves over of `batch`, described as
+/// far as `kernel` asks.
+BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBatch& batch,
+                       bool described) {
   BiasProblem problem = leftover(parts.physics, batch);
   if (!described) return problem;
   const BiasPhysics physics(parts.physics);
@@ -34,9 +38,10 @@ BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBa
   return problem;
 }
 
-/// Of the orientations of `batch`, if all were measured: residual rotation vectors in B and sigma in rad, at the poses
-/// of `problem`.
-std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics, const MeasurementBatch& batch,
+/// Of the orientations of `batch`, if all were measured: residual rotation vectors in B and sigma
+/// in rad, at the poses of `problem`.
+std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics,
+                                            const MeasurementBatch& batch,
                                             const BiasProblem& problem) {
   BiasProblem rotation = problem;
   rotation.sigma.setConstant(physics.cell->tracker.sigma_rotation);
@@ -53,29 +58,33 @@ std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics, const 
 }
 
 /// The bias that is worth it, with the physics identified anew where observations are left out.
-Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, const BiasProblem& problem,
-                                             const BiasOptions& options, const LeftOut& left_out) {
-  ChosenBias chosen = TRY(choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
-    const auto without = left_out.without(observations);
-    return without ? std::optional(without->residual_B) : std::nullopt;
-  }));
+Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts,
+                                             const BiasProblem& problem, const BiasOptions& options,
+                                             const LeftOut& left_out) {
+  ChosenBias chosen =
+      TRY(choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
+        const auto without = left_out.without(observations);
+        return without ? std::optional(without->residual_B) : std::nullopt;
+      }));
   parts.bias_choice = std::move(chosen.choice);
   return std::move(chosen.model);
 }
 
-/// The orientation by a process of its own, of the same kernel: what is learned of the positions stays what it is.
-/// Where the kernel was chosen for the positions, it must be worth it here too.
-Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const BiasProblem& problem,
-                         const BiasOptions& options) {
+/// The orientation by a process of its own, of the same kernel: what is learned of the positions
+/// stays what it is. Where the kernel was chosen for the positions, it must be worth it here too.
+Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch,
+                         const BiasProblem& problem, const BiasOptions& options) {
   const std::optional<BiasProblem> rotation = rotation_problem(parts.physics, batch, problem);
   if (!rotation) {
-    parts.oriented_poses = static_cast<int>(std::count_if(batch.measurements.begin(), batch.measurements.end(),
-                                                          [](const Measurement& m) { return m.R_WT.has_value(); }));
+    parts.oriented_poses =
+        static_cast<int>(std::count_if(batch.measurements.begin(), batch.measurements.end(),
+                                       [](const Measurement& m) { return m.R_WT.has_value(); }));
     return {};
   }
   const BiasModel learned = TRY(BiasModel::fit(*rotation, options));
   if (parts.bias_choice && !is_worth_it(*rotation, learned)) {
-    parts.bias_choice->sentence += "; of the orientations it explains nothing beyond chance and corrects none";
+    parts.bias_choice->sentence +=
+        "; of the orientations it explains nothing beyond chance and corrects none";
     return {};
   }
   parts.rotation_bias = learned.state();
@@ -94,11 +103,13 @@ void forget_bias(CompensatedModel::Parts& parts) {
   parts.bias_spread = 1;
 }
 
-/// What does not fit the others is not learned: a smooth function would spread it over its neighbours.
+/// What does not fit the others is not learned: a smooth function would spread it over its
+/// neighbours.
 MeasurementBatch without_suspects(const CompensatedModel::Parts& parts, MeasurementBatch batch) {
   std::erase_if(batch.measurements, [&](const Measurement& m) {
-    return std::any_of(parts.suspects.begin(), parts.suspects.end(),
-                       [&](const SuspectPose& pose) { return pose.pose_id == m.pose_id && pose.row == m.row; });
+    return std::any_of(parts.suspects.begin(), parts.suspects.end(), [&](const SuspectPose& pose) {
+      return pose.pose_id == m.pose_id && pose.row == m.row;
+    });
   });
   return batch;
 }
@@ -109,8 +120,8 @@ struct Learned {
 };
 
 /// Of the kernel in `options`.
-Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const LeftOut& left_out,
-                             const BiasOptions& options) {
+Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch,
+                             const LeftOut& left_out, const BiasOptions& options) {
   if (options.kernel == kAutoBias) {
     BiasProblem problem = problem_of(parts, batch, true);
     std::optional<BiasModel> chosen = TRY(chosen_bias(parts, problem, options, left_out));
@@ -138,7 +149,8 @@ void take_over(CompensatedModel::Parts& parts, const BiasModel& bias, const Meas
                const LeftOut& left_out) {
   parts.bias = bias.state();
   parts.bias->features.clear();
-  if (bias.has_blocks()) parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, bias);
+  if (bias.has_blocks())
+    parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, bias);
   if (bias.needs_features()) {
     for (const Measurement& m : batch.measurements)
       parts.bias_contexts.push_back(without_what_nobody_asks(m.context, parts.physics));
@@ -148,18 +160,21 @@ void take_over(CompensatedModel::Parts& parts, const BiasModel& bias, const Meas
 
 }  // namespace
 
-Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, const std::string& kernel,
-                const LeftOut& left_out, std::uint64_t seed, const std::function<bool(double)>& progress) {
+Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all,
+                const std::string& kernel, const LeftOut& left_out, std::uint64_t seed,
+                const std::function<bool(double)>& progress) {
   forget_bias(parts);
   if (kernel == "none") return {};
   const MeasurementBatch batch = without_suspects(parts, all);
   if (batch.measurements.size() < kLeastBiasPoses && kernel == kAutoBias) {
-    const std::string why = fmt::format("no bias: {} poses are too few to learn one from", batch.measurements.size());
+    const std::string why =
+        fmt::format("no bias: {} poses are too few to learn one from", batch.measurements.size());
     parts.bias_choice = BiasChoice{"none", {}, why};
     return {};
   }
   if (batch.measurements.size() < kLeastBiasPoses) {
-    return refused("{} poses to learn a bias from, at least {} are needed", batch.measurements.size(), kLeastBiasPoses)
+    return refused("{} poses to learn a bias from, at least {} are needed",
+                   batch.measurements.size(), kLeastBiasPoses)
         .in("batch " + batch.id)
         .beyond(batch.measurements.size(), kLeastBiasPoses)
         .next("measure more, or say bias: none");

@@ -19,7 +19,8 @@ constexpr double kLargestLog = 2.3;   // f 10: beyond it the bias is wrong, not 
 constexpr int kThirds = 40;           // of that interval that the search narrows down
 constexpr double kNothing = 1e-4;     // of log f
 
-/// Of the poses left out: squares of what is missed, and what is said of them. All m², sums of three coordinates.
+/// Of the poses left out: squares of what is missed, and what is said of them. All m², sums of
+/// three coordinates.
 struct Missed {
   std::vector<double> square, uncertain, instrument;
 };
@@ -32,17 +33,18 @@ std::vector<BiasFeatures> at(const std::vector<BiasFeatures>& all, const std::ve
   return some;
 }
 
-/// What is uncertain of a pose left out: the bias, what it takes for noise beyond the instrument's, and the parameters
-/// as far as it does not know them (`identified`, m² of a coordinate).
+/// What is uncertain of a pose left out: the bias, what it takes for noise beyond the instrument's,
+/// and the parameters as far as it does not know them (`identified`, m² of a coordinate).
 double uncertain(const BiasPrediction& bias, double instrument, double identified) {
   const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();
-  return bias.covariance_B.trace() + (noise.array() - instrument).max(0.0).sum() + 3 * bias.prior_share * identified;
+  return bias.covariance_B.trace() + (noise.array() - instrument).max(0.0).sum() +
+         3 * bias.prior_share * identified;
 }
 
-/// Adds every fifth pose from `first` on, with all rows of its joint vector; false where nothing can be said without
-/// them.
-bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_parameters, const LeftOut& left_out,
-              Index first, Missed& missed) {
+/// Adds every fifth pose from `first` on, with all rows of its joint vector; false where nothing
+/// can be said without them.
+bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_parameters,
+              const LeftOut& left_out, Index first, Missed& missed) {
   std::vector<Index> block, rest;
   const std::vector<PoseGroup> poses = pose_groups(problem.q);
   for (Index p = 0; p < std::ssize(poses); ++p) {
@@ -52,15 +54,16 @@ bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_p
   }
   const auto without = left_out.without(block);
   if (!without) return false;
-  const BiasProblem fewer{problem.q(rest, Eigen::all), without->residual_B(rest, Eigen::all), problem.sigma(rest),
-                          at(problem.features, rest)};
+  const BiasProblem fewer{problem.q(rest, Eigen::all), without->residual_B(rest, Eigen::all),
+                          problem.sigma(rest), at(problem.features, rest)};
   const Result<BiasModel> bias = BiasModel::fit(fewer, options);
   if (!bias) return false;
   const auto said = bias->predict_all(problem.q(block, Eigen::all), at(problem.features, block));
   for (std::size_t k = 0; k < block.size(); ++k) {
     const double instrument = std::pow(problem.sigma(block[k]), 2);
     const double identified = has_parameters ? 0 : without->variance(static_cast<Index>(k));
-    missed.square.push_back((without->residual_B.row(block[k]).transpose() - said[k].mean_B).squaredNorm());
+    missed.square.push_back(
+        (without->residual_B.row(block[k]).transpose() - said[k].mean_B).squaredNorm());
     missed.uncertain.push_back(uncertain(said[k], instrument, identified));
     missed.instrument.push_back(3 * instrument);
   }
@@ -77,8 +80,8 @@ double misfit(const Missed& missed, double log_f) {
   return sum;
 }
 
-/// The likeliest f from 1 on. Where what is uncertain is small beside the instrument's noise, hundreds of poses say
-/// little of it, and it stays near 1.
+/// The likeliest f from 1 on. Where what is uncertain is small beside the instrument's noise,
+/// hundreds of poses say little of it, and it stays near 1.
 double likeliest_spread(const Missed& missed) {
   double low = 0, high = kLargestLog;
   for (int k = 0; k < kThirds; ++k) {
@@ -94,8 +97,8 @@ double likeliest_spread(const Missed& missed) {
 
 }  // namespace
 
-double bias_spread(const BiasProblem& problem, const BiasModel& bias, const LeftOut& left_out, std::uint64_t seed,
-                   const std::function<bool(double)>& progress) {
+double bias_spread(const BiasProblem& problem, const BiasModel& bias, const LeftOut& left_out,
+                   std::uint64_t seed, const std::function<bool(double)>& progress) {
   if (problem.q.rows() > kMostObservations || left_out.size() != problem.q.rows()) return 1;
   BiasOptions options;
   options.kernel = bias.state().kernel;
@@ -103,8 +106,11 @@ double bias_spread(const BiasProblem& problem, const BiasModel& bias, const Left
   options.seed = seed;
   Missed missed;
   for (Index fold = 0; fold < kFolds; ++fold) {
-    options.progress = [&](double share) { return progress((static_cast<double>(fold) + share) / kFolds); };
-    if (!add_fold(problem, options, spelled_bias(bias.state().kernel)->has("parameters"), left_out, fold, missed))
+    options.progress = [&](double share) {
+      return progress((static_cast<double>(fold) + share) / kFolds);
+    };
+    if (!add_fold(problem, options, spelled_bias(bias.state().kernel)->has("parameters"), left_out,
+                  fold, missed))
       return 1;
   }
   return likeliest_spread(missed);

@@ -8,17 +8,20 @@
 
 namespace trammel {
 
-/// How many times as far a bias misses poses that it was not learned from as its covariance says; at least 1, and 1 of
-/// more than 200 observations. Hyperparameters that were found from few poses are taken for exact by every prediction,
-/// and fit these poses better than others. Fifths of the poses are left out by turns, the physics and the
-/// hyperparameters found without them (Stone 1974).
+/// How many times as far a bias misses poses that it was not learned from as its covariance says;
+/// at least 1, and 1 of more than 200 observations. Hyperparameters that were found from few poses
+/// are taken for exact by every prediction, and fit these poses better than others. Fifths of the
+/// poses are left out by turns, the physics and the hyperparameters found without them (Stone
+/// 1974).
 ///
-/// Model: what is missed of a coordinate is normal with the variance f² v + sigma², v what bias and parameters leave
-/// uncertain, sigma the instrument's. f is as large as makes the sum of squares what it is expected to be.
+/// Model: what is missed of a coordinate is normal with the variance f² v + sigma², v what bias and
+/// parameters leave uncertain, sigma the instrument's. f is as large as makes the sum of squares
+/// what it is expected to be.
 ///
-/// `problem`: what `bias` was fitted to; `left_out`: of the same poses. 1 where too little is left to identify from, or
-/// where `progress` gives up.
-[[nodiscard]] double bias_spread(const BiasProblem& problem, const BiasModel& bias, const LeftOut& left_out,
-                                 std::uint64_t seed, const std::function<bool(double share)>& progress);
+/// `problem`: what `bias` was fitted to; `left_out`: of the same poses. 1 where too little is left
+/// to identify from, or where `progress` gives up.
+[[nodiscard]] double bias_spread(const BiasProblem& problem, const BiasModel& bias,
+                                 const LeftOut& left_out, std::uint64_t seed,
+                                 const std::function<bool(double share)>& progress);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSupportShare = 0.25;  // of the progress of an extended model; the rest is its training
+constexpr double kSupportShare =
+    0.25;  // of the progress of an extended model; the rest is its training
 constexpr double kExtendedShare = 0.6;  // of that of an extension; the rest is the model beside it
 
 bool contains(const std::vector<std::string>& list, const std::string& word) {
@@ -28,7 +29,8 @@ TrainOptions as_part(TrainOptions options, double from, double to) {
   return options;
 }
 
-/// From a batch that the diagnosis has looked at: another tool, which a training refuses, may be what it found.
+/// From a batch that the diagnosis has looked at: another tool, which a training refuses, may be
+/// what it found.
 Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                  const std::vector<std::string>& sources, TrainOptions options) {
   options.looked_at = true;
@@ -36,7 +38,8 @@ Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const 
   return train(cell, batch, options);
 }
 
-std::vector<std::string> joined(std::vector<std::string> own, const std::vector<std::string>& found) {
+std::vector<std::string> joined(std::vector<std::string> own,
+                                const std::vector<std::string>& found) {
   own.insert(own.end(), found.begin(), found.end());
   return own;
 }
@@ -53,22 +56,28 @@ bool is_of_the_base(const std::string& source) {
   return cause != nullptr && cause->part == causes::Part::kBase;
 }
 
-/// Leaves out of `supported` what another day does as well without, and says what the rest is worth on it. Causes that
-/// go with the batch anyway, and the base, are not asked.
-std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
-                             const CheckedBatch& batch, const Diagnosis& diagnosis, Supported& supported) {
-  if (std::all_of(supported.sources.begin(), supported.sources.end(), is_of_the_base)) return std::nullopt;
-  const auto day = AnotherDay::make(cell, batch.rows(), joined(own, supported.sources), suspected_rows(diagnosis));
+/// Leaves out of `supported` what another day does as well without, and says what the rest is worth
+/// on it. Causes that go with the batch anyway, and the base, are not asked.
+std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell,
+                             const std::vector<std::string>& own, const CheckedBatch& batch,
+                             const Diagnosis& diagnosis, Supported& supported) {
+  if (std::all_of(supported.sources.begin(), supported.sources.end(), is_of_the_base))
+    return std::nullopt;
+  const auto day = AnotherDay::make(cell, batch.rows(), joined(own, supported.sources),
+                                    suspected_rows(diagnosis));
   if (!day) return std::nullopt;
   auto carried = supported_by(
       {supported.sources,
        [&](const std::vector<std::string>& some) { return day->left_by(joined(own, some)); },
-       [](const std::string& source) { return !is_of_the_base(source) && !lasting_sources({source}).empty(); },
+       [](const std::string& source) {
+         return !is_of_the_base(source) && !lasting_sources({source}).empty();
+       },
        {}});
   if (!carried) return std::nullopt;
   for (Unsupported& one : carried->left_out) one.another_day = true;
   supported.sources = carried->sources;
-  supported.left_out.insert(supported.left_out.end(), carried->left_out.begin(), carried->left_out.end());
+  supported.left_out.insert(supported.left_out.end(), carried->left_out.begin(),
+                            carried->left_out.end());
   const auto before = day->left_by(own);
   const auto after = day->left_by(joined(own, supported.sources));
   if (!before || !after) return std::nullopt;
@@ -81,24 +90,27 @@ std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell, const std:
 
 Status check_can_extend(const Diagnosis& diagnosis) {
   if (diagnosis.sources_after != diagnosis.sources_before) return {};
-  return refused("no cause was named that the model could be extended by ({}): {}", to_string(diagnosis.verdict),
-                 diagnosis.sentence);
+  return refused("no cause was named that the model could be extended by ({}): {}",
+                 to_string(diagnosis.verdict), diagnosis.sentence);
 }
 
-std::vector<std::string> added_sources(const std::vector<std::string>& own, const Diagnosis& diagnosis) {
+std::vector<std::string> added_sources(const std::vector<std::string>& own,
+                                       const Diagnosis& diagnosis) {
   std::vector<std::string> added;
-  std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
-               [&](const std::string& source) {
-                 // Another form of what the cell has already, such as the compliance: training chooses it again.
+  std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(),
+               std::back_inserter(added), [&](const std::string& source) {
+                 // Another form of what the cell has already, such as the compliance: training
+                 // chooses it again.
                  const bool form = as_listed(source, own) != source;
-                 return !form && !contains(diagnosis.sources_before, source) && !contains(own, source);
+                 return !form && !contains(diagnosis.sources_before, source) &&
+                        !contains(own, source);
                });
   return added;
 }
 
-Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
-                                     const CheckedBatch& batch, const Diagnosis& diagnosis,
-                                     const TrainOptions& options) {
+Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell,
+                                     const std::vector<std::string>& own, const CheckedBatch& batch,
+                                     const Diagnosis& diagnosis, const TrainOptions& options) {
   if (const Status allowed = check_can_extend(diagnosis); !allowed)
     return Failure(allowed.error()).in("batch " + diagnosis.batch.id);
   if (batch.held_out().measurements.empty())
@@ -106,16 +118,17 @@ Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, co
         .in("batch " + batch.id())
         .of("set")
         .beyond(0, 1);
-  Supported supported =
-      TRY(supported_by(cell, own, added_sources(own, diagnosis), batch.training(),
-                       judges_of(diagnosis, batch.held_out()).batch, [&options](double share) {
-                         return !options.progress ||
-                                options.progress("asking of each cause what it is worth", kSupportShare * share);
-                       }));
+  Supported supported = TRY(supported_by(
+      cell, own, added_sources(own, diagnosis), batch.training(),
+      judges_of(diagnosis, batch.held_out()).batch, [&options](double share) {
+        return !options.progress ||
+               options.progress("asking of each cause what it is worth", kSupportShare * share);
+      }));
   std::optional<DayGain> day = carry(cell, own, batch, diagnosis, supported);
   std::vector<std::string> sources = joined(own, supported.sources);
   auto model = TRY(trained(cell, batch, sources, as_part(options, kSupportShare, 1)));
-  return ExtendedModel{std::move(model), std::move(sources), std::move(supported.left_out), std::move(day)};
+  return ExtendedModel{std::move(model), std::move(sources), std::move(supported.left_out),
+                       std::move(day)};
 }
 
 Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
@@ -126,7 +139,8 @@ Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
   }
   Judges judges{std::move(held_out), {}};
   auto& all = judges.batch.measurements;
-  if (static_cast<double>(rows.size()) > kMostLeftOut * static_cast<double>(all.size())) return judges;
+  if (static_cast<double>(rows.size()) > kMostLeftOut * static_cast<double>(all.size()))
+    return judges;
   std::erase_if(all, [&](const Measurement& m) {
     if (!rows.contains(m.row)) return false;
     judges.left_out.push_back(m.pose_id);
@@ -135,27 +149,29 @@ Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
   return judges;
 }
 
-Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
-                         const TrainOptions& options) {
+Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                         const Diagnosis& diagnosis, const TrainOptions& options) {
   const std::vector<std::string>& own = cell->model.error_sources;
-  auto after = TRY(extended_model(cell, own, batch, diagnosis, as_part(options, 0, kExtendedShare)));
+  auto after =
+      TRY(extended_model(cell, own, batch, diagnosis, as_part(options, 0, kExtendedShare)));
   auto before = TRY(trained(cell, batch, own, as_part(options, kExtendedShare, 1)));
   Judges judges = judges_of(diagnosis, batch.held_out());
   PairedGain gain = paired_gain(before, after.model, judges.batch);
   gain.left_out = std::move(judges.left_out);
   JudgingSession session{batch.id(), batch.training(), std::move(judges.batch)};
   const ServedModel present(cell->name, 0, before);
-  GateVerdict verdict =
-      verdict_on(after.model, &present, {}, std::nullopt, {session}, {.bar = Bar::kBetterBeyondChance});
+  GateVerdict verdict = verdict_on(after.model, &present, {}, std::nullopt, {session},
+                                   {.bar = Bar::kBetterBeyondChance});
   std::vector<std::string> lasting = lasting_sources(after.sources);
   return Extension{std::move(after.sources), std::move(lasting),        std::move(before),
                    std::move(after.model),   std::move(gain),           std::move(session),
                    std::move(verdict),       std::move(after.left_out), std::move(after.day)};
 }
 
-Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
-                        const TrainOptions& options) {
-  if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
+Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                        const Diagnosis& diagnosis, const TrainOptions& options) {
+  if (const Status possible = check_can_extend(diagnosis); !possible)
+    return Applied{{}, sentence(possible.error())};
   return extend(cell, batch, diagnosis, options).map([](Extension extension) {
     std::string why_not = extension.why_not();
     return Applied{std::move(extension), std::move(why_not)};
@@ -167,7 +183,9 @@ std::string Extension::why_not() const {
   return verdict.put_in_force ? "" : verdict.why;
 }
 
-HoldOut held_out_to_extend(std::uint64_t seed) { return held_out_by_service(kUsualJudgingShare, seed); }
+HoldOut held_out_to_extend(std::uint64_t seed) {
+  return held_out_by_service(kUsualJudgingShare, seed);
+}
 
 Error with_rows_set_aside(Error error, const CheckedBatch& batch) {
   const std::size_t aside = batch.held_out().measurements.size();

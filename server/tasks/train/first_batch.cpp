@@ -10,7 +10,8 @@ namespace trammel {
 
 namespace {
 
-/// The cell with the sources that are asked for; a level that cannot be read is refused by the training.
+/// The cell with the sources that are asked for; a level that cannot be read is refused by the
+/// training.
 std::shared_ptr<const Cell> with_sources(const std::shared_ptr<const Cell>& cell,
                                          const std::optional<std::string>& level) {
   if (!level) return cell;
@@ -23,13 +24,17 @@ std::shared_ptr<const Cell> with_sources(const std::shared_ptr<const Cell>& cell
 
 }  // namespace
 
-std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cell,
+                                          const CheckedBatch& batch,
                                           const std::optional<std::string>& level) {
   if (auto doubt = batch_doubt(batch.rows(), *cell)) return doubt;
-  const auto jump = jump_within(with_sources(cell, level), batch.in_order_of_time(cell->robot).rows());
+  const auto jump =
+      jump_within(with_sources(cell, level), batch.in_order_of_time(cell->robot).rows());
   if (!jump) return std::nullopt;
-  return refused("something changed in the middle of it, {}; no single arm fits the poses before and after",
-                 in_words(*jump))
+  return refused(
+             "something changed in the middle of it, {}; no single arm fits the poses before and "
+             "after",
+             in_words(*jump))
       .at_row(jump->row)
       .of("pose_id")
       .with_text(jump->pose_id)

@@ -10,15 +10,17 @@
 
 namespace trammel {
 
-/// What speaks against learning from a batch of which no model in force can judge: it was not read as it was meant
-/// (batch_doubt()), or something began in the middle of it (jump_within(); `text` is the pose, `row` its row). The
-/// command line, the library, Python and the daemon ask this before a model is trained from nothing, unless somebody
-/// has looked at the batch. `batch` is checked against `cell`; `level`: instead of the cell's error sources.
-[[nodiscard]] std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cell,
-                                                        const CheckedBatch& batch,
-                                                        const std::optional<std::string>& level = {});
+/// What speaks against learning from a batch of which no model in force can judge: it was not read
+/// as it was meant (batch_doubt()), or something began in the middle of it (jump_within(); `text`
+/// is the pose, `row` its row). The command line, the library, Python and the daemon ask this
+/// before a model is trained from nothing, unless somebody has looked at the batch. `batch` is
+/// checked against `cell`; `level`: instead of the cell's error sources.
+[[nodiscard]] std::optional<Error> doubt_of_first_batch(
+    const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+    const std::optional<std::string>& level = {});
 /// Refuses a batch with a doubt_of_first_batch().
-[[nodiscard]] Status check_first_batch(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+[[nodiscard]] Status check_first_batch(const std::shared_ptr<const Cell>& cell,
+                                       const CheckedBatch& batch,
                                        const std::optional<std::string>& level = {});
 
 }  // namespace trammel

@@ -5,6 +5,8 @@
 namespace trammel {
 
 /// Of a training whose progress was answered with false.
-[[nodiscard]] inline Failure given_up() { return failure(ErrorCode::kBusy, "training given up on request"); }
+[[nodiscard]] inline Failure given_up() {
+  return failure(ErrorCode::kBusy, "training given up on request");
+}
 
 }  // namespace trammel

@@ -9,14 +9,16 @@ namespace trammel {
 
 std::vector<std::string> lasting_sources(const std::vector<std::string>& sources) {
   std::vector<std::string> lasting;
-  std::copy_if(sources.begin(), sources.end(), std::back_inserter(lasting), [](const std::string& source) {
-    const CauseRecord* cause = find_cause(source);
-    return cause == nullptr || cause->lasting == causes::Lasting::kAlways;
-  });
+  std::copy_if(sources.begin(), sources.end(), std::back_inserter(lasting),
+               [](const std::string& source) {
+                 const CauseRecord* cause = find_cause(source);
+                 return cause == nullptr || cause->lasting == causes::Lasting::kAlways;
+               });
   return lasting;
 }
 
-std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell, const CheckedBatch& batch) {
+std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell,
+                                          const CheckedBatch& batch) {
   const std::vector<std::string> listed = spelled_out(cell.model.error_sources, cell);
   std::vector<std::string> sources;
   for (const ErrorSourcePtr& source : model.parts().physics.sources) {
@@ -32,7 +34,8 @@ std::optional<std::string> level_with_additions(const Cell& cell, const Compensa
     return std::find(level.begin(), level.end(), as_listed(name, level)) != level.end();
   };
   std::vector<std::string> names;
-  for (const ErrorSourcePtr& source : in_force.parts().physics.sources) names.push_back(source->name());
+  for (const ErrorSourcePtr& source : in_force.parts().physics.sources)
+    names.push_back(source->name());
   const std::size_t own = level.size();
   const bool is_warm = shows_warmth(batch);
   for (const std::string& name : lasting_sources(names)) {

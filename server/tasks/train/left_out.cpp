@@ -13,8 +13,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no part in it. Each is
-/// taken in its own standard deviation: beside hundreds of kg m a square root would lose angles and compliances.
+/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no
+/// part in it. Each is taken in its own standard deviation: beside hundreds of kg m a square root
+/// would lose angles and compliances.
 MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
   std::vector<Index> open;
   for (Index k = 0; k < covariance.rows(); ++k) {
@@ -23,19 +24,20 @@ MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
   if (open.empty()) return MatrixXd(J.rows(), 0);
   const VectorXd stddev = covariance.diagonal()(open).cwiseSqrt();
   const VectorXd inverse = stddev.cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inverse.asDiagonal() * covariance(open, open) *
-                                                      inverse.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+      inverse.asDiagonal() * covariance(open, open) * inverse.asDiagonal());
   return J(Eigen::all, open) * stddev.asDiagonal() * eigen.eigenvectors() *
          eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
-std::vector<const Measurement*> observations(const CalibrationResult& found, const MeasurementBatch& batch) {
+std::vector<const Measurement*> observations(const CalibrationResult& found,
+                                             const MeasurementBatch& batch) {
   std::vector<const Measurement*> poses;
   for (const Measurement& m : batch.measurements) {
     if (m.gauge) continue;
-    const bool suspect = std::any_of(found.suspects.begin(), found.suspects.end(), [&](const SuspectPose& pose) {
-      return pose.pose_id == m.pose_id && pose.row == m.row;
-    });
+    const bool suspect = std::any_of(
+        found.suspects.begin(), found.suspects.end(),
+        [&](const SuspectPose& pose) { return pose.pose_id == m.pose_id && pose.row == m.row; });
     if (!suspect) poses.push_back(&m);
   }
   return poses;
@@ -64,8 +66,8 @@ LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) 
     residual_.segment<3>(6 * i) = (m.p_W - X_WT.translation()) / sigma_(i);
     J_.middleRows<3>(6 * i) = J_W.topRows<3>() / sigma_(i);
     if (!m.R_WT) continue;
-    const double turn =
-        std::hypot(m.sigma_rotation.value_or(model.cell->tracker.sigma_rotation), found.discrepancy_rotation);
+    const double turn = std::hypot(m.sigma_rotation.value_or(model.cell->tracker.sigma_rotation),
+                                   found.discrepancy_rotation);
     residual_.segment<3>(6 * i + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose()) / turn;
     J_.middleRows<3>(6 * i + 3) = J_W.bottomRows<3>() / turn;
   }
@@ -84,7 +86,8 @@ std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses
       J.middleRows<6>(6 * i) = J_.middleRows<6>(row);
       residual.segment<6>(6 * i) = residual_.segment<6>(row);
     }
-    // The precision of the parameters without these poses. With them the gradient was 0, so they answer for its rest.
+    // The precision of the parameters without these poses. With them the gradient was 0, so they
+    // answer for its rest.
     MatrixXd precision = MatrixXd::Identity(J.cols(), J.cols());
     if (count > 0) precision.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), -1.0);
     const Eigen::LLT<MatrixXd> factor(precision);
@@ -92,7 +95,8 @@ std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses
     moved = factor.solve(J.transpose() * residual);
     for (Index i = 0; i < count; ++i) {
       const MatrixXd uncertain = factor.matrixL().solve(J.middleRows<3>(6 * i).transpose());
-      result.variance(i) = std::pow(sigma_(poses[static_cast<std::size_t>(i)]), 2) * uncertain.squaredNorm() / 3;
+      result.variance(i) =
+          std::pow(sigma_(poses[static_cast<std::size_t>(i)]), 2) * uncertain.squaredNorm() / 3;
     }
   }
   const VectorXd all = residual_ + J_ * moved;

@@ -21,35 +21,39 @@ constexpr double kSettledTurn = 1e-9;  // rad
 constexpr double kBeyondChance = 3;    // standard deviations of chi^2
 
 /// A frame that the cell knows, and that is not named, must be the model's.
-Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said, const Pose& kept,
-                        const std::string& source) {
+Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said,
+                        const Pose& kept, const std::string& source) {
   if (!said) return {};
   const Vector6 difference = pose_difference(*said, kept);
   if (difference.cwiseAbs().maxCoeff() <= kSameFrame) return {};
   const double shift_mm = to_mm(difference.head<3>().norm());
   const double turn_deg = to_deg(difference.tail<3>().norm());
   const bool shifted = shift_mm > to_mm(kSameFrame);
-  return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from", cell.name, what,
-                 shift_mm, turn_deg)
+  return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from",
+                 cell.name, what, shift_mm, turn_deg)
       .of(fmt::format("{}: {}", source, shifted ? "xyz_mm" : "q_wxyz"))
       .with_value(shifted ? shift_mm : turn_deg)
-      .next(fmt::format("name {} among what is refitted, or leave it in the cell file as the model has it", source));
+      .next(fmt::format(
+          "name {} among what is refitted, or leave it in the cell file as the model has it",
+          source));
 }
 
 std::vector<std::string> names_of(const CompensatedModel& model) {
   std::vector<std::string> names;
-  for (const ErrorSourcePtr& source : model.parts().physics.sources) names.push_back(source->name());
+  for (const ErrorSourcePtr& source : model.parts().physics.sources)
+    names.push_back(source->name());
   return names;
 }
 
 }  // namespace
 
-Status check_may_start_from(const CompensatedModel& from, const Cell& cell, const MeasurementBatch& batch,
-                            const std::vector<std::string>& only) {
+Status check_may_start_from(const CompensatedModel& from, const Cell& cell,
+                            const MeasurementBatch& batch, const std::vector<std::string>& only) {
   TRY(require_positions(batch, "identifying anew in a model"));
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
-    return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);
+    return refused("the model to start from is of another robot than cell {}", cell.name)
+        .in("batch " + batch.id);
   }
   if (!corrects(only, causes::Part::kBase)) {
     TRY(check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"));
@@ -57,15 +61,18 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
   for (const auto& [name, kept] : model.tools) {
     const auto said = cell.tools.find(name);
     if (said == cell.tools.end() || corrects(only, causes::Part::kTool)) continue;
-    const Status same = check_same_frame(cell, fmt::format("tool '{}'", name), said->second, kept, "tool");
+    const Status same =
+        check_same_frame(cell, fmt::format("tool '{}'", name), said->second, kept, "tool");
     if (!same) return same;
   }
   for (const Measurement& m : batch.measurements) {
     const std::string& tool = m.context.tool;
-    const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
-                                      [&](const auto& known) { return known.first == tool; });
+    const bool of_model =
+        std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
+                    [&](const auto& known) { return known.first == tool; });
     if (of_model || cell.tools.at(tool) || corrects(only, causes::Part::kTool)) continue;
-    return refused("where tool '{}' sits is known to neither cell {} nor the model to start from", tool, cell.name)
+    return refused("where tool '{}' sits is known to neither cell {} nor the model to start from",
+                   tool, cell.name)
         .in("batch " + batch.id)
         .at_row(m.row)
         .of("tool_id")
@@ -89,8 +96,8 @@ CalibrationResult known_of(const CompensatedModel::Parts& parts) {
   return known;
 }
 
-/// What the bias says at each pose, seen from the arm's base as it really stands (A), and with what sigma a measurement
-/// is met there that it has been taken off.
+/// What the bias says at each pose, seen from the arm's base as it really stands (A), and with what
+/// sigma a measurement is met there that it has been taken off.
 struct BiasAt {
   std::vector<Vector3> shift_A;
   std::vector<Matrix3> turn_A;
@@ -113,9 +120,12 @@ Result<BiasAt> bias_at(CompensatedModel::Parts parts, const MeasurementBatch& po
     const Pose X_BT = physics.X_WB.inverse() * physics.pose_W(contexts[i]);
     const Pose& predicted = predictions[i].X_BT_predicted;
     bias.shift_A.emplace_back(R_AB * (predicted.translation() - X_BT.translation()));
-    bias.turn_A.emplace_back(R_AB * predicted.linear() * X_BT.linear().transpose() * R_AB.transpose());
-    const double beyond = std::max(0.0, predictions[i].covariance_B.trace() / 3 - tracker * tracker);
-    bias.sigma.push_back(std::sqrt(std::pow(poses.measurements[i].sigma.value_or(tracker), 2) + beyond));
+    bias.turn_A.emplace_back(R_AB * predicted.linear() * X_BT.linear().transpose() *
+                             R_AB.transpose());
+    const double beyond =
+        std::max(0.0, predictions[i].covariance_B.trace() / 3 - tracker * tracker);
+    bias.sigma.push_back(
+        std::sqrt(std::pow(poses.measurements[i].sigma.value_or(tracker), 2) + beyond));
   }
   return bias;
 }
@@ -131,10 +141,13 @@ MeasurementBatch without_bias(MeasurementBatch poses, const BiasAt& bias, const 
   return poses;
 }
 
-/// Whether the poses are missed by more than their sigmas, `fitted` parameters being theirs, let chance miss them.
-bool is_beyond_chance(const PhysicalModel& model, const MeasurementBatch& poses, std::size_t fitted) {
+/// Whether the poses are missed by more than their sigmas, `fitted` parameters being theirs, let
+/// chance miss them.
+bool is_beyond_chance(const PhysicalModel& model, const MeasurementBatch& poses,
+                      std::size_t fitted) {
   const BiasProblem left = leftover(model, poses);
-  const double chi2 = (left.residual_B.rowwise().squaredNorm().array() / left.sigma.array().square()).sum();
+  const double chi2 =
+      (left.residual_B.rowwise().squaredNorm().array() / left.sigma.array().square()).sum();
   const double freedom = 3.0 * static_cast<double>(left.sigma.size()) - static_cast<double>(fitted);
   return freedom > 0 && chi2 > freedom + kBeyondChance * std::sqrt(2 * freedom);
 }
@@ -153,11 +166,13 @@ Status take_over(CompensatedModel::Parts& parts, const CompensatedModel& from, c
   parts.cost_record = found.cost_record;
   if (is_beyond_chance(found.model, met, refit.anew.size()))
     parts.discrepancy = std::hypot(parts.discrepancy, found.discrepancy);
-  for (const Measurement& m : met.measurements) parts.trained_with.emplace(m.context.tool, m.context.payload);
+  for (const Measurement& m : met.measurements)
+    parts.trained_with.emplace(m.context.tool, m.context.payload);
   if (!parts.bias) return {};
   PhysicalModel learned = TRY(in_cell(from.learned_physics().whole(), found.model.cell));
   const auto before = static_cast<Index>(from.parts().parameters.size());
-  const MatrixXd since = parts.bias_origin ? parts.bias_origin->covariance : MatrixXd::Zero(before, before);
+  const MatrixXd since =
+      parts.bias_origin ? parts.bias_origin->covariance : MatrixXd::Zero(before, before);
   parts.bias_origin = CompensatedModel::Parts::BiasOrigin{std::move(learned), refit.carried(since)};
   return {};
 }
@@ -177,19 +192,23 @@ void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const 
   provenance.training_poses = poses;
 }
 
-/// The poses as the sources meet them: as of another batch than the model's where they are, and no better known than
-/// what the model leaves unexplained.
-MeasurementBatch as_met(const CompensatedModel& from, const Cell& cell, MeasurementBatch poses, bool own) {
+/// The poses as the sources meet them: as of another batch than the model's where they are, and no
+/// better known than what the model leaves unexplained.
+MeasurementBatch as_met(const CompensatedModel& from, const Cell& cell, MeasurementBatch poses,
+                        bool own) {
   for (Measurement& m : poses.measurements) {
     m.context.served = !own;
-    m.sigma = std::hypot(m.sigma.value_or(cell.tracker.sigma), from.bias() ? 0.0 : from.parts().discrepancy);
+    m.sigma = std::hypot(m.sigma.value_or(cell.tracker.sigma),
+                         from.bias() ? 0.0 : from.parts().discrepancy);
   }
   return poses;
 }
 
-/// Refits, and where the model has a bias takes it off and refits until the base no longer turns. Fills `parts`.
+/// Refits, and where the model has a bias takes it off and refits until the base no longer turns.
+/// Fills `parts`.
 Result<Refit> refit_beside_bias(CompensatedModel::Parts& parts, const CompensatedModel& from,
-                                const std::shared_ptr<const Cell>& cell, const MeasurementBatch& poses,
+                                const std::shared_ptr<const Cell>& cell,
+                                const MeasurementBatch& poses,
                                 const std::vector<std::string>& only) {
   const CalibrationResult known = known_of(from.parts());
   MeasurementBatch met = poses;
@@ -225,8 +244,8 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   const bool is_its_own = batch.hash() == from.provenance().batch_hash;
   if (of_this_batch && !is_its_own && lasting_sources(sources) != sources) {
     return refused(
-               "the model to start from has sources that began during batch {}: none that began during this one can be "
-               "added",
+               "the model to start from has sources that began during batch {}: none that began "
+               "during this one can be added",
                from.provenance().batch_id)
         .in("batch " + batch.id());
   }
@@ -242,11 +261,13 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   return result;
 }
 
-Cell with_known_tools(Cell cell, const CompensatedModel& from, const std::vector<std::string>& only) {
+Cell with_known_tools(Cell cell, const CompensatedModel& from,
+                      const std::vector<std::string>& only) {
   if (corrects(only, causes::Part::kTool)) return cell;
   for (const auto& [name, payload] : from.parts().trained_with) {
     const auto tool = cell.tools.find(name);
-    if (tool != cell.tools.end() && !tool->second) tool->second = served_tool(from.parts().physics, name);
+    if (tool != cell.tools.end() && !tool->second)
+      tool->second = served_tool(from.parts().physics, name);
   }
   return cell;
 }

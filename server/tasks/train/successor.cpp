@@ -25,17 +25,21 @@ std::string narrower(const ServedModel& present, const CheckedBatch& batch) {
   }
   const double covered = coverage(poses, parts.q_min, parts.q_max);
   if (covered >= GateOptions::kLeastCoverage) return "";
-  return fmt::format("the batch spreads over {:.0f} % of the joint ranges of version {} (limit {:.0f} %)",
-                     100 * covered, present.version, 100 * GateOptions::kLeastCoverage);
+  return fmt::format(
+      "the batch spreads over {:.0f} % of the joint ranges of version {} (limit {:.0f} %)",
+      100 * covered, present.version, 100 * GateOptions::kLeastCoverage);
 }
 
 }  // namespace
 
-Result<Successor> train_successor(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                                  const ServedModel* present, TrainOptions options) {
+Result<Successor> train_successor(const std::shared_ptr<const Cell>& cell,
+                                  const CheckedBatch& batch, const ServedModel* present,
+                                  TrainOptions options) {
   const std::string why = present == nullptr ? "" : narrower(*present, batch);
   if (why.empty()) {
-    return train(cell, batch, options).map([](CompensatedModel model) { return Successor{std::move(model), ""}; });
+    return train(cell, batch, options).map([](CompensatedModel model) {
+      return Successor{std::move(model), ""};
+    });
   }
   options.level.reset();
   options.from = present->model;
@@ -45,8 +49,9 @@ Result<Successor> train_successor(const std::shared_ptr<const Cell>& cell, const
     refitted = train(cell, batch, options);
   }
   if (!refitted) return tl::make_unexpected(refitted.error());
-  return Successor{std::move(*refitted), fmt::format("{}: {} refitted, the rest is that of version {}", why,
-                                                     causes_in_words(options.refit), present->version)};
+  return Successor{std::move(*refitted),
+                   fmt::format("{}: {} refitted, the rest is that of version {}", why,
+                               causes_in_words(options.refit), present->version)};
 }
 
 }  // namespace trammel

@@ -13,9 +13,11 @@ namespace trammel {
 namespace {
 
 /// 3 x N, m: what the sources, identified on `train`, leave of `judges`.
-Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell,
+                                 const std::vector<std::string>& sources,
                                  const MeasurementBatch& train, const MeasurementBatch& judged_by) {
-  const CalibrationResult identified = TRY(calibrate(cell, with_unknown_tool(sources, *cell), train, {}));
+  const CalibrationResult identified =
+      TRY(calibrate(cell, with_unknown_tool(sources, *cell), train, {}));
   const MeasurementBatch judges = aligned(judged_by, identified.sessions, cell->tracker);
   Eigen::Matrix3Xd left(3, static_cast<Eigen::Index>(judges.measurements.size()));
   for (Eigen::Index i = 0; i < left.cols(); ++i) {
@@ -25,20 +27,25 @@ Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const 
   return left;
 }
 
-std::vector<std::string> joined(std::vector<std::string> own, const std::vector<std::string>& found) {
+std::vector<std::string> joined(std::vector<std::string> own,
+                                const std::vector<std::string>& found) {
   own.insert(own.end(), found.begin(), found.end());
   return own;
 }
 
 }  // namespace
 
-Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
+Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell,
+                               const std::vector<std::string>& own,
                                const std::vector<std::string>& found, const MeasurementBatch& train,
-                               const MeasurementBatch& judges, const std::function<bool(double share)>& progress) {
+                               const MeasurementBatch& judges,
+                               const std::function<bool(double share)>& progress) {
   const MeasurementBatch merged = merge_repeats(train, cell->tracker.sigma).batch;
-  return supported_by(
-      {found, [&](const std::vector<std::string>& some) { return left_by(cell, joined(own, some), merged, judges); },
-       [](const std::string&) { return true; }, progress});
+  return supported_by({found,
+                       [&](const std::vector<std::string>& some) {
+                         return left_by(cell, joined(own, some), merged, judges);
+                       },
+                       [](const std::string&) { return true; }, progress});
 }
 
 Result<Supported> supported_by(const SupportQuestion& question) {
@@ -52,15 +59,16 @@ Result<Supported> supported_by(const SupportQuestion& question) {
     Eigen::Matrix3Xd left;
     for (std::size_t k = 0; k < supported.sources.size(); ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(supported.sources.size());
-      if (question.progress && !question.progress((asked + share) / static_cast<double>(found.size())))
+      if (question.progress &&
+          !question.progress((asked + share) / static_cast<double>(found.size())))
         return given_up();
       if (!question.may_be_dropped(supported.sources[k])) continue;
       std::vector<std::string> others = supported.sources;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
       const auto without = question.left_by(others);
       if (!without) continue;  // the rest cannot do without it
-      // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at which it does
-      // nothing.
+      // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at
+      // which it does nothing.
       const double z = paired_gain(*without, with).z_sum;
       if (z > least.z || (z == least.z && !least.source.empty())) continue;
       least = {supported.sources[k], z};
@@ -78,9 +86,9 @@ Result<Supported> supported_by(const SupportQuestion& question) {
 std::string to_string(const std::vector<Unsupported>& left_out) {
   std::vector<std::string> sentences;
   for (const Unsupported& one : left_out) {
-    sentences.push_back(fmt::format("{} is left out: {} do as well without it (z {:.2f})", in_words(one.source),
-                                    one.another_day ? "poses held out in blocks of time" : "the poses held out",
-                                    one.z));
+    sentences.push_back(fmt::format(
+        "{} is left out: {} do as well without it (z {:.2f})", in_words(one.source),
+        one.another_day ? "poses held out in blocks of time" : "the poses held out", one.z));
   }
   return fmt::format("{}", fmt::join(sentences, "; "));
 }

@@ -41,7 +41,8 @@ BatchSplit prepared(const CheckedBatch& batch, double sigma) {
 /// The sources to identify, as asked.
 Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
   Result<std::vector<std::string>> names =
-      options.level ? parse_level(*options.level) : Result<std::vector<std::string>>(cell.model.error_sources);
+      options.level ? parse_level(*options.level)
+                    : Result<std::vector<std::string>>(cell.model.error_sources);
   if (!names) return names;
   return with_unknown_tool(std::move(*names), cell);
 }
@@ -69,18 +70,22 @@ void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& train
   }
 }
 
-/// When it was trained, and from how new measurements: those of the model that it starts from count, too.
-void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch, const TrainOptions& options) {
+/// When it was trained, and from how new measurements: those of the model that it starts from
+/// count, too.
+void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch,
+                  const TrainOptions& options) {
   parts.provenance.trained_at = options.trained_at;
   parts.provenance.measured_at = std::max(parts.provenance.measured_at, batch.rows().measured_at);
   parts.provenance.program_version = kProgramVersion;
 }
 
-/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
-void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch, const MeasurementBatch& trained,
-                     const TrainOptions& options) {
+/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held
+/// out.
+void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch,
+                     const MeasurementBatch& trained, const TrainOptions& options) {
   record_domain(parts, trained);
-  for (const Measurement& m : trained.measurements) parts.trained_with.emplace(m.context.tool, m.context.payload);
+  for (const Measurement& m : trained.measurements)
+    parts.trained_with.emplace(m.context.tool, m.context.payload);
   record_temperature(parts, trained);
   parts.provenance.level.clear();
   for (const ErrorSourcePtr& source : parts.physics.sources) {
@@ -121,16 +126,18 @@ Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSpl
 /// Says what is being done; false: give up.
 using Report = std::function<bool(const std::string& stage, double share)>;
 
-/// A bias learned anew for a model whose named sources were, too: its poses become the domain. Where there is none to
-/// take, the domain of the physics stays.
-Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainOptions& options, const Report& report) {
+/// A bias learned anew for a model whose named sources were, too: its poses become the domain.
+/// Where there is none to take, the domain of the physics stays.
+Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainOptions& options,
+                     const Report& report) {
   CompensatedModel::Parts& parts = refitted.parts;
   const LeftOut left_out(refitted.found, refitted.poses);
   const JointVector slope = extrapolation_slope(left_out, parts.physics.cell->robot);
   const JointVector slope_before = parts.extrapolation_slope;
   parts.extrapolation_slope = slope;
-  const Status learned = add_bias(parts, refitted.poses, kernel, left_out, options.seed,
-                                  [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
+  const Status learned =
+      add_bias(parts, refitted.poses, kernel, left_out, options.seed,
+               [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return learned;
   if (parts.bias) {
     record_domain(parts, refitted.poses);
@@ -141,9 +148,10 @@ Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainO
 }
 
 /// train() from another model.
-Result<CompensatedModel> train_from(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
-                                    const CheckedBatch& batch, BatchSplit split, const TrainOptions& options,
-                                    const Report& report) {
+Result<CompensatedModel> train_from(const CompensatedModel& from,
+                                    const std::shared_ptr<const Cell>& cell,
+                                    const CheckedBatch& batch, BatchSplit split,
+                                    const TrainOptions& options, const Report& report) {
   std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
   for (MeasurementBatch* rows : {&split.train, &split.validation}) {
     if (!has_sessions(*rows)) continue;
@@ -179,12 +187,14 @@ CompensatedModel::Parts calibrated_parts(CalibrationResult calibration, const Le
 }
 
 /// The physics by all rows of `batch`, and what changed between its sessions.
-Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch, const std::shared_ptr<const Cell>& cell,
-                                         const std::vector<std::string>& sources, const TrainOptions& options,
-                                         const Report& report) {
+Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
+                                         const std::shared_ptr<const Cell>& cell,
+                                         const std::vector<std::string>& sources,
+                                         const TrainOptions& options, const Report& report) {
   const Identify identify = [&](const std::vector<std::string>& names) {
-    return options.fleet ? calibrate_among_twins(cell, names, batch, *options.fleet)
-                         : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
+    return options.fleet
+               ? calibrate_among_twins(cell, names, batch, *options.fleet)
+               : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
   };
   return identify_sessions(identify, sources, batch, [&](double share) -> Status {
     if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
@@ -192,15 +202,18 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch, const st
   });
 }
 
-/// The same without rows that fit none of the arms on which the others agree. They leave `batch`, and are suspects.
-Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain, MeasurementBatch& batch,
+/// The same without rows that fit none of the arms on which the others agree. They leave `batch`,
+/// and are suspects.
+Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
+                                              MeasurementBatch& batch,
                                               const std::shared_ptr<const Cell>& cell,
-                                              const std::vector<std::string>& sources, const TrainOptions& options,
-                                              const Report& report) {
+                                              const std::vector<std::string>& sources,
+                                              const TrainOptions& options, const Report& report) {
   const auto calibration = plain.map([](const IdentifiedSessions& all) { return all.calibration; });
   std::optional<Agreement> agreement = agreement_of(cell, sources, batch, calibration);
   if (!agreement) return plain;
-  Result<IdentifiedSessions> found = identified_on(agreement->agreeing, cell, sources, options, report);
+  Result<IdentifiedSessions> found =
+      identified_on(agreement->agreeing, cell, sources, options, report);
   if (!found) return plain;
   add_suspects(agreement->others, found->calibration);
   batch = std::move(agreement->agreeing);
@@ -211,17 +224,19 @@ Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain, 
 Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
                                       const TrainOptions& options, const Report& report) {
   const std::vector<std::string> sources = TRY(sources_of(*cell, options));
-  auto found = identified_by_most(identified_on(split.train, cell, sources, options, report), split.train, cell,
-                                  sources, options, report);
+  auto found = identified_by_most(identified_on(split.train, cell, sources, options, report),
+                                  split.train, cell, sources, options, report);
   if (!found) return found;
   split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
-  split.validation = aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);
+  split.validation =
+      aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);
   return found;
 }
 
 /// train() from nothing but the measurements.
-Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                                    BatchSplit split, const TrainOptions& options, const Report& report) {
+Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
+                                    const CheckedBatch& batch, BatchSplit split,
+                                    const TrainOptions& options, const Report& report) {
   std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
   IdentifiedSessions found = TRY(identified(cell, split, options, report));
   const LeftOut left_out(found.calibration, split.train);
@@ -239,22 +254,27 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, con
   return validated(std::move(parts), split);
 }
 
-/// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of the position, three
-/// numbers a pose; several set-ups; what twins have in common.
+/// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of
+/// the position, three numbers a pose; several set-ups; what twins have in common.
 Status check_gauges(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
   if (!has_gauges(batch)) return {};
-  if (has_sessions(batch)) return require_positions(batch, "a training from several set-ups of the instrument");
+  if (has_sessions(batch))
+    return require_positions(batch, "a training from several set-ups of the instrument");
   if (options.fleet) return require_positions(batch, "a training with prior: fleet");
   const std::string& bias = options.bias ? *options.bias : cell.model.bias;
   if (bias == kNoBias || bias == kAutoBias) return {};
-  return refused("a bias ({}) is learned from positions, and the batch has distances or touches", bias)
+  return refused("a bias ({}) is learned from positions, and the batch has distances or touches",
+                 bias)
       .in("batch " + batch.id)
       .of("distance_mm")
       .with_text(bias)
-      .next("train with --bias none (model: {bias: none} in the cell file): the physics is identified from all rows");
+      .next(
+          "train with --bias none (model: {bias: none} in the cell file): the physics is "
+          "identified from all rows");
 }
 
-/// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell file.
+/// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell
+/// file.
 Status check_read(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
   const Cell known = options.from ? with_known_tools(cell, *options.from, options.refit) : cell;
   if (options.looked_at) return check_orientations(batch, known);
@@ -277,11 +297,13 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
   TRY(check_gauges(batch.rows(), *cell, options));
   TRY(check_read(batch.rows(), *cell, options));
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
-  if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
+  if (split.train.measurements.empty())
+    return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
 
   if (!report("calibrating", 0.0)) return given_up();
-  Result<CompensatedModel> model = options.from ? train_from(*options.from, cell, batch, split, options, report)
-                                                : train_anew(cell, batch, split, options, report);
+  Result<CompensatedModel> model =
+      options.from ? train_from(*options.from, cell, batch, split, options, report)
+                   : train_anew(cell, batch, split, options, report);
   if (model && !report("done", 1.0)) return given_up();
   return model;
 }
@@ -302,7 +324,9 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Ch
   const LeftOut left_out(as_it_is, rows);
   parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
   TRY(add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
-               [&](double share) { return !options.progress || options.progress("learning the bias", share); }));
+               [&](double share) {
+                 return !options.progress || options.progress("learning the bias", share);
+               }));
   record_training(parts, batch, rows, options);
   return validated(std::move(parts), {rows, {}});
 }

@@ -31,7 +31,8 @@ Failure failed(const char* what, int error) {
                  std::strerror(error));
 }
 
-/// Above the standard streams and the channel, which are set up one after the other: none may be overwritten first.
+/// Above the standard streams and the channel, which are set up one after the other: none may be
+/// overwritten first.
 int out_of_the_way(int descriptor) {
   if (descriptor < 0 || descriptor > ChildProcess::kChannel) return descriptor;
   const int moved = ::fcntl(descriptor, F_DUPFD_CLOEXEC, ChildProcess::kChannel + 1);
@@ -44,7 +45,8 @@ using Pair = std::pair<Descriptor, Descriptor>;
 /// The first end is ours and does not block.
 Result<Pair> socket_pair() {
   std::array<int, 2> ends{};
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) return failed("socketpair", errno);
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
+    return failed("socketpair", errno);
   Pair pair{Descriptor(out_of_the_way(ends[0])), Descriptor(out_of_the_way(ends[1]))};
   ::fcntl(pair.first.get(), F_SETFL, O_NONBLOCK);
   return pair;
@@ -75,7 +77,8 @@ class SpawnPlan {
     ::posix_spawnattr_setsigmask(&attributes_, &none);
     ::posix_spawnattr_setsigdefault(&attributes_, &all);
     ::posix_spawnattr_setpgroup(&attributes_, 0);
-    ::posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+    ::posix_spawnattr_setflags(
+        &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   }
   ~SpawnPlan() {
     ::posix_spawn_file_actions_destroy(&actions_);
@@ -87,15 +90,17 @@ class SpawnPlan {
   /// 0, or the error.
   int start(const std::vector<std::string>& argv, pid_t& pid) const {
     std::vector<char*> arguments;
-    for (const std::string& argument : argv) arguments.push_back(const_cast<char*>(argument.c_str()));
+    for (const std::string& argument : argv)
+      arguments.push_back(const_cast<char*>(argument.c_str()));
     arguments.push_back(nullptr);
     std::vector<char*> environment = environment_of_child();
-    return ::posix_spawn(&pid, arguments[0], &actions_, &attributes_, arguments.data(), environment.data());
+    return ::posix_spawn(&pid, arguments[0], &actions_, &attributes_, arguments.data(),
+                         environment.data());
   }
 
  private:
-  /// Ours, and one thread for linear algebra: OpenBLAS starts one for each processor otherwise, as soon as it is
-  /// loaded.
+  /// Ours, and one thread for linear algebra: OpenBLAS starts one for each processor otherwise, as
+  /// soon as it is loaded.
   static std::vector<char*> environment_of_child() {
     static std::string one_thread = "OPENBLAS_NUM_THREADS=1";
     std::vector<char*> all = {one_thread.data()};
@@ -182,16 +187,19 @@ bool ChildProcess::reap() {
   int status = 0;
   const pid_t reaped = ::wait4(pid_, &status, WNOHANG, &used);
   if (reaped == 0) return false;
-  status_ = reaped == pid_ ? status : 0;  // else somebody else has reaped it, and its status is lost
+  status_ =
+      reaped == pid_ ? status : 0;  // else somebody else has reaped it, and its status is lost
   if (reaped != pid_) return true;
   usage_.processor_time = seconds(used.ru_utime) + seconds(used.ru_stime);
-  // Not used.ru_maxrss: that counts the memory of this process, which the child shared until it was another program.
+  // Not used.ru_maxrss: that counts the memory of this process, which the child shared until it was
+  // another program.
   return true;
 }
 
 std::optional<std::string> ChildProcess::ending() {
   if (!reap()) return std::nullopt;
-  if (WIFSIGNALED(*status_)) return fmt::format("signal {} ({})", WTERMSIG(*status_), ::strsignal(WTERMSIG(*status_)));
+  if (WIFSIGNALED(*status_))
+    return fmt::format("signal {} ({})", WTERMSIG(*status_), ::strsignal(WTERMSIG(*status_)));
   return fmt::format("exit code {}", WEXITSTATUS(*status_));
 }
 
@@ -205,7 +213,8 @@ ChildProcess::Usage ChildProcess::usage() {
 ChildProcess::State ChildProcess::state() const {
   const std::string line = first_line_of(fmt::format("/proc/{}/stat", pid_));
   const std::size_t name_end = line.rfind(')');
-  const char state = name_end == std::string::npos || name_end + 2 >= line.size() ? 'R' : line[name_end + 2];
+  const char state =
+      name_end == std::string::npos || name_end + 2 >= line.size() ? 'R' : line[name_end + 2];
   if (state == 'R') return State::kRuns;
   return state == 'D' ? State::kWaitsForDisk : State::kStands;
 }

@@ -31,29 +31,34 @@ class Descriptor {
   int number_ = -1;
 };
 
-/// A program that was started to compute, and nothing else: it inherits no descriptor but a socket to talk by and its
-/// standard streams (nothing to read; what it writes comes to words()), no blocked or ignored signal, and has a process
-/// group of its own: a terminal's signals do not reach it. It ends with this object. Not of a fork: the memory of a
-/// process with many threads and gigabytes is not copied.
+/// A program that was started to compute, and nothing else: it inherits no descriptor but a socket
+/// to talk by and its standard streams (nothing to read; what it writes comes to words()), no
+/// blocked or ignored signal, and has a process group of its own: a terminal's signals do not reach
+/// it. It ends with this object. Not of a fork: the memory of a process with many threads and
+/// gigabytes is not copied.
 class ChildProcess {
  public:
   static constexpr int kChannel = 3;  ///< the descriptor of its end of the socket
 
   /// argv[0] is the program's path.
-  [[nodiscard]] static Result<std::unique_ptr<ChildProcess>> start(const std::vector<std::string>& argv);
+  [[nodiscard]] static Result<std::unique_ptr<ChildProcess>> start(
+      const std::vector<std::string>& argv);
   ~ChildProcess();  ///< kills it
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   [[nodiscard]] int channel() const { return channel_.get(); }  ///< does not block
-  [[nodiscard]] int words() const { return words_.get(); }      ///< does not block; -1: it says nothing any more
+  [[nodiscard]] int words() const {
+    return words_.get();
+  }  ///< does not block; -1: it says nothing any more
   void close_words() { words_.close(); }
   [[nodiscard]] int end() const { return pidfd_.get(); }  ///< can be read once it has ended
   [[nodiscard]] pid_t pid() const { return pid_; }
 
   /// SIGKILL, and until it is gone; a second at most, should the kernel not let go of it.
   void kill();
-  /// How it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty while it runs.
+  /// How it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty while it
+  /// runs.
   [[nodiscard]] std::optional<std::string> ending();
 
   /// What it has used until now, or until it ended.

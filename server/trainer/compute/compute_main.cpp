@@ -24,8 +24,10 @@ namespace trammel {
 
 namespace {
 
-constexpr int kNiceness = 10;       // a tenth of an equal share beside the service, all of it where nobody wants it
-constexpr rlim_t kTimeBeyond = 60;  // s after the limit of processor time: the service ends it before that
+constexpr int kNiceness =
+    10;  // a tenth of an equal share beside the service, all of it where nobody wants it
+constexpr rlim_t kTimeBeyond =
+    60;  // s after the limit of processor time: the service ends it before that
 constexpr std::chrono::milliseconds kReportInterval{50};
 constexpr int kGone = 1;  // exit code where the other end is
 
@@ -74,7 +76,8 @@ class Answers {
         answer(*frame);
       } catch (const std::bad_alloc&) {
         bench_.reset();
-        send(message::of_error(failure(ErrorCode::kTooLarge, "it asks for more memory than there is").value(), true));
+        send(message::of_error(
+            failure(ErrorCode::kTooLarge, "it asks for more memory than there is").value(), true));
       } catch (const std::exception& error) {
         send(message::of_error(failure(ErrorCode::kInternal, "{}", error.what()).value(), false));
       }
@@ -176,7 +179,8 @@ class Answers {
 int compute_main(const std::vector<std::string>& arguments) {
   constexpr int kUsage = 2;
   if (arguments.size() != 3) return kUsage;
-  const auto parent = number(arguments[0]), memory_mb = number(arguments[1]), processor_s = number(arguments[2]);
+  const auto parent = number(arguments[0]), memory_mb = number(arguments[1]),
+             processor_s = number(arguments[2]);
   if (!parent || !memory_mb || !processor_s) return kUsage;
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != *parent) return kGone;  // it was gone before that was set

@@ -24,11 +24,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTick{100};
-constexpr int kTicksStill = 10;      // without processor time, of a process that does not ask for any
+constexpr int kTicksStill = 10;  // without processor time, of a process that does not ask for any
 constexpr int kTicksForDisk = 300;   // of one that waits for the disk
 constexpr double kAnyTime = 0.5e-3;  // s, of the processor in a tick: less is none
 constexpr std::size_t kWordsKept = 600;
-constexpr std::int64_t kLeastMemory = std::int64_t{256} << 20;  // bytes, of a job where the host has little
+constexpr std::int64_t kLeastMemory = std::int64_t{256}
+                                      << 20;  // bytes, of a job where the host has little
 
 std::int64_t memory_mb_of(const ComputeOptions& options) {
   if (options.memory_mb > 0) return options.memory_mb;
@@ -40,7 +41,8 @@ std::string last_words(const std::string& words) {
   const std::size_t end = words.find_last_not_of("\r\n ");
   if (end == std::string::npos) return "";
   const std::size_t before = words.find_last_of('\n', end);
-  std::string line = words.substr(before == std::string::npos ? 0 : before + 1, end - (before + 1) + 1);
+  std::string line =
+      words.substr(before == std::string::npos ? 0 : before + 1, end - (before + 1) + 1);
   std::replace_if(
       line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
   return line;
@@ -78,10 +80,12 @@ ComputeProcess::ComputeProcess(const ComputeOptions& options, std::unique_ptr<Ch
 
 ComputeProcess::~ComputeProcess() = default;
 
-Result<std::unique_ptr<ComputeProcess>> ComputeProcess::start(const ComputeOptions& options, const ComputeTask& task,
+Result<std::unique_ptr<ComputeProcess>> ComputeProcess::start(const ComputeOptions& options,
+                                                              const ComputeTask& task,
                                                               const StopRequests& stop) {
   std::vector<std::string> argv = options.program;
-  for (const std::int64_t limit : {std::int64_t{::getpid()}, memory_mb_of(options), std::int64_t{options.cpu_s}})
+  for (const std::int64_t limit :
+       {std::int64_t{::getpid()}, memory_mb_of(options), std::int64_t{options.cpu_s}})
     argv.push_back(std::to_string(limit));
   auto child = TRY(ChildProcess::start(argv));
   std::unique_ptr<ComputeProcess> process(new ComputeProcess(options, std::move(child), stop));
@@ -91,7 +95,9 @@ Result<std::unique_ptr<ComputeProcess>> ComputeProcess::start(const ComputeOptio
   return process;
 }
 
-Status ComputeProcess::take(const BatchText& batch, bool judges) { return send(message::of_batch(batch, judges)); }
+Status ComputeProcess::take(const BatchText& batch, bool judges) {
+  return send(message::of_batch(batch, judges));
+}
 
 Result<Made> ComputeProcess::make(const ComputeWatch& watch) {
   TRY(send(message::make()));
@@ -99,7 +105,8 @@ Result<Made> ComputeProcess::make(const ComputeWatch& watch) {
   try {
     return message::to_made(frame);
   } catch (const nlohmann::json::exception& error) {
-    return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "not understood: {}", error.what()));
+    return broken(Breakdown::Kind::kCrashed,
+                  failure(ErrorCode::kInternal, "not understood: {}", error.what()));
   }
 }
 
@@ -111,7 +118,8 @@ Result<GateVerdict> ComputeProcess::judge(const Opponents& opponents) {
   try {
     return message::to_verdict(frame);
   } catch (const nlohmann::json::exception& error) {
-    return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "not understood: {}", error.what()));
+    return broken(Breakdown::Kind::kCrashed,
+                  failure(ErrorCode::kInternal, "not understood: {}", error.what()));
   }
 }
 
@@ -127,7 +135,8 @@ Status ComputeProcess::send(const Frame& frame) {
   if (breakdown_) return tl::make_unexpected(breakdown_->error);
   const std::string bytes = encoded(frame);
   for (std::size_t sent = 0; sent < bytes.size();) {
-    const ssize_t n = ::send(child_->channel(), bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t n = ::send(child_->channel(), bytes.data() + sent, bytes.size() - sent,
+                             MSG_NOSIGNAL | MSG_DONTWAIT);
     if (n >= 0) {
       sent += static_cast<std::size_t>(n);
     } else if (errno == EAGAIN || errno == EINTR) {
@@ -168,20 +177,23 @@ Status ComputeProcess::heard(const Frame& frame, const ComputeWatch& watch) {
       Error error = message::to_error(frame, over_memory);
       if (!over_memory) return Failure(std::move(error));
       const auto limit = memory_mb_of(options_);
-      return broken(Breakdown::Kind::kOverMemory,
-                    failure(ErrorCode::kTooLarge, "its computing asks for more than {} MiB of memory", limit)
-                        .of("memory_mb")
-                        .beyond(limit, limit)
-                        .next("fewer poses or a simpler bias, or a larger memory_mb in the server file"));
+      return broken(
+          Breakdown::Kind::kOverMemory,
+          failure(ErrorCode::kTooLarge, "its computing asks for more than {} MiB of memory", limit)
+              .of("memory_mb")
+              .beyond(limit, limit)
+              .next("fewer poses or a simpler bias, or a larger memory_mb in the server file"));
     }
     return {};
   } catch (const nlohmann::json::exception& error) {
-    return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "not understood: {}", error.what()));
+    return broken(Breakdown::Kind::kCrashed,
+                  failure(ErrorCode::kInternal, "not understood: {}", error.what()));
   }
 }
 
 Status ComputeProcess::wait(short events) {
-  if (Clock::now() > next_tick_ + kTick) {  // the caller took its time, and the process may have waited for it
+  if (Clock::now() >
+      next_tick_ + kTick) {  // the caller took its time, and the process may have waited for it
     next_tick_ = Clock::now() + kTick;
     ticks_still_ = 0;
     time_at_last_tick_ = -1;
@@ -209,7 +221,8 @@ Status ComputeProcess::look_after() {
   const double time = child_->usage().processor_time;
   if (time > options_.cpu_s) {
     return broken(Breakdown::Kind::kOverTime,
-                  failure(ErrorCode::kTooLarge, "its computing took more than {} s of processor time", options_.cpu_s)
+                  failure(ErrorCode::kTooLarge,
+                          "its computing took more than {} s of processor time", options_.cpu_s)
                       .of("cpu_s")
                       .beyond(time, options_.cpu_s)
                       .next("fewer poses or a simpler bias, or a larger cpu_s in the server file"));
@@ -218,9 +231,11 @@ Status ComputeProcess::look_after() {
   time_at_last_tick_ = time;
   const ChildProcess::State state = gets_on ? ChildProcess::State::kRuns : child_->state();
   ticks_still_ = state == ChildProcess::State::kRuns ? 0 : ticks_still_ + 1;
-  if (ticks_still_ < (state == ChildProcess::State::kWaitsForDisk ? kTicksForDisk : kTicksStill)) return {};
+  if (ticks_still_ < (state == ChildProcess::State::kWaitsForDisk ? kTicksForDisk : kTicksStill))
+    return {};
   return broken(Breakdown::Kind::kHung,
-                failure(ErrorCode::kInternal, "its computing hung: it did not use the processor, nor ask for it"));
+                failure(ErrorCode::kInternal,
+                        "its computing hung: it did not use the processor, nor ask for it"));
 }
 
 void ComputeProcess::read_words() {
@@ -252,23 +267,27 @@ Failure ComputeProcess::broken(Breakdown::Kind kind, Failure why) {
 }
 
 Failure ComputeProcess::crashed() {
-  // It has closed its end of the socket, so it is over in a moment; one that is not has lost its mind.
+  // It has closed its end of the socket, so it is over in a moment; one that is not has lost its
+  // mind.
   pollfd end{child_->end(), POLLIN, 0};
   ::poll(&end, 1, static_cast<int>(kTick.count()));
   if (child_->words() >= 0) read_words();
   const auto ending = child_->ending();
   const std::string how = ending ? "was ended by " + *ending : "stopped to answer";
   const std::string said = last_words(words_);
-  return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "the process that computed it {}{}", how,
-                                                   said.empty() ? "" : ": " + said));
+  return broken(Breakdown::Kind::kCrashed,
+                failure(ErrorCode::kInternal, "the process that computed it {}{}", how,
+                        said.empty() ? "" : ": " + said));
 }
 
 Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options, ComputeTask task,
                                                    const StopRequests& stop) {
-  if (options.program.empty()) return std::unique_ptr<Computing>(std::make_unique<Workbench>(std::move(task)));
-  return ComputeProcess::start(options, task, stop).map([](std::unique_ptr<ComputeProcess> process) {
-    return std::unique_ptr<Computing>(std::move(process));
-  });
+  if (options.program.empty())
+    return std::unique_ptr<Computing>(std::make_unique<Workbench>(std::move(task)));
+  return ComputeProcess::start(options, task, stop)
+      .map([](std::unique_ptr<ComputeProcess> process) {
+        return std::unique_ptr<Computing>(std::move(process));
+      });
 }
 
 }  // namespace trammel

@@ -20,15 +20,17 @@ struct StopRequests {
   [[nodiscard]] bool any() const { return service.stop_requested() || job.stop_requested(); }
 };
 
-/// The computing of a job in a process of its own, where it can hurt nobody: ended at once where it is to stop, within
-/// two seconds where it crashes or stands still, and where it takes more than a job may. It stands still when it
-/// neither gets on nor wants to: no processor time used for a second though it is neither ready to run nor waiting for
-/// the disk. One that computes for ever is ended by the limit of processor time.
+/// The computing of a job in a process of its own, where it can hurt nobody: ended at once where it
+/// is to stop, within two seconds where it crashes or stands still, and where it takes more than a
+/// job may. It stands still when it neither gets on nor wants to: no processor time used for a
+/// second though it is neither ready to run nor waiting for the disk. One that computes for ever is
+/// ended by the limit of processor time.
 class ComputeProcess : public Computing {
  public:
   /// Refuses (kInternal) where no process can be started.
   [[nodiscard]] static Result<std::unique_ptr<ComputeProcess>> start(const ComputeOptions& options,
-                                                                     const ComputeTask& task, const StopRequests& stop);
+                                                                     const ComputeTask& task,
+                                                                     const StopRequests& stop);
   ~ComputeProcess() override;
 
   [[nodiscard]] Status take(const BatchText& batch, bool judges) override;
@@ -39,7 +41,8 @@ class ComputeProcess : public Computing {
 
  private:
   class Wake;
-  ComputeProcess(const ComputeOptions& options, std::unique_ptr<ChildProcess> child, const StopRequests& stop);
+  ComputeProcess(const ComputeOptions& options, std::unique_ptr<ChildProcess> child,
+                 const StopRequests& stop);
 
   [[nodiscard]] Status send(const Frame& frame);
   /// The next message that is an answer; those before it go to `watch`.
@@ -68,7 +71,8 @@ class ComputeProcess : public Computing {
 };
 
 /// The same here where `options` names no program, else in a process of its own.
-[[nodiscard]] Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options, ComputeTask task,
+[[nodiscard]] Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options,
+                                                                 ComputeTask task,
                                                                  const StopRequests& stop);
 
 }  // namespace trammel

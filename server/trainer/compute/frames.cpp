@@ -27,7 +27,8 @@ Result<nlohmann::json> head_of(const std::string& text) {
 }  // namespace
 
 std::string encoded(const Frame& frame) {
-  const std::string head = frame.head.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string head =
+      frame.head.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   const Sizes sizes = {head.size(), frame.text.size()};
   std::string bytes(sizeof(Sizes), '\0');
   std::memcpy(bytes.data(), sizes.data(), sizeof(Sizes));
@@ -40,8 +41,8 @@ Result<std::optional<Frame>> FrameReader::next() {
   std::memcpy(sizes.data(), buffer_.data(), sizeof(Sizes));
   const auto [head_bytes, text_bytes] = sizes;
   if (head_bytes > limits_.head_bytes || text_bytes > limits_.text_bytes) {
-    return failure(ErrorCode::kTooLarge, "{} and {} bytes, limit {} and {}", head_bytes, text_bytes, limits_.head_bytes,
-                   limits_.text_bytes)
+    return failure(ErrorCode::kTooLarge, "{} and {} bytes, limit {} and {}", head_bytes, text_bytes,
+                   limits_.head_bytes, limits_.text_bytes)
         .in(kWhere);
   }
   const std::size_t whole = sizeof(Sizes) + head_bytes + text_bytes;

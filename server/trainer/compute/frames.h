@@ -23,7 +23,8 @@ struct FrameLimits {
   std::size_t text_bytes = std::size_t{1} << 30;
 };
 
-/// Sizes (8 bytes each, as this host writes them), head, text. Text in the head that is not UTF-8 is replaced.
+/// Sizes (8 bytes each, as this host writes them), head, text. Text in the head that is not UTF-8
+/// is replaced.
 [[nodiscard]] std::string encoded(const Frame& frame);
 
 /// Makes frames of the bytes that come, however they are cut.
@@ -32,8 +33,8 @@ class FrameReader {
   explicit FrameReader(FrameLimits limits = {}) : limits_(limits) {}
 
   void feed(std::string_view bytes) { buffer_.append(bytes); }
-  /// The next whole frame; empty while there is none. Refuses sizes beyond the limits and a head that is no JSON
-  /// object; what comes after that means nothing.
+  /// The next whole frame; empty while there is none. Refuses sizes beyond the limits and a head
+  /// that is no JSON object; what comes after that means nothing.
   [[nodiscard]] Result<std::optional<Frame>> next();
 
  private:

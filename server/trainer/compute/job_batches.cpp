@@ -19,8 +19,10 @@ HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed, bool 
   return apply ? held_out_by_service(validation_share, seed) : drawn(0, seed);
 }
 
-Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, const HoldOut& hold_out) {
-  const std::string id = text.id.empty() ? "sent-" + sha256_hex(text.csv).substr(0, kIdOfSentBatch) : text.id;
+Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell,
+                                    const HoldOut& hold_out) {
+  const std::string id =
+      text.id.empty() ? "sent-" + sha256_hex(text.csv).substr(0, kIdOfSentBatch) : text.id;
   auto parsed = TRY(parse_batch(text.csv, "batch " + id));
   parsed.id = id;
   TRY(require_positions(parsed, "the service"));
@@ -29,7 +31,10 @@ Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, con
 
 JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
                        std::vector<std::string> earlier)
-    : cell_(cell), hold_out_(std::move(hold_out)), own_ids_(std::move(own)), earlier_ids_(std::move(earlier)) {}
+    : cell_(cell),
+      hold_out_(std::move(hold_out)),
+      own_ids_(std::move(own)),
+      earlier_ids_(std::move(earlier)) {}
 
 void JobBatches::add(const BatchText& text, bool judges) {
   auto batch = received_batch(text, cell_, hold_out_);
@@ -37,11 +42,14 @@ void JobBatches::add(const BatchText& text, bool judges) {
     sessions_.push_back(judging_session(*batch));
     judge_once_ = false;
   }
-  const bool earlier = std::find(earlier_ids_.begin(), earlier_ids_.end(), text.id) != earlier_ids_.end();
+  const bool earlier =
+      std::find(earlier_ids_.begin(), earlier_ids_.end(), text.id) != earlier_ids_.end();
   if (text.id.empty() || is_own(text.id) || earlier) own_.emplace(text.id, std::move(batch));
 }
 
-Result<CheckedBatch> JobBatches::first() const { return own(own_ids_.empty() ? "" : own_ids_.front()); }
+Result<CheckedBatch> JobBatches::first() const {
+  return own(own_ids_.empty() ? "" : own_ids_.front());
+}
 
 Result<CheckedBatch> JobBatches::first_without_older_judges() {
   const auto batch = first();
@@ -72,9 +80,10 @@ const std::vector<JudgingSession>& JobBatches::judging_sessions() {
 Result<JobBatches::SessionsOfDiagnosis> JobBatches::sessions_of_diagnosis() {
   std::vector<JudgingSession> sessions = judging_sessions();
   const auto batch = TRY(first());
-  const auto own = std::find_if(sessions.begin(), sessions.end(), [&](const JudgingSession& session) {
-    return !own_ids_.empty() && session.batch_id == batch.id();
-  });
+  const auto own =
+      std::find_if(sessions.begin(), sessions.end(), [&](const JudgingSession& session) {
+        return !own_ids_.empty() && session.batch_id == batch.id();
+      });
   const auto place = static_cast<std::size_t>(own - sessions.begin());
   if (own == sessions.end()) {
     // It came with the question and is not stored, or is older than those that judge.

@@ -11,31 +11,35 @@
 
 namespace trammel {
 
-/// The rows that a diagnosis does not look at: those held out to judge what it finds, where that is to be applied, else
-/// what the batch says itself.
-[[nodiscard]] HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed, bool apply);
+/// The rows that a diagnosis does not look at: those held out to judge what it finds, where that is
+/// to be applied, else what the batch says itself.
+[[nodiscard]] HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed,
+                                            bool apply);
 
-/// A text that was received as a batch of the cell. Refuses what the batch reader and the cell refuse. One without an
-/// id gets it from its content.
-[[nodiscard]] Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, const HoldOut& hold_out);
+/// A text that was received as a batch of the cell. Refuses what the batch reader and the cell
+/// refuse. One without an id gets it from its content.
+[[nodiscard]] Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell,
+                                                  const HoldOut& hold_out);
 
-/// The batches that one job works on, and those that judge what it makes. Each of them is parsed, checked and split
-/// once.
+/// The batches that one job works on, and those that judge what it makes. Each of them is parsed,
+/// checked and split once.
 class JobBatches {
  public:
-  /// `own`: the ids of those to work on; none: the one without an id. `earlier`: those to learn from as well. The cell
-  /// outlives it.
-  JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own, std::vector<std::string> earlier = {});
+  /// `own`: the ids of those to work on; none: the one without an id. `earlier`: those to learn
+  /// from as well. The cell outlives it.
+  JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
+             std::vector<std::string> earlier = {});
 
-  /// `judges`: it is one of those that judge, which come oldest first. One of these that does not fit the cell, which
-  /// has changed since, does not count.
+  /// `judges`: it is one of those that judge, which come oldest first. One of these that does not
+  /// fit the cell, which has changed since, does not count.
   void add(const BatchText& text, bool judges);
 
   /// The first of those to work on.
   [[nodiscard]] Result<CheckedBatch> first() const;
   /// The same without copies of rows that judge in older batches.
   [[nodiscard]] Result<CheckedBatch> first_without_older_judges();
-  /// All to work on together, and the earlier ones that still fit the cell, without such copies: sessions of one arm.
+  /// All to work on together, and the earlier ones that still fit the cell, without such copies:
+  /// sessions of one arm.
   [[nodiscard]] Result<CheckedBatch> to_learn_from();
   /// Those whose rows may judge what the job makes, oldest first.
   [[nodiscard]] const std::vector<JudgingSession>& judging_sessions();

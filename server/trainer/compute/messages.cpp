@@ -71,7 +71,8 @@ Json json_of(const std::optional<FleetPrior>& fleet) {
   if (!fleet) return nullptr;
   Json parameters = Json::array();
   for (const FleetParameter& one : fleet->parameters)
-    parameters.push_back({{"name", one.name}, {"mean", one.mean}, {"spread", one.spread}, {"robots", one.robots}});
+    parameters.push_back(
+        {{"name", one.name}, {"mean", one.mean}, {"spread", one.spread}, {"robots", one.robots}});
   return {{"robot", fleet->robot}, {"robots", fleet->robots}, {"parameters", parameters}};
 }
 
@@ -81,7 +82,8 @@ std::optional<FleetPrior> fleet_from(const Json& json) {
   fleet.robot = json.at("robot");
   fleet.robots = json.at("robots");
   for (const Json& one : json.at("parameters"))
-    fleet.parameters.push_back({one.at("name"), one.at("mean"), one.at("spread"), one.at("robots")});
+    fleet.parameters.push_back(
+        {one.at("name"), one.at("mean"), one.at("spread"), one.at("robots")});
   return fleet;
 }
 
@@ -91,7 +93,8 @@ std::vector<Frame> of_task(const ComputeTask& task) {
   std::vector<Frame> frames;
   frames.push_back(frame("cell", {}, task.cell->cell_yaml));
   frames.push_back(frame("robot", {}, task.cell->robot_yaml));
-  if (task.in_force) frames.push_back(frame("in_force", {{"version", task.in_force->version}}, task.in_force->text));
+  if (task.in_force)
+    frames.push_back(frame("in_force", {{"version", task.in_force->version}}, task.in_force->text));
   frames.push_back(frame("task", {{"cell", task.cell->name},
                                   {"diagnose", task.kind == JobKind::kDiagnose},
                                   {"check", task.kind == JobKind::kCheck},
@@ -112,7 +115,8 @@ std::vector<Frame> of_task(const ComputeTask& task) {
 
 Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   const Json& head = frame.head;
-  auto cell = TRY(parse_cell(texts.cell, texts.robot, "cell " + head.at("cell").get<std::string>()));
+  auto cell =
+      TRY(parse_cell(texts.cell, texts.robot, "cell " + head.at("cell").get<std::string>()));
   ComputeTask task;
   task.cell = std::make_shared<const Cell>(std::move(cell));
   task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose
@@ -134,10 +138,13 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   return task;
 }
 
-ModelText to_model_text(const Frame& frame) { return {frame.head.at("version").get<int>(), frame.text}; }
+ModelText to_model_text(const Frame& frame) {
+  return {frame.head.at("version").get<int>(), frame.text};
+}
 
 Frame of_batch(const BatchText& batch, bool judges) {
-  return frame("batch", {{"id", batch.id}, {"taken_in", batch.taken_in}, {"judges", judges}}, batch.csv);
+  return frame("batch", {{"id", batch.id}, {"taken_in", batch.taken_in}, {"judges", judges}},
+               batch.csv);
 }
 
 BatchText to_batch(const Frame& frame, bool& judges) {
@@ -150,7 +157,8 @@ Frame make() { return frame("make"); }
 std::vector<Frame> of_opponents(const Opponents& opponents) {
   std::vector<Frame> frames;
   if (opponents.in_force)
-    frames.push_back(frame("opponent", {{"version", opponents.in_force->version}}, opponents.in_force->text));
+    frames.push_back(
+        frame("opponent", {{"version", opponents.in_force->version}}, opponents.in_force->text));
   for (const ModelText& before : opponents.served_before)
     frames.push_back(frame("served_before", {{"version", before.version}}, before.text));
   Json question = {{"most_before", opponents.most_before}};
@@ -177,7 +185,8 @@ Frame of_findings(const std::string& findings, const std::string& page) {
 }
 
 Findings to_findings(const Frame& frame) {
-  const auto bytes = std::min(frame.head.at("findings_bytes").get<std::size_t>(), frame.text.size());
+  const auto bytes =
+      std::min(frame.head.at("findings_bytes").get<std::size_t>(), frame.text.size());
   return {frame.text.substr(0, bytes), frame.text.substr(bytes)};
 }
 
@@ -197,7 +206,8 @@ Result<Made> to_made(const Frame& frame) {
   made.remarks = frame.head.at("remarks");
   made.quarantine = frame.head.at("quarantine");
   made.message = frame.head.at("message");
-  made.outcome.verdict = job_verdict_of(frame.head.at("verdict").get<std::string>()).value_or(JobVerdict::kOpen);
+  made.outcome.verdict =
+      job_verdict_of(frame.head.at("verdict").get<std::string>()).value_or(JobVerdict::kOpen);
   made.outcome.why = frame.head.at("why");
   if (frame.text.empty()) return made;
   auto model = TRY(deserialize(frame.text, "the model that was made", ModelTexts::kAsTheyAre));
@@ -218,11 +228,12 @@ Frame of_verdict(const GateVerdict& verdict) {
 
 GateVerdict to_verdict(const Frame& frame) {
   const Json& head = frame.head;
-  return {head.at("put_in_force"),
-          head.at("message"),
-          head.at("undecided"),
-          head.at("why"),
-          {get<double>(head, "before_m"), get<double>(head, "after_m"), get<double>(head, "limit_m")}};
+  return {
+      head.at("put_in_force"),
+      head.at("message"),
+      head.at("undecided"),
+      head.at("why"),
+      {get<double>(head, "before_m"), get<double>(head, "after_m"), get<double>(head, "limit_m")}};
 }
 
 Frame of_error(const Error& error, bool over_memory) {

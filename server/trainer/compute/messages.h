@@ -3,9 +3,10 @@
 #include "server/trainer/compute/frames.h"
 #include "server/trainer/compute/task.h"
 
-/// What the service and the process that computes for it say to each other. The service sends the texts of a task, the
-/// task, its batches and `make`; then, as often as it likes, the texts of opponents and `judge`. Each of these two is
-/// answered by `made`, `verdict` or `error`; before that come `progress` and `found`.
+/// What the service and the process that computes for it say to each other. The service sends the
+/// texts of a task, the task, its batches and `make`; then, as often as it likes, the texts of
+/// opponents and `judge`. Each of these two is answered by `made`, `verdict` or `error`; before
+/// that come `progress` and `found`.
 namespace trammel::message {
 
 /// What kind of message it is: the member `is`.
@@ -27,7 +28,8 @@ namespace trammel::message {
 
 // These throw nlohmann::json::exception where a message is not what it says it is.
 
-/// Of the texts `cell`, `robot` and `in_force` and the frame that ends them. Refuses a cell that cannot be read.
+/// Of the texts `cell`, `robot` and `in_force` and the frame that ends them. Refuses a cell that
+/// cannot be read.
 struct TaskTexts {
   std::string cell, robot;
   std::optional<ModelText> in_force;

@@ -25,15 +25,21 @@ struct BatchText {
 struct ComputeTask {
   std::shared_ptr<const Cell> cell;
   JobKind kind = JobKind::kTrain;
-  std::vector<std::string> batch_ids;         ///< to learn from or to diagnose, together; none: the one that was sent
-  std::vector<std::string> earlier_ids = {};  ///< sessions of the same arm to learn from as well, oldest first
-  std::string level, bias;                    ///< of a training; empty: as usual
-                                              ///< `level` of a check: its tolerance in mm; empty: as the cell file says
-  std::vector<std::string> earlier_checks;    ///< of a check: what those before it saw, as drift_of() reads it
-  bool apply = false;                         ///< of a diagnosis: train a model with the causes found
-  bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
+  std::vector<std::string>
+      batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
+  std::vector<std::string> earlier_ids =
+      {};  ///< sessions of the same arm to learn from as well, oldest first
+  std::string level,
+      bias;  ///< of a training; empty: as usual
+             ///< `level` of a check: its tolerance in mm; empty: as the cell file says
+  std::vector<std::string>
+      earlier_checks;  ///< of a check: what those before it saw, as drift_of() reads it
+  bool apply = false;  ///< of a diagnosis: train a model with the causes found
+  bool hold_against_in_force =
+      false;  ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
-  std::optional<FleetPrior> fleet;  ///< where the cell file says `prior: fleet`, and there are twins
+  std::optional<FleetPrior>
+      fleet;  ///< where the cell file says `prior: fleet`, and there are twins
   std::uint64_t seed = 1;
   double validation_share = kUsualJudgingShare;
   double accept_ratio = GateOptions::kUsualAcceptRatio;
@@ -76,8 +82,8 @@ struct ComputeCost {
   std::optional<double> processor_time;     ///< s
 };
 
-/// The computing of one job: its batches are given to it one by one, it makes what the job asks for, and judges it as
-/// often as it is asked. Of one thread.
+/// The computing of one job: its batches are given to it one by one, it makes what the job asks
+/// for, and judges it as often as it is asked. Of one thread.
 class Computing {
  public:
   virtual ~Computing() = default;

@@ -32,8 +32,8 @@ std::string findings_text(const Diagnosis& diagnosis, const Cell& cell) {
 }
 
 /// The cell as it is served: with the error sources of the model in force.
-std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, const ServedModel* in_force,
-                                      const CheckedBatch& batch) {
+std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell,
+                                      const ServedModel* in_force, const CheckedBatch& batch) {
   if (in_force == nullptr) return cell;
   auto served = std::make_shared<Cell>(*cell);
   served->model.error_sources = sources_in_force(in_force->model, *cell, batch);
@@ -45,7 +45,8 @@ Made nothing_applied(const std::string& why, const ServedModel& present) {
   made.outcome.verdict = JobVerdict::kNothingApplied;
   made.outcome.why = why;
   made.outcome.next = "submit the batch where it is good, and release it";
-  made.message = fmt::format("nothing applied: {}; version {} stays in force", why, present.version);
+  made.message =
+      fmt::format("nothing applied: {}; version {} stays in force", why, present.version);
   return made;
 }
 
@@ -53,7 +54,8 @@ bool has_unknown_tools(const CompensatedModel& model, const MeasurementBatch& ba
   return known_rows(model, batch).measurements.size() < batch.measurements.size();
 }
 
-/// Whether `after` is better than `before` beyond chance, on those judges of the sessions that both know.
+/// Whether `after` is better than `before` beyond chance, on those judges of the sessions that both
+/// know.
 bool is_better_on(const std::vector<JudgingSession>& sessions, const CompensatedModel& before,
                   const CompensatedModel& after) {
   std::vector<Vector3> errors_before, errors_after;
@@ -71,7 +73,8 @@ bool is_better_on(const std::vector<JudgingSession>& sessions, const Compensated
   const auto n = static_cast<Eigen::Index>(errors_before.size());
   if (n == 0) return false;
   return paired_gain(Eigen::Map<const Eigen::Matrix3Xd>(errors_before.front().data(), 3, n),
-                     Eigen::Map<const Eigen::Matrix3Xd>(errors_after.front().data(), 3, n), pose_groups(q))
+                     Eigen::Map<const Eigen::Matrix3Xd>(errors_after.front().data(), 3, n),
+                     pose_groups(q))
       .beyond_chance();
 }
 
@@ -92,22 +95,26 @@ Made nothing_carried(const DayGain& day) {
   return made;
 }
 
-/// What is said of an extended model beside its verdict. `judged_less`: pose ids that did not judge.
-std::string remarks_of(const std::vector<std::string>& judged_less, const std::vector<Unsupported>& left_out,
+/// What is said of an extended model beside its verdict. `judged_less`: pose ids that did not
+/// judge.
+std::string remarks_of(const std::vector<std::string>& judged_less,
+                       const std::vector<Unsupported>& left_out,
                        const std::optional<DayGain>& day) {
   return judged_without(judged_less) + joined_by_semicolons({to_string(left_out)}) +
          (day ? joined_by_semicolons({to_string(*day)}) : "");
 }
 
 HoldOut hold_out_of(const ComputeTask& task) {
-  return task.kind != JobKind::kTrain ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
-                                      : held_out_by_service(task.validation_share, task.seed);
+  return task.kind != JobKind::kTrain
+             ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
+             : held_out_by_service(task.validation_share, task.seed);
 }
 
 }  // namespace
 
 Workbench::Workbench(ComputeTask task)
-    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids, task_.earlier_ids) {}
+    : task_(std::move(task)),
+      batches_(*task_.cell, hold_out_of(task_), task_.batch_ids, task_.earlier_ids) {}
 
 Status Workbench::take(const BatchText& batch, bool judges) {
   batches_.add(batch, judges);
@@ -133,7 +140,8 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   if (task_.hold_against_in_force) {
     const auto batch = TRY(batches_.first());
     if (!in_force) {
-      if (const auto doubt = doubt_of_first_batch(task_.cell, batch)) return Made{std::nullopt, "", sentence(*doubt)};
+      if (const auto doubt = doubt_of_first_batch(task_.cell, batch))
+        return Made{std::nullopt, "", sentence(*doubt)};
     }
     if (in_force) {
       const Triage triaged = triage(in_force->model, batch);
@@ -144,18 +152,20 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   }
   const auto batch = TRY(batches_.to_learn_from());
   const bool as_usual = task_.level.empty() && task_.bias.empty();
-  auto successor =
-      TRY(train_successor(task_.cell, batch, as_usual ? in_force.get() : nullptr, train_options(batch, watch)));
+  auto successor = TRY(train_successor(task_.cell, batch, as_usual ? in_force.get() : nullptr,
+                                       train_options(batch, watch)));
   if (!task_.earlier_ids.empty()) {
     TRY(choose_alone(successor, changed, watch));
   }
-  return made(std::move(successor.model), joined_by_semicolons({seen, successor.note}), batches_.judging_sessions());
+  return made(std::move(successor.model), joined_by_semicolons({seen, successor.note}),
+              batches_.judging_sessions());
 }
 
 Result<Made> Workbench::checked(const ComputeWatch& watch) {
   const auto batch = TRY(batches_.first());
   const auto present = TRY(in_force());
-  if (!present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
+  if (!present)
+    return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
   CheckAsked asked;
   if (!task_.level.empty()) asked.tolerance = std::stod(task_.level) * from_mm(1);
   for (const std::string& earlier : task_.earlier_checks) {
@@ -163,7 +173,8 @@ Result<Made> Workbench::checked(const ComputeWatch& watch) {
   }
   const HealthCheck check = TRY(check_robot(present->model, *task_.cell, batch, std::move(asked)));
   const auto json = check_json(check, batch, present->model);
-  TRY(watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", ""));
+  TRY(watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n",
+                  ""));
   Made made;
   made.outcome.verdict = JobVerdict::kDiagnosed;
   made.outcome.why = check.sentence;
@@ -178,15 +189,17 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
   auto alone = train_successor(task_.cell, own, in_force_.get(), train_options(own, watch));
   if (!alone) return {};  // too little by itself
   const std::vector<JudgingSession>& sessions = batches_.judging_sessions();
-  const auto session = std::find_if(sessions.begin(), sessions.end(),
-                                    [&](const JudgingSession& one) { return one.batch_id == own.id(); });
+  const auto session =
+      std::find_if(sessions.begin(), sessions.end(),
+                   [&](const JudgingSession& one) { return one.batch_id == own.id(); });
   const char* why = nullptr;
-  if (changed && session != sessions.end() && is_better_on({*session}, together.model, alone->model)) {
+  if (changed && session != sessions.end() &&
+      is_better_on({*session}, together.model, alone->model)) {
     why = "the arm has changed in more than one way: learned from this batch alone";
   } else if (!changed && !is_better_on(sessions, in_force_->model, together.model)) {
     why =
-        "the sessions together are no better for the tools that were known: what was known stays, the new tool is "
-        "added";
+        "the sessions together are no better for the tools that were known: what was known stays, "
+        "the new tool is added";
   }
   if (why == nullptr) return {};
   alone->note += (alone->note.empty() ? "" : "; ") + std::string(why);
@@ -205,7 +218,8 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   }
   DiagnoseOptions options;
   options.seed = task_.seed;
-  options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage, double share) {
+  options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage,
+                                                                         double share) {
     return watch.progress("diagnosing: " + stage, whole * share);
   };
   const auto served = as_served(task_.cell, present.get(), batch);
@@ -218,7 +232,8 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   made.message = to_string(diagnosis->verdict);
   if (!task_.apply) return made;
   if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
-    const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
+    const std::string stays =
+        present ? fmt::format("; version {} stays in force", present->version) : "";
     made.outcome.verdict = JobVerdict::kNothingApplied;
     made.outcome.why = sentence(can_apply.error());
     made.message = "nothing applied: " + made.outcome.why + stays;
@@ -249,7 +264,8 @@ Result<Made> Workbench::first_extended(const CheckedBatch& batch, const Diagnosi
   Extension extension = TRY(extend(task_.cell, batch, diagnosis, options));
   if (extension.day && !extension.day->carries()) return nothing_carried(*extension.day);
   without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(extension.before));
-  const std::string remarks = remarks_of(extension.gain.left_out, extension.left_out, extension.day);
+  const std::string remarks =
+      remarks_of(extension.gain.left_out, extension.left_out, extension.day);
   return made(std::move(extension.after), remarks, {std::move(extension.judges)});
 }
 
@@ -264,17 +280,20 @@ TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWa
   options.fleet = task_.fleet;
   options.seed = task_.seed;
   options.trained_at = task_.now;
-  options.looked_at = true;  // by this job, or by whoever asked for a training from batches that he knows
+  options.looked_at =
+      true;  // by this job, or by whoever asked for a training from batches that he knows
   options.progress = watch.progress;
   return options;
 }
 
-Made Workbench::made(CompensatedModel model, std::string remarks, std::vector<JudgingSession> sessions) {
+Made Workbench::made(CompensatedModel model, std::string remarks,
+                     std::vector<JudgingSession> sessions) {
   sessions_ = std::move(sessions);
   candidate_ = model;
   std::vector<std::string> texts;
   for (const Note& note : warnings_of(model, model.parts().validation))
-    if (note.code != kNotConfirmed) texts.push_back(note.text);  // of every model of the cell; its page says it
+    if (note.code != kNotConfirmed)
+      texts.push_back(note.text);  // of every model of the cell; its page says it
   remarks += joined_by_semicolons(texts);
   return {std::move(model), std::move(remarks), ""};
 }

@@ -21,23 +21,28 @@ constexpr int kToldWithin = 2;  // weeks
 constexpr int kQuarter = 13;    // weeks
 
 bool is(const Event& event, const Named& name) {
-  const bool kind = std::find(event.names.begin(), event.names.end(), name.cause) != event.names.end();
+  const bool kind =
+      std::find(event.names.begin(), event.names.end(), name.cause) != event.names.end();
   return kind && (event.joint == 0 || name.joint == event.joint);
 }
 
 /// What every arm has from the first day on, and no cell file lists.
-bool is_of_every_arm(const Named& name) { return name.cause == "gear_transmission" && name.joint <= 4; }
+bool is_of_every_arm(const Named& name) {
+  return name.cause == "gear_transmission" && name.joint <= 4;
+}
 
 bool is(const Event& event, const std::vector<Named>& names) {
-  return std::any_of(names.begin(), names.end(), [&](const Named& name) { return is(event, name); });
+  return std::any_of(names.begin(), names.end(),
+                     [&](const Named& name) { return is(event, name); });
 }
 
 bool is_open(const std::vector<Named>& names) {
-  return names.empty() ||
-         std::any_of(names.begin(), names.end(), [](const Named& name) { return name.cause == "unknown"; });
+  return names.empty() || std::any_of(names.begin(), names.end(),
+                                      [](const Named& name) { return name.cause == "unknown"; });
 }
 
-std::optional<CompensatedModel> trained(const Arm& arm, const MeasurementBatch& batch, const TrainOptions& options) {
+std::optional<CompensatedModel> trained(const Arm& arm, const MeasurementBatch& batch,
+                                        const TrainOptions& options) {
   const auto checked = check_against_cell(batch, *arm.cell(), drawn(0.2, 1));
   if (!checked) return std::nullopt;
   const auto model = train(arm.cell(), *checked, options);
@@ -124,7 +129,8 @@ void CellYear::judge(const Said& said, int week, YearScore& score) {
   if (!said.changed && !said.cannot_tell) return;
   for (const Event& event : arm_.events()) {
     EventOfYear& told = told_[event.what];
-    const bool now = event.week <= week && (event.slow || event.week == 0 || week - event.week <= kToldWithin);
+    const bool now =
+        event.week <= week && (event.slow || event.week == 0 || week - event.week <= kToldWithin);
     if (!now || told.told != Told::kMissed) continue;
     told.told = Told::kOpen;
     told.told_in = week;
@@ -170,7 +176,8 @@ double CellYear::oracle_error(int week) {
 }
 
 void CellYear::drill(int week, YearScore& score) {
-  const std::vector<Hole> holes = driller_.drill(week, kHoles, static_cast<std::uint64_t>(300 + week));
+  const std::vector<Hole> holes =
+      driller_.drill(week, kHoles, static_cast<std::uint64_t>(300 + week));
   double sum = 0;
   int drilled = 0;
   for (const Hole& hole : holes) {
@@ -184,8 +191,9 @@ void CellYear::drill(int week, YearScore& score) {
     ++drilled;
   }
   const double rms = std::sqrt(sum / std::max(1, drilled));
-  score.weeks.push_back({arm_.cell()->name, week, rms, driller_.error_in_force(week).value_or(0), oracle_error(week),
-                         without_physics_ ? driller_.error_of(*without_physics_, week) : 0, !trusted_});
+  score.weeks.push_back(
+      {arm_.cell()->name, week, rms, driller_.error_in_force(week).value_or(0), oracle_error(week),
+       without_physics_ ? driller_.error_of(*without_physics_, week) : 0, !trusted_});
 }
 
 void CellYear::finish(YearScore& score) const {

@@ -51,16 +51,19 @@ double y_of(double error) {
   return kHeight - 14 - share * (kHeight - 24);
 }
 
-std::string line(const std::vector<WeekOfArm>& weeks, double WeekOfArm::*error, const std::string& kind, int last) {
+std::string line(const std::vector<WeekOfArm>& weeks, double WeekOfArm::*error,
+                 const std::string& kind, int last) {
   std::string points;
-  for (const WeekOfArm& week : weeks) points += fmt::format("{:.1f},{:.1f} ", x_of(week.week, last), y_of(week.*error));
+  for (const WeekOfArm& week : weeks)
+    points += fmt::format("{:.1f},{:.1f} ", x_of(week.week, last), y_of(week.*error));
   return fmt::format("<polyline class=\"{}\" points=\"{}\"/>", kind, points);
 }
 
-std::string drawn(const std::string& cell, const std::vector<WeekOfArm>& weeks, const YearScore& score) {
+std::string drawn(const std::string& cell, const std::vector<WeekOfArm>& weeks,
+                  const YearScore& score) {
   const int last = last_week(score);
-  std::string svg =
-      fmt::format("<h3>{}</h3><svg viewBox=\"0 0 {} {}\" role=\"img\">", html_text(cell), kWidth, kHeight);
+  std::string svg = fmt::format("<h3>{}</h3><svg viewBox=\"0 0 {} {}\" role=\"img\">",
+                                html_text(cell), kWidth, kHeight);
   for (const double level : {1e-5, 1e-4, 1e-3})
     svg += fmt::format(
         "<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"2\" "
@@ -68,23 +71,28 @@ std::string drawn(const std::string& cell, const std::vector<WeekOfArm>& weeks, 
         kLeft, kWidth, y_of(level), to_mm(level));
   for (const WeekOfArm& week : weeks)
     if (week.warned)
-      svg += fmt::format("<rect x=\"{:.1f}\" y=\"0\" width=\"{:.1f}\" height=\"{}\" fill=\"#f3e3b3\"/>",
-                         x_of(week.week, last) - 8, 16.0, kHeight - 14);
+      svg += fmt::format(
+          "<rect x=\"{:.1f}\" y=\"0\" width=\"{:.1f}\" height=\"{}\" fill=\"#f3e3b3\"/>",
+          x_of(week.week, last) - 8, 16.0, kHeight - 14);
   for (const EventOfYear& event : score.events)
     if (event.cell == cell)
       svg += fmt::format(
-          "<line class=\"event\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" y2=\"{1}\"><title>{2}</title></line>",
+          "<line class=\"event\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" "
+          "y2=\"{1}\"><title>{2}</title></line>",
           x_of(event.week, last), kHeight - 14, html_text(event.what));
-  svg += line(weeks, &WeekOfArm::without_physics, "gp", last) + line(weeks, &WeekOfArm::oracle, "oracle", last) +
+  svg += line(weeks, &WeekOfArm::without_physics, "gp", last) +
+         line(weeks, &WeekOfArm::oracle, "oracle", last) +
          line(weeks, &WeekOfArm::holes, "holes", last);
   for (int week = 0; week < last; week += std::max(1, last / 4))
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\">week {}</text>", x_of(week, last), kHeight - 2, week);
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\">week {}</text>", x_of(week, last), kHeight - 2,
+                       week);
   return svg + "</svg>";
 }
 
 std::string told(const EventOfYear& event) {
   if (event.told == Told::kMissed) return "not seen";
-  return fmt::format("{} in week {}", event.told == Told::kNamed ? "named" : "seen, left open", event.told_in);
+  return fmt::format("{} in week {}", event.told == Told::kNamed ? "named" : "seen, left open",
+                     event.told_in);
 }
 
 }  // namespace
@@ -101,7 +109,8 @@ std::string year_page(const YearScore& score) {
   HtmlTable events;
   events.head = {"cell", "week", "what", "told"};
   for (const EventOfYear& event : score.events)
-    events.rows.push_back({{html_text(event.cell), std::to_string(event.week), html_text(event.what), told(event)}});
+    events.rows.push_back(
+        {{html_text(event.cell), std::to_string(event.week), html_text(event.what), told(event)}});
   HtmlTable figures;
   figures.head = {"figure", "value"};
   const auto row = [&](const std::string& name, int count, int of) {
@@ -119,17 +128,16 @@ std::string year_page(const YearScore& score) {
   const auto open = std::count_if(score.events.begin(), score.events.end(),
                                   [](const EventOfYear& e) { return e.told == Told::kOpen; });
   const std::string verdict = fmt::format(
-      "Of {} things that happened to {} arms, {} were named and {} seen and left open. The server was killed {} "
-      "times.",
+      "Of {} things that happened to {} arms, {} were named and {} seen and left open. The server "
+      "was killed {} times.",
       score.events.size(), by_cell.size(), named, open, score.kills);
-  return fill_in(
-      kPage,
-      {{"style", std::string(page_style())},
-       {"span", fmt::format("{} arms over {} weeks · {}", by_cell.size(), last_week(score), shown_day(unix_now()))},
-       {"verdict", verdict},
-       {"figures", html_table(figures)},
-       {"arms", arms},
-       {"events", html_table(events)}});
+  return fill_in(kPage, {{"style", std::string(page_style())},
+                         {"span", fmt::format("{} arms over {} weeks · {}", by_cell.size(),
+                                              last_week(score), shown_day(unix_now()))},
+                         {"verdict", verdict},
+                         {"figures", html_table(figures)},
+                         {"arms", arms},
+                         {"events", html_table(events)}});
 }
 
 }  // namespace trammel::year

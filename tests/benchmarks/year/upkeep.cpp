@@ -24,7 +24,8 @@ Named named(const json& cause) {
   Named named{cause.value("cause", ""), 0};
   if (cause.contains("joint") && cause["joint"].is_number()) named.joint = cause["joint"];
   const std::string parameter = cause.value("parameter", "");
-  if (named.joint == 0 && !parameter.empty() && std::isdigit(static_cast<unsigned char>(parameter.back())) != 0)
+  if (named.joint == 0 && !parameter.empty() &&
+      std::isdigit(static_cast<unsigned char>(parameter.back())) != 0)
     named.joint = parameter.back() - '0';
   return named;
 }
@@ -33,7 +34,8 @@ std::vector<std::vector<Named>> names_in(const json& changes) {
   std::vector<std::vector<Named>> all;
   for (const json& change : changes) {
     all.push_back({named(change)});
-    for (const json& other : change.value("could_also_be", json::array())) all.back().push_back(named(other));
+    for (const json& other : change.value("could_also_be", json::array()))
+      all.back().push_back(named(other));
   }
   return all;
 }
@@ -74,8 +76,8 @@ Metrologist::Metrologist(const Arm& arm, client::Session& session) : arm_(arm), 
 Taken Metrologist::follow(std::int64_t job) {
   const auto ended = session_.wait_for_job(job, kLimit, [](const client::JobStatus&) {});
   if (!ended) return {.verdict = sentence(ended.error())};
-  return {ended->verdict + (ended->why.empty() ? "" : ": " + ended->why), ended->model_version, ended->in_force,
-          ended->verdict == "quarantined"};
+  return {ended->verdict + (ended->why.empty() ? "" : ": " + ended->why), ended->model_version,
+          ended->in_force, ended->verdict == "quarantined"};
 }
 
 Taken Metrologist::submit(const std::string& id, const MeasurementBatch& batch) {
@@ -98,7 +100,8 @@ Taken Metrologist::release() {
 }
 
 Said Metrologist::check(int week) {
-  const MeasurementBatch batch = arm_.measured(check_poses_, week, static_cast<std::uint64_t>(77 + week), true);
+  const MeasurementBatch batch =
+      arm_.measured(check_poses_, week, static_cast<std::uint64_t>(77 + week), true);
   const auto job = session_.check_health(arm_.cell()->name, "", to_csv(batch), std::nan(""));
   if (!job) return {.cannot_tell = true, .sentence = sentence(job.error())};
   const Taken ended = follow(*job);

@@ -21,8 +21,9 @@ struct Named {
 /// What the service said of a cell in a week.
 struct Said {
   bool changed = false, cannot_tell = false;
-  bool in_force = false;                      ///< a diagnosis has put a model in force
-  std::vector<std::vector<Named>> seen = {};  ///< by change: what it is called, and what it could also be
+  bool in_force = false;  ///< a diagnosis has put a model in force
+  std::vector<std::vector<Named>> seen =
+      {};  ///< by change: what it is called, and what it could also be
   std::string sentence = {};
 };
 
@@ -43,11 +44,13 @@ class Metrologist {
   [[nodiscard]] Taken measure(int week, int poses);
   /// Sends a batch; a job that was broken off by a server that died is followed on the next one.
   [[nodiscard]] Taken submit(const std::string& id, const MeasurementBatch& batch);
-  /// The batch does not fit the model in force, and a check has said why: it is trained from all the same.
+  /// The batch does not fit the model in force, and a check has said why: it is trained from all
+  /// the same.
   [[nodiscard]] Taken release();
   /// Follows the job of a batch that is there already.
   [[nodiscard]] Taken follow(std::int64_t job);
-  /// Asks what is wrong by the last batch, lets what is sure go into the model, and says what it was.
+  /// Asks what is wrong by the last batch, lets what is sure go into the model, and says what it
+  /// was.
   [[nodiscard]] Said diagnose();
   /// The version in force; 0: none.
   [[nodiscard]] int in_force() const;

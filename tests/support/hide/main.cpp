@@ -1,6 +1,6 @@
-// Hides an effect in a cell that it draws, and writes batch.csv, cell.yaml, robot.yaml and the sealed truth.json.
-// `trammel_hide --kind KIND --seed S --lambda L [--poses N] [--ranges R] [--position-only] [--validation SHARE] -o
-// FOLDER`
+// Hides an effect in a cell that it draws, and writes batch.csv, cell.yaml, robot.yaml and the
+// sealed truth.json. `trammel_hide --kind KIND --seed S --lambda L [--poses N] [--ranges R]
+// [--position-only] [--validation SHARE] -o FOLDER`
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
@@ -22,12 +22,14 @@ int main(int argc, char** argv) {
   bool position_only = false;
   std::string folder = ".";
   CLI::App app("Hides an effect in a measured cell.");
-  app.add_option("--kind", spec.kind, "a cause, causes joined by '+', mixture2, mixture3, null_..., unknown_..., ...");
+  app.add_option("--kind", spec.kind,
+                 "a cause, causes joined by '+', mixture2, mixture3, null_..., unknown_..., ...");
   app.add_option("--seed", spec.seed);
   app.add_option("--lambda", spec.lambda, "strength outside what the cell's error sources explain");
   app.add_option("--poses", spec.poses);
   app.add_option("--ranges", spec.ranges, "calibration, 1dim, 3dim, 6dim-s, 6dim-m, 6dim-l");
-  app.add_option("--validation", spec.validation_share, "share of the poses set aside for validation");
+  app.add_option("--validation", spec.validation_share,
+                 "share of the poses set aside for validation");
   app.add_flag("--position-only", position_only);
   app.add_option("-o,--output", folder, "an existing folder");
   CLI11_PARSE(app, argc, argv);

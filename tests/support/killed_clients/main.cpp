@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   load.kills = std::atoi(argv[3]);
   if (argc > 4) load.idle = std::atoi(argv[4]);
   const trammel::test::KillOutcome outcome = trammel::test::kill_clients(load);
-  std::printf("killed %d; honest clients: %zu calls, %zu lost, longest %.2f s\n", outcome.killed, outcome.calls,
-              outcome.lost, outcome.longest_call_s);
+  std::printf("killed %d; honest clients: %zu calls, %zu lost, longest %.2f s\n", outcome.killed,
+              outcome.calls, outcome.lost, outcome.longest_call_s);
   return outcome.lost == 0 && outcome.killed == load.kills ? 0 : 1;
 }

@@ -1,5 +1,6 @@
-// A program that links libtrammel as others do: learns from a batch, or extends a cell by what it shows, and says what
-// became of it. `trammel_library_door train|extend CELL BATCH`; exit code 0 done, 1 nothing applied, 3 refused.
+// A program that links libtrammel as others do: learns from a batch, or extends a cell by what it
+// shows, and says what became of it. `trammel_library_door train|extend CELL BATCH`; exit code 0
+// done, 1 nothing applied, 3 refused.
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -18,7 +19,8 @@ int refused(const api::Error& error) {
 int train(const api::Cell& cell, const std::vector<api::Batch>& batches) {
   const auto model = api::train(cell, batches);
   if (!model) return refused(model.error());
-  for (const api::Note& note : model->notes()) std::printf("%s: %s\n", note.code.c_str(), note.text.c_str());
+  for (const api::Note& note : model->notes())
+    std::printf("%s: %s\n", note.code.c_str(), note.text.c_str());
   return 0;
 }
 

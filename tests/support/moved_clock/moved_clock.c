@@ -1,5 +1,6 @@
-/* Moves the host's clock for the process that it is loaded into, by as many seconds as stand in the eight octets of the
- * file TRAMMEL_TEST_CLOCK, at whatever moment they are written there. Clocks that nobody sets go on as they are. */
+/* Moves the host's clock for the process that it is loaded into, by as many seconds as stand in the
+ * eight octets of the file TRAMMEL_TEST_CLOCK, at whatever moment they are written there. Clocks
+ * that nobody sets go on as they are. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <stdint.h>

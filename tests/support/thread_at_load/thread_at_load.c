@@ -1,5 +1,5 @@
-/* A library that starts a thread when it is loaded, as OpenBLAS does. The thread blocks no signal. Its name is
- * `at_load`. */
+/* A library that starts a thread when it is loaded, as OpenBLAS does. The thread blocks no signal.
+ * Its name is `at_load`. */
 #define _GNU_SOURCE
 #include <pthread.h>
 #include <signal.h>
