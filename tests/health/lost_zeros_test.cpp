@@ -109,6 +109,20 @@ std::vector<JointVector> spread_poses(int count, std::uint64_t seed) {
   return poses;
 }
 
+TEST(LostZeroOfTheLastJoint, StandsNotBesideAToolThatOrientationsShowNotToHaveTurned) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    PlainCheck knocked{spread_poses(14, seed), JointVector::Zero(6), true};
+    knocked.seed = seed;
+    knocked.tool += Vector3(0.8e-3, -0.4e-3, 0.5e-3);
+    const HealthCheck check =
+        test::demand(checked(model_of_six_axes(), measured(test::irb120(), knocked)));
+    ASSERT_EQ(check.changed.size(), 1u) << check.sentence;
+    EXPECT_EQ(check.changed.front().cause.record->spelling, "tool_changed") << check.sentence;
+    EXPECT_TRUE(check.changed.front().could_also_be.empty()) << check.sentence;
+    EXPECT_EQ(check.sentence.find("mark of joint 6"), std::string::npos) << check.sentence;
+  }
+}
+
 TEST(LostZeroOfTheLastJoint, StandsBesideEveryToolThatSitsElsewhere) {
   for (const bool orientation : {false, true}) {
     for (const double zero : {0.0, 2e-4, 3e-3}) {
