@@ -10,6 +10,7 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/budget/budget_words.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -268,9 +269,17 @@ std::string Model::text() const { return serialize(inside_->model); }
 
 ModelFacts Model::facts() const {
   const ModelProvenance& from = inside_->model.provenance();
-  return {from.id,    from.hash,     inside_->model.cell().name,
-          from.level, from.batch_id, from.training_poses,
-          0,          false,         notes()};
+  const auto& budget = inside_->model.parts().budget;
+  return {from.id,
+          from.hash,
+          inside_->model.cell().name,
+          from.level,
+          from.batch_id,
+          from.training_poses,
+          0,
+          false,
+          notes(),
+          budget ? in_words(*budget) : std::vector<std::string>()};
 }
 Cell Model::cell() const {
   const auto& cell = inside_->model.parts().physics.cell;

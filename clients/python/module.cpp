@@ -203,7 +203,8 @@ py::dict to_python(const api::ModelFacts& facts) {
   return py::dict("id"_a = facts.id, "hash"_a = facts.hash, "cell"_a = facts.cell,
                   "level"_a = facts.level, "batch"_a = facts.batch,
                   "training_poses"_a = facts.training_poses, "version"_a = facts.version,
-                  "in_force"_a = facts.in_force, "notes"_a = to_python(facts.notes));
+                  "in_force"_a = facts.in_force, "notes"_a = to_python(facts.notes),
+                  "budget"_a = facts.budget);
 }
 
 py::dict to_python(const api::Figures& f) {

@@ -202,6 +202,7 @@ ModelInfo from_wire(const wire::ModelInfo& info) {
   result.validation_rms_mm = if_known(info.validation_rms_mm());
   result.in_force = info.in_force();
   for (const wire::Note& note : info.notes()) result.notes.push_back(from_wire(note));
+  for (const std::string& line : info.budget()) result.budget.push_back(line);
   return result;
 }
 

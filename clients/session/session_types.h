@@ -41,6 +41,8 @@ struct ModelInfo {
   /// What a user of the model should know, the gravest first. In a list of versions only the one in
   /// force has them.
   std::vector<Note> notes = {};
+  /// Where the millimetres come from, for people, of the one in force; empty in other answers.
+  std::vector<std::string> budget = {};
 };
 
 /// How the arm comes to a pose; what is not known is neutral.

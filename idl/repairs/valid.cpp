@@ -101,6 +101,7 @@ void shape(CdrWalk& walk, Of<ModelInfo>) {
   walk.wides(1);
   walk.flag("in_force");
   walk.list("notes", MAX_NOTES, 3 * kNumber, "note", [&] { shape(walk, Of<Note>()); });
+  walk.list("budget", MAX_BUDGET_LINES, kNumber, "line", [&] { sentence(walk, "budget"); });
 }
 
 void shape(CdrWalk& walk, Of<Joints>) { walk.wides(walk.list("joints_rad", MAX_JOINTS, 8)); }

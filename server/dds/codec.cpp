@@ -10,6 +10,7 @@
 #include "server/base/hash.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
 
 namespace trammel {
 namespace {
@@ -169,6 +170,15 @@ std::vector<wire::Note> to_wire(const std::vector<Note>& notes) {
     list.back().text(told_sentence(note.text));
   }
   return list;
+}
+
+std::vector<std::string> budget_to_wire(const ServedModel& served) {
+  const auto& budget = served.model.parts().budget;
+  std::vector<std::string> lines;
+  if (budget) lines = in_words(*budget);
+  if (lines.size() > wire::MAX_BUDGET_LINES) lines.resize(wire::MAX_BUDGET_LINES);
+  for (std::string& line : lines) line = told_sentence(line);
+  return lines;
 }
 
 wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s) {

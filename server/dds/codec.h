@@ -32,6 +32,8 @@ namespace trammel {
 
 /// The first MAX_NOTES.
 [[nodiscard]] std::vector<wire::Note> to_wire(const std::vector<Note>& notes);
+/// Its error budget in words, the first lines; empty: it has none.
+[[nodiscard]] std::vector<std::string> budget_to_wire(const ServedModel& served);
 [[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force,
                                       std::int64_t now_unix_s);
 [[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);

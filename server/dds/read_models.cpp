@@ -139,8 +139,10 @@ Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
     reply.models().push_back(to_wire(models[i], now));
     const auto hash = hashes.find(models[i].batch_id);
     if (hash != hashes.end()) reply.models().back().batch_hash(hash->second);
-    if (served && served->version == models[i].version)
+    if (served && served->version == models[i].version) {
       reply.models().back().notes(to_wire(served->notes));
+      reply.models().back().budget(budget_to_wire(*served));
+    }
   }
   return reply;
 }

@@ -56,6 +56,7 @@ void StateTopics::publish(const ServedModel& model, const std::string& server_id
   status.cell(model.cell);
   status.server(server_id);
   status.model(to_wire(model, true, unix_now_s()));
+  status.model().budget(budget_to_wire(model));
   model_status_->write(&status);
 }
 

@@ -823,6 +823,32 @@ TEST_F(HandlersTest, EveryAnswerOfAModelAndTheListSayWhatAUserOfItShouldKnow) {
   EXPECT_EQ(codes(listed->in_force()), expected);
 }
 
+TEST_F(HandlersTest, TheListTellsWhereTheMillimetresOfTheModelInForceComeFrom) {
+  CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
+  parts.budget.emplace();
+  parts.budget->poses = 20;
+  parts.budget->as_it_stands.error_rms = 1e-3;
+  BudgetLine zero;
+  zero.line = "zero:4";
+  zero.kind = LineKind::kJointZero;
+  zero.name = "the zero of joint 4";
+  zero.alone_rms = 1e-3;
+  parts.budget->as_it_stands.lines = {zero};
+  const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
+  for (const bool in_force : {false, true})
+    ASSERT_TRUE(backend_.store->add_model("cell-7", model, 0, in_force, ""));
+  backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", 2, model}));
+  const auto listed = handlers_.answer(read_request(wire::READ_MODELS));
+  ASSERT_EQ(listed->models().size(), 2u);
+  EXPECT_TRUE(listed->models().front().budget().empty());
+  const auto& told = listed->models().back().budget();
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(std::string(told[1]).find("the zero of joint 4: 1.000 mm alone"), std::string::npos)
+      << std::string(told[1]);
+  EXPECT_TRUE(handlers_.answer(predict_request())->model().budget().empty())
+      << "an answer of a pose is short";
+}
+
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
   test::Answered<wire::PredictError> calls(handlers_, "server-a");
   auto request = predict_request();

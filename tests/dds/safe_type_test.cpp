@@ -126,6 +126,7 @@ ModelInfo some_model() {
   note.severity(NOTE_STOP);
   note.text("Nobody compared it.");
   model.notes({note, note});
+  model.budget({"the drawing is off by 1 mm", "the zero of joint 4"});
   return model;
 }
 

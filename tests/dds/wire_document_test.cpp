@@ -72,6 +72,7 @@ TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
       {"MAX_SENTENCE", MAX_SENTENCE},
       {"MAX_JOBS", MAX_JOBS},
       {"MAX_ERRORS", MAX_ERRORS},
+      {"MAX_BUDGET_LINES", MAX_BUDGET_LINES},
       {"kMaxText", kMaxText},
       {"MAX_BATCHES", MAX_BATCHES},
       {"MAX_VERSIONS", MAX_VERSIONS},

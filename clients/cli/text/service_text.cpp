@@ -45,7 +45,8 @@ ordered_json model_json(const client::ModelInfo& model) {
           {"data_age_s", if_known(model.data_age_s)},
           {"training_poses", model.training_poses},
           {"validation_rms_mm", if_known(model.validation_rms_mm)},
-          {"notes", notes_json(model.notes)}};
+          {"notes", notes_json(model.notes)},
+          {"budget", {{"sentences", model.budget}}}};
 }
 
 std::string kind_in_words(const std::string& kind) {

@@ -89,6 +89,8 @@ struct ModelFacts {
   bool in_force = false;   ///< of a service: whether its cell is served with it
   std::vector<Note>
       notes;  ///< the gravest first; in a service's list of versions only of the one in force
+  std::vector<std::string> budget;  ///< where the millimetres come from, its first lines for
+                                    ///< people; of a service: of the one in force, when listed
 };
 
 /// Told what is being done and which share of it is done, [0, 1]. Returns false to give up (kBusy).

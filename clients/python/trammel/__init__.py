@@ -369,7 +369,7 @@ class Model:
 
     @property
     def facts(self) -> Dict[str, Any]:
-        """`id hash cell level batch training_poses`."""
+        """`id hash cell level batch training_poses notes budget`; `budget`: its first lines for people."""
         return self._inside.facts()
 
     @property
@@ -513,7 +513,8 @@ class Session:
         return self._inside.servers()
 
     def models(self, cell: str = "") -> List[Dict[str, Any]]:
-        """The models of a cell, or those in force of all: `id hash cell level batch training_poses version in_force notes`."""
+        """The models of a cell, or those in force of all: `id hash cell level batch training_poses version in_force notes`,
+        and `budget`: of the one in force, where the millimetres come from, for people."""
         return self._inside.models(cell)
 
     def export_model(self, cell: str, version: int = 0) -> str:

@@ -57,6 +57,7 @@ struct BudgetLine {
   std::vector<std::string>
       with;            ///< lines that the poses cannot tell from it: they are counted here
   std::string action;  ///< what to do; empty: nothing stands out
+  std::string since_session;  ///< of a change between sessions: the first that has it; else empty
   [[nodiscard]] std::string cause_or_kind() const;
 };
 
@@ -83,6 +84,9 @@ struct ErrorBudget {
   /// is taken out of it and of every line. Lines of frames do not stand here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
+  /// Of several sessions: what changed on the arm between them, each line at the poses where it
+  /// acts. The lines stand in `as_it_stands`, too, at all poses. Empty: nothing changed.
+  std::vector<BudgetLine> between_sessions;
 
   [[nodiscard]] const BudgetLine* line(std::string_view name) const;
 };

@@ -30,6 +30,7 @@ Json json_of(const BudgetLine& line) {
   if (line.times_usual) json["times_usual"] = *line.times_usual;
   if (!line.with.empty()) json["with"] = line.with;
   if (!line.action.empty()) json["action"] = line.action;
+  if (!line.since_session.empty()) json["since_session"] = line.since_session;
   return json;
 }
 
@@ -54,13 +55,18 @@ BudgetLine line_from(const Json& json) {
   if (json.contains("times_usual")) line.times_usual = number_from(json, "times_usual");
   line.with = json.value("with", std::vector<std::string>{});
   line.action = json.value("action", "");
+  line.since_session = json.value("since_session", "");
   return line;
 }
 
-Json json_of(const BudgetView& view) {
+Json json_of(const std::vector<BudgetLine>& all) {
   Json lines = Json::array();
-  for (const BudgetLine& line : view.lines) lines.push_back(json_of(line));
-  return {{"error_rms_m", view.error_rms}, {"lines", std::move(lines)}};
+  for (const BudgetLine& line : all) lines.push_back(json_of(line));
+  return lines;
+}
+
+Json json_of(const BudgetView& view) {
+  return {{"error_rms_m", view.error_rms}, {"lines", json_of(view.lines)}};
 }
 
 BudgetView view_from(const Json& json) {
@@ -76,20 +82,27 @@ Json budget_json(const ErrorBudget& budget) {
   Json steps = Json::array();
   for (const PutRight& step : budget.put_right)
     steps.push_back({{"step", step.step}, {"name", step.name}, {"left_m", step.left_rms}});
-  return {{"poses", budget.poses},
-          {"as_it_stands", json_of(budget.as_it_stands)},
-          {"beyond_frames", json_of(budget.beyond_frames)},
-          {"put_right", std::move(steps)}};
+  Json json = {{"poses", budget.poses},
+               {"as_it_stands", json_of(budget.as_it_stands)},
+               {"beyond_frames", json_of(budget.beyond_frames)},
+               {"put_right", std::move(steps)}};
+  if (!budget.between_sessions.empty())
+    json["between_sessions"] = json_of(budget.between_sessions);
+  return json;
 }
 
 ErrorBudget budget_from(const Json& json) {
   ErrorBudget budget{count_from(json, "poses"),
                      view_from(json.at("as_it_stands")),
                      view_from(json.at("beyond_frames")),
+                     {},
                      {}};
   for (const Json& step : list_from(json.at("put_right")))
     budget.put_right.push_back({step.at("step").get<std::string>(),
                                 step.at("name").get<std::string>(), number_from(step, "left_m")});
+  if (json.contains("between_sessions"))
+    for (const Json& line : list_from(json.at("between_sessions")))
+      budget.between_sessions.push_back(line_from(line));
   return budget;
 }
 
