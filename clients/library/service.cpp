@@ -128,7 +128,8 @@ trammel::Result<client::TargetMm> to_wire(const Target& target, const Context& c
 ModelFacts facts_of(const client::ModelInfo& model) {
   return {model.id,      model.hash,     model.cell,
           model.level,   model.batch_id, model.training_poses,
-          model.version, model.in_force, library::to_api(model.notes), model.budget};
+          model.version, model.in_force, library::to_api(model.notes),
+          model.budget};
 }
 
 Job job_of(const client::JobStatus& job) {

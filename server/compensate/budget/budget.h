@@ -55,8 +55,8 @@ struct BudgetLine {
   double left_if_right = 0;  ///< m rms: what is left of the error if only this line were put right
   std::optional<double> times_usual;  ///< the value over what arms of this kind show
   std::vector<std::string>
-      with;            ///< lines that the poses cannot tell from it: they are counted here
-  std::string action;  ///< what to do; empty: nothing stands out
+      with;                   ///< lines that the poses cannot tell from it: they are counted here
+  std::string action;         ///< what to do; empty: nothing stands out
   std::string since_session;  ///< of a change between sessions: the first that has it; else empty
   [[nodiscard]] std::string cause_or_kind() const;
 };

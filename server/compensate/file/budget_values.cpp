@@ -86,8 +86,7 @@ Json budget_json(const ErrorBudget& budget) {
                {"as_it_stands", json_of(budget.as_it_stands)},
                {"beyond_frames", json_of(budget.beyond_frames)},
                {"put_right", std::move(steps)}};
-  if (!budget.between_sessions.empty())
-    json["between_sessions"] = json_of(budget.between_sessions);
+  if (!budget.between_sessions.empty()) json["between_sessions"] = json_of(budget.between_sessions);
   return json;
 }
 
