@@ -11,6 +11,7 @@
 #include "server/bias/bias_data.h"
 #include "server/bias/choose_bias.h"
 #include "server/calibrate/calibration.h"
+#include "server/calibrate/causes/cause_choice.h"
 #include "server/calibrate/changes.h"
 #include "server/compensate/budget/budget.h"
 #include "server/compensate/evaluation.h"
@@ -75,6 +76,8 @@ struct ModelParts {
   std::vector<Change>
       changes;  ///< of the arm between these sessions; their sources are among those of the physics
   double discrepancy = 0;  ///< m per axis, see CalibrationResult
+  std::optional<CauseChoice>
+      cause_choice;  ///< where the error sources were `auto`: what was tried, and what it brought
   std::optional<BiasChoice>
       bias_choice;  ///< where the bias was `auto`: what was tried and what it is worth
   std::optional<BiasState>

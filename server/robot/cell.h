@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/result.h"
@@ -21,10 +22,17 @@ struct Tracker {
       Vector3::UnitZ();  ///< direction in which the target faces, unit vector in T
 };
 
+/// Written in a list of error sources, or in its place: training chooses by the measurements.
+inline constexpr std::string_view kAutoSources = "auto";
+
 /// What to identify and what to learn. Sources as spelled on the command line: `geometry`,
 /// `gear_transmission:3`.
 struct ModelSpec {
   std::vector<std::string> error_sources = {"base", "geometry", "compliance"};
+  /// Set where the cell file says `auto`: what it names beside it. A training keeps these, adds
+  /// what the measurements ask for, and does not keep to error_sources, which are these or, where
+  /// there are none, the usual ones.
+  std::optional<std::vector<std::string>> beside_auto;
   std::string bias = "se";
 };
 

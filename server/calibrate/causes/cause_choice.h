@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace trammel {
+
+/// A cause that was tried beside those before it in the list.
+struct TriedCause {
+  std::vector<std::string> sources;  ///< as they are spelled: `joint_map:2`
+  double held_out_before = 0;  ///< m, rms of positions that were left out, with the causes before it
+  double held_out_after = 0;   ///< m, the same with this cause
+  double gain = 0;     ///< nat: how much likelier the batch is with it, all other causes beside it
+  double freedom = 0;  ///< how many of its numbers the batch tells
+  double chance = 1;   ///< p: that noise alone would show so much of it
+  bool taken = false;
+  std::string why;  ///< for people, one clause
+};
+
+/// What a training with `error_sources: auto` tried, the largest gain first.
+struct CauseChoice {
+  double held_out = 0;  ///< m, with all that was taken
+  std::vector<TriedCause> tried;
+};
+
+}  // namespace trammel
