@@ -8,8 +8,9 @@ namespace trammel {
 /// A cause that was tried beside those before it in the list.
 struct TriedCause {
   std::vector<std::string> sources;  ///< as they are spelled: `joint_map:2`
-  double held_out_before = 0;  ///< m, rms of positions that were left out, with the causes before it
-  double held_out_after = 0;   ///< m, the same with this cause
+  double held_out_before =
+      0;                      ///< m, rms of positions that were left out, with the causes before it
+  double held_out_after = 0;  ///< m, the same with this cause
   double gain = 0;     ///< nat: how much likelier the batch is with it, all other causes beside it
   double freedom = 0;  ///< how many of its numbers the batch tells
   double chance = 1;   ///< p: that noise alone would show so much of it
