@@ -245,7 +245,8 @@ py::dict to_python(const api::Evaluation& e) {
 py::dict to_python(const api::Job& job) {
   return py::dict("id"_a = job.id, "cell"_a = job.cell, "stage"_a = job.stage, "what"_a = job.what,
                   "share"_a = job.share, "verdict"_a = job.verdict, "version"_a = job.version,
-                  "in_force"_a = job.in_force, "why"_a = job.why, "next"_a = job.next);
+                  "in_force"_a = job.in_force, "why"_a = job.why, "next"_a = job.next,
+                  "held_back"_a = job.held_back);
 }
 
 py::dict to_python(const api::Server& server) {

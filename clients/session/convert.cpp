@@ -88,6 +88,20 @@ const char* text(wire::JobVerdict verdict) {
   return "open";
 }
 
+const char* text(wire::HeldBack reason) {
+  switch (reason) {
+    case wire::HELD_BACK_NO:
+      return "";
+    case wire::HELD_BACK_FEW_JUDGES:
+      return "few_judges";
+    case wire::HELD_BACK_STOP_NOTE:
+      return "stop_note";
+    case wire::HELD_BACK_STEP_LIMIT:
+      return "step_limit";
+  }
+  return "";
+}
+
 const char* text(wire::JobKind kind) {
   switch (kind) {
     case wire::JOB_TRAINING_OF_BATCHES:
@@ -254,6 +268,7 @@ JobStatus status_of(const wire::Job& job) {
                    job.share(),  job.model_version(), job.in_force()};
   const wire::JobOutcome& outcome = job.outcome();
   status.verdict = text(outcome.verdict());
+  status.held_back = text(outcome.held_back());
   status.before_mm = if_known(outcome.before_mm());
   status.after_mm = if_known(outcome.after_mm());
   status.limit_mm = if_known(outcome.limit_mm());

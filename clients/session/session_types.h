@@ -110,6 +110,10 @@ struct JobStatus {
   std::optional<double> before_mm = {}, after_mm = {}, limit_mm = {}, u95_mm = {};
   std::string why = {};   ///< of a job that made no model
   std::string next = {};  ///< what to do, as one clause
+  /// Why a person decides about its model: `few_judges stop_note step_limit`; empty: the poses held
+  /// out decide. After the last two no later training learns from its batch until a model that did
+  /// has been in force.
+  std::string held_back = {};
 };
 
 /// What a change takes for granted.
@@ -152,7 +156,8 @@ struct BatchOfService {
   int poses = 0;
   std::int64_t accepted_unix_s = 0;
   std::string hash;         ///< SHA-256 of its text
-  bool learned = false;     ///< a model was made of it
+  bool learned = false;     ///< later trainings may learn from it: a model of it was made, and is
+                            ///< not held back as doubtful
   std::string server = {};  ///< that says so
 };
 

@@ -224,6 +224,7 @@ void shape(CdrWalk& walk, Of<Job>) {
   walk.longs(1);
   walk.flag("in_force");
   walk.enumerator("verdict", VERDICT_CANCELLED);
+  walk.enumerator("held_back", HELD_BACK_STEP_LIMIT);
   walk.wides(4);
   walk.enumerator("code", RESULT_MALFORMED);
   sentence(walk, "why");

@@ -245,10 +245,25 @@ wire::JobVerdict to_wire(JobVerdict verdict) {
   TRAMMEL_CHECK(false);
 }
 
+wire::HeldBack to_wire(HeldBack reason) {
+  switch (reason) {
+    case HeldBack::kNo:
+      return wire::HELD_BACK_NO;
+    case HeldBack::kFewJudges:
+      return wire::HELD_BACK_FEW_JUDGES;
+    case HeldBack::kStopNote:
+      return wire::HELD_BACK_STOP_NOTE;
+    case HeldBack::kStepLimit:
+      return wire::HELD_BACK_STEP_LIMIT;
+  }
+  TRAMMEL_CHECK(false);
+}
+
 wire::JobOutcome to_wire(const JobOutcome& outcome) {
   constexpr double kBytesPerMb = 1 << 20;
   wire::JobOutcome result;
   result.verdict(to_wire(outcome.verdict));
+  result.held_back(to_wire(outcome.held_back));
   result.before_mm(mm_or_unknown(outcome.before));
   result.after_mm(mm_or_unknown(outcome.after));
   result.limit_mm(mm_or_unknown(outcome.limit));

@@ -14,10 +14,17 @@
 namespace trammel {
 namespace {
 
-/// Of the cell $1. Without a reference to the row, so that it is read once.
-constexpr const char* kLearned =
-    "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job WHERE "
-    "jobs.cell = $1 AND jobs.state = 'done' AND jobs.model_version > 0";
+/// Of the cell $1, see Store::batches_learned_from(). Without a reference to the row, so that it
+/// is read once.
+const std::string& learned_batches() {
+  static const std::string batches = fmt::format(
+      "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job LEFT JOIN "
+      "job_outcomes ON job_outcomes.job = jobs.id WHERE jobs.cell = $1 AND jobs.state = 'done' AND "
+      "jobs.model_version > 0 AND (COALESCE(job_outcomes.held_back, '') NOT IN ('{}', '{}') OR "
+      "jobs.model_version IN (SELECT version FROM activations WHERE cell = $1))",
+      to_text(HeldBack::kStopNote), to_text(HeldBack::kStepLimit));
+  return batches;
+}
 
 const std::string& record_columns() {
   static const std::string columns = fmt::format(
@@ -27,7 +34,7 @@ const std::string& record_columns() {
       "discarded.batch = batches.id), id IN ({}), (SELECT CASE WHEN state IN ('queued', 'running') "
       "THEN '' WHEN message = '' THEN state ELSE message END FROM jobs WHERE jobs.id = "
       "batches.job) FROM batches WHERE cell = $1 ",
-      kLearned);
+      learned_batches());
   return columns;
 }
 
@@ -230,7 +237,7 @@ Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
 
 Result<std::set<std::string>> Store::batches_learned_from(const std::string& cell) const {
   return connection_->exclusively([&](Database& database) -> Result<std::set<std::string>> {
-    auto rows = prepare(database, kLearned, cell);
+    auto rows = prepare(database, learned_batches().c_str(), cell);
     std::set<std::string> ids;
     while (rows.next()) ids.insert(rows.text(0));
     return ids;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "server/base/result.h"
+#include "server/compensate/held_back.h"
 
 namespace trammel {
 
@@ -14,7 +15,7 @@ enum class JobVerdict {
   kOpen,       ///< nothing yet; also of jobs from before outcomes were recorded
   kInForce,    ///< its model was put in force
   kNotBetter,  ///< its model is stored; the one in force stays, because the new one is not better
-  kUndecided,  ///< its model is stored; too few poses can judge it, a person decides
+  kUndecided,  ///< its model is stored; a person decides, see JobOutcome::held_back
   kDiagnosed,  ///< the diagnosis is made; nothing was to be applied
   kNothingApplied,  ///< the diagnosis is made; it found nothing that a model could be extended by
   kQuarantined,     ///< its batch is in quarantine, nothing was learned from it
@@ -34,6 +35,7 @@ enum class JobVerdict {
 /// The end of a job as data. Its message (StoredJob) says the same in one sentence.
 struct JobOutcome {
   JobVerdict verdict = JobVerdict::kOpen;
+  HeldBack held_back = HeldBack::kNo;  ///< of a job that made a model; also of one not better
   std::optional<double> before;  ///< m, held-out rms of the model in force; of a first one, nominal
   std::optional<double> after;   ///< m, of the new model on the same poses
   std::optional<double> limit;   ///< m, what `after` had to be below

@@ -62,7 +62,7 @@ constexpr const char* kJobColumns =
     "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, CASE WHEN "
     "EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, "
     "started_at, finished_at, verdict, before_m, after_m, limit_m, code, why, next_step, "
-    "peak_bytes, processor_s, job_claims.server FROM jobs LEFT JOIN job_claims ON job_claims.job = "
+    "peak_bytes, processor_s, job_claims.server, held_back FROM jobs LEFT JOIN job_claims ON job_claims.job = "
     "jobs.id LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON "
     "job_outcomes.job = jobs.id ";
 
@@ -79,6 +79,7 @@ JobOutcome outcome_of(Rows& row) {
   outcome.next = row.text(18);
   outcome.peak_memory = optional_integer(row, 19);
   outcome.processor_time = optional_number(row, 20);
+  outcome.held_back = held_back_of(row.text(22));
   return outcome;
 }
 
@@ -140,14 +141,14 @@ void record_start(Database& database, std::int64_t job) {
 void record_outcome(Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
          "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
-         "next_step, peak_bytes, processor_s) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON "
-         "CONFLICT (job) DO UPDATE SET verdict = excluded.verdict, before_m = excluded.before_m, "
+         "next_step, peak_bytes, processor_s, held_back) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, "
+         "$10, $11) ON CONFLICT (job) DO UPDATE SET verdict = excluded.verdict, before_m = excluded.before_m, "
          "after_m = excluded.after_m, limit_m = excluded.limit_m, code = excluded.code, why = "
          "excluded.why, next_step = excluded.next_step, peak_bytes = excluded.peak_bytes, "
-         "processor_s = excluded.processor_s",
+         "processor_s = excluded.processor_s, held_back = excluded.held_back",
          job, to_text(outcome.verdict), outcome.before, outcome.after, outcome.limit,
          outcome.code ? to_text(*outcome.code) : "", outcome.why, outcome.next, outcome.peak_memory,
-         outcome.processor_time);
+         outcome.processor_time, to_text(outcome.held_back));
 }
 
 void record_end(Database& database, std::int64_t job, const JobOutcome& outcome) {
@@ -290,6 +291,19 @@ bool fail_job(Database& database, std::int64_t id, const std::string& message,
   record_end(database, id, outcome);
   record_job_end(database, id, to_text(outcome.verdict), message, by);
   return true;
+}
+
+Result<std::set<std::string>> Store::batches_of_version(const std::string& cell,
+                                                        int version) const {
+  return connection_->exclusively([&](Database& database) -> Result<std::set<std::string>> {
+    auto rows = prepare(database,
+                        "SELECT batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
+                        "WHERE jobs.cell = $1 AND model_version = $2",
+                        cell, version);
+    std::set<std::string> ids;
+    while (rows.next()) ids.insert(rows.text(0));
+    return ids;
+  });
 }
 
 Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {

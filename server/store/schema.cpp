@@ -65,6 +65,12 @@ void put_cells_of_releases_into_their_key(Database& database) {
   database.execute("DROP TABLE job_releases_before");
 }
 
+bool outcomes_say_what_holds_back(Database& database) {
+  return integer_of(database,
+                    "SELECT COUNT(*) FROM pragma_table_info('job_outcomes') WHERE name = "
+                    "'held_back'") > 0;
+}
+
 /// Refuses a file that is neither empty nor a store of ours. Changes nothing.
 Status check_owner(Database& database, const std::string& path) {
   const std::int64_t application = integer_of(database, "PRAGMA application_id");
@@ -107,6 +113,7 @@ Status prepare_file(Database& database, const std::string& path) {
     database.execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   }
   database.execute(in_sqlite(kTablesBeside));
+  if (!outcomes_say_what_holds_back(database)) database.execute(in_sqlite(kOutcomeHeldBack));
   put_cells_of_releases_into_their_key(database);
   fill_in_times(database);
   count_versions(database);
@@ -119,7 +126,7 @@ Status prepare_file(Database& database, const std::string& path) {
 Status check_readable(Database& database, const std::string& path) {
   TRY(check_owner(database, path));
   const bool has_all = database.has_table("audit_end") && database.has_table("cells") &&
-                       database.has_table("job_claims");
+                       database.has_table("job_claims") && outcomes_say_what_holds_back(database);
   if (integer_of(database, "PRAGMA user_version") == kSchemaVersion && has_all) return {};
   return refused("of an older schema, and cannot be written").in(path);
 }

@@ -198,6 +198,9 @@ INSERT INTO audit_end (rows, hash) VALUES (0, '');
 
 const char* const kAuditServer = "ALTER TABLE audit ADD COLUMN server TEXT NOT NULL DEFAULT '';";
 
+const char* const kOutcomeHeldBack =
+    "ALTER TABLE job_outcomes ADD COLUMN held_back TEXT NOT NULL DEFAULT '';";
+
 const char* const kTablesOfServers = R"sql(
 CREATE TABLE servers (
   token      TEXT    PRIMARY KEY,

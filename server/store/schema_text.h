@@ -25,6 +25,8 @@ extern const char* const kTablesBeside;
 extern const char* const kTablesGone;
 extern const char* const kAuditTables;
 extern const char* const kAuditServer;  ///< what was added to them: which server made the change
+/// What was added to outcomes of jobs: why a person decides about the model (HeldBack).
+extern const char* const kOutcomeHeldBack;
 
 /// Of a store that several servers share: who is there, by the starts of servers (`token`), and how
 /// cells are described. The newest description of a cell is the one that the record goes by.

@@ -28,14 +28,15 @@ std::vector<Migration> all_migrations() {
            "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);CREATE INDEX IF NOT EXISTS "
            "jobs_failed ON jobs (id) WHERE state = 'failed';",
        2},
-      {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3}};
+      {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3},
+      {kOutcomeHeldBack, 3}};
 #ifdef TRAMMEL_NEXT_SCHEMA
   // The program of the next minor version, for the test of an update that goes from server to
   // server.
   all.push_back(
       {"ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';CREATE TABLE job_colours (job "
        "BIGINT PRIMARY KEY REFERENCES jobs (id));",
-       3});
+       4});
 #endif
   return all;
 }

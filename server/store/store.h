@@ -37,7 +37,7 @@ struct StoredBatch {
   std::string who = {};         ///< of a new one: who sent it, for the audit trail
   bool pruned = false;          ///< its text is gone
   bool discarded = false;       ///< it stays in quarantine for ever
-  bool learned = false;  ///< a model was made of it, here or on the server that this one followed
+  bool learned = false;         ///< it is among Store::batches_learned_from()
   std::string outcome =
       {};  ///< what the training that was queued with it came to; empty: it is not over
 };
@@ -202,6 +202,10 @@ class Store {
                                           const ChangeId& change_id = {});
   /// Whether a job made that version here; false: it was imported.
   [[nodiscard]] Result<bool> was_made_by_job(const std::string& cell, int version) const;
+  /// The batches of the job that made that version here, without those of before that it learned
+  /// from beside them.
+  [[nodiscard]] Result<std::set<std::string>> batches_of_version(const std::string& cell,
+                                                                 int version) const;
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as
@@ -228,7 +232,8 @@ class Store {
   [[nodiscard]] Result<std::int64_t> changes_made() const;
   /// The same with descriptions_made(), by one statement. Of a store that several servers share.
   [[nodiscard]] Result<RecordCounts> counts() const;
-  /// The ids of the batches that any model of the cell was trained from.
+  /// The ids of the batches that later trainings of the cell may learn from: a model was made of
+  /// them that was in force at some time, or whose outcome has no is_doubt().
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one
   /// that was discarded. `by_job`: refuses (kNotFound), too, where another server has that job by

@@ -21,6 +21,21 @@ Status check_own(const Store& store, const StoredJob& job, const std::set<std::s
   return {};
 }
 
+/// Of `stored`; see judging_sources(). `own`: judge also where they are in quarantine.
+std::vector<BatchSource> newest_judges(const std::vector<StoredBatch>& stored,
+                                       const std::set<std::string>& may_judge,
+                                       const std::set<std::string>& own) {
+  std::vector<BatchSource> judging;
+  for (auto batch = stored.rbegin(); batch != stored.rend() && judging.size() < kMostSessions;
+       ++batch) {
+    const bool judges =
+        own.contains(batch->id) || (batch->quarantine.empty() && may_judge.contains(batch->id));
+    if (judges && !batch->pruned) judging.push_back({batch->id, true});
+  }
+  std::reverse(judging.begin(), judging.end());
+  return judging;
+}
+
 }  // namespace
 
 Status check_released(const StoredBatch& batch) {
@@ -60,6 +75,14 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
   return earlier;
 }
 
+Result<std::vector<BatchSource>> judging_sources(const Store& store, const std::string& cell,
+                                                 const std::set<std::string>& also) {
+  const auto stored = TRY(store.batches(cell));
+  auto may_judge = TRY(store.batches_learned_from(cell));
+  may_judge.insert(also.begin(), also.end());
+  return newest_judges(stored, may_judge, {});
+}
+
 Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job,
                                                bool judged,
                                                const std::vector<std::string>& earlier) {
@@ -69,15 +92,7 @@ Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJ
   std::vector<BatchSource> judging;
   if (judged) {
     const auto may_judge = TRY(store.batches_learned_from(job.cell));
-    for (auto batch = stored.rbegin(); batch != stored.rend() && judging.size() < kMostSessions;
-         ++batch) {
-      if (batch->pruned) continue;
-      if (!own.contains(batch->id) &&
-          (!batch->quarantine.empty() || !may_judge.contains(batch->id)))
-        continue;
-      judging.push_back({batch->id, true});
-    }
-    std::reverse(judging.begin(), judging.end());
+    judging = newest_judges(stored, may_judge, own);
   }
   std::vector<BatchSource> sources;
   for (const std::vector<std::string>* some : {&job.batch_ids, &earlier}) {

@@ -21,6 +21,7 @@ JobOutcome outcome_of(const GateVerdict& verdict) {
   outcome.verdict = verdict.put_in_force ? JobVerdict::kInForce
                     : verdict.undecided  ? JobVerdict::kUndecided
                                          : JobVerdict::kNotBetter;
+  outcome.held_back = verdict.held_back;
   outcome.before = verdict.figures.before;
   outcome.after = verdict.figures.after;
   outcome.limit = verdict.figures.limit;
@@ -256,6 +257,7 @@ GateVerdict ModelHistory::within_step_limit(GateVerdict verdict, const Candidate
   if (!step || *step <= *limit) return verdict;
   verdict.put_in_force = false;
   verdict.undecided = true;
+  verdict.held_back = HeldBack::kStepLimit;
   verdict.why +=
       fmt::format("; but a pose recently asked for would move by {:.4f} mm, limit {:g} mm",
                   to_mm(*step), to_mm(*limit));
@@ -272,7 +274,8 @@ Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate,
   const auto others = TRY(opponents(candidate.job.cell, present));
   const auto judged_by_poses = TRY(judging(others));
   const std::optional<GateVerdict> verdict = within_step_limit(judged_by_poses, candidate, present);
-  const bool released = may_release && (verdict->put_in_force || verdict->undecided);
+  const bool released =
+      may_release && (verdict->put_in_force || (verdict->undecided && !is_doubt(verdict->held_back)));
   std::string message = verdict->message + candidate.remarks;
   if (may_release && !released)
     message += fmt::format("; what was in quarantine of {} stays there",

@@ -515,9 +515,8 @@ Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::str
   const auto present = registry_.in_force(cell_name);
   if (!present || present->version == version) return nothing_to_judge;
   const auto asked = TRY(registry_.version(cell_name, version));
-  StoredJob nothing;
-  nothing.cell = cell_name;
-  const auto sources = TRY(batch_sources(store_, nothing, true));
+  const auto own = TRY(store_.batches_of_version(cell_name, version));
+  const auto sources = TRY(judging_sources(store_, cell_name, own));
   if (sources.empty()) return nothing_to_judge;  // a person decides, and has
   JobBatches batches(*cell, held_out_by_service(options_.validation_share, options_.seed), {});
   for (const BatchSource& source : sources) {

@@ -137,6 +137,7 @@ Job some_job() {
   job.batch_ids({"lt-07", "lt-8"});
   job.outcome().why("because");
   job.outcome().verdict(VERDICT_CANCELLED);
+  job.outcome().held_back(HELD_BACK_STEP_LIMIT);
   return job;
 }
 

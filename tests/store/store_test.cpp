@@ -200,6 +200,32 @@ TEST_P(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-08", "x").error().code, ErrorCode::kNotFound);
 }
 
+TEST_P(StoreTest, ABatchWhoseModelIsDoubtfulIsLearnedFromOnceAPersonPutsTheModelInForce) {
+  const auto made_of = [&](const std::string& id, int poses, JobVerdict verdict, HeldBack reason) {
+    JobOutcome outcome;
+    outcome.verdict = verdict;
+    outcome.held_back = reason;
+    const std::int64_t made = submit(test::batch_of(id));
+    return demand(store_->add_model("cell-7", test::nominal_model(cell_, poses), made, false,
+                                    "waits", false, {}, outcome));
+  };
+  made_of("plain", 40, JobVerdict::kNotBetter, HeldBack::kNo);
+  made_of("few", 41, JobVerdict::kUndecided, HeldBack::kFewJudges);
+  const int doubted = made_of("doubted", 42, JobVerdict::kUndecided, HeldBack::kStopNote);
+  made_of("worse", 43, JobVerdict::kNotBetter, HeldBack::kStopNote);
+  made_of("far", 44, JobVerdict::kUndecided, HeldBack::kStepLimit);
+  restart();
+  using Ids = std::set<std::string>;
+  EXPECT_EQ(demand(store_->batches_learned_from("cell-7")), (Ids{"few", "plain"}));
+  EXPECT_FALSE(demand(store_->batch_record("cell-7", "doubted")).learned);
+  EXPECT_EQ(demand(store_->recent_jobs("cell-7", 5))[2].outcome.held_back, HeldBack::kStopNote);
+  ASSERT_TRUE(store_->activate("cell-7", doubted));
+  EXPECT_EQ(demand(store_->batches_learned_from("cell-7")), (Ids{"doubted", "few", "plain"}));
+  add_model(45, true);
+  EXPECT_TRUE(demand(store_->batch_record("cell-7", "doubted")).learned) << "it was in force";
+  EXPECT_EQ(demand(store_->batches_of_version("cell-7", doubted)), Ids{"doubted"});
+}
+
 TEST_P(StoreTest, ABatchSaysWhatTheTrainingThatCameWithItCameTo) {
   const auto added = store_->add_batch(batch("lt-07"), job());
   ASSERT_TRUE(added);

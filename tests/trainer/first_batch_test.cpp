@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -86,17 +87,50 @@ TEST(FirstBatch, AModelThatLeavesHundredsOfSigmaWaitsForAPerson) {
       << job.outcome.why;
 }
 
-TEST(FirstBatch, ThreeBadRowsInTenAreNamedAndAPersonDecides) {
-  auto without_bias = std::make_shared<Cell>(*test::cell_7());
-  without_bias->model.bias = "none";
-  LearningCell cell(without_bias);
-  MeasurementBatch bad = measured(8);
+/// Three rows in ten are off by some 30 mm.
+MeasurementBatch doubtful(std::uint64_t seed) {
+  MeasurementBatch bad = measured(seed);
   for (std::size_t i = 0; i < bad.measurements.size(); ++i) {
     const auto k = static_cast<double>(i);
     if (i % 10 < 3)
       bad.measurements[i].p_W += 0.03 * Vector3(std::sin(7 * k), std::cos(5 * k), std::sin(3 * k));
   }
-  const JobProgress job = cell.submit(std::move(bad));
+  return bad;
+}
+
+TEST(FirstBatch, ADoubtfulOneHoldsUpNoLaterBatchAndCountsOnceAPersonActivatesItsModel) {
+  auto without_bias = std::make_shared<Cell>(*test::cell_7());
+  without_bias->model.bias = "none";
+  LearningCell cell(without_bias);
+  const auto learned = [&] {
+    std::set<std::string> ids;
+    for (const StoredBatch& batch : test::demand(cell.trainer().batches("cell-7")))
+      if (batch.learned) ids.insert(batch.id);
+    return ids;
+  };
+  const JobProgress waits = cell.submit(doubtful(8));
+  ASSERT_EQ(waits.outcome.verdict, JobVerdict::kUndecided) << waits.what;
+  EXPECT_EQ(waits.outcome.held_back, HeldBack::kStopNote);
+  EXPECT_EQ(learned(), std::set<std::string>());
+
+  const JobProgress good = cell.submit(measured(2));
+  EXPECT_EQ(good.outcome.verdict, JobVerdict::kInForce) << good.what;
+  EXPECT_EQ(good.outcome.held_back, HeldBack::kNo);
+  EXPECT_EQ(cell.version(2).provenance().batch_id, "day-2");
+  EXPECT_EQ(learned(), std::set<std::string>{"day-2"});
+
+  ASSERT_TRUE(cell.trainer().activate("cell-7", 1, {}, true));
+  EXPECT_EQ(learned(), (std::set<std::string>{"day-1", "day-2"}));
+  ASSERT_TRUE(cell.trainer().activate("cell-7", 2));
+  const JobProgress later = cell.submit(measured(3));
+  EXPECT_EQ(cell.version(3).provenance().batch_id, "day-1+day-2+day-3") << later.what;
+}
+
+TEST(FirstBatch, ThreeBadRowsInTenAreNamedAndAPersonDecides) {
+  auto without_bias = std::make_shared<Cell>(*test::cell_7());
+  without_bias->model.bias = "none";
+  LearningCell cell(without_bias);
+  const JobProgress job = cell.submit(doubtful(8));
   EXPECT_EQ(cell.in_force(), 0) << job.what;
   EXPECT_EQ(job.outcome.verdict, JobVerdict::kUndecided) << job.what;
   EXPECT_NE(job.outcome.why.find("of the measured rows do not fit the others"), std::string::npos)

@@ -78,6 +78,7 @@ ordered_json job_json(const client::JobStatus& job) {
           {"model_version", job.model_version},
           {"in_force", job.in_force},
           {"verdict", job.verdict},
+          {"held_back", job.held_back},
           {"before_mm", if_known(job.before_mm)},
           {"after_mm", if_known(job.after_mm)},
           {"limit_mm", if_known(job.limit_mm)},

@@ -56,6 +56,8 @@ struct Job {
   bool in_force = false;  ///< whether that model serves its cell
   std::string why;        ///< of a job that made no model
   std::string next;       ///< what to do, as one clause
+  std::string held_back;  ///< why a person decides about it: `few_judges stop_note step_limit`;
+                          ///< empty: the poses held out decide
 };
 
 /// A server, by its last status.

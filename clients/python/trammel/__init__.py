@@ -544,7 +544,7 @@ class Session:
         return self._inside.submit(cell, batch.name, batch.csv())
 
     def wait_for(self, job: int, limit_s: float = 600.0) -> Dict[str, Any]:
-        """Waits until the job is done or failed: `id cell stage what share verdict version in_force why next`."""
+        """Waits until the job is done or failed: `id cell stage what share verdict version in_force why next held_back`."""
         return self._inside.wait_for(job, limit_s)
 
     def retrain(self, cell: str, batch_ids: Sequence[str] = (), level: str = "", bias: str = "") -> int:

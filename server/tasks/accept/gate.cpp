@@ -174,6 +174,7 @@ class Duel {
     if (const std::string few = too_few(); !few.empty()) {
       GateVerdict undecided = stays(few, without_limit(figures_of(shared_gain())));
       undecided.undecided = true;
+      undecided.held_back = HeldBack::kFewJudges;
       return undecided;
     }
     return of_another();

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/compensate/held_back.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/served_model.h"
 #include "server/tasks/accept/judging.h"
@@ -67,6 +68,7 @@ struct GateVerdict {
       false;  ///< not enough to judge by: nothing speaks against the candidate, a person decides
   std::string why = {};  ///< of the message: the reason alone
   GateFigures figures = {};
+  HeldBack held_back = HeldBack::kNo;  ///< also where the judges found it not better
 };
 
 /// What no chance explains, however few the judges are: half as much again (rms of the same poses).

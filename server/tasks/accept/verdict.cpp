@@ -65,7 +65,7 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
 /// Whatever the judges say: its notes keep it from being put in force by itself.
 GateVerdict left_to_a_person(const Note& stop, GateFigures figures) {
   return {false, "not in force: " + stop.text + "; activate it if it is right", true, stop.text,
-          std::move(figures)};
+          std::move(figures), HeldBack::kStopNote};
 }
 
 }  // namespace
@@ -77,9 +77,10 @@ GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_
   GateQuestion question{candidate, in_force, std::move(served_before), sessions, 0};
   if (in_force != nullptr) question.first_new = first_new(sessions, in_force->model);
   GateVerdict verdict = judge(question, options);
+  const auto stop = stop_of(candidate);
+  if (stop) verdict.held_back = HeldBack::kStopNote;
   if (!verdict.put_in_force) return verdict;
-  if (const auto stop = stop_of(candidate))
-    return left_to_a_person(*stop, std::move(verdict.figures));
+  if (stop) return left_to_a_person(*stop, std::move(verdict.figures));
   if (!record) return verdict;
   return judge_by_record(candidate, *record, sessions, options.accept_ratio, std::move(verdict));
 }

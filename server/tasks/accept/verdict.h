@@ -34,8 +34,8 @@ struct Opponents {
 
 /// judge() of the candidate with the sessions that came after `in_force` (null: none) told from
 /// those before; and where the version marked in force cannot be asked, against its record. A model
-/// with a stop_of() is never put in force: it is undecided, a person decides. `sessions`: oldest
-/// first.
+/// with a stop_of() is never put in force: it is undecided, a person decides, or not better; its
+/// HeldBack says so in both cases. `sessions`: oldest first.
 [[nodiscard]] GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
                                      std::vector<ServedModel> served_before,
                                      const std::optional<RecordInForce>& record,

@@ -219,6 +219,7 @@ Frame of_verdict(const GateVerdict& verdict) {
   Json head = {{"put_in_force", verdict.put_in_force},
                {"message", verdict.message},
                {"undecided", verdict.undecided},
+               {"held_back", to_text(verdict.held_back)},
                {"why", verdict.why}};
   put(head, "before_m", verdict.figures.before);
   put(head, "after_m", verdict.figures.after);
@@ -233,7 +234,8 @@ GateVerdict to_verdict(const Frame& frame) {
       head.at("message"),
       head.at("undecided"),
       head.at("why"),
-      {get<double>(head, "before_m"), get<double>(head, "after_m"), get<double>(head, "limit_m")}};
+      {get<double>(head, "before_m"), get<double>(head, "after_m"), get<double>(head, "limit_m")},
+      held_back_of(head.at("held_back").get<std::string>())};
 }
 
 Frame of_error(const Error& error, bool over_memory) {
