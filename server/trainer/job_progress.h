@@ -14,6 +14,9 @@ namespace trammel {
 
 enum class JobStage { kQueued, kTraining, kStoring, kDone, kFailed };
 
+/// JobProgress::what of a job (kStoring) while its model is held against others.
+inline constexpr const char* kJudging = "judging";
+
 /// What a watcher sees of one job.
 struct JobProgress {
   std::int64_t job = 0;

@@ -255,6 +255,8 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
   const Judging judging = [&](const Opponents& opponents) -> Result<GateVerdict> {
     if (stop.any()) return given_up();
     if (judged && is_same(judged->first, opponents)) return judged->second;
+    progress.what = kJudging;
+    book_.report(progress);
     auto verdict = computing.judge(opponents);
     if (verdict) judged = {opponents, *verdict};
     return verdict;

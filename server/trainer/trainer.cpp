@@ -310,7 +310,8 @@ Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
   TRY(check_batch_id(batch.id));
   const auto received =
       TRY(received_batch({batch.id, batch.csv, batch.accepted_at}, *cell,
-                         held_out_by_service(options_.validation_share, options_.seed)));
+                         held_out_by_service(options_.validation_share, options_.seed),
+                         options_.compute.reads));
   batch.poses = static_cast<int>(received.size());
   if (batch.poses > options_.max_poses) {
     return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch.id, batch.poses,
@@ -369,7 +370,8 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
   } else {
     const auto batch =
         TRY(received_batch({"", csv, job.created_at}, *cell,
-                           held_out_of_diagnosis(options_.validation_share, options_.seed, apply)));
+                           held_out_of_diagnosis(options_.validation_share, options_.seed, apply),
+                           options_.compute.reads));
     if (const auto poses = static_cast<int>(batch.size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses,
                      options_.max_poses)
@@ -518,7 +520,8 @@ Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::str
   const auto own = TRY(store_.batches_of_version(cell_name, version));
   const auto sources = TRY(judging_sources(store_, cell_name, own));
   if (sources.empty()) return nothing_to_judge;  // a person decides, and has
-  JobBatches batches(*cell, held_out_by_service(options_.validation_share, options_.seed), {});
+  JobBatches batches(*cell, held_out_by_service(options_.validation_share, options_.seed),
+                     options_.compute.reads, {});
   for (const BatchSource& source : sources) {
     const auto stored = TRY(store_.batch(cell_name, source.id));
     batches.add({source.id, stored.csv, stored.accepted_at}, true);

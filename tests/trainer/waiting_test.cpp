@@ -1,6 +1,5 @@
-// Who waits for whom: while one cell's model is judged, or put in force, nobody else does. The
-// linker leads judge() here first (`--wrap` in tests/CMakeLists.txt), so that a test can hold it
-// up.
+// Who waits for whom: while one cell's model is judged, or put in force, nobody else does. A
+// listener holds either up.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -58,21 +57,6 @@ class Gate {
   int waiting_ = 0, passed_ = 0;
 };
 
-Gate judging;
-
-}  // namespace
-
-GateVerdict real_judge(const GateQuestion& question, const GateOptions& options) asm(
-    "__real__ZN7trammel5judgeERKNS_12GateQuestionERKNS_11GateOptionsE");
-GateVerdict wrap_judge(const GateQuestion& question, const GateOptions& options) asm(
-    "__wrap__ZN7trammel5judgeERKNS_12GateQuestionERKNS_11GateOptionsE");
-GateVerdict wrap_judge(const GateQuestion& question, const GateOptions& options) {
-  judging.pass();
-  return real_judge(question, options);
-}
-
-namespace {
-
 class Waiting : public testing::Test {
  protected:
   Waiting() : store_(test::demand(Store::open(folder_.file("trammel.db")))) {
@@ -84,11 +68,12 @@ class Waiting : public testing::Test {
     static_cast<void>(test::demand(trainer_->start()));
   }
   ~Waiting() override {
-    judging.open();
+    judging_.open();
     publishing_.open();
   }
 
   void heard(const JobProgress& progress) {
+    if (progress.stage == JobStage::kStoring && progress.what == kJudging) judging_.pass();
     if (progress.stage != JobStage::kDone && progress.stage != JobStage::kFailed) return;
     const std::lock_guard lock(mutex_);
     finished_[progress.job] = progress;
@@ -116,7 +101,7 @@ class Waiting : public testing::Test {
     auto done = std::async(std::launch::async, [&] { return change().has_value(); });
     const bool in_time = done.wait_for(kLimit) == std::future_status::ready;
     if (!in_time) {
-      judging.open();
+      judging_.open();
       publishing_.open();
     }
     return done.get() && in_time;
@@ -127,6 +112,7 @@ class Waiting : public testing::Test {
                         {"cell-8", test::small_cell("cell-8")}};
   std::unique_ptr<Store> store_;
   ModelRegistry registry_;
+  Gate judging_;
   Gate publishing_;  // of models of cell-7
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -136,9 +122,9 @@ class Waiting : public testing::Test {
 
 TEST_F(Waiting, AModelOfAnyCellCanBePutInForceWhileAnotherOneIsJudged) {
   train_all();
-  judging.shut();
+  judging_.shut();
   const std::int64_t third = submit("cell-7", "third", 3);
-  ASSERT_TRUE(judging.somebody_waits());
+  ASSERT_TRUE(judging_.somebody_waits());
   EXPECT_TRUE(ends([&] { return trainer_->activate("cell-8", 2); }));
   EXPECT_EQ(registry_.in_force("cell-8")->version, 2);
   EXPECT_TRUE(ends([&] { return trainer_->rollback("cell-8"); }));
@@ -150,10 +136,10 @@ TEST_F(Waiting, AModelOfAnyCellCanBePutInForceWhileAnotherOneIsJudged) {
     return trainer_->submit("cell-8", "third",
                             test::small_batch_csv(*cells_.at("cell-8"), {.seed = 3}), "client:3");
   }));
-  const int before = judging.passed();
-  judging.open();
+  const int before = judging_.passed();
+  judging_.open();
   EXPECT_EQ(finished(third).stage, JobStage::kDone);
-  EXPECT_GT(judging.passed(), before)
+  EXPECT_GT(judging_.passed(), before)
       << "what is in force has changed meanwhile: it is judged against that";
 }
 

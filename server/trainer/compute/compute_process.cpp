@@ -283,7 +283,7 @@ Failure ComputeProcess::crashed() {
 Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options, ComputeTask task,
                                                    const StopRequests& stop) {
   if (options.program.empty())
-    return std::unique_ptr<Computing>(std::make_unique<Workbench>(std::move(task)));
+    return std::unique_ptr<Computing>(std::make_unique<Workbench>(std::move(task), options.reads));
   return ComputeProcess::start(options, task, stop)
       .map([](std::unique_ptr<ComputeProcess> process) {
         return std::unique_ptr<Computing>(std::move(process));

@@ -20,24 +20,26 @@ HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed, bool 
 }
 
 Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell,
-                                    const HoldOut& hold_out) {
+                                    const HoldOut& hold_out, const BatchReads& reads) {
   const std::string id =
       text.id.empty() ? "sent-" + sha256_hex(text.csv).substr(0, kIdOfSentBatch) : text.id;
+  if (reads) reads(id);
   auto parsed = TRY(parse_batch(text.csv, "batch " + id));
   parsed.id = id;
   TRY(require_positions(parsed, "the service"));
   return check_against_cell(dated(std::move(parsed), text.taken_in), cell, hold_out);
 }
 
-JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
-                       std::vector<std::string> earlier)
+JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, BatchReads reads,
+                       std::vector<std::string> own, std::vector<std::string> earlier)
     : cell_(cell),
       hold_out_(std::move(hold_out)),
+      reads_(std::move(reads)),
       own_ids_(std::move(own)),
       earlier_ids_(std::move(earlier)) {}
 
 void JobBatches::add(const BatchText& text, bool judges) {
-  auto batch = received_batch(text, cell_, hold_out_);
+  auto batch = received_batch(text, cell_, hold_out_, reads_);
   if (judges && batch) {
     sessions_.push_back(judging_session(*batch));
     judge_once_ = false;

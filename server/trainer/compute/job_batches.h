@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/tasks/accept/judging.h"
+#include "server/trainer/compute/compute_options.h"
 #include "server/trainer/compute/task.h"
 
 namespace trammel {
@@ -19,7 +20,8 @@ namespace trammel {
 /// A text that was received as a batch of the cell. Refuses what the batch reader and the cell
 /// refuse. One without an id gets it from its content.
 [[nodiscard]] Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell,
-                                                  const HoldOut& hold_out);
+                                                  const HoldOut& hold_out,
+                                                  const BatchReads& reads = {});
 
 /// The batches that one job works on, and those that judge what it makes. Each of them is parsed,
 /// checked and split once.
@@ -27,7 +29,7 @@ class JobBatches {
  public:
   /// `own`: the ids of those to work on; none: the one without an id. `earlier`: those to learn
   /// from as well. The cell outlives it.
-  JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
+  JobBatches(const Cell& cell, HoldOut hold_out, BatchReads reads, std::vector<std::string> own,
              std::vector<std::string> earlier = {});
 
   /// `judges`: it is one of those that judge, which come oldest first. One of these that does not
@@ -56,6 +58,7 @@ class JobBatches {
 
   const Cell& cell_;
   const HoldOut hold_out_;
+  const BatchReads reads_;
   const std::vector<std::string> own_ids_, earlier_ids_;
   std::map<std::string, Result<CheckedBatch>> own_;  // by id, earlier ones among them
   std::vector<JudgingSession> sessions_;

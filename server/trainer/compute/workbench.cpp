@@ -112,9 +112,10 @@ HoldOut hold_out_of(const ComputeTask& task) {
 
 }  // namespace
 
-Workbench::Workbench(ComputeTask task)
+Workbench::Workbench(ComputeTask task, BatchReads reads)
     : task_(std::move(task)),
-      batches_(*task_.cell, hold_out_of(task_), task_.batch_ids, task_.earlier_ids) {}
+      batches_(*task_.cell, hold_out_of(task_), std::move(reads), task_.batch_ids,
+               task_.earlier_ids) {}
 
 Status Workbench::take(const BatchText& batch, bool judges) {
   batches_.add(batch, judges);

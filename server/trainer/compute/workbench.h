@@ -19,7 +19,7 @@ struct Diagnosis;
 /// neither store nor registry.
 class Workbench : public Computing {
  public:
-  explicit Workbench(ComputeTask task);
+  explicit Workbench(ComputeTask task, BatchReads reads = {});
 
   [[nodiscard]] Status take(const BatchText& batch, bool judges) override;
   [[nodiscard]] Result<Made> make(const ComputeWatch& watch) override;
