@@ -274,8 +274,8 @@ Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate,
   const auto others = TRY(opponents(candidate.job.cell, present));
   const auto judged_by_poses = TRY(judging(others));
   const std::optional<GateVerdict> verdict = within_step_limit(judged_by_poses, candidate, present);
-  const bool released =
-      may_release && (verdict->put_in_force || (verdict->undecided && !is_doubt(verdict->held_back)));
+  const bool released = may_release && (verdict->put_in_force ||
+                                        (verdict->undecided && !is_doubt(verdict->held_back)));
   std::string message = verdict->message + candidate.remarks;
   if (may_release && !released)
     message += fmt::format("; what was in quarantine of {} stays there",
