@@ -330,7 +330,7 @@ wire::JobKind to_wire(JobKind kind) {
 
 wire::Job to_wire(const Trainer::DatedJob& dated) {
   wire::Job job = to_wire(dated.progress);
-  job.kind(to_wire(dated.asked.kind));
+  job.kind(to_wire(dated.asked.kind()));
   const std::size_t batches =
       std::min<std::size_t>(dated.asked.batch_ids.size(), wire::MAX_BATCHES);
   for (std::size_t i = 0; i < batches; ++i)

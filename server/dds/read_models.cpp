@@ -227,7 +227,7 @@ Result<ReadModelsReply> Handlers::fleet() const {
   std::map<std::string, std::string> checks;  // the last of each cell
   const auto jobs = TRY(trainer_.jobs(""));
   for (const Trainer::DatedJob& job : jobs) {
-    if (job.asked.kind != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
+    if (job.asked.kind() != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
     if (const auto found = trainer_.diagnosis(job.asked.id))
       checks[job.asked.cell] = found->findings;
   }

@@ -117,7 +117,7 @@ std::string outcome_of(const StoredJob& job, const std::optional<JobProgress>& n
   if (now) return fmt::format("{}, {:.0f} %", html_text(now->what), 100 * now->share);
   const std::string verdict = apart_words(to_text(job.outcome.verdict));
   const std::string why = with_micro(job.outcome.why.empty() ? job.message : job.outcome.why);
-  if (job.kind != JobKind::kTrain && !why.empty()) return html_text(why);
+  if (job.kind() != JobKind::kTrain && !why.empty()) return html_text(why);
   return html_text(why.empty() ? verdict : verdict + ": " + why);
 }
 
@@ -140,7 +140,7 @@ std::string batches_of(const StoredJob& job) {
 }
 
 bool has_findings(const StoredJob& job) {
-  return job.kind != JobKind::kTrain && job.state == JobState::kDone;
+  return job.kind() != JobKind::kTrain && job.state == JobState::kDone;
 }
 
 /// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made
@@ -148,7 +148,7 @@ bool has_findings(const StoredJob& job) {
 std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
   const StoredJob* last = nullptr;  // the jobs come oldest first
   for (const StoredJob& job : jobs)
-    if (job.kind == kind && has_findings(job)) last = &job;
+    if (job.kind() == kind && has_findings(job)) last = &job;
   if (last == nullptr) return "";
   const std::string name =
       fmt::format("Last {}, {} UTC", kind_of(kind), shown_time(last->finished_at));
@@ -166,7 +166,7 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
     const auto now = progress_in(running, job->id);
     rows.push_back(
         {{html_link(job_address(job->id), std::to_string(job->id)),
-          html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
+          html_link(cell_address(job->cell), job->cell), kind_of(job->kind()), batches_of(*job),
           html_time(job->created_at), html_time(job->finished_at),
           job->server.empty() ? "–" : html_text(job->server),
           outcome_of(*job, now) +
@@ -313,7 +313,7 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
   const auto job = TRY(server.store.job(id));
   const auto now = progress_in(unfinished(server), id);
   std::vector<HtmlRow> rows = {{{"cell", html_link(cell_address(job.cell), job.cell)}},
-                               {{"what", kind_of(job.kind)}},
+                               {{"what", kind_of(job.kind())}},
                                {{"batches", batches_of(job)}},
                                {{"asked (UTC)", html_time(job.created_at)}},
                                {{"begun (UTC)", html_time(job.started_at)}},
@@ -329,7 +329,7 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
   if (job.model_version > 0)
     rows.push_back({{"model", html_link(model_address(job.cell, job.model_version),
                                         fmt::format("version {}", job.model_version))}});
-  if (job.kind != JobKind::kTrain && !now)
+  if (job.kind() != JobKind::kTrain && !now)
     rows.push_back({{"found", html_link(job_address(id) + "/findings", "what it found")}});
   return ServicePage{fmt::format("Job {}", id),
                      html_section("What became of it", html_table({"", {}, rows})),
@@ -364,7 +364,7 @@ Result<std::string> history_report(const Watched& server, const std::string& cel
   }
   for (const StoredJob& job :
        server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>())) {
-    if (job.kind != JobKind::kTrain || !job.finished_at) continue;
+    if (job.kind() != JobKind::kTrain || !job.finished_at) continue;
     history.trainings.push_back({*job.finished_at, fmt::format("{}", fmt::join(job.batch_ids, "+")),
                                  to_text(job.outcome.verdict), job.outcome.why, job.outcome.before,
                                  job.outcome.after});

@@ -61,7 +61,8 @@ HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_progr
   const auto found = server.trainer.diagnosis(job);
   if (!found) return refused_reply(found.error());
   if (!for_programs && !found->page.empty()) return stored_page_reply(found->page, asked->cell);
-  if (!for_programs && asked->kind == JobKind::kCheck) return health_reply(found->findings, *asked);
+  if (!for_programs && asked->kind() == JobKind::kCheck)
+    return health_reply(found->findings, *asked);
   return {200, "application/json", found->findings};
 }
 

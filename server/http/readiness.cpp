@@ -57,8 +57,9 @@ CellReadiness untrained(const std::string& cell, const Watched& server, int* ask
   if (++*asked > kMostAsked) return one;
   const auto jobs = server.store.recent_jobs(cell, 1);
   if (!jobs) return {cell, State::kUnreadable, 0, sentence(jobs.error())};
-  const auto last = std::find_if(jobs->rbegin(), jobs->rend(),
-                                 [](const StoredJob& job) { return job.kind == JobKind::kTrain; });
+  const auto last = std::find_if(jobs->rbegin(), jobs->rend(), [](const StoredJob& job) {
+    return job.kind() == JobKind::kTrain;
+  });
   if (last == jobs->rend()) return one;
   one.state = State::kTrainingEnded;
   one.why = fmt::format("job {} ended without a model in force: {}", last->id, last->message);

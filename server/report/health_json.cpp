@@ -182,10 +182,6 @@ std::optional<DriftSeen> drift_of(const std::string& check) {
   return seen;
 }
 
-std::string drift_text(const DriftSeen& drift) {
-  return ordered_json{{"drift_seen", drift_json(drift)}}.dump();
-}
-
 ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   ordered_json json = {{"verdict", to_string(check.verdict)},
                        {"tolerance_mm", to_mm(check.tolerance)},

@@ -22,8 +22,6 @@ struct CheckedSince {
                                                 const CompensatedModel& model);
 /// What the check that health_json() wrote says of the arm's drift; empty: nothing.
 [[nodiscard]] std::optional<DriftSeen> drift_of(const std::string& check);
-/// A text that drift_of() reads, and nothing else of the check.
-[[nodiscard]] std::string drift_text(const DriftSeen& drift);
 /// For people: the verdict, what changed, what would have been seen, when the next check is due.
 [[nodiscard]] std::string health_text(const HealthCheck& check);
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/store/audit_rows.h"
 #include "server/store/changes.h"
@@ -60,9 +61,11 @@ std::vector<std::string> batches_of(Database& database, std::int64_t job) {
 
 constexpr const char* kJobColumns =
     "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, CASE WHEN "
-    "EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, "
+    "health_checks.job IS NULL THEN kind ELSE 'check' END, "
     "started_at, finished_at, verdict, before_m, after_m, limit_m, code, why, next_step, "
-    "peak_bytes, processor_s, job_claims.server, held_back FROM jobs LEFT JOIN job_claims ON job_claims.job = "
+    "peak_bytes, processor_s, job_claims.server, held_back, tolerance_m, apply FROM jobs LEFT JOIN "
+    "health_checks ON health_checks.job = jobs.id LEFT JOIN diagnoses ON diagnoses.job = jobs.id "
+    "LEFT JOIN job_claims ON job_claims.job = "
     "jobs.id LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON "
     "job_outcomes.job = jobs.id ";
 
@@ -83,10 +86,12 @@ JobOutcome outcome_of(Rows& row) {
   return outcome;
 }
 
-JobKind job_kind_of(const std::string& text) {
-  return text == "diagnose" ? JobKind::kDiagnose
-         : text == "check"  ? JobKind::kCheck
-                            : JobKind::kTrain;
+/// What is asked, in a row of kJobColumns.
+AskedJob asked_of(Rows& row) {
+  const std::string kind = row.text(9);
+  if (kind == "check") return AskedCheck{optional_number(row, 23)};
+  if (kind == "diagnose") return AskedDiagnosis{!row.is_null(24) && row.truth(24)};
+  return AskedTraining{row.text(2), row.text(3)};
 }
 
 /// The job in a row of kJobColumns, without its batches.
@@ -94,14 +99,12 @@ StoredJob job_of(Rows& row) {
   StoredJob job;
   job.id = row.integer64(0);
   job.cell = row.text(1);
-  job.level = row.text(2);
-  job.bias = row.text(3);
+  job.asked = asked_of(row);
   job.state = job_state_of(row.text(4));
   job.message = row.text(5);
   job.created_at = row.integer64(6);
   job.model_version = row.integer(7);
   job.attempts = row.integer(8);
-  job.kind = job_kind_of(row.text(9));
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
@@ -139,16 +142,18 @@ void record_start(Database& database, std::int64_t job) {
 }
 
 void record_outcome(Database& database, std::int64_t job, const JobOutcome& outcome) {
-  change(database,
-         "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
-         "next_step, peak_bytes, processor_s, held_back) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, "
-         "$10, $11) ON CONFLICT (job) DO UPDATE SET verdict = excluded.verdict, before_m = excluded.before_m, "
-         "after_m = excluded.after_m, limit_m = excluded.limit_m, code = excluded.code, why = "
-         "excluded.why, next_step = excluded.next_step, peak_bytes = excluded.peak_bytes, "
-         "processor_s = excluded.processor_s, held_back = excluded.held_back",
-         job, to_text(outcome.verdict), outcome.before, outcome.after, outcome.limit,
-         outcome.code ? to_text(*outcome.code) : "", outcome.why, outcome.next, outcome.peak_memory,
-         outcome.processor_time, to_text(outcome.held_back));
+  change(
+      database,
+      "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
+      "next_step, peak_bytes, processor_s, held_back) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, "
+      "$10, $11) ON CONFLICT (job) DO UPDATE SET verdict = excluded.verdict, before_m = "
+      "excluded.before_m, "
+      "after_m = excluded.after_m, limit_m = excluded.limit_m, code = excluded.code, why = "
+      "excluded.why, next_step = excluded.next_step, peak_bytes = excluded.peak_bytes, "
+      "processor_s = excluded.processor_s, held_back = excluded.held_back",
+      job, to_text(outcome.verdict), outcome.before, outcome.after, outcome.limit,
+      outcome.code ? to_text(*outcome.code) : "", outcome.why, outcome.next, outcome.peak_memory,
+      outcome.processor_time, to_text(outcome.held_back));
 }
 
 void record_end(Database& database, std::int64_t job, const JobOutcome& outcome) {
@@ -165,17 +170,24 @@ std::string list_of(const std::set<std::int64_t>& ids) {
   return fmt::format("{}", fmt::join(ids, ", "));
 }
 
+AskedTraining training_of(const StoredJob& job) {
+  const auto* training = std::get_if<AskedTraining>(&job.asked);
+  return training != nullptr ? *training : AskedTraining{};
+}
+
 const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
 
 std::int64_t insert_job(Database& database, const StoredJob& job) {
-  Rows made = prepare(database,
-                      "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
-                      "VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING id",
-                      job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message,
-                      job.created_at, stored_kind(job.kind));
+  Rows made =
+      prepare(database,
+              "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
+              "VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING id",
+              job.cell, training_of(job).level, training_of(job).bias, to_text(JobState::kQueued),
+              job.message, job.created_at, stored_kind(job.kind()));
   const std::int64_t id = made.next() ? made.integer64(0) : 0;
-  if (job.kind == JobKind::kCheck)
-    change(database, "INSERT INTO health_checks (job) VALUES ($1)", id);
+  if (const auto* check = std::get_if<AskedCheck>(&job.asked))
+    change(database, "INSERT INTO health_checks (job, tolerance_m) VALUES ($1, $2)", id,
+           check->tolerance);
   return id;
 }
 
@@ -261,6 +273,15 @@ const char* asked_for(JobKind kind) {
   return "training asked";
 }
 
+/// What the audit trail says of it besides.
+std::string details_of(const AskedJob& asked) {
+  const auto* training = std::get_if<AskedTraining>(&asked);
+  if (training != nullptr && !training->level.empty()) return ", level " + training->level;
+  const auto* check = std::get_if<AskedCheck>(&asked);
+  if (check == nullptr || !check->tolerance) return "";
+  return fmt::format(", tolerance {:g} mm", to_mm(*check->tolerance));
+}
+
 /// Queues the job that `insert` makes, or returns the one that was queued under this id before.
 template <typename Insert>
 Result<StoredJob> queue_once(Database& database, const StoredJob& job, const ChangeId& change_id,
@@ -268,10 +289,9 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
   const auto queued = TRY(once(database, job.cell, change_id, [&] {
     return insert().map([&](const StoredJob& made) {
       record_audit(database,
-                   {made.cell, asked_for(made.kind), fmt::format("job {}", made.id), "",
+                   {made.cell, asked_for(made.kind()), fmt::format("job {}", made.id), "",
                     fmt::format("of {}{}{}", made.batch_ids.empty() ? "a batch sent with it" : "",
-                                fmt::join(made.batch_ids, ", "),
-                                made.level.empty() ? "" : ", level " + made.level)},
+                                fmt::join(made.batch_ids, ", "), details_of(made.asked))},
                    change_id);
       return ChangeOutcome{0, made.id};
     });
@@ -332,15 +352,14 @@ Result<bool> Store::was_made_by_job(const std::string& cell, int version) const 
   });
 }
 
-Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
+Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const std::string& csv,
                                        const ChangeId& change_id) {
   return connection_->in_transaction([&](Database& database) {
     return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
-      Result<StoredJob> queued = insert_job_over(database, job);
-      if (queued) {
-        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES ($1, $2, $3)", queued->id,
-               diagnosis.csv, diagnosis.apply ? 1 : 0);
-      }
+      const auto queued = TRY(insert_job_over(database, job));
+      const auto* asked = std::get_if<AskedDiagnosis>(&job.asked);
+      change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES ($1, $2, $3)", queued.id,
+             csv, asked != nullptr && asked->apply ? 1 : 0);
       return queued;
     });
   });
@@ -348,14 +367,13 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
 
 Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
   return connection_->exclusively([&](Database& database) -> Result<StoredDiagnosis> {
-    auto row =
-        prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = $1", job);
+    auto row = prepare(database, "SELECT csv, findings, page FROM diagnoses WHERE job = $1", job);
     if (!row.next())
       return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
     if (const auto asked = read_job(database, job);
         asked && is_pruned(database, "answer of job", asked->cell, std::to_string(job)))
       return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
-    return StoredDiagnosis{row.text(0), row.truth(1), row.text(2), row.text(3)};
+    return StoredDiagnosis{row.text(0), row.text(1), row.text(2)};
   });
 }
 

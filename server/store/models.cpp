@@ -187,10 +187,11 @@ Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
 
 }  // namespace
 
-Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model,
-                             std::int64_t job, bool put_in_force, const std::string& message,
-                             bool release, const ChangeId& change_id, const JobOutcome& outcome) {
-  const std::string content = serialize(model);
+Result<int> Store::add_model(const std::string& cell, const NewModel& added, std::int64_t job,
+                             bool put_in_force, const std::string& message, bool release,
+                             const ChangeId& change_id, const JobOutcome& outcome) {
+  const CompensatedModel& model = added.model;
+  const std::string content = added.text.empty() ? serialize(model) : added.text;
   const auto insert = [&](Database& database) -> Result<ChangeOutcome> {
     const auto next = TRY(next_version(database, cell));
     const int version = next;

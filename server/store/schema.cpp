@@ -65,10 +65,8 @@ void put_cells_of_releases_into_their_key(Database& database) {
   database.execute("DROP TABLE job_releases_before");
 }
 
-bool outcomes_say_what_holds_back(Database& database) {
-  return integer_of(database,
-                    "SELECT COUNT(*) FROM pragma_table_info('job_outcomes') WHERE name = "
-                    "'held_back'") > 0;
+bool has_column(Database& database, const char* table, const char* column) {
+  return exists(database, "SELECT 1 FROM pragma_table_info($1) WHERE name = $2", table, column);
 }
 
 /// Refuses a file that is neither empty nor a store of ours. Changes nothing.
@@ -113,7 +111,10 @@ Status prepare_file(Database& database, const std::string& path) {
     database.execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   }
   database.execute(in_sqlite(kTablesBeside));
-  if (!outcomes_say_what_holds_back(database)) database.execute(in_sqlite(kOutcomeHeldBack));
+  if (!has_column(database, "job_outcomes", "held_back"))
+    database.execute(in_sqlite(kOutcomeHeldBack));
+  if (!has_column(database, "health_checks", "tolerance_m"))
+    database.execute(in_sqlite(kCheckTolerance));
   put_cells_of_releases_into_their_key(database);
   fill_in_times(database);
   count_versions(database);
@@ -126,7 +127,9 @@ Status prepare_file(Database& database, const std::string& path) {
 Status check_readable(Database& database, const std::string& path) {
   TRY(check_owner(database, path));
   const bool has_all = database.has_table("audit_end") && database.has_table("cells") &&
-                       database.has_table("job_claims") && outcomes_say_what_holds_back(database);
+                       database.has_table("job_claims") &&
+                       has_column(database, "job_outcomes", "held_back") &&
+                       has_column(database, "health_checks", "tolerance_m");
   if (integer_of(database, "PRAGMA user_version") == kSchemaVersion && has_all) return {};
   return refused("of an older schema, and cannot be written").in(path);
 }

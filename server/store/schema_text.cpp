@@ -201,6 +201,8 @@ const char* const kAuditServer = "ALTER TABLE audit ADD COLUMN server TEXT NOT N
 const char* const kOutcomeHeldBack =
     "ALTER TABLE job_outcomes ADD COLUMN held_back TEXT NOT NULL DEFAULT '';";
 
+const char* const kCheckTolerance = "ALTER TABLE health_checks ADD COLUMN tolerance_m REAL;";
+
 const char* const kTablesOfServers = R"sql(
 CREATE TABLE servers (
   token      TEXT    PRIMARY KEY,

@@ -27,6 +27,8 @@ extern const char* const kAuditTables;
 extern const char* const kAuditServer;  ///< what was added to them: which server made the change
 /// What was added to outcomes of jobs: why a person decides about the model (HeldBack).
 extern const char* const kOutcomeHeldBack;
+/// What was added to checks of a robot's health: the tolerance that was asked for, m.
+extern const char* const kCheckTolerance;
 
 /// Of a store that several servers share: who is there, by the starts of servers (`token`), and how
 /// cells are described. The newest description of a cell is the one that the record goes by.

@@ -29,7 +29,7 @@ std::vector<Migration> all_migrations() {
            "jobs_failed ON jobs (id) WHERE state = 'failed';",
        2},
       {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3},
-      {kOutcomeHeldBack, 3}};
+      {in_postgres(std::string(kOutcomeHeldBack) + kCheckTolerance), 3}};
 #ifdef TRAMMEL_NEXT_SCHEMA
   // The program of the next minor version, for the test of an update that goes from server to
   // server.

@@ -8,6 +8,8 @@
 #include <set>
 #include <stop_token>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "server/base/result.h"
@@ -46,24 +48,48 @@ enum class JobState { kQueued, kRunning, kDone, kFailed };
 
 enum class JobKind { kTrain, kDiagnose, kCheck };
 
-/// A training or a diagnosis, finished or not.
+/// A model of batches.
+struct AskedTraining {
+  std::string level = {}, bias = {};  ///< empty: as the cell file says
+};
+/// What the model in force does not explain of a batch.
+struct AskedDiagnosis {
+  bool apply = false;  ///< train a model with the causes found
+};
+/// Whether the robot still is as the model in force has it.
+struct AskedCheck {
+  std::optional<double> tolerance = {};  ///< m; empty: as the cell file says
+};
+/// In the order of JobKind.
+using AskedJob = std::variant<AskedTraining, AskedDiagnosis, AskedCheck>;
+[[nodiscard]] inline JobKind kind_of(const AskedJob& asked) {
+  return static_cast<JobKind>(asked.index());
+}
+/// Whether it is to make a model: a training, and a diagnosis that is applied.
+[[nodiscard]] inline bool is_to_train(const AskedJob& asked) {
+  const auto* diagnosis = std::get_if<AskedDiagnosis>(&asked);
+  return kind_of(asked) == JobKind::kTrain || (diagnosis != nullptr && diagnosis->apply);
+}
+
+/// A training, a diagnosis or a check, finished or not.
 struct StoredJob {
   std::int64_t id = 0;
   std::string cell;
   std::vector<std::string>
       batch_ids;  ///< trained together, in this order; none: a diagnosis of a batch sent with it
-  std::string level, bias;  ///< empty: as the cell file says
+  AskedJob asked = {};
   JobState state = JobState::kQueued;
   std::string message;          ///< why it failed, or the outcome for its model
   std::int64_t created_at = 0;  ///< Unix time, s
   int model_version = 0;        ///< 0 until done
   int attempts = 0;  ///< how often it was started; putting it back in the queue takes one off
-  JobKind kind = JobKind::kTrain;
   std::optional<std::int64_t> started_at =
       {};  ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
   JobOutcome outcome = {};                       ///< the same as `message`, as data
   std::string server = {};  ///< that works on it, or did; empty: none, or not recorded
+
+  [[nodiscard]] JobKind kind() const { return kind_of(asked); }
 };
 
 [[nodiscard]] inline bool is_over(const StoredJob& job) {
@@ -94,12 +120,20 @@ enum class CancelledJob {
   kAsked   ///< the server that works on it hears of it
 };
 
-/// The request of a diagnosis and its findings.
+/// What a diagnosis or a check has beside its job.
 struct StoredDiagnosis {
   std::string csv;        ///< the batch if it was sent with the request; else empty
-  bool apply = false;     ///< train a model with the causes found
   std::string findings;   ///< JSON; empty until found
   std::string page = {};  ///< HTML; of the last few diagnoses only
+};
+
+/// A model to be stored.
+struct NewModel {
+  /// `text`: what serialize() made of the model, where somebody has it.
+  NewModel(const CompensatedModel& model, std::string text = {})
+      : model(model), text(std::move(text)) {}
+  const CompensatedModel& model;
+  std::string text;
 };
 
 /// A line of a cell's model history.
@@ -208,10 +242,9 @@ class Store {
                                                                  int version) const;
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
-  /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as
+  /// Queues a diagnosis or a check of the one batch that `job` names, or of `csv`. Refuses as
   /// add_job().
-  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job,
-                                                const StoredDiagnosis& diagnosis,
+  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const std::string& csv,
                                                 const ChangeId& change_id = {});
   /// kNotFound: there is no such job, it is no diagnosis, or its findings were pruned.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
@@ -324,7 +357,7 @@ class Store {
   /// `outcome` and, if asked, puts the model in force, all in one transaction. If the model is put
   /// in force, or if `release` is set, the batches that the job may release leave quarantine.
   /// Returns the version.
-  [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model,
+  [[nodiscard]] Result<int> add_model(const std::string& cell, const NewModel& model,
                                       std::int64_t job, bool put_in_force,
                                       const std::string& message, bool release = false,
                                       const ChangeId& change_id = {},

@@ -81,7 +81,7 @@ const std::vector<StoreTable> kTables = {
                  {"processor_s", 'n'},
                  {"held_back", 'b'}})},
     {"job_releases", 3, columns_of({{"job", 'i'}, {"cell", 'b'}, {"batch", 'b'}})},
-    {"health_checks", 1, columns_of({{"job", 'i'}})},
+    {"health_checks", 1, columns_of({{"job", 'i'}, {"tolerance_m", 'n'}})},
     {"activation_figures", 1,
      columns_of(
          {{"number", 'i'}, {"before_m", 'n'}, {"after_m", 'n'}, {"limit_m", 'n'}, {"why", 'b'}})},

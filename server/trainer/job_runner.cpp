@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "server/base/unix_time.h"
-#include "server/compensate/model_file.h"
 #include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
 #include "server/tasks/train/given_up.h"
@@ -64,14 +63,14 @@ bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
 }
 
 /// What the checks of the cell that are done saw of its arm's drift, oldest first.
-Result<std::vector<std::string>> earlier_checks(const Store& store, const std::string& cell) {
+Result<std::vector<DriftSeen>> earlier_checks(const Store& store, const std::string& cell) {
   const auto jobs = TRY(store.recent_jobs(cell, kMostEarlierJobs));
-  std::vector<std::string> earlier;
+  std::vector<DriftSeen> earlier;
   for (const StoredJob& job : jobs) {
-    if (job.kind != JobKind::kCheck || job.state != JobState::kDone) continue;
+    if (job.kind() != JobKind::kCheck || job.state != JobState::kDone) continue;
     const auto found = store.diagnosis(job.id);
-    const auto drift = found ? drift_of(found->findings) : std::nullopt;
-    if (drift) earlier.push_back(drift_text(*drift));
+    auto drift = found ? drift_of(found->findings) : std::nullopt;
+    if (drift) earlier.push_back(std::move(*drift));
   }
   return earlier;
 }
@@ -136,24 +135,16 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   if (const auto cell = cells_.find(job->cell); !cell)
     return tl::make_unexpected(Failed{cell.error(), verdict_of(cell.error()), false, {}, true});
   book_.report(progress_at(*job, JobStage::kTraining));
-  std::optional<StoredDiagnosis> asked;
-  if (job->kind != JobKind::kTrain) {
-    auto stored = store_.diagnosis(id);
-    if (!stored) return failed(stored.error());
-    asked = std::move(*stored);
-  }
-  return compute(*job, asked, stop);
+  return compute(*job, stop);
 }
 
-JobRunner::Attempt JobRunner::compute(const StoredJob& job,
-                                      const std::optional<StoredDiagnosis>& asked,
-                                      const StopRequests& stop) {
-  auto task = task_of(job, asked);
+JobRunner::Attempt JobRunner::compute(const StoredJob& job, const StopRequests& stop) {
+  auto task = task_of(job);
   if (!task) return tl::make_unexpected(Failed{task.error(), verdict_of(task.error())});
   const std::vector<std::string> earlier = task->earlier_ids;
   const auto computing = start_computing(options_.compute, std::move(*task), stop);
   if (!computing) return tl::make_unexpected(Failed{computing.error(), JobVerdict::kBroken, true});
-  if (const Status given = give_batches(**computing, job, asked, earlier); !given)
+  if (const Status given = give_batches(**computing, job, earlier); !given)
     return tl::make_unexpected(failed_by(**computing, given.error()));
   ComputeWatch watch;
   watch.progress = reporter(job, stop);
@@ -169,15 +160,11 @@ JobRunner::Attempt JobRunner::compute(const StoredJob& job,
   return keep(job, *made, **computing, stop);
 }
 
-Result<ComputeTask> JobRunner::task_of(const StoredJob& job,
-                                       const std::optional<StoredDiagnosis>& asked) const {
+Result<ComputeTask> JobRunner::task_of(const StoredJob& job) const {
   ComputeTask task;
   task.cell = cells_.now().at(job.cell);
-  task.kind = job.kind;
+  task.asked = job.asked;
   task.batch_ids = job.batch_ids;
-  task.level = job.level;
-  task.bias = job.bias;
-  task.apply = asked && asked->apply;
   const auto came = TRY(came_with_batch(job));
   task.hold_against_in_force = came;
   const auto alone = TRY(learns_alone(job, came));
@@ -185,10 +172,9 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job,
     auto earlier = TRY(earlier_sessions(store_, job, task.cell->sessions, options_.max_poses));
     task.earlier_ids = std::move(earlier);
   }
-  if (const auto present = registry_.in_force(job.cell))
-    task.in_force = ModelText{present->version, serialize(present->model)};
+  if (const auto present = registry_.in_force(job.cell)) task.in_force = history_.text_of(*present);
   task.fleet = fleet_prior_of(job);
-  if (job.kind == JobKind::kCheck) {
+  if (job.kind() == JobKind::kCheck) {
     auto earlier = TRY(earlier_checks(store_, job.cell));
     task.earlier_checks = std::move(earlier);
   }
@@ -200,7 +186,7 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job,
 }
 
 Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch) const {
-  if (job.kind != JobKind::kTrain) return true;
+  if (job.kind() != JobKind::kTrain) return true;
   if (came_with_batch) return false;
   // Somebody asked: for what he released, with all that the cell knows; else for the batches that
   // he named.
@@ -214,7 +200,7 @@ Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch)
 std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
   const Cell& cell = *cells_.now().at(job.cell);
   const auto rules = rules_of(cell);
-  if (job.kind != JobKind::kTrain || !rules || !rules->fleet_prior) return std::nullopt;
+  if (job.kind() != JobKind::kTrain || !rules || !rules->fleet_prior) return std::nullopt;
   std::vector<FleetMember> twins;
   for (const auto& [name, other] : cells_.now()) {
     if (name == job.cell || !same_type(other->robot, cell.robot)) continue;
@@ -225,22 +211,21 @@ std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const 
 }
 
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
-  if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return false;
+  if (job.kind() != JobKind::kTrain || job.batch_ids.size() != 1) return false;
   return store_.came_with_batches({job.id}).map(
       [](const std::set<std::int64_t>& came) { return !came.empty(); });
 }
 
 Status JobRunner::give_batches(Computing& computing, const StoredJob& job,
-                               const std::optional<StoredDiagnosis>& asked,
                                const std::vector<std::string>& earlier) const {
-  const auto sources = TRY(batch_sources(store_, job, !asked || asked->apply, earlier));
+  const auto sources = TRY(batch_sources(store_, job, is_to_train(job.asked), earlier));
   for (const BatchSource& source : sources) {
     const auto stored = TRY(store_.batch(job.cell, source.id));
     TRY(computing.take({source.id, stored.csv, stored.accepted_at}, source.judges));
   }
-  if (asked && job.batch_ids.empty())
-    return computing.take({"", asked->csv, job.created_at}, false);
-  return {};
+  if (!job.batch_ids.empty()) return {};
+  const auto sent = TRY(store_.diagnosis(job.id));
+  return computing.take({"", sent.csv, job.created_at}, false);
 }
 
 JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Computing& computing,
@@ -249,7 +234,8 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
   progress.share = 1;
   book_.report(progress);
   const ComputeCost cost = computing.cost();
-  const Candidate candidate{*made.model, job, made.remarks, cost.peak_memory, cost.processor_time};
+  const Candidate candidate{
+      *made.model, job, made.remarks, made.model_text, cost.peak_memory, cost.processor_time};
   std::optional<std::pair<Opponents, GateVerdict>>
       judged;  // the last time: the disk may make it be asked again
   const Judging judging = [&](const Opponents& opponents) -> Result<GateVerdict> {

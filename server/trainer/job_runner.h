@@ -54,19 +54,16 @@ class JobRunner {
   using Attempt = tl::expected<void, Failed>;
 
   [[nodiscard]] Attempt attempt(std::int64_t id, const StopRequests& stop);
-  [[nodiscard]] Attempt compute(const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
-                                const StopRequests& stop);
+  [[nodiscard]] Attempt compute(const StoredJob& job, const StopRequests& stop);
   /// What the job is computed from, but its batches.
-  [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job,
-                                            const std::optional<StoredDiagnosis>& asked) const;
+  [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job) const;
+  [[nodiscard]] std::optional<FleetPrior> fleet_prior_of(const StoredJob& job) const;
   /// Whether the job came with its batch: somebody else's training was asked for, knowing the
   /// batch.
-  [[nodiscard]] std::optional<FleetPrior> fleet_prior_of(const StoredJob& job) const;
   [[nodiscard]] Result<bool> came_with_batch(const StoredJob& job) const;
   /// Whether it learns from the batches of the job alone: somebody named them.
   [[nodiscard]] Result<bool> learns_alone(const StoredJob& job, bool came_with_batch) const;
   [[nodiscard]] Status give_batches(Computing& computing, const StoredJob& job,
-                                    const std::optional<StoredDiagnosis>& asked,
                                     const std::vector<std::string>& earlier) const;
   [[nodiscard]] Attempt keep(const StoredJob& job, const Made& made, Computing& computing,
                              const StopRequests& stop);

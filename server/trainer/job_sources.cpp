@@ -12,7 +12,7 @@ constexpr std::int64_t kSecondsPerDay = 86400;
 
 Status check_own(const Store& store, const StoredJob& job, const std::set<std::string>& own,
                  const std::vector<StoredBatch>& stored) {
-  if (job.kind != JobKind::kTrain) return {};
+  if (job.kind() != JobKind::kTrain) return {};
   const auto may_release = TRY(store.may_release(job.id));
   for (const StoredBatch& batch : stored) {
     if (!own.contains(batch.id) || may_release) continue;

@@ -323,9 +323,9 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int 
   ChangeId decided;
   // Of a store with one server the cell's lock says the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
-  const auto version =
-      TRY(store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force,
-                           judged.message, judged.release, decided, judged.outcome));
+  const auto version = TRY(store_.add_model(cell, {candidate.model, candidate.text},
+                                            candidate.job.id, judged.put_in_force, judged.message,
+                                            judged.release, decided, judged.outcome));
   auto served = registry_.reclaimed({cell, version, candidate.model});
   if (judged.put_in_force) {
     put_in_force(std::move(served));
@@ -341,15 +341,16 @@ void ModelHistory::put_in_force(ServedModelPtr model) {
   if (listener_) listener_(*model, true);
 }
 
+ModelText ModelHistory::text_of(const ServedModel& model) const {
+  auto text = store_.model_text(model.cell, model.version);
+  return {model.version, text ? std::move(*text) : serialize(model.model)};
+}
+
 Result<Opponents> ModelHistory::opponents(const std::string& cell,
                                           const ServedModel* present) const {
   Opponents opponents;
   opponents.most_before = kMostServedBefore;
-  if (present != nullptr) {
-    auto text = store_.model_text(cell, present->version);
-    opponents.in_force =
-        ModelText{present->version, text ? std::move(*text) : serialize(present->model)};
-  }
+  if (present != nullptr) opponents.in_force = text_of(*present);
   auto before = TRY(served_before(cell));
   opponents.served_before = std::move(before);
   const auto record = TRY(record_not_loaded(cell));

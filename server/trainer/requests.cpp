@@ -6,6 +6,7 @@
 
 #include "server/base/hash.h"
 #include "server/base/name_check.h"
+#include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/error_sources/spelling.h"
@@ -84,9 +85,9 @@ Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
                                        const std::string& csv, bool apply, const ChangeId& id) {
   StoredJob job;
-  job.kind = JobKind::kDiagnose;
+  job.asked = AskedDiagnosis{apply};
   job.cell = cell_name;
-  return look_at(std::move(job), batch_id, csv, apply, id);
+  return look_at(std::move(job), batch_id, csv, id);
 }
 
 Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::string& batch_id,
@@ -97,21 +98,21 @@ Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::str
                    cell_name)
         .of("cell");
   StoredJob job;
-  job.kind = JobKind::kCheck;
+  job.asked = AskedCheck{tolerance_mm ? std::optional(*tolerance_mm * from_mm(1)) : std::nullopt};
   job.cell = cell_name;
-  if (tolerance_mm) job.level = fmt::format("{}", *tolerance_mm);
-  return look_at(std::move(job), batch_id, csv, false, id);
+  return look_at(std::move(job), batch_id, csv, id);
 }
 
 Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id,
-                                      const std::string& csv, bool apply, const ChangeId& id) {
+                                      const std::string& csv, const ChangeId& id) {
   const std::string& cell_name = job.cell;
+  const bool apply = is_to_train(job.asked);
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
   const auto cell = TRY(cells_.find(cell_name));
   if (!batch_id.empty() && !csv.empty()) {
     return failure(ErrorCode::kUsage,
                    "a {} is of a stored batch or of one that is sent, not of both",
-                   job.kind == JobKind::kCheck ? "check" : "diagnosis");
+                   job.kind() == JobKind::kCheck ? "check" : "diagnosis");
   }
   job.created_at = unix_now();
   if (csv.empty()) {
@@ -133,7 +134,7 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
   if (const auto before = queued_before(id); !before || *before)
     return before.map(the_job);  // meanwhile
   TRY(check_room(cell_name));
-  const auto accepted = TRY(store_.add_diagnosis(job, {csv, apply, "", ""}, id));
+  const auto accepted = TRY(store_.add_diagnosis(job, csv, id));
   enqueue(accepted, true);
   return accepted.id;
 }
@@ -169,8 +170,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name,
   StoredJob job;
   job.cell = cell_name;
   job.batch_ids = batch_ids.empty() ? std::vector{stored.back().id} : batch_ids;
-  job.level = level;
-  job.bias = bias;
+  job.asked = AskedTraining{level, bias};
   job.created_at = unix_now();
   if (batch_ids.empty()) {
     auto earlier = TRY(earlier_sessions(store_, job, cell->sessions, options_.max_poses));
@@ -256,7 +256,7 @@ void Trainer::enqueue(const StoredJob& job, bool asked_for) {
 }
 
 Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
-  if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return true;
+  if (job.kind() != JobKind::kTrain || job.batch_ids.size() != 1) return true;
   return store_.came_with_batches({job.id}).map(
       [](const std::set<std::int64_t>& came) { return came.empty(); });
 }

@@ -240,8 +240,7 @@ class Trainer {
   /// Queues a job that looks at one batch and learns nothing from it, unless it is to `apply` what
   /// it finds.
   [[nodiscard]] Result<std::int64_t> look_at(StoredJob job, const std::string& batch_id,
-                                             const std::string& csv, bool apply,
-                                             const ChangeId& id);
+                                             const std::string& csv, const ChangeId& id);
   /// The id of a stored batch, of the newest where none is named; refused in quarantine where what
   /// is found in it is to be applied.
   [[nodiscard]] Result<std::string> batch_to_diagnose(const std::string& cell,

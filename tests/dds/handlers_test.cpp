@@ -548,7 +548,7 @@ TEST_F(HandlersTest, ACheckIsQueuedAgainstTheModelInForceAndRefusedWithoutOne) {
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
   const auto queued = handlers_.answer(request);
   ASSERT_TRUE(queued) << queued.error().message;
-  EXPECT_EQ(backend_.store->job(queued->job())->kind, JobKind::kCheck);
+  EXPECT_EQ(backend_.store->job(queued->job())->kind(), JobKind::kCheck);
   ASSERT_TRUE(backend_.store->store_findings(queued->job(), R"({"verdict": "healthy"})", ""));
   auto fetch = read_request(wire::READ_FINDINGS);
   fetch.job(queued->job());
@@ -664,7 +664,7 @@ TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
   request.batch_ids({"lt-07"});
   const auto queued = handlers_.answer(request);
   ASSERT_TRUE(queued) << queued.error().message;
-  EXPECT_TRUE(backend_.store->diagnosis(queued->job())->apply);
+  EXPECT_TRUE(std::get<AskedDiagnosis>(backend_.store->job(queued->job())->asked).apply);
   request.batch_ids({"lt-07", "lt-08"});
   EXPECT_EQ(refusal(request), Refusal("", {}, "batch_ids").of(ErrorCode::kUsage).beyond(2, 1));
 }

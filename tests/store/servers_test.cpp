@@ -264,7 +264,8 @@ TEST_F(Servers, ARecordOfBeforeIsBroughtUpToDateAndWhoHadTheOldTablesMayUseTheNe
   one_.reset();
   other_.reset();
   say("DROP TABLE servers; DROP TABLE cell_descriptions; ALTER TABLE audit DROP COLUMN "
-      "server;ALTER TABLE job_outcomes DROP COLUMN held_back;UPDATE trammel_schema SET version = 2, works_from = 2");
+      "server;ALTER TABLE job_outcomes DROP COLUMN held_back; ALTER TABLE health_checks DROP "
+      "COLUMN tolerance_m;UPDATE trammel_schema SET version = 2, works_from = 2");
   std::string service = url_;
   service.replace(service.find("postgres@"), 9, "earlier@");
   EXPECT_EQ(Store::open(service).error().code, ErrorCode::kRefused);

@@ -173,7 +173,9 @@ TEST_F(SharedStore, ASchemaOfTheFutureIsRefusedUnlessItSaysThatThisProgramWorksO
 TEST_F(SharedStore, ASchemaOfBeforeIsBroughtUpToDateByInitAndByNothingElse) {
   say("CREATE TABLE replica (epoch bigint); CREATE TABLE learned_elsewhere (cell text); CREATE "
       "TABLE versions_elsewhere (cell text); DROP TABLE servers, cell_descriptions; ALTER TABLE "
-      "audit DROP COLUMN server; ALTER TABLE job_outcomes DROP COLUMN held_back; UPDATE trammel_schema SET version = 1, works_from = 1");
+      "audit DROP COLUMN server; ALTER TABLE job_outcomes DROP COLUMN held_back; ALTER TABLE "
+      "health_checks DROP COLUMN tolerance_m; UPDATE trammel_schema SET version = 1, works_from = "
+      "1");
   const auto older = Store::open(url_);
   ASSERT_FALSE(older);
   EXPECT_NE(sentence(older.error()).find("trammel store init"), std::string::npos)

@@ -27,17 +27,21 @@ class StoreCopyTest : public testing::Test {
   void SetUp() override {
     const auto store = demand(Store::open(file_));
     const std::string csv("# \xC3\xA4 \xFF\0 end\r\n", 13);
-    const StoredJob job = test::job_of("lt-07");
+    StoredJob job = test::job_of("lt-07");
     const auto made = demand(store->add_batch(test::batch_of("lt-07", csv, "client:1"), job));
     JobOutcome outcome;
     outcome.verdict = JobVerdict::kInForce;
     outcome.after = 0.1 + 0.2;
+    outcome.held_back = HeldBack::kFewJudges;
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), made.id, true, "made",
                                  false, {}, outcome));
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 2), 0, true, "better"));
     ASSERT_TRUE(store->rollback("cell-7", 1, {"robot-3:17", "roll back"}));
     ASSERT_TRUE(store->set_quarantine("cell-7", "lt-07", "odd"));
-    ASSERT_TRUE(store->add_diagnosis(job, {csv, true, "", ""}));
+    job.asked = AskedDiagnosis{true};
+    ASSERT_TRUE(store->add_diagnosis(job, csv));
+    job.asked = AskedCheck{0.1e-3};
+    ASSERT_TRUE(store->add_diagnosis(job, csv));
   }
   static void expect_same(const StoreContent& a, const StoreContent& b) {
     EXPECT_EQ(a.identity, b.identity);

@@ -135,7 +135,7 @@ TEST_P(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
   ASSERT_TRUE(store_->add_batch(batch("b", "2", "r2"), job()));
   StoredJob both = job();
   both.batch_ids = {"b", "a"};
-  both.level = "M2";
+  both.asked = AskedTraining{"M2"};
   both.bias = "matern52";
   const auto queued = store_->add_job(both);
   ASSERT_TRUE(queued) << queued.error().message;
@@ -147,12 +147,11 @@ TEST_P(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
 
 TEST_P(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
   StoredJob asked = job();
-  asked.kind = JobKind::kDiagnose;
-  const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", true, "", ""});
+  asked.asked = AskedDiagnosis{true};
+  const auto queued = store_->add_diagnosis(asked, "q1_deg\n1\n");
   ASSERT_TRUE(queued) << queued.error().message;
   restart();
-  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kDiagnose);
-  EXPECT_TRUE(store_->diagnosis(queued->id)->apply);
+  EXPECT_TRUE(std::get<AskedDiagnosis>(store_->unfinished_jobs()->at(0).asked).apply);
   EXPECT_EQ(store_->diagnosis(queued->id)->csv, "q1_deg\n1\n");
   ASSERT_TRUE(store_->store_findings(queued->id, "{}", "<html>"));
   ASSERT_TRUE(store_->set_job_done(queued->id, "nothing found"));
@@ -165,21 +164,25 @@ TEST_P(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
 
 TEST_P(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
   StoredJob asked = job();
-  asked.kind = JobKind::kCheck;
-  const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", false, "", ""});
-  ASSERT_TRUE(queued) << queued.error().message;
-  EXPECT_EQ(queued->kind, JobKind::kCheck);
-  restart();
-  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kCheck);
-  EXPECT_EQ(store_->audit()->rows.back().what, "check asked");
+  for (const std::optional<double>& tolerance : {std::optional<double>(), std::optional(0.1e-3)}) {
+    asked.asked = AskedCheck{tolerance};
+    const auto queued = store_->add_diagnosis(asked, "q1_deg\n1\n");
+    ASSERT_TRUE(queued) << queued.error().message;
+    EXPECT_EQ(queued->kind(), JobKind::kCheck);
+    restart();
+    EXPECT_EQ(std::get<AskedCheck>(store_->unfinished_jobs()->back().asked).tolerance, tolerance)
+        << "bit for bit";
+    EXPECT_EQ(store_->audit()->rows.back().what, "check asked");
+  }
+  EXPECT_EQ(store_->audit()->rows.back().after, "of a batch sent with it, tolerance 0.1 mm");
 }
 
 TEST_P(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
   std::vector<std::int64_t> jobs;
   for (int i = 0; i < 22; ++i) {
     StoredJob asked = job();
-    asked.kind = JobKind::kDiagnose;
-    jobs.push_back(store_->add_diagnosis(asked, {"csv", false, "", ""})->id);
+    asked.asked = AskedDiagnosis{};
+    jobs.push_back(store_->add_diagnosis(asked, "csv")->id);
     ASSERT_TRUE(store_->store_findings(jobs.back(), "{}", "<html>"));
   }
   EXPECT_EQ(store_->diagnosis(jobs[1])->page, "");
@@ -257,8 +260,8 @@ TEST_F(StoreFileTest, TakesAFileOfTheFirstSchemaOn) {
   }
   open();
   EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "");
-  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kTrain);
-  EXPECT_TRUE(store_->add_diagnosis(job(), {"csv", false, "", ""}));
+  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind(), JobKind::kTrain);
+  EXPECT_TRUE(store_->add_diagnosis(job(), "csv"));
 }
 
 TEST_F(StoreFileTest, TakesOnAFileOfBeforeTimesWereKeptAndKnowsWhenItsModelsWereTrained) {

@@ -87,6 +87,39 @@ std::optional<FleetPrior> fleet_from(const Json& json) {
   return fleet;
 }
 
+Json json_of(const AskedJob& asked) {
+  if (const auto* diagnosis = std::get_if<AskedDiagnosis>(&asked))
+    return {{"is", "diagnosis"}, {"apply", diagnosis->apply}};
+  if (const auto* check = std::get_if<AskedCheck>(&asked)) {
+    Json json = {{"is", "check"}};
+    put(json, "tolerance_m", check->tolerance);
+    return json;
+  }
+  const auto& training = std::get<AskedTraining>(asked);
+  return {{"is", "training"}, {"level", training.level}, {"bias", training.bias}};
+}
+
+AskedJob asked_from(const Json& json) {
+  const std::string kind = json.at("is");
+  if (kind == "diagnosis") return AskedDiagnosis{json.at("apply")};
+  if (kind == "check") return AskedCheck{get<double>(json, "tolerance_m")};
+  return AskedTraining{json.at("level"), json.at("bias")};
+}
+
+Json json_of(const std::vector<DriftSeen>& drifts) {
+  Json list = Json::array();
+  for (const DriftSeen& one : drifts)
+    list.push_back({{"from", one.from}, {"until", one.until}, {"misfit", one.misfit}});
+  return list;
+}
+
+std::vector<DriftSeen> drifts_from(const Json& json) {
+  std::vector<DriftSeen> drifts;
+  for (const Json& one : json)
+    drifts.push_back({one.at("from"), one.at("until"), one.at("misfit")});
+  return drifts;
+}
+
 }  // namespace
 
 std::vector<Frame> of_task(const ComputeTask& task) {
@@ -96,15 +129,11 @@ std::vector<Frame> of_task(const ComputeTask& task) {
   if (task.in_force)
     frames.push_back(frame("in_force", {{"version", task.in_force->version}}, task.in_force->text));
   frames.push_back(frame("task", {{"cell", task.cell->name},
-                                  {"diagnose", task.kind == JobKind::kDiagnose},
-                                  {"check", task.kind == JobKind::kCheck},
+                                  {"asked", json_of(task.asked)},
                                   {"batch_ids", task.batch_ids},
                                   {"earlier_ids", task.earlier_ids},
-                                  {"earlier_checks", task.earlier_checks},
-                                  {"level", task.level},
+                                  {"earlier_checks", json_of(task.earlier_checks)},
                                   {"fleet", json_of(task.fleet)},
-                                  {"bias", task.bias},
-                                  {"apply", task.apply},
                                   {"hold_against_in_force", task.hold_against_in_force},
                                   {"seed", task.seed},
                                   {"validation_share", task.validation_share},
@@ -119,16 +148,11 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
       TRY(parse_cell(texts.cell, texts.robot, "cell " + head.at("cell").get<std::string>()));
   ComputeTask task;
   task.cell = std::make_shared<const Cell>(std::move(cell));
-  task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose
-              : head.at("check").get<bool>()  ? JobKind::kCheck
-                                              : JobKind::kTrain;
+  task.asked = asked_from(head.at("asked"));
   task.batch_ids = head.at("batch_ids").get<std::vector<std::string>>();
   task.earlier_ids = head.at("earlier_ids").get<std::vector<std::string>>();
-  task.earlier_checks = head.at("earlier_checks").get<std::vector<std::string>>();
-  task.level = head.at("level");
-  task.bias = head.at("bias");
+  task.earlier_checks = drifts_from(head.at("earlier_checks"));
   task.fleet = fleet_from(head.at("fleet"));
-  task.apply = head.at("apply");
   task.hold_against_in_force = head.at("hold_against_in_force");
   task.in_force = std::move(texts.in_force);
   task.seed = head.at("seed");
@@ -212,6 +236,7 @@ Result<Made> to_made(const Frame& frame) {
   if (frame.text.empty()) return made;
   auto model = TRY(deserialize(frame.text, "the model that was made", ModelTexts::kAsTheyAre));
   made.model = std::move(model);
+  made.model_text = frame.text;
   return made;
 }
 

@@ -9,6 +9,7 @@
 
 #include "server/compensate/compensated_model.h"
 #include "server/fleet/fleet_prior.h"
+#include "server/health/health_check.h"
 #include "server/store/store.h"
 #include "server/tasks/accept/verdict.h"
 
@@ -24,17 +25,12 @@ struct BatchText {
 
 struct ComputeTask {
   std::shared_ptr<const Cell> cell;
-  JobKind kind = JobKind::kTrain;
+  AskedJob asked = {};
   std::vector<std::string>
       batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
   std::vector<std::string> earlier_ids =
       {};  ///< sessions of the same arm to learn from as well, oldest first
-  std::string level,
-      bias;  ///< of a training; empty: as usual
-             ///< `level` of a check: its tolerance in mm; empty: as the cell file says
-  std::vector<std::string>
-      earlier_checks;  ///< of a check: what those before it saw, as drift_of() reads it
-  bool apply = false;  ///< of a diagnosis: train a model with the causes found
+  std::vector<DriftSeen> earlier_checks = {};  ///< of a check: what those before it saw
   bool hold_against_in_force =
       false;  ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
@@ -54,6 +50,9 @@ struct Made {
   /// Of a diagnosis that makes no model.
   std::string message = {};
   JobOutcome outcome = {};
+  /// What serialize() made of the model in another process that computed it; empty: it was this
+  /// one.
+  std::string model_text = {};
 };
 
 /// What a job says on its way.

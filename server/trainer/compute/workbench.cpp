@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/base/units.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -105,8 +104,8 @@ std::string remarks_of(const std::vector<std::string>& judged_less,
 }
 
 HoldOut hold_out_of(const ComputeTask& task) {
-  return task.kind != JobKind::kTrain
-             ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
+  return kind_of(task.asked) != JobKind::kTrain
+             ? held_out_of_diagnosis(task.validation_share, task.seed, is_to_train(task.asked))
              : held_out_by_service(task.validation_share, task.seed);
 }
 
@@ -123,18 +122,13 @@ Status Workbench::take(const BatchText& batch, bool judges) {
 }
 
 Result<Made> Workbench::make(const ComputeWatch& watch) {
-  switch (task_.kind) {
-    case JobKind::kTrain:
-      return trained(watch);
-    case JobKind::kDiagnose:
-      return diagnosed(watch);
-    case JobKind::kCheck:
-      return checked(watch);
-  }
-  return trained(watch);
+  if (const auto* diagnosis = std::get_if<AskedDiagnosis>(&task_.asked))
+    return diagnosed(*diagnosis, watch);
+  if (const auto* check = std::get_if<AskedCheck>(&task_.asked)) return checked(*check, watch);
+  return trained(std::get<AskedTraining>(task_.asked), watch);
 }
 
-Result<Made> Workbench::trained(const ComputeWatch& watch) {
+Result<Made> Workbench::trained(const AskedTraining& asked, const ComputeWatch& watch) {
   const auto in_force = TRY(this->in_force());
   std::string seen;
   bool changed = false;
@@ -152,7 +146,7 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
     }
   }
   const auto batch = TRY(batches_.to_learn_from());
-  const bool as_usual = task_.level.empty() && task_.bias.empty();
+  const bool as_usual = asked.level.empty() && asked.bias.empty();
   auto successor = TRY(train_successor(task_.cell, batch, as_usual ? in_force.get() : nullptr,
                                        train_options(batch, watch)));
   if (!task_.earlier_ids.empty()) {
@@ -162,17 +156,13 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
               batches_.judging_sessions());
 }
 
-Result<Made> Workbench::checked(const ComputeWatch& watch) {
+Result<Made> Workbench::checked(const AskedCheck& asked, const ComputeWatch& watch) {
   const auto batch = TRY(batches_.first());
   const auto present = TRY(in_force());
   if (!present)
     return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
-  CheckAsked asked;
-  if (!task_.level.empty()) asked.tolerance = std::stod(task_.level) * from_mm(1);
-  for (const std::string& earlier : task_.earlier_checks) {
-    if (auto drift = drift_of(earlier)) asked.earlier.push_back(std::move(*drift));
-  }
-  const HealthCheck check = TRY(check_robot(present->model, *task_.cell, batch, std::move(asked)));
+  const HealthCheck check = TRY(check_robot(present->model, *task_.cell, batch,
+                                            {asked.tolerance, false, task_.earlier_checks}));
   const auto json = check_json(check, batch, present->model);
   TRY(watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n",
                   ""));
@@ -208,18 +198,18 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
   return {};
 }
 
-Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
+Result<Made> Workbench::diagnosed(const AskedDiagnosis& asked, const ComputeWatch& watch) {
   // What is to judge an extended model must not have been looked at.
-  const auto batch = TRY(task_.apply ? batches_.first_without_older_judges() : batches_.first());
+  const auto batch = TRY(asked.apply ? batches_.first_without_older_judges() : batches_.first());
   const auto present = TRY(in_force());
-  if (task_.apply && task_.batch_ids.empty() && present) {
+  if (asked.apply && task_.batch_ids.empty() && present) {
     // What was sent with the question goes through the same door as what is submitted.
     const Triage triaged = triage(present->model, batch);
     if (!triaged.learn) return nothing_applied(triaged.sentence, *present);
   }
   DiagnoseOptions options;
   options.seed = task_.seed;
-  options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage,
+  options.progress = [&watch, whole = asked.apply ? kDiagnosisShare : 1](const std::string& stage,
                                                                          double share) {
     return watch.progress("diagnosing: " + stage, whole * share);
   };
@@ -231,7 +221,7 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   made.outcome.verdict = JobVerdict::kDiagnosed;
   made.outcome.why = diagnosis->sentence;
   made.message = to_string(diagnosis->verdict);
-  if (!task_.apply) return made;
+  if (!asked.apply) return made;
   if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
     const std::string stays =
         present ? fmt::format("; version {} stays in force", present->version) : "";
@@ -272,12 +262,13 @@ Result<Made> Workbench::first_extended(const CheckedBatch& batch, const Diagnosi
 
 TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWatch& watch) const {
   TrainOptions options;
-  if (!task_.level.empty()) {
-    options.level = task_.level;
+  const auto* asked = std::get_if<AskedTraining>(&task_.asked);
+  if (asked != nullptr && !asked->level.empty()) {
+    options.level = asked->level;
   } else if (in_force_) {
     options.level = level_with_additions(*task_.cell, in_force_->model, batch.rows());
   }
-  if (!task_.bias.empty()) options.bias = task_.bias;
+  if (asked != nullptr && !asked->bias.empty()) options.bias = asked->bias;
   options.fleet = task_.fleet;
   options.seed = task_.seed;
   options.trained_at = task_.now;
@@ -314,7 +305,8 @@ Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
     if (before.size() >= opponents.most_before) break;
     if (auto model = loaded(text)) before.push_back(std::move(*model));
   }
-  const Bar bar = task_.kind == JobKind::kDiagnose ? Bar::kBetterBeyondChance : Bar::kBetter;
+  const Bar bar =
+      kind_of(task_.asked) == JobKind::kDiagnose ? Bar::kBetterBeyondChance : Bar::kBetter;
   return verdict_on(*candidate_, present.get(), std::move(before), opponents.record, sessions_,
                     {bar, task_.accept_ratio});
 }

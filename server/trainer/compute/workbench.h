@@ -26,14 +26,14 @@ class Workbench : public Computing {
   [[nodiscard]] Result<GateVerdict> judge(const Opponents& opponents) override;
 
  private:
-  [[nodiscard]] Result<Made> trained(const ComputeWatch& watch);
-  [[nodiscard]] Result<Made> checked(const ComputeWatch& watch);
+  [[nodiscard]] Result<Made> trained(const AskedTraining& asked, const ComputeWatch& watch);
+  [[nodiscard]] Result<Made> checked(const AskedCheck& asked, const ComputeWatch& watch);
   /// Puts a model of the own batch alone in place of one of all sessions: where the arm has
   /// `changed` and this one is better beyond chance on the batch's judges; and where the batch
   /// brings a tool that the model in force does not know and all sessions together are no better
   /// for the others.
   [[nodiscard]] Status choose_alone(Successor& together, bool changed, const ComputeWatch& watch);
-  [[nodiscard]] Result<Made> diagnosed(const ComputeWatch& watch);
+  [[nodiscard]] Result<Made> diagnosed(const AskedDiagnosis& asked, const ComputeWatch& watch);
   /// With what the diagnosis of `batch` beside the sources `own` found.
   [[nodiscard]] Result<Made> extended(const CheckedBatch& batch,
                                       const std::vector<std::string>& own,
