@@ -25,6 +25,10 @@ namespace trammel {
 [[nodiscard]] std::int64_t insert_job(Database& database, const StoredJob& job);
 void insert_job_batches(Database& database, std::int64_t job, const std::string& cell,
                         const std::vector<std::string>& batch_ids);
+/// In the order asked for.
+[[nodiscard]] std::vector<std::string> batches_of_job(Database& database, std::int64_t job);
+/// The result of an UPDATE that should have changed one unfinished job; kNotFound: it has not.
+[[nodiscard]] Status changed_one(int changes, std::int64_t job);
 /// kConflict.
 [[nodiscard]] Failure discarded_failure(const std::string& cell, const std::string& id);
 /// Empty: there is no such job.

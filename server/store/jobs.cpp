@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <map>
 #include <set>
 #include <string_view>
@@ -15,13 +14,10 @@
 #include "server/store/pruned.h"
 #include "server/store/store.h"
 
-// Jobs and the findings of diagnoses.
+// Jobs: asked for, under way, over.
 
 namespace trammel {
 namespace {
-
-constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();  // rows
-constexpr int kPagesKept = 20;  // pages of diagnoses; findings are kept for ever
 
 constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {
     {{JobState::kQueued, "queued"},
@@ -41,22 +37,6 @@ JobState job_state_of(std::string_view text) {
     if (text == name) return value;
   }
   return JobState::kFailed;  // the schema's CHECK allows no other text
-}
-
-/// The result of an UPDATE that should have changed one unfinished job.
-Status changed_one(int changes, std::int64_t id) {
-  if (changes == 1) return {};
-  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id)
-      .of("job")
-      .with_value(id);
-}
-
-std::vector<std::string> batches_of(Database& database, std::int64_t job) {
-  auto rows =
-      prepare(database, "SELECT batch FROM job_batches WHERE job = $1 ORDER BY position", job);
-  std::vector<std::string> ids;
-  while (rows.next()) ids.push_back(rows.text(0));
-  return ids;
 }
 
 constexpr const char* kJobColumns =
@@ -170,6 +150,21 @@ std::string list_of(const std::set<std::int64_t>& ids) {
   return fmt::format("{}", fmt::join(ids, ", "));
 }
 
+Status changed_one(int changes, std::int64_t id) {
+  if (changes == 1) return {};
+  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id)
+      .of("job")
+      .with_value(id);
+}
+
+std::vector<std::string> batches_of_job(Database& database, std::int64_t job) {
+  auto rows =
+      prepare(database, "SELECT batch FROM job_batches WHERE job = $1 ORDER BY position", job);
+  std::vector<std::string> ids;
+  while (rows.next()) ids.push_back(rows.text(0));
+  return ids;
+}
+
 AskedTraining training_of(const StoredJob& job) {
   const auto* training = std::get_if<AskedTraining>(&job.asked);
   return training != nullptr ? *training : AskedTraining{};
@@ -210,7 +205,7 @@ Result<StoredJob> read_job(Database& database, std::int64_t id) {
   if (!row.next())
     return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
   StoredJob job = job_of(row);
-  job.batch_ids = batches_of(database, id);
+  job.batch_ids = batches_of_job(database, id);
   return job;
 }
 
@@ -362,53 +357,6 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const std::string& 
              csv, asked != nullptr && asked->apply ? 1 : 0);
       return queued;
     });
-  });
-}
-
-Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
-  return connection_->exclusively([&](Database& database) -> Result<StoredDiagnosis> {
-    auto row = prepare(database, "SELECT csv, findings, page FROM diagnoses WHERE job = $1", job);
-    if (!row.next())
-      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
-    if (const auto asked = read_job(database, job);
-        asked && is_pruned(database, "answer of job", asked->cell, std::to_string(job)))
-      return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
-    return StoredDiagnosis{row.text(0), row.text(1), row.text(2)};
-  });
-}
-
-Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, std::int64_t since,
-                                                      std::size_t most) const {
-  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredCheck>> {
-    auto rows =
-        prepare(database,
-                "SELECT jobs.id, finished_at, findings FROM health_checks JOIN jobs ON jobs.id = "
-                "health_checks.job JOIN diagnoses ON diagnoses.job = jobs.id JOIN job_times ON "
-                "job_times.job = jobs.id WHERE cell = $1 AND state = 'done' AND findings <> '' AND "
-                "finished_at >= $2 ORDER BY jobs.id DESC LIMIT $3",
-                cell, since, most == 0 ? kAll : static_cast<std::int64_t>(most));
-    std::vector<StoredCheck> checks;
-    while (rows.next()) {
-      const std::int64_t job = rows.integer64(0);
-      checks.push_back({job, rows.integer64(1), batches_of(database, job), rows.text(2)});
-    }
-    std::reverse(checks.begin(), checks.end());
-    return checks;
-  });
-}
-
-Status Store::store_findings(std::int64_t job, const std::string& findings,
-                             const std::string& page) {
-  return connection_->in_transaction([&](Database& database) -> Status {
-    TRY(check_held(database, connection_->worker, job, true));
-    const int changes =
-        change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings,
-               page, job);
-    change(database,
-           "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN (SELECT job FROM "
-           "diagnoses WHERE page <> '' ORDER BY job DESC LIMIT $1)",
-           kPagesKept);
-    return changed_one(changes, job);
   });
 }
 

@@ -129,11 +129,10 @@ struct StoredDiagnosis {
 
 /// A model to be stored.
 struct NewModel {
-  /// `text`: what serialize() made of the model, where somebody has it.
-  NewModel(const CompensatedModel& model, std::string text = {})
-      : model(model), text(std::move(text)) {}
+  NewModel(const CompensatedModel& made, std::string serialized = {})
+      : model(made), text(std::move(serialized)) {}
   const CompensatedModel& model;
-  std::string text;
+  std::string text;  ///< what serialize() made of it; empty: nobody has done that yet
 };
 
 /// A line of a cell's model history.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
 #include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
 #include "server/tasks/train/given_up.h"
@@ -172,7 +173,8 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job) const {
     auto earlier = TRY(earlier_sessions(store_, job, task.cell->sessions, options_.max_poses));
     task.earlier_ids = std::move(earlier);
   }
-  if (const auto present = registry_.in_force(job.cell)) task.in_force = history_.text_of(*present);
+  if (const auto present = registry_.in_force(job.cell))
+    task.in_force = ModelText{present->version, serialize(present->model)};
   task.fleet = fleet_prior_of(job);
   if (job.kind() == JobKind::kCheck) {
     auto earlier = TRY(earlier_checks(store_, job.cell));

@@ -341,16 +341,15 @@ void ModelHistory::put_in_force(ServedModelPtr model) {
   if (listener_) listener_(*model, true);
 }
 
-ModelText ModelHistory::text_of(const ServedModel& model) const {
-  auto text = store_.model_text(model.cell, model.version);
-  return {model.version, text ? std::move(*text) : serialize(model.model)};
-}
-
 Result<Opponents> ModelHistory::opponents(const std::string& cell,
                                           const ServedModel* present) const {
   Opponents opponents;
   opponents.most_before = kMostServedBefore;
-  if (present != nullptr) opponents.in_force = text_of(*present);
+  if (present != nullptr) {
+    auto text = store_.model_text(cell, present->version);
+    opponents.in_force =
+        ModelText{present->version, text ? std::move(*text) : serialize(present->model)};
+  }
   auto before = TRY(served_before(cell));
   opponents.served_before = std::move(before);
   const auto record = TRY(record_not_loaded(cell));

@@ -88,8 +88,6 @@ class ModelHistory {
   /// the cell's step limit is put in force by a person only.
   [[nodiscard]] RecentPoses& recent_poses() { return recent_poses_; }
 
-  /// As it is stored; where that cannot be read, as serialize() makes it.
-  [[nodiscard]] ModelText text_of(const ServedModel& model) const;
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any
   /// more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell,
