@@ -116,7 +116,8 @@ Json json_of(const std::vector<DriftSeen>& drifts) {
 std::vector<DriftSeen> drifts_from(const Json& json) {
   std::vector<DriftSeen> drifts;
   for (const Json& one : json)
-    drifts.push_back({one.at("from"), one.at("until"), one.at("misfit")});
+    drifts.push_back(
+        {one.at("from"), one.at("until"), one.at("misfit").get<std::vector<double>>()});
   return drifts;
 }
 
