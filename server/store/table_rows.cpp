@@ -2,10 +2,11 @@
 
 #include <bit>
 #include <charconv>
+#include <set>
 #include <string_view>
 
 #include "server/base/hash.h"
-#include "server/store/audit_rows.h"
+#include "server/store/statements.h"
 
 namespace trammel {
 namespace {
@@ -120,6 +121,22 @@ std::string list_of(const StoreTable& table, std::size_t count, bool placeholder
   return list;
 }
 
+/// As list_of(); a column that a file of before lacks is as it will be once that is brought up to
+/// date.
+std::string selected_columns(Database& database, const StoreTable& table) {
+  if (database.is_shared()) return list_of(table, table.columns.size(), false);
+  std::set<std::string> there;
+  Rows rows = prepare(database, "SELECT name FROM pragma_table_info($1)", table.name);
+  while (rows.next()) there.insert(rows.text(0));
+  std::string list;
+  for (const StoreColumn& column : table.columns) {
+    const bool is_there = there.empty() || there.contains(column.name);
+    const char* otherwise = column.kind == Kind::kBytes ? "''" : "NULL";
+    list += (list.empty() ? "" : ", ") + std::string(is_there ? column.name : otherwise);
+  }
+  return list;
+}
+
 StoredValue value_of(const Rows& row, int column, Kind kind) {
   if (row.is_null(column)) return nullptr;
   if (kind == Kind::kInteger) return row.integer64(column);
@@ -159,10 +176,8 @@ void each_row(Database& database, const StoreTable& table,
               const std::function<bool(const StoredRow&)>& visit) {
   const auto keys = static_cast<std::size_t>(table.keys);
   const std::string names = list_of(table, keys, false);
-  std::string columns = list_of(table, table.columns.size(), false);
-  if (table.name == std::string_view("audit") && !trail_names_servers(database))
-    columns.replace(columns.rfind("server"), std::string_view("server").size(), "''");
-  const std::string all = fmt::format("SELECT {} FROM {} ", columns, table.name);
+  const std::string all =
+      fmt::format("SELECT {} FROM {} ", selected_columns(database, table), table.name);
   const std::string order = fmt::format("ORDER BY {} LIMIT {}", names, kRowsAtOnce);
   const std::string first = all + order;
   const std::string next =
