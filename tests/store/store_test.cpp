@@ -20,6 +20,8 @@
 namespace trammel {
 namespace {
 
+using test::demand;
+
 using test::Refusal;
 using test::refusal_of;
 
