@@ -61,6 +61,13 @@ TEST(ServiceText, HowAJobEndedIsNotWhatIsInForceNow) {
   EXPECT_TRUE(put_in_force(job)) << "a job from before verdicts were kept";
 }
 
+TEST(ServiceText, AJobSaysForProgramsWhyAPersonDecides) {
+  client::JobStatus job = {1, "cell-7", "done", "not in force: few poses", 1, 1, false};
+  EXPECT_EQ(job_json(job)["held_back"], "") << "nobody need decide";
+  job.held_back = "stop_note";
+  EXPECT_EQ(job_json(job)["held_back"], "stop_note");
+}
+
 TEST(ServiceText, ServersThatSayDifferentThingsOfABatchAreNamed) {
   client::BatchOfService one{"cell-7", "lt-07", "", 60, 0, "", true, "a"};
   client::BatchOfService other = one;

@@ -792,6 +792,7 @@ class Guards(unittest.TestCase):
         self.assertEqual(trammel.train(self.cell, batch).notes, notes)
         ended = self.session.wait_for(self.session.submit("cell-7", batch), limit_s=300)
         self.assertEqual((ended["verdict"], ended["in_force"]), ("undecided", False), ended)
+        self.assertEqual(ended["held_back"], "stop_note")
         made = trammel.Model.parse(self.session.export_model("cell-7", ended["version"]))
         self.assertIn(made.notes[0]["text"], ended["what"])
 

@@ -21,7 +21,6 @@ namespace trammel {
 namespace {
 
 using test::demand;
-
 using test::Refusal;
 using test::refusal_of;
 
