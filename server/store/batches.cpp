@@ -85,9 +85,10 @@ struct KeptBatch {
 };
 
 KeptBatch keep_at_once(Database& database, const StoredBatch& batch, const StoredJob& job) {
-  auto row = prepare(database, kAddAtOnce, batch.cell, batch.id, training_of(job).level,
-                     training_of(job).bias, job.message, job.created_at, stored_kind(job.kind()),
-                     batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses);
+  const AskedTraining training = training_of(job);  // outlives the statement
+  auto row = prepare(database, kAddAtOnce, batch.cell, batch.id, training.level, training.bias,
+                     job.message, job.created_at, stored_kind(job.kind()), batch.csv, batch.hash,
+                     batch.request_id, batch.accepted_at, batch.poses);
   if (!row.next())
     throw DatabaseError(DatabaseError::Kind::kAgain,
                         "the batch is neither there nor was it stored");

@@ -173,12 +173,12 @@ AskedTraining training_of(const StoredJob& job) {
 const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
 
 std::int64_t insert_job(Database& database, const StoredJob& job) {
-  Rows made =
-      prepare(database,
-              "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
-              "VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING id",
-              job.cell, training_of(job).level, training_of(job).bias, to_text(JobState::kQueued),
-              job.message, job.created_at, stored_kind(job.kind()));
+  const AskedTraining training = training_of(job);  // outlives the statement
+  Rows made = prepare(database,
+                      "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
+                      "VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING id",
+                      job.cell, training.level, training.bias, to_text(JobState::kQueued),
+                      job.message, job.created_at, stored_kind(job.kind()));
   const std::int64_t id = made.next() ? made.integer64(0) : 0;
   if (const auto* check = std::get_if<AskedCheck>(&job.asked))
     change(database, "INSERT INTO health_checks (job, tolerance_m) VALUES ($1, $2)", id,
