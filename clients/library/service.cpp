@@ -133,9 +133,8 @@ ModelFacts facts_of(const client::ModelInfo& model) {
 }
 
 Job job_of(const client::JobStatus& job) {
-  return {job.job,     job.cell,          job.stage,    job.what, job.share,
-          job.verdict, job.model_version, job.in_force, job.why,  job.next,
-          job.held_back};
+  return {job.job,           job.cell,     job.stage, job.what, job.share,    job.verdict,
+          job.model_version, job.in_force, job.why,   job.next, job.held_back};
 }
 
 /// `asked`, with each element made by `make`.

@@ -33,8 +33,8 @@ struct BatchSource {
 
 /// The stored batches that the job is computed from: those it works on, `earlier` ones and, where
 /// it may make a model (`judged`), those whose rows may judge that one: judging_sources(), and its
-/// own also where they are in quarantine. Refuses a training from batches in quarantine that it may not
-/// release.
+/// own also where they are in quarantine. Refuses a training from batches in quarantine that it may
+/// not release.
 [[nodiscard]] Result<std::vector<BatchSource>> batch_sources(
     const Store& store, const StoredJob& job, bool judged,
     const std::vector<std::string>& earlier = {});

@@ -64,8 +64,12 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
 
 /// Whatever the judges say: its notes keep it from being put in force by itself.
 GateVerdict left_to_a_person(const Note& stop, GateFigures figures) {
-  return {false, "not in force: " + stop.text + "; activate it if it is right", true, stop.text,
-          std::move(figures), HeldBack::kStopNote};
+  return {false,
+          "not in force: " + stop.text + "; activate it if it is right",
+          true,
+          stop.text,
+          std::move(figures),
+          HeldBack::kStopNote};
 }
 
 }  // namespace
