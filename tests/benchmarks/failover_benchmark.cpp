@@ -1,7 +1,7 @@
 // How long no change is taken when the host of the record's primary is killed, frozen or cut off,
 // and whether anything that was acknowledged is lost: a PostgreSQL of three hosts under Patroni
 // (deploy/patroni), two servers, clients that change something all the time. Needs root. --rounds N
-// (of each fault), --clients N, --faults kill,freeze,cut.
+// (of each fault), --clients N, --faults kill,freeze,cut,mute,deaf.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
@@ -58,7 +58,7 @@ int measure(const std::vector<std::string>& faults, int rounds, int clients) {
 
 int main(int argc, char** argv) {
   CLI::App app("Faults of a record that fails over");
-  std::vector<std::string> faults = {"kill", "freeze", "cut"};
+  std::vector<std::string> faults = {"kill", "freeze", "cut", "mute", "deaf"};
   int rounds = 2, clients = 4;
   app.add_option("--faults", faults, "kill, freeze, cut")->delimiter(',');
   app.add_option("--rounds", rounds)->check(CLI::Range(1, 1000));

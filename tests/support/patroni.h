@@ -26,7 +26,8 @@ class Patroni {
   [[nodiscard]] std::string sql(const std::string& statement) const;
   /// The number of the host that takes changes, 1 to 3; 0: none does.
   [[nodiscard]] int primary() const;
-  /// `kill`, `freeze`, `thaw`, `start`, `cut`, `mend`: of one host all processes, or its line.
+  /// `kill`, `freeze`, `thaw`, `start`: all processes of a host. `cut`, `mute` (nothing leaves it),
+  /// `deaf` (nothing reaches it), `mend`: its line.
   void act(const std::string& what, int host) const;
   /// Until both other hosts follow, and would take over.
   [[nodiscard]] bool wait_until_whole() const;
