@@ -1,6 +1,7 @@
 #include "server/report/budget_json.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/base/units.h"
 #include "server/compensate/budget/budget_words.h"
@@ -12,7 +13,13 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json json_of(const BudgetLine& line) {
+ordered_json number_or_null(double number) {
+  return std::isfinite(number) ? ordered_json(number) : ordered_json(nullptr);
+}
+
+}  // namespace
+
+ordered_json budget_line_json(const BudgetLine& line) {
   ordered_json json = {{"line", line.line},
                        {"kind", line.cause_or_kind()},
                        {"name", line.name},
@@ -20,10 +27,10 @@ ordered_json json_of(const BudgetLine& line) {
                        {"value", nullptr},
                        {"u95", nullptr},
                        {"unit", nullptr},
-                       {"alone_rms_mm", to_mm(line.alone_rms)},
-                       {"alone_max_mm", to_mm(line.alone_max)},
-                       {"share", line.share},
-                       {"left_if_right_mm", to_mm(line.left_if_right)},
+                       {"alone_rms_mm", number_or_null(to_mm(line.alone_rms))},
+                       {"alone_max_mm", number_or_null(to_mm(line.alone_max))},
+                       {"share", number_or_null(line.share)},
+                       {"left_if_right_mm", number_or_null(to_mm(line.left_if_right))},
                        {"times_usual", nullptr},
                        {"with", line.with},
                        {"action", line.action}};
@@ -34,6 +41,7 @@ ordered_json json_of(const BudgetLine& line) {
     json["unit"] = line.value->unit;
   }
   if (line.times_usual) json["times_usual"] = *line.times_usual;
+  if (!line.since_session.empty()) json["since_session"] = line.since_session;
   if (!line.numbers.empty()) json["numbers"] = ordered_json::array();
   for (const BudgetNumber& number : line.numbers)
     json["numbers"].push_back({{"name", number.name},
@@ -43,24 +51,27 @@ ordered_json json_of(const BudgetLine& line) {
   return json;
 }
 
-ordered_json json_of(const BudgetView& view) {
+ordered_json budget_view_json(const BudgetView& view) {
+  const auto size = [](const BudgetLine& line) {
+    return std::isfinite(line.alone_rms) ? line.alone_rms : -1.0;
+  };
   ordered_json lines = ordered_json::array();
   std::vector<BudgetLine> largest_first = view.lines;
-  std::stable_sort(largest_first.begin(), largest_first.end(),
-                   [](const BudgetLine& one, const BudgetLine& other) {
-                     return one.alone_rms > other.alone_rms;
-                   });
-  for (const BudgetLine& line : largest_first) lines.push_back(json_of(line));
+  std::stable_sort(
+      largest_first.begin(), largest_first.end(),
+      [&](const BudgetLine& one, const BudgetLine& other) { return size(one) > size(other); });
+  for (const BudgetLine& line : largest_first) lines.push_back(budget_line_json(line));
   return {{"nominal_rms_mm", to_mm(view.error_rms)}, {"lines", std::move(lines)}};
 }
 
-}  // namespace
-
 ordered_json budget_json(const ErrorBudget& budget) {
-  ordered_json json = json_of(budget.as_it_stands);
+  ordered_json json = budget_view_json(budget.as_it_stands);
   json["poses"] = budget.poses;
-  json["beyond_frames"] = json_of(budget.beyond_frames);
+  json["beyond_frames"] = budget_view_json(budget.beyond_frames);
   json["sentences"] = in_words(budget);
+  if (!budget.between_sessions.empty()) json["between_sessions"] = ordered_json::array();
+  for (const BudgetLine& line : budget.between_sessions)
+    json["between_sessions"].push_back(budget_line_json(line));
   return json;
 }
 

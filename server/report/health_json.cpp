@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
+#include "server/compensate/budget/error_budget.h"
 #include "server/compensate/model_notes.h"
+#include "server/report/budget_json.h"
 #include "server/report/note_json.h"
 
 namespace trammel {
@@ -16,6 +20,13 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::size_t kShownSizes = 5;  // for people: those that are hardest to see
+constexpr std::size_t kShownLines = 6;  // for people: of what changed
+
+/// The measurements of a check and the model that they were held against.
+struct CheckedWith {
+  const CheckedBatch& batch;
+  const CompensatedModel& model;
+};
 
 ordered_json length_json(const std::optional<double>& length) {
   return length ? ordered_json(to_mm(*length)) : ordered_json(nullptr);
@@ -47,103 +58,108 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   return json;
 }
 
-/// What a budget calls a line.
-struct LineName {
-  std::string line, kind;
-  int joint = -1;  ///< 0-based
-};
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+
+/// A line of a budget as far as a check knows it: how often it is usual and what would be left
+/// without it is not known.
+BudgetLine change_line(std::string line, LineKind kind, int joint, std::string name) {
+  BudgetLine change;
+  change.line = std::move(line);
+  change.kind = kind;
+  change.joint = joint;
+  change.name = std::move(name);
+  for (double* unknown : {&change.alone_rms, &change.alone_max, &change.share,
+                          &change.left_if_right})
+    *unknown = kNotKnown;
+  return change;
+}
 
 /// `zero:4`, `length:6`, `twist:2`, `compliance:3`; else the cause, and its joint where it has one.
-LineName line_of(const SingleCause& cause) {
+BudgetLine line_of(const SingleCause& cause) {
   const CauseRecord& record = *cause.record;
+  const std::string name = in_words(cause);
   const std::size_t digits = cause.parameter.find_first_of("0123456789");
   if (record.part == causes::Part::kLinks && digits != std::string::npos) {
     const std::string letters = cause.parameter.substr(0, digits),
                       number = cause.parameter.substr(digits);
     const int joint = std::stoi(number) - 1;
-    if (letters == "q") return {"zero:" + number, "joint_zero", joint};
-    const std::string word = letters == "d" || letters == "a" ? "length" : "twist";
-    return {word + ":" + number, word, joint};
+    if (letters == "q") return change_line("zero:" + number, LineKind::kJointZero, joint, name);
+    if (letters == "d" || letters == "a")
+      return change_line("length:" + number, LineKind::kLength, joint, name);
+    return change_line("twist:" + number, LineKind::kTwist, joint, name);
   }
   const std::string spelling(record.spelling);
-  if (cause.joint < 0) return {spelling, spelling};
-  const std::string of_joint = ":" + std::to_string(cause.joint + 1);
-  if (record.search == causes::SearchFamily::kZeroStep && !cause.any_function)
-    return {"zero" + of_joint, "joint_zero", cause.joint};
+  const std::string of_joint = cause.joint < 0 ? "" : ":" + std::to_string(cause.joint + 1);
+  if (cause.joint >= 0 && record.search == causes::SearchFamily::kZeroStep && !cause.any_function)
+    return change_line("zero" + of_joint, LineKind::kJointZero, cause.joint, name);
   const bool is_gearbox = record.gives_way && record.numbers == causes::Numbers::kOneAJoint;
-  return {spelling + of_joint, is_gearbox ? "joint_compliance" : spelling, cause.joint};
+  BudgetLine line = change_line(
+      spelling + of_joint,
+      is_gearbox && cause.joint >= 0 ? LineKind::kJointCompliance : LineKind::kCause, cause.joint,
+      name);
+  line.cause = spelling;
+  return line;
 }
 
-/// A line of a budget as far as a check knows it: what it has no number for is null.
-ordered_json change_line(const LineName& line, const std::string& name) {
-  return {{"line", line.line},
-          {"kind", line.kind},
-          {"name", name},
-          {"joint", line.joint >= 0 ? ordered_json(line.joint + 1) : ordered_json(nullptr)},
-          {"value", nullptr},
-          {"u95", nullptr},
-          {"unit", nullptr},
-          {"alone_rms_mm", nullptr},
-          {"alone_max_mm", nullptr},
-          {"share", nullptr},
-          {"left_if_right_mm", nullptr},
-          {"times_usual", nullptr},
-          {"with", ordered_json::array()},
-          {"action", ""}};
-}
+/// The lines of a check, with the m rms that they are put in order by.
+using SizedLines = std::vector<std::pair<double, BudgetLine>>;
 
-/// Lines with the m rms that they are put in order by.
-using SizedLines = std::vector<std::pair<double, ordered_json>>;
-
-/// A line for each zero; what each of several does alone is not known.
-void add_zero_lines(const SeenChange& change, SizedLines& lines) {
+/// A line for each zero. What each of several does alone is known at the poses of the check.
+void add_zero_lines(const SeenChange& change, const CheckedWith* with, SizedLines& lines) {
   for (const LostZero& zero : change.zeros) {
     const std::string n = std::to_string(zero.joint + 1);
-    ordered_json line =
-        change_line({"zero:" + n, "joint_zero", zero.joint}, "the zero of joint " + n);
-    line["value"] = to_deg(zero.by);
-    line["u95"] = to_deg(zero.u95);
-    line["unit"] = "deg";
-    if (change.zeros.size() == 1) line["alone_rms_mm"] = to_mm(change.effect_rms);
+    BudgetLine line = change_line("zero:" + n, LineKind::kJointZero, zero.joint,
+                                  "the zero of joint " + n);
+    line.value = BudgetNumber{"q" + n, to_deg(zero.by), to_deg(zero.u95), "deg"};
+    if (change.zeros.size() == 1) {
+      line.alone_rms = change.effect_rms;
+    } else if (with != nullptr) {
+      line.alone_rms = alone_of_zero(with->model, zero.joint, zero.by, with->batch.rows());
+    }
     for (const LostZero& other : change.zeros)
-      if (other.joint != zero.joint)
-        line["with"].push_back("zero:" + std::to_string(other.joint + 1));
-    line["action"] = "re-master joint " + n;
-    lines.emplace_back(change.effect_rms, std::move(line));
+      if (other.joint != zero.joint) line.with.push_back("zero:" + std::to_string(other.joint + 1));
+    line.action = "re-master joint " + n;
+    lines.emplace_back(std::isfinite(line.alone_rms) ? line.alone_rms : change.effect_rms,
+                       std::move(line));
   }
 }
 
 void add_line(const SeenChange& change, SizedLines& lines) {
-  ordered_json line = change_line(line_of(change.cause), in_words(change.cause));
-  line["alone_rms_mm"] = to_mm(change.effect_rms);
-  for (const SingleCause& other : change.could_also_be) line["with"].push_back(line_of(other).line);
-  line["action"] = change.cause.record->action;
+  BudgetLine line = line_of(change.cause);
+  line.alone_rms = change.effect_rms;
+  for (const SingleCause& other : change.could_also_be) line.with.push_back(line_of(other).line);
+  line.action = change.cause.record->action;
   lines.emplace_back(change.effect_rms, std::move(line));
 }
 
 /// What changed since the model was made, in the shape of a budget: from what is off now to what a
 /// healthy robot leaves. A check finds the base anew, so that all of it is beyond the base's frame.
-ordered_json change_budget_json(const HealthCheck& check) {
+ordered_json change_budget_json(const HealthCheck& check, const CheckedWith* with) {
   SizedLines sized;
   for (const SeenChange& change : check.changed) {
     if (change.zeros.empty()) {
       add_line(change, sized);
     } else {
-      add_zero_lines(change, sized);
+      add_zero_lines(change, with, sized);
     }
   }
-  ordered_json rest = change_line({"rest", "rest"}, "what a healthy robot leaves");
-  rest["alone_rms_mm"] = to_mm(check.expected_rms);
+  const auto by_size = [](const auto& a, const auto& b) { return a.first > b.first; };
+  std::stable_sort(sized.begin(), sized.end(), by_size);
+  std::vector<std::string> sentences;
+  for (const auto& [size, line] : sized)
+    if (sentences.size() < kShownLines) sentences.push_back(sentence(line));
+  BudgetLine rest = change_line("rest", LineKind::kRest, -1, "what a healthy robot leaves");
+  rest.alone_rms = check.expected_rms;
   sized.emplace_back(check.expected_rms, std::move(rest));
-  std::stable_sort(sized.begin(), sized.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(sized.begin(), sized.end(), by_size);
   ordered_json lines = ordered_json::array();
-  for (auto& [size, line] : sized) lines.push_back(std::move(line));
+  for (const auto& [size, line] : sized) lines.push_back(budget_line_json(line));
   ordered_json beyond_frames = {{"nominal_rms_mm", to_mm(check.rms)}, {"lines", lines}};
   return {{"nominal_rms_mm", to_mm(check.rms)},
           {"poses", check.poses},
           {"lines", std::move(lines)},
-          {"beyond_frames", std::move(beyond_frames)}};
+          {"beyond_frames", std::move(beyond_frames)},
+          {"sentences", std::move(sentences)}};
 }
 
 constexpr double kMonth = 30 * 86400.0;  // s
@@ -182,7 +198,10 @@ std::optional<DriftSeen> drift_of(const std::string& check) {
   return seen;
 }
 
-ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
+namespace {
+
+ordered_json health_json(const HealthCheck& check, const CheckedSince& since,
+                         const CheckedWith* with) {
   ordered_json json = {{"verdict", to_string(check.verdict)},
                        {"tolerance_mm", to_mm(check.tolerance)},
                        {"rms_mm", to_mm(check.rms)},
@@ -202,7 +221,7 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   json["drift_seen"] = check.drift ? drift_json(*check.drift) : ordered_json(nullptr);
   for (const SeenChange& change : check.changed)
     json["changed"].push_back(change_json(change, since));
-  json["budget"] = change_budget_json(check);
+  json["budget"] = change_budget_json(check, with);
   for (const SmallestEffect& smallest : check.smallest) {
     ordered_json one = cause_json(smallest.cause);
     one["effect_rms_mm"] = length_json(smallest.rms);
@@ -216,10 +235,18 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   return json;
 }
 
+}  // namespace
+
+ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
+  return health_json(check, since, nullptr);
+}
+
 ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch,
                         const CompensatedModel& model) {
   const auto& rows = batch.rows().measurements;
-  ordered_json json = health_json(check, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
+  const CheckedWith with{batch, model};
+  ordered_json json =
+      health_json(check, {batch.id(), rows.empty() ? "" : rows.front().pose_id}, &with);
   json["notes"] = notes_json(notes_of(model));
   return json;
 }

@@ -80,10 +80,23 @@ std::string due_text(const nlohmann::ordered_json& check) {
   return fmt::format("next check: {}{}{}\n", due, due.empty() ? "" : "; ", because);
 }
 
+/// The lines of what changed, with what each does alone; empty where nothing did, and of a server
+/// that does not say it.
+std::string lines_text(const nlohmann::ordered_json& check) {
+  const auto budget = check.find("budget");
+  if (budget == check.end() || !budget->is_object() || !budget->contains("sentences") ||
+      !(*budget)["sentences"].is_array())
+    return "";
+  std::string text;
+  for (const auto& line : (*budget)["sentences"])
+    if (line.is_string()) text += "  " + line.get<std::string>() + "\n";
+  return text.empty() ? "" : "what changed, line by line:\n" + text;
+}
+
 std::string check_text(const nlohmann::ordered_json& check) {
   return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(),
                      check.at("why").get<std::string>()) +
-         due_text(check);
+         lines_text(check) + due_text(check);
 }
 
 /// The notes of the model that a service checked against, as warn_of_notes() tells them.
@@ -197,7 +210,7 @@ Result<Extent> check(const CheckArguments& arguments) {
   const HealthCheck health = TRY(check_robot(model, model.cell(), batch, std::move(asked)));
   const auto json = check_json(health, batch, model);
   warn_of_notes(notes_of(model));
-  tell(health_text(health), {arguments.json, arguments.report});
+  tell(health_text(health) + lines_text(json), {arguments.json, arguments.report});
   TRY(write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments));
   TRY(write_json(arguments.json, json));
   return extent_of(json, arguments);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/compensate/budget/error_budget.h"
+#include "server/compensate/budget/items.h"
 #include "server/error_sources/catalogue.h"
 
 namespace trammel {
@@ -90,6 +91,36 @@ std::vector<ParameterDifference> parameters_of(const CalibrationResult& found,
   return all;
 }
 
+/// kg, of the payload `id`: as its cell has it, and what was identified beyond it.
+BudgetNumber mass_of(const ModelParts& parts, const std::string& id) {
+  BudgetNumber mass{"mass", 0, 0, "kg"};
+  const auto payload = parts.physics.cell->payloads.find(id);
+  if (payload != parts.physics.cell->payloads.end()) mass.value = payload->second.mass;
+  for (const IdentifiedParameter& one : parts.parameters) {
+    if (one.parameter.name != "mass" && one.parameter.name != "mass[" + id + "]") continue;
+    mass.value += one.value;
+    mass.u95 = 2 * one.stddev;
+  }
+  return mass;
+}
+
+/// What the newer arm does otherwise because it carries something else than the older one.
+void add_load(const ModelParts& before, const ModelParts& now, PredictedDifference& predicted) {
+  const PhysicalModel as_before = with_load_of(now.physics, before.physics);
+  Eigen::Matrix3Xd load(3, std::ssize(predicted.poses));
+  for (Eigen::Index i = 0; i < load.cols(); ++i) {
+    const PoseContext& pose = predicted.poses[static_cast<std::size_t>(i)];
+    load.col(i) =
+        now.physics.pose_W(pose).translation() - as_before.pose_W(pose).translation();
+  }
+  if (load.isZero(0)) return;
+  predicted.load = std::move(load);
+  const std::string& id = predicted.poses.front().payload;
+  const BudgetNumber old_mass = mass_of(before, id), new_mass = mass_of(now, id);
+  predicted.load_change = BudgetNumber{"mass", new_mass.value - old_mass.value,
+                                       std::hypot(old_mass.u95, new_mass.u95), "kg"};
+}
+
 }  // namespace
 
 ModelDifference difference_between(const CompensatedModel& before, const CompensatedModel& now,
@@ -102,7 +133,9 @@ ModelDifference difference_between(const CompensatedModel& before, const Compens
   const std::vector<ErrorPrediction> old_poses = before.predict_all(poses),
                                      new_poses = now.predict_all(poses);
   PredictedDifference predicted{poses, Eigen::Matrix3Xd(3, std::ssize(poses)),
-                                Eigen::Matrix3Xd(3, std::ssize(poses))};
+                                Eigen::Matrix3Xd(3, std::ssize(poses)),
+                                {},
+                                {}};
   const Pose X_BW_old = before.parts().physics.X_WB.inverse(),
              X_BW_new = now.parts().physics.X_WB.inverse();
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -115,6 +148,7 @@ ModelDifference difference_between(const CompensatedModel& before, const Compens
     predicted.all.col(column) = found.model.X_WB.linear() * moved_B;
     predicted.learned.col(column) = found.model.X_WB.linear() * (moved_B - by_physics);
   }
+  add_load(before.parts(), now.parts(), predicted);
   difference.budget = error_budget(found, predicted);
   return difference;
 }

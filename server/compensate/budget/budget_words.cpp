@@ -38,8 +38,10 @@ std::string detail(const BudgetLine& line) {
 
 std::string sentence(const BudgetLine& line) {
   if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));
-  std::string text = fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line),
-                                 to_mm(line.alone_rms), 100 * line.share);
+  std::string text = line.name + detail(line);
+  if (std::isfinite(line.alone_rms))
+    text += fmt::format(": {:.3f} mm alone", to_mm(line.alone_rms));
+  if (std::isfinite(line.share)) text += fmt::format(", {:.0f} %", 100 * line.share);
   if (!line.action.empty()) text += "; " + line.action;
   return text;
 }
@@ -65,6 +67,9 @@ std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
         most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;
     if (shown) text.push_back(sentence(line));
   }
+  for (const BudgetLine& line : budget.between_sessions)
+    text.push_back(
+        fmt::format("since session {}, at its poses: {}", line.since_session, sentence(line)));
   return text;
 }
 

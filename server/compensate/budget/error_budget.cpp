@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <set>
 
 #include "server/base/shown_value.h"
@@ -251,9 +253,76 @@ std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<Bu
   return steps;
 }
 
+/// Since which session what changed on the arm acts, by the name of the source.
+using Since = std::map<std::string, std::string>;
+
+Since since_of(const ModelParts& parts) {
+  Since since;
+  for (const Change& change : parts.changes) {
+    const std::vector<std::string> sources = change.sources();
+    for (std::size_t k = 0; k < sources.size(); ++k) {
+      const std::size_t session = change.steps.empty() ? change.session : k + 1;
+      if (session < parts.sessions.size()) since[sources[k]] = parts.sessions[session].id;
+    }
+  }
+  return since;
+}
+
+/// The columns of `vectors` at which `effect` is not zero.
+std::vector<Eigen::Index> where_it_acts(const Eigen::Matrix3Xd& effect) {
+  std::vector<Eigen::Index> columns;
+  for (Eigen::Index i = 0; i < effect.cols(); ++i)
+    if (!effect.col(i).isZero(0)) columns.push_back(i);
+  return columns;
+}
+
+std::vector<BudgetLine> between_sessions(const PhysicalModel& model,
+                                         const std::vector<BudgetItem>& items,
+                                         const Effects& effects, const Since& since) {
+  std::vector<BudgetLine> lines;
+  for (std::size_t k = 0; k < items.size(); ++k) {
+    const auto found = since.find(model.sources[items[k].source]->name());
+    const std::vector<Eigen::Index> at = where_it_acts(effects.lines[k]);
+    if (found == since.end() || at.empty()) continue;
+    lines.push_back(sized(items[k].line, effects.lines[k](Eigen::all, at),
+                          effects.total(Eigen::all, at)));
+    lines.back().since_session = found->second;
+  }
+  std::stable_sort(lines.begin(), lines.end(), [](const BudgetLine& one, const BudgetLine& other) {
+    return one.alone_rms > other.alone_rms;
+  });
+  return lines;
+}
+
+/// What is told beside the parameters.
+struct ToldBeside {
+  bool has_bias = false;
+  Since since = {};
+  const PredictedDifference* difference = nullptr;
+};
+
+/// Between two models whose arms carry something else, one line has all that follows from it.
+void add_load(const PredictedDifference& difference, const PhysicalModel& model,
+              std::vector<BudgetItem>& items, Effects& effects) {
+  for (std::size_t k = items.size(); k-- > 0;) {
+    if (!changes_load(*model.sources[items[k].source])) continue;
+    effects.together += effects.lines[k];
+    items.erase(items.begin() + static_cast<std::ptrdiff_t>(k));
+    effects.lines.erase(effects.lines.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  BudgetItem item;
+  item.line.line = "payload";
+  item.line.cause = "payload";
+  item.line.name = "what the arm carries";
+  item.line.value = difference.load_change;
+  items.push_back(std::move(item));
+  effects.lines.push_back(difference.load);
+  effects.together -= difference.load;
+}
+
 /// `positions` is not empty.
 ErrorBudget budget_of(const Identified& found, const LeftAt& left,
-                      const MeasurementBatch& positions, bool has_bias) {
+                      const MeasurementBatch& positions, const ToldBeside& beside) {
   ErrorBudget budget;
   budget.poses = static_cast<int>(positions.measurements.size());
   const Datum datum = datum_of(found, contexts_of(positions));
@@ -265,9 +334,12 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left,
     add_values(datum, parameters, item);
     judge(datum, item);
   }
-  const Effects effects = effects_of(left, datum, items, positions);
+  Effects effects = effects_of(left, datum, items, positions);
+  budget.between_sessions = between_sessions(datum.model, items, effects, beside.since);
+  if (beside.difference != nullptr && beside.difference->load.cols() > 0)
+    add_load(*beside.difference, datum.model, items, effects);
   const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell),
-                        has_bias};
+                        beside.has_bias};
   budget.as_it_stands = view_of(asked, true, [](const Eigen::Matrix3Xd& all) { return all; });
   const BeyondFrames beyond_frames(datum.model, positions);
   budget.beyond_frames = view_of(asked, false, beyond_frames);
@@ -282,7 +354,7 @@ ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& 
   if (positions.measurements.empty()) return {};
   const ModelParts& parts = model.parts();
   return budget_of({parts.physics, parts.parameters, parts.covariance}, left_by(model, positions),
-                   positions, model.bias().has_value());
+                   positions, {model.bias().has_value(), since_of(parts)});
 }
 
 ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseContext>& targets) {
@@ -311,14 +383,29 @@ ErrorBudget error_budget(const CalibrationResult& between, const PredictedDiffer
   const auto n = std::ssize(predicted.poses);
   const LeftAt left{predicted.all, predicted.learned, Eigen::Matrix3Xd::Zero(3, n)};
   return budget_of({between.model, between.parameters, between.covariance}, left, at,
-                   !predicted.learned.isZero(0));
+                   {!predicted.learned.isZero(0), {}, &predicted});
 }
 
 ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return {};
   return budget_of({calibration.model, calibration.parameters, calibration.covariance},
-                   left_by(calibration.model, positions), positions, false);
+                   left_by(calibration.model, positions), positions, {});
+}
+
+double alone_of_zero(const CompensatedModel& model, int joint, double by,
+                     const MeasurementBatch& measured) {
+  const MeasurementBatch positions = positions_of(measured);
+  if (positions.measurements.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const PhysicalModel& physics = model.parts().physics;
+  Eigen::Matrix3Xd effect(3, std::ssize(positions.measurements));
+  for (Eigen::Index i = 0; i < effect.cols(); ++i) {
+    PoseContext context = positions.measurements[static_cast<std::size_t>(i)].context;
+    const Vector3 p_W = physics.pose_W(context).translation();
+    context.q(joint) += by;
+    effect.col(i) = physics.pose_W(context).translation() - p_W;
+  }
+  return std::sqrt(mean_square(BeyondFrames(physics, positions)(effect)));
 }
 
 }  // namespace trammel

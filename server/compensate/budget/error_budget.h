@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "server/compensate/budget/budget.h"
 #include "server/compensate/compensated_model.h"
 
@@ -21,9 +23,17 @@ namespace trammel {
 struct PredictedDifference {
   std::vector<PoseContext> poses;
   Eigen::Matrix3Xd all, learned;
+  /// Of it, because what the arm carries differs (`load_change`); 0 x 0: it carries the same.
+  Eigen::Matrix3Xd load;
+  std::optional<BudgetNumber> load_change;  ///< of the mass, kg
 };
 /// Of the difference between two models, whose parameters differ by those of `between`.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& between,
                                        const PredictedDifference& predicted);
+
+/// m rms, at positions beyond what touching base and tool frames would take away: a joint's zero
+/// (0-based) that is off by `by`, rad (m of a rail). Not a number without poses.
+[[nodiscard]] double alone_of_zero(const CompensatedModel& model, int joint, double by,
+                                   const MeasurementBatch& measured);
 
 }  // namespace trammel

@@ -131,11 +131,6 @@ bool is_own_weight(const ErrorSource& source) {
   return source.cause().acts.on == causes::ActsOn::kLoad && source.cause().added_by_data;
 }
 
-/// Payload, balancers, cables: what the gearboxes then carry.
-bool changes_load(const ErrorSource& source) {
-  return source.cause().acts.on == causes::ActsOn::kLoad && !is_own_weight(source);
-}
-
 /// The model without those of its sources for which `goes` is true.
 template <typename Goes>
 PhysicalModel without_sources(const PhysicalModel& model, const Goes& goes) {
@@ -195,6 +190,27 @@ PhysicalModel without(const PhysicalModel& model, const BudgetItem& item) {
   PhysicalModel rest = model;
   for (const Eigen::Index place : item.places) rest.values(place) = 0;
   return rest;
+}
+
+bool changes_load(const ErrorSource& source) {
+  return source.cause().acts.on == causes::ActsOn::kLoad && !is_own_weight(source);
+}
+
+PhysicalModel with_load_of(const PhysicalModel& model, const PhysicalModel& other) {
+  PhysicalModel result = with_told_load(model);
+  Cell cell = *model.cell;
+  for (const auto& [id, payload] : other.cell->payloads) cell.payloads[id] = payload;
+  result.cell = std::make_shared<const Cell>(std::move(cell));
+  Eigen::Index place = 0;
+  for (const ErrorSourcePtr& source : other.sources) {
+    const auto count = std::ssize(source->parameters());
+    if (changes_load(*source)) {
+      const Eigen::Index first = add_source(result, source);
+      result.values.segment(first, count) = other.values.segment(place, count);
+    }
+    place += count;
+  }
+  return result;
 }
 
 PhysicalModel with_told_load(const PhysicalModel& model) {

@@ -31,6 +31,11 @@ struct BudgetItem {
 /// The model without the sources that change what the arm carries (payload, balancer): what they do
 /// is counted in their own lines, and not once more in those of the gearboxes.
 [[nodiscard]] PhysicalModel with_told_load(const PhysicalModel& model);
+/// Whether the source changes what the arm carries (payload, balancer).
+[[nodiscard]] bool changes_load(const ErrorSource& source);
+/// The model with what another model's arm carries: the payloads of its cell, and its sources that
+/// change the load.
+[[nodiscard]] PhysicalModel with_load_of(const PhysicalModel& model, const PhysicalModel& other);
 /// The place of `item` in with_told_load().
 [[nodiscard]] BudgetItem in_told_load(const PhysicalModel& model, const BudgetItem& item);
 
