@@ -6,6 +6,8 @@
 #include <set>
 #include <unsupported/Eigen/SpecialFunctions>
 
+#include "server/fleet/student.h"
+
 namespace trammel {
 
 namespace {
@@ -153,15 +155,9 @@ double FleetParameter::next_stddev() const {
   return spread * std::sqrt(kNormalOverStudent * (n + 1) / (n - 1) * (1 + 1 / n));
 }
 
-namespace {
-
-/// How probable it is that a value of Student's t with `freedom` degrees of freedom is farther from
-/// 0 than `t`.
 double two_sided(double t, double freedom) {
   return Eigen::numext::betainc(0.5 * freedom, 0.5, freedom / (freedom + t * t));
 }
-
-}  // namespace
 
 const FleetParameter* FleetPrior::find(const std::string& name) const {
   const auto found = std::find_if(parameters.begin(), parameters.end(),

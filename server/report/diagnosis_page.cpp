@@ -350,7 +350,8 @@ std::string measured_on(const Diagnosis& diagnosis) {
 
 }  // namespace
 
-std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
+std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell,
+                           const std::string& after_repair) {
   return fill_in(embedded::diagnosis_page_html,
                  {{"page_css", std::string(page_style())},
                   {"mark", page_mark({"diagnosis", cell.name})},
@@ -364,7 +365,7 @@ std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
                   {"findings", findings_text(diagnosis)},
                   {"unexplained", unexplained_text(diagnosis)},
                   {"figures", figures_table(diagnosis)},
-                  {"budget", budget_section(diagnosis.budget)},
+                  {"budget", after_repair + budget_section(diagnosis.budget)},
                   {"confusion", not_separable_text(diagnosis)},
                   {"next_poses", next_poses_text(diagnosis, cell)},
                   {"unseen", unseen_text(diagnosis)},

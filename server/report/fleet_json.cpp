@@ -2,6 +2,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
+#include "server/fleet/fleet_lines.h"
 #include "server/report/note_json.h"
 #include "server/robot/cell_rules.h"
 
@@ -35,6 +36,44 @@ ordered_json unlike_of(const std::vector<FleetEntry>& cells, std::size_t which) 
   if (!prior) return nullptr;
   ordered_json all = ordered_json::array();
   for (const Unlike& one : unlike_twins(parts, *prior)) all.push_back(unlike_json(one));
+  return all;
+}
+
+constexpr std::size_t kShownLines = 6;  // for people, of those that differ
+
+/// The budgets of its sisters that are of one drawing; a sister without one is left out.
+std::vector<const ErrorBudget*> sisters_of(const std::vector<FleetEntry>& cells,
+                                           std::size_t which) {
+  std::vector<const ErrorBudget*> sisters;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (i == which || !cells[i].model) continue;
+    const ModelParts& parts = cells[i].model->parts();
+    const Chain& own = cells[which].model->parts().physics.cell->robot;
+    if (parts.budget && same_type(parts.physics.cell->robot, own)) sisters.push_back(&*parts.budget);
+  }
+  return sisters;
+}
+
+/// In which line it differs from its sisters; null where it has no budget or they are too few.
+ordered_json lines_of(const std::vector<FleetEntry>& cells, std::size_t which) {
+  const auto& budget = cells[which].model->parts().budget;
+  const std::vector<const ErrorBudget*> sisters = sisters_of(cells, which);
+  if (!budget || std::ssize(sisters) < kFewestTwins) return nullptr;
+  ordered_json all = ordered_json::array();
+  for (const LineAmongSisters& line : lines_among_sisters(*budget, sisters))
+    all.push_back({{"line", line.line},
+                   {"name", line.name},
+                   {"joint", line.joint >= 0 ? ordered_json(line.joint + 1) : ordered_json(nullptr)},
+                   {"value", line.own.value},
+                   {"u95", line.own.u95},
+                   {"unit", line.own.unit},
+                   {"sisters", line.sisters.value},
+                   {"sisters_u95", line.sisters.u95},
+                   {"robots", line.robots},
+                   {"difference_rms_mm", to_mm(line.difference_rms)},
+                   {"z", line.z},
+                   {"differs", line.differs},
+                   {"sentence", to_string(line)}});
   return all;
 }
 
@@ -78,6 +117,7 @@ ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
       one["robot"] = robot.name();
       one["model"] = entry.model->provenance().id;
       one["unlike_twins"] = unlike_of(cells, i);
+      one["lines_among_sisters"] = lines_of(cells, i);
       one["notes"] = notes_json(notes_of(*entry.model));
       const auto prior = learn_fleet_prior(robot, members_but(cells, cells.size()));
       if (prior && std::find(told.begin(), told.end(), robot.name()) == told.end()) {
@@ -89,6 +129,23 @@ ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
   }
   return json;
 }
+
+namespace {
+
+/// The lines of its budget in which it differs, at most kShownLines.
+std::string lines_text(const ordered_json& cell) {
+  if (!cell.contains("lines_among_sisters") || !cell["lines_among_sisters"].is_array()) return "";
+  std::string text;
+  std::size_t shown = 0;
+  for (const ordered_json& line : cell["lines_among_sisters"]) {
+    if (!line.at("differs").get<bool>() || shown++ == kShownLines) break;
+    text += "    " + line.at("sentence").get<std::string>() + "\n";
+  }
+  return text.empty() ? "  no line of its budget differs from its sisters\n"
+                      : "  its budget differs from its sisters in:\n" + text;
+}
+
+}  // namespace
 
 std::string fleet_text(const ordered_json& fleet) {
   std::string text;
@@ -110,6 +167,7 @@ std::string fleet_text(const ordered_json& fleet) {
       for (const ordered_json& one : cell["unlike_twins"])
         text += "  unlike its twins: " + one.at("sentence").get<std::string>() + "\n";
     }
+    text += lines_text(cell);
   }
   for (const ordered_json& type : fleet.at("types"))
     text += fmt::format("{}: learned from {} robots\n", type.at("robot").get<std::string>(),

@@ -42,13 +42,27 @@ std::string twins_of(const ordered_json& cell) {
   return "unlike its twins:<ul>" + list + "</ul>";
 }
 
+/// In which lines of its error budget it differs from robots of its type.
+std::string lines_of(const ordered_json& cell) {
+  const ordered_json& lines = member(cell, "lines_among_sisters");
+  if (!lines.is_array()) return "–";
+  std::string list;
+  for (const ordered_json& line : lines) {
+    const ordered_json& differs = member(line, "differs");
+    if (differs.is_boolean() && differs.get<bool>())
+      list += "<li>" + html_text(text_in(line, "sentence")) + "</li>";
+  }
+  return list.empty() ? "none" : "<ul>" + list + "</ul>";
+}
+
 HtmlRow cell_row(const ordered_json& cell) {
   const std::string verdict = verdict_of(cell);
   const ordered_json& version = member(cell, "version");
   std::string model = or_dash(text_in(cell, "model"));
   if (version.is_number_integer()) model += fmt::format(" (version {})", version.get<int>());
   return {{or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model,
-           html_text(verdict), or_dash(text_in(member(cell, "health"), "due")), twins_of(cell)},
+           html_text(verdict), or_dash(text_in(member(cell, "health"), "due")), twins_of(cell),
+           lines_of(cell)},
           verdict == "changed" ? "changed" : ""};
 }
 
@@ -80,7 +94,9 @@ std::string fleet_page(const ordered_json& fleet, std::int64_t at) {
   const std::string verdict = fmt::format(
       "<p class=\"verdict\">{}: {} changed, {} not checked yet.</p>", count, changed, unchecked);
   const std::string table = html_table(
-      {"stacks", {"cell", "robot", "model", "health", "next check", "among its twins"}, rows});
+      {"stacks", {"cell", "robot", "model", "health", "next check", "among its twins",
+                  "lines of the budget that differ"},
+                 rows});
   return plain_page({.mark = {"fleet", ""},
                      .title = "Fleet",
                      .subtitle = fmt::format("{} · {}", count, shown_day(at)),

@@ -13,11 +13,13 @@
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
+#include "server/report/after_repair_report.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
 #include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_sources_file.h"
+#include "server/tasks/train/did_it_help.h"
 
 namespace trammel::cli {
 
@@ -112,6 +114,19 @@ Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) 
   return Extent::kPart;
 }
 
+/// What the repair since the model of --since did; its section of the page.
+Result<std::string> tell_since(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                               const DiagnoseArguments& arguments, ordered_json& json) {
+  if (arguments.since.empty()) return std::string();
+  const CompensatedModel before = TRY(load_model(arguments.since));
+  const AfterRepair repair = TRY(did_it_help(before, cell, batch));
+  json["since"] = after_repair_json(repair);
+  std::string text = "\n";
+  for (const std::string& line : in_words(repair)) text += line + "\n";
+  say(text, arguments);
+  return after_repair_section(repair);
+}
+
 Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   if (arguments.batches.empty())
     return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
@@ -120,6 +135,7 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   outputs.add("--model", arguments.model);
   std::vector<NamedFile> inputs = {{"--cell", arguments.cell}};
   for (const std::string& path : arguments.batches) inputs.push_back({"--batch", path});
+  if (!arguments.since.empty()) inputs.push_back({"--since", arguments.since});
   TRY(outputs.check(inputs));
   Cell read = TRY(read_cell_to_train(arguments.cell));
   const auto cell = std::make_shared<const Cell>(std::move(read));
@@ -130,9 +146,10 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   warn_of_notes(notes);
   ordered_json json = diagnosis_json(*diagnosis, notes);
   say(diagnosis_text(json), arguments);
+  const std::string after_repair = TRY(tell_since(cell, batch, arguments, json));
   std::optional<Result<Applied>> applied;
   if (arguments.apply) applied = apply(cell, batch, *diagnosis, arguments, json, outputs);
-  TRY(write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments));
+  TRY(write_diagnosis(json, diagnosis_page(*diagnosis, *cell, after_repair), outputs, arguments));
   if (!applied) return leaves_open(json, arguments) ? Extent::kPart : Extent::kAll;
   if (!*applied) return tl::make_unexpected(applied->error());
   return tell_applied(**applied, arguments);
@@ -204,11 +221,18 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
       ->add_option("--cell-out", arguments->cell_out,
                    "With --apply, on files: cell file to write instead of --cell itself")
       ->needs(apply_flag);
+  command
+      ->add_option("--since", arguments->since,
+                   "On files: model file from before a repair; tells whether the repair helped, line "
+                   "by line of its error budget")
+      ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
+      if (!arguments->since.empty())
+        return failure(ErrorCode::kUsage, "--since is for files").of("--since");
       return diagnose_at_service(*arguments).map([](bool all) {
         return all ? Extent::kAll : Extent::kPart;
       });

@@ -11,7 +11,7 @@ namespace trammel::cli {
 
 /// What `trammel diagnose` was asked.
 struct DiagnoseArguments {
-  std::string cell, report, next_poses, json, model, cell_out;
+  std::string cell, report, next_poses, json, model, cell_out, since;
   std::vector<std::string> batches;  ///< at a service one at most
   std::uint64_t seed = 1;
   bool apply = false, strict = false;

@@ -14,11 +14,6 @@ namespace {
 constexpr double kAlwaysShown =
     0.1;  // of the error: a line beyond the first ones that has more is shown as well
 
-std::string value_of(const BudgetNumber& value) {
-  const ShownValue read = show_read(value.value, value.u95, {1, value.unit});
-  return fmt::format("{} ± {} {}", read.value, read.expanded, value.unit);
-}
-
 std::string joined(const std::vector<std::string>& all) {
   return fmt::format("{}", fmt::join(all, ", "));
 }
@@ -26,7 +21,7 @@ std::string joined(const std::vector<std::string>& all) {
 /// What stands behind the name, in brackets.
 std::string detail(const BudgetLine& line) {
   std::vector<std::string> parts;
-  if (line.value) parts.push_back(value_of(*line.value));
+  if (line.value) parts.push_back(in_words(*line.value));
   if (!line.with.empty() && line.kind != LineKind::kUntold)
     parts.push_back("these poses cannot tell it from " + joined(line.with));
   if (line.times_usual && !line.action.empty())
@@ -35,6 +30,11 @@ std::string detail(const BudgetLine& line) {
 }
 
 }  // namespace
+
+std::string in_words(const BudgetNumber& number) {
+  const ShownValue read = show_read(number.value, number.u95, {1, number.unit});
+  return fmt::format("{} ± {} {}", read.value, read.expanded, number.unit);
+}
 
 std::string sentence(const BudgetLine& line) {
   if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));

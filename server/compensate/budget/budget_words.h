@@ -8,6 +8,9 @@
 
 namespace trammel {
 
+/// `3.000 ± 0.004 deg`.
+[[nodiscard]] std::string in_words(const BudgetNumber& number);
+
 /// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it
 /// shows): 14.6 mm alone, 46
 /// %`.

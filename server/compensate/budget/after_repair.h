@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/compensate/budget/between.h"
+
+/// Whether a repair helped: the model of the measurements after it, held against the one before.
+namespace trammel {
+
+/// What became of a line that was to be put right.
+struct LineOutcome {
+  enum class Helped {
+    kPutRight,    ///< no longer beyond its U, or beyond what is usual
+    kPartly,      ///< nearer to the drawing than before
+    kTooFar,      ///< beyond the drawing to the other side
+    kNotMoved,    ///< it stands where it stood
+    kWrongWay,    ///< farther off than before
+    kCannotTell,  ///< these poses do not tell it so well as it was off
+  };
+  std::string line, name, action;  ///< as the budget before had them
+  BudgetNumber before, moved, now;
+  double alone_before = 0;  ///< m rms, at the poses after the repair
+  Helped helped = Helped::kCannotTell;
+};
+/// `put_right`, `partly`, `too_far`, `not_moved`, `wrong_way`, `cannot_tell`.
+[[nodiscard]] std::string_view to_string(LineOutcome::Helped helped);
+
+struct AfterRepair {
+  std::string model;           ///< id of the one before
+  ErrorBudget before, now;     ///< of both models, at the poses after the repair
+  ModelDifference difference;  ///< now minus before
+  std::vector<LineOutcome> lines;  ///< those that stood out before, and lost zeros; the largest first
+};
+
+/// `before` and `now` are of one drawing; `poses` are not empty, and both models know their tools
+/// and payloads.
+[[nodiscard]] AfterRepair after_repair(const CompensatedModel& before, const CompensatedModel& now,
+                                       const std::vector<PoseContext>& poses);
+
+/// For people: the whole error before and now, what became of each line, then what else moved.
+[[nodiscard]] std::vector<std::string> in_words(const AfterRepair& repair, int most = 6);
+
+}  // namespace trammel
