@@ -8,6 +8,7 @@
 
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
 #include "server/report/html.h"
 
 namespace trammel {
@@ -84,7 +85,15 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
     if (worth) rows.push_back(row_of(line, longest, beyond));
     small += worth || line.kind == LineKind::kUntold ? 0 : 1;
   }
-  std::string text = fmt::format(
+  std::string text;
+  if (const std::string doubt = doubt_of_file(*budget); !doubt.empty())
+    text += "<p class=\"verdict\">" + html_text(doubt) + "</p>";
+  for (const BudgetLine& line : budget->between_sessions)
+    text += "<p>" +
+            html_text(fmt::format("Since session {}, at its poses: {}", line.since_session,
+                                  sentence(line))) +
+            "</p>";
+  text += fmt::format(
       "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool "
       "frames would leave {:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. "
       "Left: what would be left if only this line were put right.{}</p>",

@@ -34,14 +34,14 @@ std::string zeros_table(const ErrorBudget& budget, const Chain& robot) {
   std::vector<HtmlRow> rows;
   for (const ZeroRemedy& zero : zeros) {
     const ShownValue read = show_read(zero.add, zero.u95, {1, zero.unit});
-    rows.push_back({{fmt::format("joint {}", zero.joint + 1),
+    rows.push_back({{fmt::format("joint {}", zero.joint + 1), html_text(words.axis(zero.joint)),
                      fmt::format("{}{} ± {} {}", zero.add > 0 ? "+" : "", read.value, read.expanded,
                                  zero.unit)}});
   }
   return fmt::format("<p>The joint stands at the angle shown plus this. {}: {}.</p>",
                      html_text(words.maker.empty() ? "In the controller" : words.maker),
                      html_text(words.zeros)) +
-         html_table({"zeros", {"zero of", "add to the angle shown"}, rows}) +
+         html_table({"zeros", {"zero of", "on the pendant", "add to the angle shown"}, rows}) +
          fmt::format("<p>Lengths: {}. Load data: {}.</p>", html_text(words.lengths),
                      html_text(words.load));
 }

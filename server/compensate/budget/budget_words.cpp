@@ -14,6 +14,9 @@ namespace {
 constexpr double kAlwaysShown =
     0.1;  // of the error: a line beyond the first ones that has more is shown as well
 
+constexpr std::size_t kFewestWrongLengths =
+    2;  // that stand out: one may be a link, more are another arm
+
 std::string joined(const std::vector<std::string>& all) {
   return fmt::format("{}", fmt::join(all, ", "));
 }
@@ -56,12 +59,23 @@ std::vector<std::string> difference_in_words(const ModelDifference& difference, 
   return text;
 }
 
+std::string doubt_of_file(const ErrorBudget& budget) {
+  std::vector<std::string> lengths;
+  for (const BudgetLine& line : budget.as_it_stands.lines)
+    if (line.kind == LineKind::kLength && !line.action.empty())
+      lengths.push_back(line.name + " by " + in_words(*line.value));
+  if (lengths.size() < kFewestWrongLengths) return "";
+  return "is this the file of this robot? Several lengths differ from it: " + joined(lengths);
+}
+
 std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   if (budget.as_it_stands.lines.empty()) return {};
-  std::vector<std::string> text = {fmt::format(
+  std::vector<std::string> text;
+  if (std::string doubt = doubt_of_file(budget); !doubt.empty()) text.push_back(std::move(doubt));
+  text.push_back(fmt::format(
       "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave "
       "{:.3f} mm",
-      to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
+      to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms)));
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     const bool shown =
         most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;

@@ -16,7 +16,11 @@ namespace trammel {
 /// %`.
 [[nodiscard]] std::string sentence(const BudgetLine& line);
 
-/// The budget in its `most` first lines, beneath a heading that names the whole error. Empty
+/// `is this the file of this robot? ...` where several lengths stand out; else empty.
+[[nodiscard]] std::string doubt_of_file(const ErrorBudget& budget);
+
+/// The budget in its `most` first lines, beneath a heading that names the whole error, and
+/// above it doubt_of_file(). Empty
 /// without lines.
 [[nodiscard]] std::vector<std::string> in_words(const ErrorBudget& budget, int most = 6);
 

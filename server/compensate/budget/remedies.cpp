@@ -27,27 +27,38 @@ const std::vector<Maker>& makers() {
         "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update "
         "the revolution counters",
         "not in the controller, but by ABB's Absolute Accuracy",
-        "tooldata: mass, cog; LoadIdentify"}},
+        "tooldata: mass, cog; LoadIdentify",
+        {"axis 1", "axis 2", "axis 3", "axis 4", "axis 5", "axis 6"}}},
       {"kuka",
        {"KUKA", "mastering of the axis (Start-up > Master), with the offset for the tool",
-        "$machine.dat, by KUKA's service alone", "Load data of the tool ($LOAD): M, X, Y, Z"}},
+        "$machine.dat, by KUKA's service alone", "Load data of the tool ($LOAD): M, X, Y, Z",
+        {"A1", "A2", "A3", "A4", "A5", "A6"}}},
       {"fanuc",
        {"FANUC",
         "MENU > SYSTEM > Master/Cal, single-axis mastering ($DMR_GRP.$MASTER_COUN), then CALIBRATE",
-        "not in the controller, but by iRCalibration", "MOTION PAYLOAD SET ($PLST_GRP)"}},
+        "not in the controller, but by iRCalibration", "MOTION PAYLOAD SET ($PLST_GRP)",
+        {"J1", "J2", "J3", "J4", "J5", "J6"}}},
       {"yaskawa",
        {"Yaskawa", "HOME POSITION of the axis (ROBOT > HOME POSITION)", "not in the controller",
-        "TOOL: W, Xg, Yg, Zg; W.GRAV.POS measurement"}},
+        "TOOL: W, Xg, Yg, Zg; W.GRAV.POS measurement",
+        {"S", "L", "U", "R", "B", "T"}}},
       {"universal robots",
        {"Universal Robots",
         "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
         "calibration.conf: delta_a, delta_d, delta_alpha",
-        "Payload: mass and centre of gravity (set_target_payload)"}},
+        "Payload: mass and centre of gravity (set_target_payload)",
+        {"Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3"}}},
       {"staubli",
        {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis",
         "arm.cfx, by the maker's service alone", "load of the tool"}},
   };
   return all;
+}
+
+/// `joint 4 (A4)`.
+std::string joint_and_axis(int joint, const MakersWords& words) {
+  const std::string plain = fmt::format("joint {}", joint + 1), axis = words.axis(joint);
+  return axis == plain ? plain : fmt::format("{} ({})", plain, axis);
 }
 
 std::string signed_value(double value, double u95, const std::string& unit) {
@@ -96,10 +107,19 @@ std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_vi
   return values;
 }
 
+std::string MakersWords::axis(int joint) const {
+  const auto place = static_cast<std::size_t>(joint);
+  return place < axes.size() ? axes[place] : fmt::format("joint {}", joint + 1);
+}
+
 MakersWords makers_words(const Chain& robot) {
   const std::string name = lower(robot.name());
-  for (const Maker& maker : makers())
-    if (name.starts_with(maker.begins)) return maker.words;
+  for (const Maker& maker : makers()) {
+    if (!name.starts_with(maker.begins)) continue;
+    MakersWords words = maker.words;
+    if (std::ssize(words.axes) != robot.size()) words.axes.clear();  // its arms of six joints
+    return words;
+  }
   return {"", "the zero of the axis in the controller",
           "where the controller takes lengths of its own arm", "the load data of the tool"};
 }
@@ -117,7 +137,9 @@ std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chai
                                words.zeros));
   for (const ZeroRemedy& zero : zeros)
     text.push_back(
-        fmt::format("  joint {}: {}", zero.joint + 1, signed_value(zero.add, zero.u95, zero.unit)));
+        fmt::format("  {}: {}{}", joint_and_axis(zero.joint, words),
+                    signed_value(zero.add, zero.u95, zero.unit),
+                    robot.joint(zero.joint).sign < 0 ? " (as the controller counts, against the right-hand rule)" : ""));
   if (zeros.empty()) text.emplace_back("zeros: none is off by more than its uncertainty");
   text.push_back(fmt::format("lengths: {}", words.lengths));
   text.push_back(fmt::format("load data: {}", words.load));

@@ -37,6 +37,9 @@ struct RemedyValue {
 /// name of the robot file; general words where no maker is known.
 struct MakersWords {
   std::string maker, zeros, lengths, load;
+  std::vector<std::string> axes = {};  ///< the names of the first ones; empty: `joint 4`
+  /// What the maker calls a joint (0-based): `A4`, `J4`, `axis 4`, `R`; else `joint 4`.
+  [[nodiscard]] std::string axis(int joint) const;
 };
 [[nodiscard]] MakersWords makers_words(const Chain& robot);
 
