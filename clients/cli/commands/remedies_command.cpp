@@ -41,6 +41,8 @@ Result<JointList> poses_to_prove(const CompensatedModel& model) {
     CommandedPose pose;
     pose.pose_id = planned.id;
     pose.context = planned.context;
+    if (model.cell().tools.size() == 1) pose.context.tool.clear();
+    if (model.cell().payloads.size() == 1) pose.context.payload.clear();
     list.poses.push_back(std::move(pose));
   }
   return list;
@@ -48,12 +50,12 @@ Result<JointList> poses_to_prove(const CompensatedModel& model) {
 
 nlohmann::ordered_json poses_json(const JointList& list) {
   nlohmann::ordered_json columns = nlohmann::ordered_json::array(), poses = columns;
-  for (std::size_t j = 0; j < list.types.size(); ++j)
-    columns.push_back(joint_column(static_cast<int>(j), list.types[j]));
+  for (std::size_t j = 0; j < list.joint_types.size(); ++j)
+    columns.push_back(joint_column(static_cast<int>(j), list.joint_types[j]));
   for (const CommandedPose& pose : list.poses) {
     nlohmann::ordered_json row = nlohmann::ordered_json::array();
-    for (std::size_t j = 0; j < list.types.size(); ++j)
-      row.push_back(joint_to_column(pose.context.q(static_cast<Eigen::Index>(j)), list.types[j]));
+    for (std::size_t j = 0; j < list.joint_types.size(); ++j)
+      row.push_back(joint_to_column(pose.context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
     poses.push_back(std::move(row));
   }
   return {{"columns", std::move(columns)}, {"poses", std::move(poses)}};

@@ -23,7 +23,7 @@ namespace trammel {
 struct PredictedDifference {
   std::vector<PoseContext> poses;
   Eigen::Matrix3Xd all, learned;
-  /// Of it, because what the arm carries differs (`load_change`); 0 x 0: it carries the same.
+  /// Of it, because what the arm carries differs (`load_change`); no column: it carries the same.
   Eigen::Matrix3Xd load;
   std::optional<BudgetNumber> load_change;  ///< of the mass, kg
 };
