@@ -15,7 +15,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAsIfRobots = 3;  // that have what is usual for a line
+constexpr double kAsIfRobots = 3;       // that have what is usual for a line
 constexpr double kUsualDeviations = 2;  // what is usual is exceeded in one of twenty cases
 
 /// Where base and tool stand is no matter of the arm; what is left has no value.
@@ -95,9 +95,8 @@ std::vector<LineAmongSisters> lines_among_sisters(const ErrorBudget& own,
   std::vector<double> chance;  // of each, that it is so far off in a fleet of equal robots
   for (const BudgetLine& line : own.as_it_stands.lines) {
     if (!is_of_the_arm(line)) continue;
-    const double usual = line.times_usual.value_or(0) > 0
-                             ? std::abs(line.value->value) / *line.times_usual
-                             : 0;
+    const double usual =
+        line.times_usual.value_or(0) > 0 ? std::abs(line.value->value) / *line.times_usual : 0;
     const std::optional<LineAmongSisters> farthest = farthest_of(line, sisters, usual);
     if (!farthest) continue;
     all.push_back(*farthest);

@@ -11,12 +11,12 @@ namespace trammel {
 /// A number of a line beside those of the sisters that have the line, in the unit of the line.
 struct LineAmongSisters {
   std::string line, name;
-  int joint = -1;              ///< 0-based; -1: of no single joint
-  BudgetNumber own, sisters;   ///< `sisters`: their mean, and U(k = 2) of the next sister's value
-  double difference_rms = 0;   ///< m rms: what the difference does alone, at the robot's own poses
-  double z = 0;                ///< standard deviations apart, U of the own value included
-  int robots = 0;              ///< sisters that have the line
-  bool differs = false;        ///< beyond what the next sister would show by chance
+  int joint = -1;             ///< 0-based; -1: of no single joint
+  BudgetNumber own, sisters;  ///< `sisters`: their mean, and U(k = 2) of the next sister's value
+  double difference_rms = 0;  ///< m rms: what the difference does alone, at the robot's own poses
+  double z = 0;               ///< standard deviations apart, U of the own value included
+  int robots = 0;             ///< sisters that have the line
+  bool differs = false;       ///< beyond what the next sister would show by chance
 };
 
 /// Each line of the arm itself that at least kFewestTwins sisters have, of a line with several

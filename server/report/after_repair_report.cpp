@@ -56,22 +56,22 @@ ordered_json after_repair_json(const AfterRepair& repair) {
 std::string after_repair_section(const AfterRepair& repair) {
   std::vector<HtmlRow> rows;
   for (const LineOutcome& line : repair.lines)
-    rows.push_back({{html_text(line.name), html_text(in_words(line.before)),
-                     is_told(line) ? html_text(in_words(line.moved)) : "",
-                     is_told(line) ? html_text(in_words(line.now)) : "",
-                     fmt::format("{:.4f}", to_mm(line.alone_before)),
-                     html_text(outcome_in_words(line))},
-                    line.helped == LineOutcome::Helped::kPutRight ? "" : "stands_out"});
+    rows.push_back(
+        {{html_text(line.name), html_text(in_words(line.before)),
+          is_told(line) ? html_text(in_words(line.moved)) : "",
+          is_told(line) ? html_text(in_words(line.now)) : "",
+          fmt::format("{:.4f}", to_mm(line.alone_before)), html_text(outcome_in_words(line))},
+         line.helped == LineOutcome::Helped::kPutRight ? "" : "stands_out"});
   std::string text = fmt::format(
       "<p>Beyond what touching frames takes away, the drawing was off by {:.4f} mm rms at these "
       "poses by model {}, and is now by {:.4f} mm.</p>",
       to_mm(repair.before.beyond_frames.error_rms), html_text(repair.model),
       to_mm(repair.now.beyond_frames.error_rms));
   if (!rows.empty())
-    text += html_table({"budget stacks",
-                        {"line", "before ± U (k = 2)", "moved by", "now", "alone before, mm rms",
-                         "did it help"},
-                        rows});
+    text += html_table(
+        {"budget stacks",
+         {"line", "before ± U (k = 2)", "moved by", "now", "alone before, mm rms", "did it help"},
+         rows});
   return html_section("Since the repair: did it help?", text);
 }
 

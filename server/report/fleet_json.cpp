@@ -49,7 +49,8 @@ std::vector<const ErrorBudget*> sisters_of(const std::vector<FleetEntry>& cells,
     if (i == which || !cells[i].model) continue;
     const ModelParts& parts = cells[i].model->parts();
     const Chain& own = cells[which].model->parts().physics.cell->robot;
-    if (parts.budget && same_type(parts.physics.cell->robot, own)) sisters.push_back(&*parts.budget);
+    if (parts.budget && same_type(parts.physics.cell->robot, own))
+      sisters.push_back(&*parts.budget);
   }
   return sisters;
 }
@@ -61,19 +62,20 @@ ordered_json lines_of(const std::vector<FleetEntry>& cells, std::size_t which) {
   if (!budget || std::ssize(sisters) < kFewestTwins) return nullptr;
   ordered_json all = ordered_json::array();
   for (const LineAmongSisters& line : lines_among_sisters(*budget, sisters))
-    all.push_back({{"line", line.line},
-                   {"name", line.name},
-                   {"joint", line.joint >= 0 ? ordered_json(line.joint + 1) : ordered_json(nullptr)},
-                   {"value", line.own.value},
-                   {"u95", line.own.u95},
-                   {"unit", line.own.unit},
-                   {"sisters", line.sisters.value},
-                   {"sisters_u95", line.sisters.u95},
-                   {"robots", line.robots},
-                   {"difference_rms_mm", to_mm(line.difference_rms)},
-                   {"z", line.z},
-                   {"differs", line.differs},
-                   {"sentence", to_string(line)}});
+    all.push_back(
+        {{"line", line.line},
+         {"name", line.name},
+         {"joint", line.joint >= 0 ? ordered_json(line.joint + 1) : ordered_json(nullptr)},
+         {"value", line.own.value},
+         {"u95", line.own.u95},
+         {"unit", line.own.unit},
+         {"sisters", line.sisters.value},
+         {"sisters_u95", line.sisters.u95},
+         {"robots", line.robots},
+         {"difference_rms_mm", to_mm(line.difference_rms)},
+         {"z", line.z},
+         {"differs", line.differs},
+         {"sentence", to_string(line)}});
   return all;
 }
 

@@ -60,10 +60,10 @@ HtmlRow cell_row(const ordered_json& cell) {
   const ordered_json& version = member(cell, "version");
   std::string model = or_dash(text_in(cell, "model"));
   if (version.is_number_integer()) model += fmt::format(" (version {})", version.get<int>());
-  return {{or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model,
-           html_text(verdict), or_dash(text_in(member(cell, "health"), "due")), twins_of(cell),
-           lines_of(cell)},
-          verdict == "changed" ? "changed" : ""};
+  return {
+      {or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model, html_text(verdict),
+       or_dash(text_in(member(cell, "health"), "due")), twins_of(cell), lines_of(cell)},
+      verdict == "changed" ? "changed" : ""};
 }
 
 std::string types_text(const ordered_json& types) {
@@ -93,10 +93,10 @@ std::string fleet_page(const ordered_json& fleet, std::int64_t at) {
   const std::string count = fmt::format("{} robot{}", rows.size(), rows.size() == 1 ? "" : "s");
   const std::string verdict = fmt::format(
       "<p class=\"verdict\">{}: {} changed, {} not checked yet.</p>", count, changed, unchecked);
-  const std::string table = html_table(
-      {"stacks", {"cell", "robot", "model", "health", "next check", "among its twins",
-                  "lines of the budget that differ"},
-                 rows});
+  const std::string table = html_table({"stacks",
+                                        {"cell", "robot", "model", "health", "next check",
+                                         "among its twins", "lines of the budget that differ"},
+                                        rows});
   return plain_page({.mark = {"fleet", ""},
                      .title = "Fleet",
                      .subtitle = fmt::format("{} · {}", count, shown_day(at)),

@@ -68,8 +68,8 @@ BudgetLine change_line(std::string line, LineKind kind, int joint, std::string n
   change.kind = kind;
   change.joint = joint;
   change.name = std::move(name);
-  for (double* unknown : {&change.alone_rms, &change.alone_max, &change.share,
-                          &change.left_if_right})
+  for (double* unknown :
+       {&change.alone_rms, &change.alone_max, &change.share, &change.left_if_right})
     *unknown = kNotKnown;
   return change;
 }
@@ -93,10 +93,10 @@ BudgetLine line_of(const SingleCause& cause) {
   if (cause.joint >= 0 && record.search == causes::SearchFamily::kZeroStep && !cause.any_function)
     return change_line("zero" + of_joint, LineKind::kJointZero, cause.joint, name);
   const bool is_gearbox = record.gives_way && record.numbers == causes::Numbers::kOneAJoint;
-  BudgetLine line = change_line(
-      spelling + of_joint,
-      is_gearbox && cause.joint >= 0 ? LineKind::kJointCompliance : LineKind::kCause, cause.joint,
-      name);
+  BudgetLine line =
+      change_line(spelling + of_joint,
+                  is_gearbox && cause.joint >= 0 ? LineKind::kJointCompliance : LineKind::kCause,
+                  cause.joint, name);
   line.cause = spelling;
   return line;
 }
@@ -108,8 +108,8 @@ using SizedLines = std::vector<std::pair<double, BudgetLine>>;
 void add_zero_lines(const SeenChange& change, const CheckedWith* with, SizedLines& lines) {
   for (const LostZero& zero : change.zeros) {
     const std::string n = std::to_string(zero.joint + 1);
-    BudgetLine line = change_line("zero:" + n, LineKind::kJointZero, zero.joint,
-                                  "the zero of joint " + n);
+    BudgetLine line =
+        change_line("zero:" + n, LineKind::kJointZero, zero.joint, "the zero of joint " + n);
     line.value = BudgetNumber{"q" + n, to_deg(zero.by), to_deg(zero.u95), "deg"};
     if (change.zeros.size() == 1) {
       line.alone_rms = change.effect_rms;

@@ -222,9 +222,10 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
                    "With --apply, on files: cell file to write instead of --cell itself")
       ->needs(apply_flag);
   command
-      ->add_option("--since", arguments->since,
-                   "On files: model file from before a repair; tells whether the repair helped, line "
-                   "by line of its error budget")
+      ->add_option(
+          "--since", arguments->since,
+          "On files: model file from before a repair; tells whether the repair helped, line "
+          "by line of its error budget")
       ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);

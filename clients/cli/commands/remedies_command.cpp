@@ -55,7 +55,8 @@ nlohmann::ordered_json poses_json(const JointList& list) {
   for (const CommandedPose& pose : list.poses) {
     nlohmann::ordered_json row = nlohmann::ordered_json::array();
     for (std::size_t j = 0; j < list.joint_types.size(); ++j)
-      row.push_back(joint_to_column(pose.context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
+      row.push_back(
+          joint_to_column(pose.context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
     poses.push_back(std::move(row));
   }
   return {{"columns", std::move(columns)}, {"poses", std::move(poses)}};
@@ -64,7 +65,8 @@ nlohmann::ordered_json poses_json(const JointList& list) {
 /// How to see afterwards whether it helped.
 std::string proof_text(const RemediesArguments& arguments) {
   return fmt::format(
-      "afterwards: measure the poses of {}, then trammel diagnose --cell CELL --batch AFTER --since "
+      "afterwards: measure the poses of {}, then trammel diagnose --cell CELL --batch AFTER "
+      "--since "
       "{}\n",
       arguments.check_poses.empty() ? "--check-poses FILE" : arguments.check_poses,
       arguments.model);
@@ -97,10 +99,11 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
   const MakersWords words = makers_words(model.cell().robot);
   nlohmann::ordered_json zeros = nlohmann::ordered_json::array();
   for (const ZeroRemedy& zero : zero_remedies(budget))
-    zeros.push_back(
-        {{"joint", zero.joint + 1},
-         {"axis", words.axis(zero.joint)},
-         {"add", zero.add}, {"u95", zero.u95}, {"unit", zero.unit}});
+    zeros.push_back({{"joint", zero.joint + 1},
+                     {"axis", words.axis(zero.joint)},
+                     {"add", zero.add},
+                     {"u95", zero.u95},
+                     {"unit", zero.unit}});
   return {{"model", model.provenance().id},
           {"cell", model.cell().name},
           {"zeros", std::move(zeros)},

@@ -33,8 +33,8 @@ LineOutcome::Helped judged(const LineOutcome& outcome, double usual) {
 }
 
 LineOutcome outcome_of(const BudgetLine& before, const AfterRepair& repair) {
-  LineOutcome outcome{before.line, before.name, before.action, *before.value, {}, *before.value,
-                      before.alone_rms};
+  LineOutcome outcome{before.line, before.name,   before.action,   *before.value,
+                      {},          *before.value, before.alone_rms};
   const BudgetLine* moved = repair.difference.budget.line(before.line);
   if (moved == nullptr || !moved->value) return outcome;
   outcome.moved = *moved->value;
@@ -78,8 +78,11 @@ std::string_view to_string(LineOutcome::Helped helped) {
 
 AfterRepair after_repair(const CompensatedModel& before, const CompensatedModel& now,
                          const std::vector<PoseContext>& poses) {
-  AfterRepair repair{before.provenance().id, error_budget(before, poses), error_budget(now, poses),
-                     difference_between(before, now, poses), {}};
+  AfterRepair repair{before.provenance().id,
+                     error_budget(before, poses),
+                     error_budget(now, poses),
+                     difference_between(before, now, poses),
+                     {}};
   for (const BudgetLine& line : repair.before.as_it_stands.lines)
     if (is_to_put_right(line)) repair.lines.push_back(outcome_of(line, repair));
   std::stable_sort(repair.lines.begin(), repair.lines.end(),

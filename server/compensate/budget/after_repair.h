@@ -31,7 +31,8 @@ struct AfterRepair {
   std::string model;           ///< id of the one before
   ErrorBudget before, now;     ///< of both models, at the poses after the repair
   ModelDifference difference;  ///< now minus before
-  std::vector<LineOutcome> lines;  ///< those that stood out before, and lost zeros; the largest first
+  std::vector<LineOutcome>
+      lines;  ///< those that stood out before, and lost zeros; the largest first
 };
 
 /// `before` and `now` are of one drawing; `poses` are not empty, and both models know their tools

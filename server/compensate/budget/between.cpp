@@ -110,8 +110,7 @@ void add_load(const ModelParts& before, const ModelParts& now, PredictedDifferen
   Eigen::Matrix3Xd load(3, std::ssize(predicted.poses));
   for (Eigen::Index i = 0; i < load.cols(); ++i) {
     const PoseContext& pose = predicted.poses[static_cast<std::size_t>(i)];
-    load.col(i) =
-        now.physics.pose_W(pose).translation() - as_before.pose_W(pose).translation();
+    load.col(i) = now.physics.pose_W(pose).translation() - as_before.pose_W(pose).translation();
   }
   if (load.isZero(0)) return;
   predicted.load = std::move(load);
@@ -132,7 +131,8 @@ ModelDifference difference_between(const CompensatedModel& before, const Compens
   difference.parameters = parameters_of(found, before.parts().physics, now.parts().physics);
   const std::vector<ErrorPrediction> old_poses = before.predict_all(poses),
                                      new_poses = now.predict_all(poses);
-  PredictedDifference predicted{poses, Eigen::Matrix3Xd(3, std::ssize(poses)),
+  PredictedDifference predicted{poses,
+                                Eigen::Matrix3Xd(3, std::ssize(poses)),
                                 Eigen::Matrix3Xd(3, std::ssize(poses)),
                                 {},
                                 {}};

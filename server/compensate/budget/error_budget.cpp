@@ -284,8 +284,8 @@ std::vector<BudgetLine> between_sessions(const PhysicalModel& model,
     const auto found = since.find(model.sources[items[k].source]->name());
     const std::vector<Eigen::Index> at = where_it_acts(effects.lines[k]);
     if (found == since.end() || at.empty()) continue;
-    lines.push_back(sized(items[k].line, effects.lines[k](Eigen::all, at),
-                          effects.total(Eigen::all, at)));
+    lines.push_back(
+        sized(items[k].line, effects.lines[k](Eigen::all, at), effects.total(Eigen::all, at)));
     lines.back().since_session = found->second;
   }
   std::stable_sort(lines.begin(), lines.end(), [](const BudgetLine& one, const BudgetLine& other) {

@@ -30,16 +30,21 @@ const std::vector<Maker>& makers() {
         "tooldata: mass, cog; LoadIdentify",
         {"axis 1", "axis 2", "axis 3", "axis 4", "axis 5", "axis 6"}}},
       {"kuka",
-       {"KUKA", "mastering of the axis (Start-up > Master), with the offset for the tool",
-        "$machine.dat, by KUKA's service alone", "Load data of the tool ($LOAD): M, X, Y, Z",
+       {"KUKA",
+        "mastering of the axis (Start-up > Master), with the offset for the tool",
+        "$machine.dat, by KUKA's service alone",
+        "Load data of the tool ($LOAD): M, X, Y, Z",
         {"A1", "A2", "A3", "A4", "A5", "A6"}}},
       {"fanuc",
        {"FANUC",
         "MENU > SYSTEM > Master/Cal, single-axis mastering ($DMR_GRP.$MASTER_COUN), then CALIBRATE",
-        "not in the controller, but by iRCalibration", "MOTION PAYLOAD SET ($PLST_GRP)",
+        "not in the controller, but by iRCalibration",
+        "MOTION PAYLOAD SET ($PLST_GRP)",
         {"J1", "J2", "J3", "J4", "J5", "J6"}}},
       {"yaskawa",
-       {"Yaskawa", "HOME POSITION of the axis (ROBOT > HOME POSITION)", "not in the controller",
+       {"Yaskawa",
+        "HOME POSITION of the axis (ROBOT > HOME POSITION)",
+        "not in the controller",
         "TOOL: W, Xg, Yg, Zg; W.GRAV.POS measurement",
         {"S", "L", "U", "R", "B", "T"}}},
       {"universal robots",
@@ -136,10 +141,11 @@ std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chai
                                words.maker.empty() ? "in the controller" : words.maker,
                                words.zeros));
   for (const ZeroRemedy& zero : zeros)
-    text.push_back(
-        fmt::format("  {}: {}{}", joint_and_axis(zero.joint, words),
-                    signed_value(zero.add, zero.u95, zero.unit),
-                    robot.joint(zero.joint).sign < 0 ? " (as the controller counts, against the right-hand rule)" : ""));
+    text.push_back(fmt::format("  {}: {}{}", joint_and_axis(zero.joint, words),
+                               signed_value(zero.add, zero.u95, zero.unit),
+                               robot.joint(zero.joint).sign < 0
+                                   ? " (as the controller counts, against the right-hand rule)"
+                                   : ""));
   if (zeros.empty()) text.emplace_back("zeros: none is off by more than its uncertainty");
   text.push_back(fmt::format("lengths: {}", words.lengths));
   text.push_back(fmt::format("load data: {}", words.load));
