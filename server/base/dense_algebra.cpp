@@ -1,0 +1,2 @@
+#define TRAMMEL_DENSE_ALGEBRA template
+#include "server/base/dense_algebra.h"
