@@ -136,14 +136,13 @@ TEST_P(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
   ASSERT_TRUE(store_->add_batch(batch("b", "2", "r2"), job()));
   StoredJob both = job();
   both.batch_ids = {"b", "a"};
-  both.asked = AskedTraining{"M2"};
-  both.bias = "matern52";
+  both.asked = AskedTraining{"M2", "matern52"};
   const auto queued = store_->add_job(both);
   ASSERT_TRUE(queued) << queued.error().message;
   const auto read = store_->job(queued->id);
   EXPECT_EQ(read->batch_ids, both.batch_ids);
-  EXPECT_EQ(read->level, "M2");
-  EXPECT_EQ(read->bias, "matern52");
+  EXPECT_EQ(std::get<AskedTraining>(read->asked).level, "M2");
+  EXPECT_EQ(std::get<AskedTraining>(read->asked).bias, "matern52");
 }
 
 TEST_P(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
