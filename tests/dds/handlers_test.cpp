@@ -745,7 +745,7 @@ TEST_F(HandlersTest, ABatchIsReleasedOnlyWithATrainingThatIsAccepted) {
   const auto accepted = handlers_.answer(request);
   ASSERT_TRUE(accepted) << accepted.error().message;
   EXPECT_GT(accepted->job(), 0);
-  EXPECT_EQ(backend_.store->job(accepted->job())->level, "M1");
+  EXPECT_EQ(std::get<AskedTraining>(backend_.store->job(accepted->job())->asked).level, "M1");
   EXPECT_TRUE(*backend_.store->may_release(accepted->job()));
   EXPECT_EQ(backend_.trainer->quarantined("")->size(), 1u) << "until its model is put in force";
   EXPECT_TRUE(happens_once(request));
