@@ -150,6 +150,8 @@ TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
   const json told = json_in("h.json");
   EXPECT_EQ(told.at("verdict"), "changed");
   EXPECT_EQ(told.at("budget").at("lines").at(0).at("line"), "zero:4");
+  EXPECT_NE(told.at("budget").at("sentences").at(0).get<std::string>().find("mm alone"),
+            std::string::npos);
   EXPECT_EQ(told.at("notes").back().at("code"), "robot_not_confirmed");
   std::vector<std::string> strictly = changed;
   strictly.emplace_back("--strict");
@@ -185,6 +187,64 @@ TEST_F(Compare, RemediesTellEachStepWhatItSetsAndWhatItLeaves) {
               lines[k].at("alone_rms_mm").get<double>())
         << k;
   EXPECT_EQ(told.at("notes").back().at("code"), "robot_not_confirmed");
+}
+
+TEST_F(Compare, AfterARepairDiagnoseSaysOfEachLineWhetherItHelped) {
+  const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
+  measure("repaired", cell, TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", 6);
+  const auto since = [&](const std::string& batch) {
+    EXPECT_EQ(trammel({"diagnose", "--cell", cell, "--batch", file(batch + ".csv"), "--since",
+                       file("now.model"), "--json", file("d.json"), "--report", file("d.html")}),
+              0);
+    return json_in("d.json").at("since");
+  };
+  const auto zero_4 = [](const json& told) {
+    for (const json& line : told.at("lines"))
+      if (line.at("line") == "zero:4") return line;
+    return json();
+  };
+  const json helped = since("repaired");
+  ASSERT_TRUE(zero_4(helped).is_object()) << helped;
+  EXPECT_EQ(zero_4(helped).at("helped"), "put_right") << helped;
+  EXPECT_NEAR(zero_4(helped).at("moved").at("value").get<double>(),
+              (kZeroBefore - kZero) / kDegree, 0.03);
+  EXPECT_LT(helped.at("now_rms_mm").get<double>(), helped.at("before_rms_mm").get<double>());
+  EXPECT_NE(text_of(file("d.html")).find("did it help"), std::string::npos);
+  EXPECT_EQ(zero_4(since("fresh")).at("helped"), "not_moved") << "nobody repaired it";
+}
+
+TEST_F(Compare, RemediesPlanThePosesThatProveThemAfterwards) {
+  ASSERT_EQ(trammel({"remedies", "--model", file("now.model"), "--json", file("r.json"),
+                     "--check-poses", file("prove.csv")}),
+            0);
+  const json told = json_in("r.json");
+  EXPECT_EQ(told.at("check_poses").at("poses").size(), 30u);
+  EXPECT_EQ(told.at("check_poses").at("columns").at(0), "q1_deg");
+  EXPECT_EQ(told.at("zeros").at(0).at("axis").get<std::string>().substr(0, 5), "axis ");
+  ASSERT_EQ(trammel({"simulate", "--cell", TRAMMEL_SOURCE_DIR "/config/cell-7.yaml", "--truth",
+                     TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", "--plan",
+                     file("prove.csv"), "-o", file("proved.csv")}),
+            0)
+      << "the plan can be measured";
+}
+
+TEST_F(Compare, ALoadThatIsAnotherHasALineOfItsOwn) {
+  const std::string shipped = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
+  folder_->write("same.yaml", text_of(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"));
+  const std::string lighter = folder_->write(
+      "lighter.yaml", replaced(replaced(text_of(shipped), "../models/abb_irb6640-205-275.yaml",
+                                        "same.yaml"),
+                               "mass_kg: 94.5", "mass_kg: 20"));
+  make("lighter", lighter, TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", 7);
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("lighter.model"), "--json",
+                     file("c.json")}),
+            0);
+  const json& lines = json_in("c.json").at("budget").at("beyond_frames").at("lines");
+  const json first = lines.at(0);
+  EXPECT_EQ(first.at("line"), "payload") << lines;
+  EXPECT_NEAR(first.at("value").get<double>(), 20 - 94.5, 1e-9);
+  EXPECT_EQ(first.at("unit"), "kg");
+  EXPECT_GT(first.at("share").get<double>(), 0.8);
 }
 
 TEST_F(Compare, APredictedProgramHasTheNotesOfItsModelAsCodes) {

@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "server/base/text_file.h"
+#include "server/compensate/budget/after_repair.h"
 #include "server/compensate/budget/between.h"
 #include "server/compensate/budget/budget_words.h"
 #include "server/compensate/budget/remedies.h"
@@ -345,6 +346,80 @@ TEST(ErrorBudget, BetweenTwoModelsIsARippleThatGrewAtItsOwnOrder) {
   const ModelDifference gone =
       difference_between(other, trained(before, "base, geometry"), at_poses_of(other, 60));
   EXPECT_EQ(gone.budget.beyond_frames.lines.front().line, "gear_transmission:3");
+}
+
+/// The outcome of zero 4 in a model of `after`, held against one in which it was off by 3 degrees.
+LineOutcome::Helped outcome_of_zero_4(const World& after) {
+  World before;
+  before.zeros(3) = 3 * kDegree;
+  const CompensatedModel one = trained(before, "base, geometry"),
+                         other = trained(after, "base, geometry");
+  const AfterRepair repair = after_repair(one, other, at_poses_of(one, 60));
+  const auto line = std::find_if(repair.lines.begin(), repair.lines.end(),
+                                 [](const LineOutcome& each) { return each.line == "zero:4"; });
+  if (line == repair.lines.end()) {
+    ADD_FAILURE() << "zero 4 is no line";
+    return LineOutcome::Helped::kCannotTell;
+  }
+  EXPECT_NEAR(line->before.value, 3, 0.05);
+  EXPECT_NEAR(line->now.value, after.zeros(3) / kDegree, 0.05);
+  EXPECT_GT(1e3 * line->alone_before, 1);
+  return line->helped;
+}
+
+TEST(ErrorBudget, AfterARepairSaysWhetherItHelped) {
+  using Helped = LineOutcome::Helped;
+  World after;
+  EXPECT_EQ(outcome_of_zero_4(after), Helped::kPutRight);
+  after.zeros(3) = 3 * kDegree;
+  EXPECT_EQ(outcome_of_zero_4(after), Helped::kNotMoved);
+  after.zeros(3) = 1 * kDegree;
+  EXPECT_EQ(outcome_of_zero_4(after), Helped::kPartly);
+  after.zeros(3) = -3 * kDegree;
+  EXPECT_EQ(outcome_of_zero_4(after), Helped::kTooFar) << "twice the remedy";
+  after.zeros(3) = 6 * kDegree;
+  EXPECT_EQ(outcome_of_zero_4(after), Helped::kWrongWay) << "the remedy with the wrong sign";
+}
+
+TEST(ErrorBudget, OfSeveralWrongLengthsAsksFirstWhetherTheFileIsOfThisRobot) {
+  ErrorBudget budget;
+  for (const int link : {2, 4}) {
+    BudgetLine line;
+    line.line = fmt::format("length:{}", link);
+    line.kind = LineKind::kLength;
+    line.name = fmt::format("the length of link {}", link);
+    line.value = BudgetNumber{fmt::format("a{}", link), 150, 0.1, "mm"};
+    line.action = "compare the robot file with the maker's drawing";
+    budget.as_it_stands.lines.push_back(line);
+  }
+  EXPECT_EQ(in_words(budget).front().find("is this the file of this robot?"), 0u)
+      << in_words(budget).front();
+  budget.as_it_stands.lines.pop_back();
+  EXPECT_EQ(in_words(budget).front().find("is this the file"), std::string::npos)
+      << "one link may be bent";
+}
+
+TEST(ErrorBudget, NamesAnAxisAsItsMakerDoes) {
+  const auto robot = [](const char* file) {
+    return test::demand(parse_robot(
+        test::demand(read_text_file(std::string(TRAMMEL_SOURCE_DIR "/models/") + file)), file));
+  };
+  EXPECT_EQ(makers_words(robot("kuka_kr210-r2700-extra.yaml")).axis(3), "A4");
+  EXPECT_EQ(makers_words(robot("yaskawa_gp25.yaml")).axis(3), "R");
+  EXPECT_EQ(makers_words(robot("kuka_lbr-iiwa-7-r800.yaml")).axis(6), "joint 7")
+      << "an arm of seven joints counts otherwise";
+}
+
+TEST(ErrorBudget, TellsWhatOneOfSeveralZerosDoesByItself) {
+  World world;
+  const CompensatedModel model = trained(world, "base, geometry");
+  const MeasurementBatch batch = measured(world, drawn_poses(60));
+  World off = world;
+  off.zeros(3) = 1 * kDegree;
+  const double as_it_stands = alone_by_hand(off, 3, drawn_poses(60));
+  const double beyond = 1e3 * alone_of_zero(model, 3, 1 * kDegree, batch);
+  EXPECT_LT(beyond, as_it_stands);
+  EXPECT_GT(beyond, 0.5 * as_it_stands);
 }
 
 TEST(ErrorBudget, BetweenAModelAndItselfIsNothing) {

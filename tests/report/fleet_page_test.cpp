@@ -14,7 +14,9 @@ bool has(const std::string& page, const std::string& part) {
 TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
   const ordered_json fleet = ordered_json::parse(
       R"({"cells": [{"cell": "a<b>", "version": 3, "robot": "R", "model": "0123", "health": {"verdict": "cannot_tell",
-          "due": "2026-12-01"}, "unlike_twins": [{"sentence": "a2 is 0.3 mm longer"}]},
+          "due": "2026-12-01"}, "unlike_twins": [{"sentence": "a2 is 0.3 mm longer"}],
+          "lines_among_sisters": [{"differs": true, "sentence": "the zero of joint 4 is off"},
+          {"differs": false, "sentence": "the zero of joint 5 is not"}]},
           {"cell": "b", "version": null, "health": {"verdict": "changed"}, "unlike_twins": []},
           {"cell": "c", "version": null, "health": null}], "types": [{"robot": "R", "robots": 3}]})");
   const std::string page = fleet_page(fleet, 1'763'942'400);
@@ -23,6 +25,8 @@ TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
         "like its twins", "not checked yet", "no model in force", "R: 3 robots", "2025-11-24",
         "3 robots: 1 changed, 1 not checked yet."})
     EXPECT_TRUE(has(page, part)) << part << "\n" << page;
+  EXPECT_TRUE(has(page, "the zero of joint 4 is off"));
+  EXPECT_FALSE(has(page, "the zero of joint 5 is not"));
 }
 
 TEST(FleetPage, OfWhatItCannotReadLeavesOut) {

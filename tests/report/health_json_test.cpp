@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/error_sources/catalogue.h"
+#include "server/report/budget_json.h"
 
 namespace trammel {
 namespace {
@@ -53,6 +54,23 @@ TEST(HealthJson, TellsWhatChangedInTheLinesOfABudgetTheLargestFirst) {
       EXPECT_TRUE(line.contains(key)) << key;
     }
   }
+}
+
+TEST(HealthJson, ALineHasTheShapeThatEveryBudgetHasAndNullForWhatACheckDoesNotKnow) {
+  HealthCheck check = made_up_check();
+  check.changed = {check.changed.back()};
+  check.changed.front().zeros = {{3, 0.1 * kDegree, 0.002 * kDegree},
+                                 {4, -0.2 * kDegree, 0.003 * kDegree}};
+  const auto budget = health_json(check, {}).at("budget");
+  const auto& line = budget.at("lines").at(0);
+  const auto shape = budget_line_json({});
+  for (const auto& [key, value] : shape.items()) EXPECT_TRUE(line.contains(key)) << key;
+  EXPECT_TRUE(line.at("alone_rms_mm").is_null()) << "what one of two does needs a model";
+  EXPECT_TRUE(line.at("share").is_null());
+  EXPECT_EQ(budget.at("sentences").size(), 2u);
+  EXPECT_NE(budget.at("sentences").at(0).get<std::string>().find("re-master joint 4"),
+            std::string::npos)
+      << budget.at("sentences");
 }
 
 }  // namespace

@@ -87,8 +87,8 @@ TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CheckedBatch batch = sessions_of(robot, test::with_zero_off(robot, 3, 2e-4), 4, 2, 1003);
-  const std::vector<SessionChange> changes =
-      session_changes(test::demand(train(cell, batch, kPhysics)));
+  const CompensatedModel model = test::demand(train(cell, batch, kPhysics));
+  const std::vector<SessionChange> changes = session_changes(model);
   ASSERT_EQ(changes.size(), 1u);
   const SessionChange& change = changes.front();
   EXPECT_EQ(change.cause, "joint_slip");
@@ -99,6 +99,18 @@ TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
   EXPECT_EQ(change.sizes.front().unit, "mrad");
   EXPECT_LT(change.sizes.front().u95, 0.05);
   EXPECT_NEAR(change.sizes.front().value, 0.2, 2 * change.sizes.front().u95);
+  ASSERT_TRUE(model.parts().budget);
+  const std::vector<BudgetLine>& between = model.parts().budget->between_sessions;
+  ASSERT_EQ(between.size(), 1u) << "what changed has a budget of its own";
+  EXPECT_EQ(between.front().since_session, "day-3");
+  EXPECT_EQ(between.front().joint, 2);
+  // Half of the poses are of sessions since: over all poses the line is smaller by sqrt(2).
+  const BudgetLine* of_all = model.parts().budget->line(between.front().line);
+  ASSERT_NE(of_all, nullptr);
+  EXPECT_NEAR(between.front().alone_rms / of_all->alone_rms, 1.414, 0.15);
+  const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
+  ASSERT_EQ(again.parts().budget->between_sessions.size(), 1u);
+  EXPECT_EQ(again.parts().budget->between_sessions.front().since_session, "day-3");
 }
 
 TEST(Sessions, WhereNoClockTellsTheirOrderTheModelSaysOnWhatItRests) {
