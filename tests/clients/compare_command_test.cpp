@@ -239,9 +239,9 @@ TEST_F(Compare, ALoadThatIsAnotherHasALineOfItsOwn) {
   ASSERT_EQ(trammel({"compare", file("before.model"), file("lighter.model"), "--json",
                      file("c.json")}),
             0);
-  const json& lines = json_in("c.json").at("budget").at("beyond_frames").at("lines");
-  const json first = lines.at(0);
-  EXPECT_EQ(first.at("line"), "payload") << lines;
+  const json told = json_in("c.json");
+  const json& first = told.at("budget").at("beyond_frames").at("lines").at(0);
+  EXPECT_EQ(first.at("line"), "payload") << told;
   EXPECT_NEAR(first.at("value").get<double>(), 20 - 94.5, 1e-9);
   EXPECT_EQ(first.at("unit"), "kg");
   EXPECT_GT(first.at("share").get<double>(), 0.8);

@@ -401,8 +401,7 @@ TEST(ErrorBudget, OfSeveralWrongLengthsAsksFirstWhetherTheFileIsOfThisRobot) {
 
 TEST(ErrorBudget, NamesAnAxisAsItsMakerDoes) {
   const auto robot = [](const char* file) {
-    return test::demand(parse_robot(
-        test::demand(read_text_file(std::string(TRAMMEL_SOURCE_DIR "/models/") + file)), file));
+    return test::demand(read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + file));
   };
   EXPECT_EQ(makers_words(robot("kuka_kr210-r2700-extra.yaml")).axis(3), "A4");
   EXPECT_EQ(makers_words(robot("yaskawa_gp25.yaml")).axis(3), "R");
