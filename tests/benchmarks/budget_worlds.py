@@ -3,9 +3,11 @@
 
 The arms are the shipped ones; their kinematics are written down here once more. Prints how often the first line is the
 one that does most in truth (by itself, or named beside the one that leads), how often a value lies within U, how near its
-millimetres are, and how many healthy arms get an action. Positions only; no loads, gearboxes or ripples. Each gross error
-is beyond what stands out, at 60 to 300 poses; with `--small` it is from 0.2 mrad and 0.2 mm on, at 20 to 400 poses. Lines
-that name others are not held against U: their value is of all of them together.
+millimetres are, how often a pair that no pose can tell apart is named as one, and how many healthy arms get an action.
+A world measures positions or full poses. Every third arm carries a load: its gearboxes give way, and one of them may be
+the gross error. Every third has a gear ripple in joint 3, which may be it, too. Each gross error is beyond what stands
+out, at 60 to 300 poses; with `--small` it is from 0.2 mrad and 0.2 mm on, at 20 to 400 poses. Lines that name others are
+not held against U: their value is of all of them together.
 
     tests/benchmarks/budget_worlds.py --trammel build/release/clients/cli/trammel --worlds 40 --healthy 20
 """
@@ -20,6 +22,9 @@ import tempfile
 import numpy as np
 import yaml
 
+ORDER = 20  # waves of the ripple in a turn of joint 3
+COG = 150.0  # mm from the flange to where the load pulls
+KINDS = ["plain", "load", "ripple"]
 MODELS = pathlib.Path(__file__).resolve().parents[2] / "models"
 ARMS = ["abb_irb120-3-06", "abb_irb1200-5-09", "abb_irb6640-205-275", "fanuc_m-20ia", "kuka_kr210-r2700-extra",
         "kuka_lbr-iiwa-7-r800", "staubli_tx2-90l", "universal-robots_ur10", "yaskawa_gp25"]
@@ -50,6 +55,10 @@ class Arm:
         self.n = len(self.rows)
         self.drive = np.diag([float(row.get("sign", 1)) for row in self.rows])
         self.transmission = self.drive.copy()
+        # Its load bends each joint by about 0.2 mrad where the arm is half stretched.
+        reach = sum(abs(row["a_mm"]) + abs(row.get("d_mm", 0)) for row in self.rows)
+        self.load = max(3.0, 100 * (reach / 3500) ** 2)  # kg
+        self.soft = 2e-4 / (9.8 * self.load * 0.5 * reach)  # rad/Nmm
         for coupling in data.get("coupling") or []:
             self.transmission[coupling["joint"] - 1, coupling["follows"] - 1] += coupling["ratio"]
 
@@ -60,14 +69,13 @@ class Arm:
             yield f"twist:alpha{k}"
             yield f"twist:beta{k}" if row.get("hayati") else f"length:d{k}"
 
-    def tip(self, q, errors):
-        """Tip in mm; `q` commanded, rad."""
+    def links(self, theta, errors):
+        """4 x 4 of each axis before its joint turns, and of the flange."""
         get = errors.get
-        zeros = np.array([get(f"zero:{k + 1}", 0.0) for k in range(self.n)])
-        # The controller's couplings change how q is counted; a zero moves its own axis alone.
-        theta = self.transmission @ q + self.drive @ zeros
         T = shift(*get("base", (0, 0, 0)))
+        frames = []
         for k, row in enumerate(self.rows):
+            frames.append(T)
             angle = math.radians(row["theta_deg"]) + theta[k]
             a = row["a_mm"] + get(f"length:a{k + 1}", 0.0)
             alpha = math.radians(row["alpha_deg"]) + get(f"twist:alpha{k + 1}", 0.0)
@@ -76,8 +84,27 @@ class Arm:
             else:
                 d = row["d_mm"] + get(f"length:d{k + 1}", 0.0)
                 T = T @ shift(0, 0, d) @ turn("z", angle) @ shift(a, 0, 0) @ turn("x", alpha)
-        tool = np.array([40.0, -25.0, 140.0]) + np.array(get("tool", (0, 0, 0)))
-        return (T @ np.append(tool, 1))[:3]
+        return frames, T
+
+    def pose(self, q, errors, load=0.0):
+        """The tool, 4 x 4, mm; `q` commanded, rad; `load` in kg, COG mm out of the flange."""
+        get = errors.get
+        zeros = np.array([get(f"zero:{k + 1}", 0.0) for k in range(self.n)])
+        # The controller's couplings change how q is counted; a zero moves its own axis alone.
+        theta = self.transmission @ q + self.drive @ zeros
+        theta[2] += get("gear_transmission:3", 0.0) * math.sin(ORDER * theta[2])
+        if load > 0:
+            frames, flange = self.links(theta, errors)
+            at = (flange @ np.array([0, 0, COG, 1]))[:3]
+            weight = np.array([0, 0, -9.80665 * load])
+            for k, frame in enumerate(frames):  # a gearbox gives way by the torque about its axis, N mm
+                torque = frame[:3, 2] @ np.cross(at - frame[:3, 3], weight)
+                theta[k] += get(f"compliance:{k + 1}", 0.0) * torque
+        _, flange = self.links(theta, errors)
+        return flange @ shift(*(np.array([40.0, -25.0, 140.0]) + np.array(get("tool", (0, 0, 0)))))
+
+    def tip(self, q, errors, load=0.0):
+        return self.pose(q, errors, load)[:3, 3]
 
     def draw_poses(self, rng, count):
         low = np.radians([max(row["limits_deg"][0], -100) for row in self.rows])
@@ -86,8 +113,13 @@ class Arm:
         return [middle + half * rng.uniform(-0.7, 0.7, self.n) for _ in range(count)]
 
 
-def usual_errors(arm, rng):
+def usual_errors(arm, rng, kind="plain"):
     errors = {}
+    if kind == "load":
+        for k in range(1, arm.n + 1):
+            errors[f"compliance:{k}"] = arm.soft * float(rng.uniform(0.5, 1))
+    if kind == "ripple":
+        errors["gear_transmission:3"] = 1e-4
     for key in arm.keys():
         size = 0.1 if key.startswith("length") else 1.5e-4
         errors[key] = float(rng.normal(0, size))
@@ -95,9 +127,14 @@ def usual_errors(arm, rng):
     return errors
 
 
-def gross_error(arm, rng, small):
-    """A key and its error: a zero of up to 5 degrees, a length of up to 10 mm, a twist, a tool, the base. `small`: from
-    0.2 mrad and 0.2 mm on, of any joint; else beyond what stands out, and of joints that frames do not take."""
+def gross_error(arm, rng, small, world="plain"):
+    """A key and its error: a zero of up to 5 degrees, a length of up to 10 mm, a twist, a tool, the base; of a `load` world
+    a gearbox of joint 2 or 3, of a `ripple` world the ripple. `small`: from 0.2 mrad and 0.2 mm on, of any joint; else
+    beyond what stands out, and of joints that frames do not take."""
+    if world == "load" and rng.random() < 0.5:
+        return f"compliance:{rng.integers(2, 4)}", arm.soft * float(rng.uniform(4, 12))
+    if world == "ripple" and rng.random() < 0.5:
+        return "gear_transmission:3", float(rng.uniform(3e-4, 3e-3))
     joints = range(1, arm.n + 1) if small else range(2, arm.n)
     kind = rng.choice(["zero", "zero", "length", "twist", "tool", "base"] if small else
                       ["zero", "zero", "length", "twist", "tool"])
@@ -118,20 +155,40 @@ def gross_error(arm, rng, small):
     return f"twist:alpha{k}", drawn(least_angle, 3e-2)
 
 
-def cell_files(folder, arm):
+def cell_files(folder, arm, kind):
     (folder / "robot.yaml").write_text((MODELS / f"{arm.name}.yaml").read_text())
+    more = {"plain": "", "load": ", compliance", "ripple": f", 'gear_transmission:3@{ORDER}'"}[kind]
+    payload = f"payloads: {{load: {{mass_kg: {arm.load}, cog_mm: [0, 0, {COG}]}}}}\n" if kind == "load" else ""
     (folder / "cell.yaml").write_text(
         "version: 1\ncell: world\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}\n"
+        f"gravity: [0, 0, -1]\n{payload}"
         "tools: {tip: {xyz_mm: [40, -25, 140], q_wxyz: [1, 0, 0, 0]}}\n"
-        "tracker: {sigma_mm: 0.02, sigma_deg: 0.003}\nmodel: {error_sources: [base, geometry, tool], bias: none}\n")
+        f"tracker: {{sigma_mm: 0.02, sigma_deg: 0.003}}\nmodel: {{error_sources: [base, geometry, tool{more}], bias: none}}\n")
 
 
-def batch_file(path, arm, errors, poses, rng):
-    lines = ["pose_id," + ",".join(f"q{k + 1}_deg" for k in range(arm.n)) + ",x_mm,y_mm,z_mm"]
-    for i, q in enumerate(poses):
-        q = np.radians(np.round(np.degrees(q), 4))
-        p = arm.tip(q, errors) + rng.normal(0, 0.02, 3)
-        lines.append(f"p{i + 1}," + ",".join(f"{v:.4f}" for v in np.degrees(q)) + "," + ",".join(f"{v:.5f}" for v in p))
+def quaternion(R):
+    """w, x, y, z of a rotation matrix."""
+    w, v = np.linalg.eigh(np.array([
+        [R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+        [R[2, 1] - R[1, 2], R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
+        [R[0, 2] - R[2, 0], R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
+        [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1]]]))
+    return v[:, np.argmax(w)]
+
+
+def batch_file(path, world, rng):
+    arm = world.arm
+    full = ",qw,qx,qy,qz" if world.full else ""
+    lines = ["pose_id," + ",".join(f"q{k + 1}_deg" for k in range(arm.n)) + ",x_mm,y_mm,z_mm" + full]
+    for i, q in enumerate(world.poses):
+        T = arm.pose(q, world.errors, world.load)
+        numbers = [f"{v:.4f}" for v in np.degrees(q)] + [f"{v:.5f}" for v in T[:3, 3] + rng.normal(0, 0.02, 3)]
+        if world.full:
+            turned = T[:3, :3]
+            for axis, angle in zip("xyz", rng.normal(0, math.radians(0.003), 3)):
+                turned = turn(axis, angle)[:3, :3] @ turned
+            numbers += [f"{v:.9f}" for v in quaternion(turned)]
+        lines.append(f"p{i + 1}," + ",".join(numbers))
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -140,26 +197,95 @@ def line_of(key):
     return re.sub(r"^(length|twist):[a-z]+", r"\1:", key)
 
 
-def alone_mm(arm, errors, key, poses):
-    without = {k: v for k, v in errors.items() if line_of(k) != line_of(key)}
-    return math.sqrt(np.mean([np.sum((arm.tip(q, errors) - arm.tip(q, without)) ** 2) for q in poses]))
+class World:
+    """An arm with hidden errors, the poses that it is measured at, and what each error does to them."""
+
+    def __init__(self, number, rng, gross=0, small=False, counts=(40, 200)):
+        self.arm = Arm(ARMS[number % len(ARMS)])
+        self.kind = KINDS[(number // len(ARMS) + number) % len(KINDS)]
+        self.errors = usual_errors(self.arm, rng, self.kind)
+        self.gross = dict(gross_error(self.arm, rng, small, self.kind) for _ in range(gross))
+        self.errors.update(self.gross)
+        self.full = bool(rng.integers(2))
+        self.load = self.arm.load if self.kind == "load" else 0.0
+        self.poses = [np.radians(np.round(np.degrees(q), 4))
+                      for q in self.arm.draw_poses(rng, int(rng.integers(*counts)))]
+
+    def alone_mm(self, line):
+        without = {k: v for k, v in self.errors.items() if line_of(k) != line}
+        return math.sqrt(np.mean([np.sum((self.arm.tip(q, self.errors, self.load) - self.arm.tip(q, without, self.load)) ** 2)
+                                  for q in self.poses]))
+
+    def pairs(self):
+        """Two lines of which no position can tell the one hidden here from the other."""
+        if "zero:1" in self.gross:
+            yield "zero:1", "base"
+        tool = self.gross.get("tool", (1, 1, 1))
+        if tool[0] == tool[1] == 0 and "d_mm" in self.arm.rows[-1] and self.arm.rows[-1]["alpha_deg"] == 0:
+            yield "tool", f"length:{self.arm.n}"
 
 
-def budget_of(trammel, folder, arm, errors, count, rng):
-    poses = arm.draw_poses(rng, count)
-    cell_files(folder, arm)
-    batch_file(folder / "batch.csv", arm, errors, poses, rng)
+def budget_of(trammel, folder, world, rng):
+    cell_files(folder, world.arm, world.kind)
+    batch_file(folder / "batch.csv", world, rng)
     done = subprocess.run([trammel, "train", "--cell", "cell.yaml", "--batch", "batch.csv", "-o", "m.model", "--json", "-"],
                           cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise SystemExit(f"{arm.name}: {done.stderr}")
-    return json.loads(done.stdout)["budget"], poses
+        raise SystemExit(f"{world.arm.name}: {done.stderr}")
+    return json.loads(done.stdout)["budget"]
 
 
-def value_of(key, error):
+def hidden_value(key, error):
+    """As people read it: mm, deg, or the unit of a gearbox."""
     if isinstance(error, tuple):
         return float(np.linalg.norm(error))
-    return error if key.startswith("length") else math.degrees(error)
+    return error if key.startswith(("length", "compliance")) else math.degrees(error)
+
+
+class Counts:
+    """How often a budget is right."""
+
+    def __init__(self):
+        self.right = self.inside = self.near = self.values = self.lines = self.pairs = self.named = self.worlds = 0
+
+    def add(self, name, world, budget, verbose):
+        by_line = {line_of(key): key for key in world.gross}
+        sizes = {line: world.alone_mm(line) for line in {line_of(key) for key in world.errors}}
+        largest = max(sizes, key=sizes.get)
+        first = budget["lines"][0]
+        good = max(sizes.get(one, 0) for one in [first["line"], *first["with"]]) >= 0.8 * sizes[largest]
+        self.worlds += 1
+        self.right += good
+        if not good:
+            print(f"{name} {len(world.poses)} poses: {world.gross} first {first['line']} with {first['with']}, "
+                  f"largest {largest} {sizes[largest]:.3f} mm")
+        for found in budget["lines"]:
+            if found["line"] in by_line:
+                self.add_line(name, by_line[found["line"]], found, world, sizes, verbose)
+        together = [{line["line"], *line["with"]} for line in budget["lines"]]
+        for pair in world.pairs():
+            is_named = any(set(pair) <= names for names in together)
+            self.pairs += 1
+            self.named += is_named
+            if not is_named:
+                print(f"{name}: {pair} is not named as a pair")
+
+    def add_line(self, name, key, found, world, sizes, verbose):
+        is_near = abs(found["alone_rms_mm"] - sizes[found["line"]]) <= 0.05 * sizes[found["line"]]
+        self.near += is_near
+        self.lines += 1
+        if verbose and not is_near:
+            print(f"{name}: {key} alone {found['alone_rms_mm']:.4f} mm, hidden {sizes[found['line']]:.4f}")
+        own = {number["name"]: number for number in found.get("numbers", [])}.get(key.partition(":")[2], found)
+        if found["with"] or own["value"] is None:  # the value is of all of them together, or there are several
+            return
+        self.values += 1
+        hidden = hidden_value(key, world.errors[key])
+        is_inside = abs(own["value"] - hidden) <= own["u95"]
+        self.inside += is_inside
+        if verbose and not is_inside:
+            print(f"{name} {len(world.poses)} poses: {key} {own['value']:.6g} +- {own['u95']:.2g} {own['unit']}, "
+                  f"hidden {hidden:.6g}")
 
 
 def main():
@@ -173,49 +299,22 @@ def main():
     asked = parser.parse_args()
     trammel = str(pathlib.Path(asked.trammel).resolve())
     rng = np.random.default_rng(asked.seed)
-    right = inside = near = values = lines = actions = 0
+    counts, actions = Counts(), 0
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        for world in range(asked.worlds):
-            arm = Arm(ARMS[world % len(ARMS)])
-            errors = usual_errors(arm, rng)
-            gross = dict(gross_error(arm, rng, asked.small) for _ in range(int(rng.integers(1, 5))))
-            errors.update(gross)
-            count = int(rng.integers(20, 400) if asked.small else rng.integers(60, 300))
-            budget, poses = budget_of(trammel, folder, arm, errors, count, rng)
-            by_line = {line_of(key): key for key in gross}
-            sizes = {line: alone_mm(arm, errors, line, poses) for line in {line_of(key) for key in errors}}
-            largest = max(sizes, key=sizes.get)
-            line = budget["lines"][0]
-            good = max(sizes.get(one, 0) for one in [line["line"], *line["with"]]) >= 0.8 * sizes[largest]
-            right += good
-            for found in budget["lines"]:
-                if found["line"] not in by_line:
-                    continue
-                key = by_line[found["line"]]
-                near += abs(found["alone_rms_mm"] - sizes[found["line"]]) <= 0.05 * sizes[found["line"]]
-                lines += 1
-                if found["with"]:  # the value is of all of them together
-                    continue
-                values += 1
-                own = {number["name"]: number for number in found.get("numbers", [])}.get(key.partition(":")[2], found)
-                is_inside = abs(own["value"] - value_of(key, errors[key])) <= own["u95"]
-                inside += is_inside
-                if asked.verbose and not is_inside:
-                    print(f"world {world} {arm.name}: {key} {own['value']:.4f} +- {own['u95']:.4f} {own['unit']}, "
-                          f"hidden {value_of(key, errors[key]):.4f}, with {found['with']}")
-            if not good:
-                print(f"world {world} {arm.name} {count} poses: {gross} first {line['line']} with {line['with']}, "
-                      f"largest {largest} {sizes[largest]:.3f} mm")
-        for world in range(asked.healthy):
-            arm = Arm(ARMS[world % len(ARMS)])
-            budget, _ = budget_of(trammel, folder, arm, usual_errors(arm, rng), int(rng.integers(40, 200)), rng)
-            acted = [line["line"] for line in budget["lines"] if line["action"]]
+        for number in range(asked.worlds):
+            world = World(number, rng, int(rng.integers(1, 5)), asked.small, (20, 400) if asked.small else (60, 300))
+            counts.add(f"world {number} {world.arm.name} ({world.kind})", world,
+                       budget_of(trammel, folder, world, rng), asked.verbose)
+        for number in range(asked.healthy):
+            world = World(number, rng)
+            acted = [line["line"] for line in budget_of(trammel, folder, world, rng)["lines"] if line["action"]]
             actions += bool(acted)
             if acted:
-                print(f"healthy {world} {arm.name}: {acted}")
-    print(f"first line right {right} of {asked.worlds}; value within U {inside} of {values}; "
-          f"millimetres within 5 % {near} of {lines}; healthy arms with an action {actions} of {asked.healthy}")
+                print(f"healthy {number} {world.arm.name}: {acted}")
+    print(f"first line right {counts.right} of {counts.worlds}; value within U {counts.inside} of {counts.values}; "
+          f"millimetres within 5 % {counts.near} of {counts.lines}; pairs named {counts.named} of {counts.pairs}; "
+          f"healthy arms with an action {actions} of {asked.healthy}")
 
 
 if __name__ == "__main__":
