@@ -206,8 +206,8 @@ TEST_F(Compare, AfterARepairDiagnoseSaysOfEachLineWhetherItHelped) {
   const json helped = since("repaired");
   ASSERT_TRUE(zero_4(helped).is_object()) << helped;
   EXPECT_EQ(zero_4(helped).at("helped"), "put_right") << helped;
-  EXPECT_NEAR(zero_4(helped).at("moved").at("value").get<double>(),
-              (kZeroBefore - kZero) / kDegree, 0.03);
+  EXPECT_NEAR(zero_4(helped).at("moved").at("value").get<double>(), (kZeroBefore - kZero) / kDegree,
+              0.03);
   EXPECT_LT(helped.at("now_rms_mm").get<double>(), helped.at("before_rms_mm").get<double>());
   EXPECT_NE(text_of(file("d.html")).find("did it help"), std::string::npos);
   EXPECT_EQ(zero_4(since("fresh")).at("helped"), "not_moved") << "nobody repaired it";
@@ -222,8 +222,8 @@ TEST_F(Compare, RemediesPlanThePosesThatProveThemAfterwards) {
   EXPECT_EQ(told.at("check_poses").at("columns").at(0), "q1_deg");
   EXPECT_EQ(told.at("zeros").at(0).at("axis").get<std::string>().substr(0, 5), "axis ");
   ASSERT_EQ(trammel({"simulate", "--cell", TRAMMEL_SOURCE_DIR "/config/cell-7.yaml", "--truth",
-                     TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", "--plan",
-                     file("prove.csv"), "-o", file("proved.csv")}),
+                     TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", "--plan", file("prove.csv"),
+                     "-o", file("proved.csv")}),
             0)
       << "the plan can be measured";
 }
@@ -232,13 +232,13 @@ TEST_F(Compare, ALoadThatIsAnotherHasALineOfItsOwn) {
   const std::string shipped = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
   folder_->write("same.yaml", text_of(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"));
   const std::string lighter = folder_->write(
-      "lighter.yaml", replaced(replaced(text_of(shipped), "../models/abb_irb6640-205-275.yaml",
-                                        "same.yaml"),
-                               "mass_kg: 100", "mass_kg: 20"));
+      "lighter.yaml",
+      replaced(replaced(text_of(shipped), "../models/abb_irb6640-205-275.yaml", "same.yaml"),
+               "mass_kg: 100", "mass_kg: 20"));
   make("lighter", lighter, TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", 7);
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("lighter.model"), "--json",
-                     file("c.json")}),
-            0);
+  ASSERT_EQ(
+      trammel({"compare", file("before.model"), file("lighter.model"), "--json", file("c.json")}),
+      0);
   const json told = json_in("c.json");
   const json& first = told.at("budget").at("beyond_frames").at("lines").at(0);
   EXPECT_EQ(first.at("line"), "payload") << told;

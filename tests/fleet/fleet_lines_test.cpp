@@ -24,8 +24,7 @@ ErrorBudget arm(std::mt19937_64& random, double lost = 0) {
   std::normal_distribution<double> deg(0, 0.03);
   ErrorBudget budget;
   for (int joint = 1; joint <= 6; ++joint)
-    budget.as_it_stands.lines.push_back(
-        zero(joint, deg(random) + (joint == 4 ? lost : 0), 0.004));
+    budget.as_it_stands.lines.push_back(zero(joint, deg(random) + (joint == 4 ? lost : 0), 0.004));
   BudgetLine base;
   base.line = "base";
   base.kind = LineKind::kBase;
