@@ -47,8 +47,11 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   if (!change.zeros.empty()) {
     json["zeros"] = ordered_json::array();
     for (const LostZero& zero : change.zeros)
-      json["zeros"].push_back(
-          {{"joint", zero.joint + 1}, {"deg", to_deg(zero.by)}, {"u95_deg", to_deg(zero.u95)}});
+      json["zeros"].push_back({{"joint", zero.joint + 1},
+                               {"deg", to_deg(zero.by)},
+                               {"u95_deg", to_deg(zero.u95)},
+                               {"effect_rms_mm", to_mm(zero.effect_rms)},
+                               {"effect_u95_mm", to_mm(zero.effect_u95)}});
   }
   json["p_value"] = change.p_value;
   json["since"] = {{"session_id", since.session_id}, {"pose_id", since.pose_id}};

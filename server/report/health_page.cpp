@@ -47,13 +47,14 @@ std::string change_of(const json& one) {
     if (zero.is_object() && zero.contains("joint") && zero.contains("deg") &&
         zero.contains("u95_deg") && zero["joint"].is_number_integer() && zero["deg"].is_number() &&
         zero["u95_deg"].is_number())
-      zeros.push_back(fmt::format("joint {} by {:.3f} ± {:.3f} deg", zero["joint"].get<int>(),
-                                  zero["deg"].get<double>(), zero["u95_deg"].get<double>()));
+      zeros.push_back(fmt::format("joint {} by {:.3f} ± {:.3f} deg, alone {}",
+                                  zero["joint"].get<int>(), zero["deg"].get<double>(),
+                                  zero["u95_deg"].get<double>(), mm_in(zero, "effect_rms_mm")));
   }
   if (zeros.empty()) return cause_of(one);
   return fmt::format(
       "{} ({})", zeros.size() > 1 ? "zeros of several joints: was it remastered?" : cause_of(one),
-      fmt::join(zeros, ", "));
+      fmt::join(zeros, "; "));
 }
 
 std::string figures(const json& found) {

@@ -109,6 +109,26 @@ std::vector<JointVector> spread_poses(int count, std::uint64_t seed) {
   return poses;
 }
 
+TEST(LostZerosOfSeveralJoints, HaveEachTheMillimetresThatACheckOfThatOneAloneTells) {
+  PlainCheck several{spread_poses(14, 5), JointVector::Zero(6)};
+  several.zeros << 0, 2e-3, -1.5e-3, 0, 2.5e-3, 0;
+  const HealthCheck all =
+      test::demand(checked(model_of_six_axes(), measured(test::irb120(), several)));
+  ASSERT_FALSE(all.changed.empty()) << all.sentence;
+  ASSERT_EQ(all.changed.front().zeros.size(), 3u) << all.sentence;
+  for (const LostZero& zero : all.changed.front().zeros) {
+    PlainCheck one = several;
+    one.zeros = several.zeros(zero.joint) * JointVector::Unit(6, zero.joint);
+    const HealthCheck alone =
+        test::demand(checked(model_of_six_axes(), measured(test::irb120(), one)));
+    ASSERT_FALSE(alone.changed.empty()) << alone.sentence;
+    EXPECT_NEAR(zero.effect_rms, alone.changed.front().effect_rms,
+                zero.effect_u95 + alone.changed.front().u95)
+        << all.sentence << alone.sentence;
+    EXPECT_LT(zero.effect_u95, 0.05 * zero.effect_rms) << all.sentence;
+  }
+}
+
 TEST(LostZeroOfTheLastJoint, StandsNotBesideAToolThatOrientationsShowNotToHaveTurned) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     PlainCheck knocked{spread_poses(14, seed), JointVector::Zero(6), true};
@@ -123,7 +143,7 @@ TEST(LostZeroOfTheLastJoint, StandsNotBesideAToolThatOrientationsShowNotToHaveTu
   }
 }
 
-TEST(LostZeroOfTheLastJoint, StandsBesideEveryToolThatSitsElsewhere) {
+TEST(LostZeroOfTheLastJoint, StandsBesideAToolThatMayHaveTurned) {
   for (const bool orientation : {false, true}) {
     for (const double zero : {0.0, 2e-4, 3e-3}) {
       PlainCheck knocked{spread_poses(14, 3), JointVector::Zero(6), orientation};

@@ -24,7 +24,7 @@ HealthCheck made_up_check() {
   SeenChange zero;
   zero.cause = {&cause_spelled("joint_slip"), 3};
   zero.effect_rms = 0.8e-3;
-  zero.zeros = {{3, 0.1 * kDegree, 0.002 * kDegree}};
+  zero.zeros = {{3, 0.1 * kDegree, 0.002 * kDegree, 0.8e-3, 0.02e-3}};
   check.changed = {length, zero};
   return check;
 }
@@ -71,6 +71,18 @@ TEST(HealthJson, ALineHasTheShapeThatEveryBudgetHasAndNullForWhatACheckDoesNotKn
   EXPECT_NE(budget.at("sentences").at(0).get<std::string>().find("re-master joint 4"),
             std::string::npos)
       << budget.at("sentences");
+}
+
+TEST(HealthJson, TellsWhatEachOfSeveralZerosDoesAlone) {
+  HealthCheck check = made_up_check();
+  SeenChange& several = check.changed.back();
+  several.cause.joint = -1;
+  several.zeros.push_back({4, 0.3 * kDegree, 0.004 * kDegree, 1.1e-3, 0.03e-3});
+  const auto json = health_json(check, {});
+  const auto& zeros = json.at("changed").back().at("zeros");
+  ASSERT_EQ(zeros.size(), 2u);
+  EXPECT_DOUBLE_EQ(zeros[1].at("effect_rms_mm"), 1.1);
+  EXPECT_DOUBLE_EQ(zeros[1].at("effect_u95_mm"), 0.03);
 }
 
 }  // namespace

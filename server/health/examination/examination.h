@@ -65,11 +65,13 @@ class Examination {
   [[nodiscard]] bool are_bad_poses(double score);
   void tell_zeros(const ZerosFit& fit);
   void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
-  /// Adds to a tool the zeros whose effect it makes up for at any poses: `beside_tool` leaves
-  /// nothing of them, `before` does. `named`: zeros that are not asked.
-  void tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before,
-                          const RefittedRows& beside_tool, const std::vector<std::size_t>& named,
-                          SeenChange& change);
+  /// Adds to a tool the zeros whose effect it makes up for at any poses, unless these show that it
+  /// has not turned. `others`: refitted beside the tool. `named`: zeros that are not asked.
+  void tell_zeros_in_tool(const CheckRows& there, const Eigen::MatrixXd& others,
+                          const std::vector<std::size_t>& named, SeenChange& change);
+  /// True where orientations show that the tool has moved without the turn that this zero makes.
+  [[nodiscard]] bool has_not_turned(const CheckRows& there, const Eigen::MatrixXd& others,
+                                    std::size_t zero, const SeenChange& tool) const;
   void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
   /// Adds the causes that explain as much as this one does beside `others`.
   void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,

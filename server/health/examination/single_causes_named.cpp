@@ -216,18 +216,18 @@ void Examination::tell_change(const Named& named, const CheckTests& tests) {
       is_all ? found_alone(fits_, one.cause, entry.columns.front()).value_or(found) : found;
   if (std::find(zeros_.causes().begin(), zeros_.causes().end(), one.cause) != zeros_.causes().end())
     change.zeros.push_back(
-        {entry.cause.joint, scale * zero.numbers(0), 2 * scale * std::sqrt(zero.covariance(0, 0))});
+        {entry.cause.joint, scale * zero.numbers(0), 2 * scale * std::sqrt(zero.covariance(0, 0)),
+         change.effect_rms, change.u95});
   tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
   if (is_tool(named.hypothesis)) {
-    Eigen::MatrixXd with_tool = joined(always_, one.columns);
+    Eigen::MatrixXd others = always_;
     std::vector<std::size_t> causes;
     for (const Named& other : named_) {
       const Hypothesis& also = questions_.hypotheses[other.hypothesis];
-      if (other.hypothesis != named.hypothesis) with_tool = joined(with_tool, also.columns);
+      if (other.hypothesis != named.hypothesis) others = joined(others, also.columns);
       causes.push_back(also.cause);
     }
-    tell_zeros_in_tool(rows_, tests.rows(), RefittedRows(rows_.covariance, with_tool), causes,
-                       change);
+    tell_zeros_in_tool(rows_, others, causes, change);
   }
   check_.changed.push_back(std::move(change));
 }

@@ -24,20 +24,20 @@ std::string joints_in_words(const std::vector<LostZero>& zeros) {
 }
 
 /// `lost zero in joint 2 (by 0.100 +- 0.002 deg)`, `the zeros of joints 2 and 4: was it remastered?
-/// (...)`.
+/// (joint 2 by 0.100 +- 0.002 deg, alone 1.204 mm rms; ...)`.
 std::string change_in_words(const SeenChange& change) {
   if (change.zeros.empty()) return in_words(change.cause);
+  const auto by = [](const LostZero& zero) {
+    return fmt::format("by {:.3f} +- {:.3f} deg", to_deg(zero.by), to_deg(zero.u95));
+  };
+  if (change.zeros.size() == 1)
+    return fmt::format("{} ({})", in_words(change.cause), by(change.zeros.front()));
   std::vector<std::string> each;
   for (const LostZero& zero : change.zeros)
-    each.push_back(
-        fmt::format("{}by {:.3f} +- {:.3f} deg",
-                    change.zeros.size() > 1 ? fmt::format("joint {} ", zero.joint + 1) : "",
-                    to_deg(zero.by), to_deg(zero.u95)));
-  const std::string what =
-      change.zeros.size() > 1
-          ? fmt::format("the zeros of joints {}: was it remastered?", joints_in_words(change.zeros))
-          : in_words(change.cause);
-  return fmt::format("{} ({})", what, fmt::join(each, ", "));
+    each.push_back(fmt::format("joint {} {}, alone {:.3f} mm rms", zero.joint + 1, by(zero),
+                               to_mm(zero.effect_rms)));
+  return fmt::format("the zeros of joints {}: was it remastered? ({})",
+                     joints_in_words(change.zeros), fmt::join(each, "; "));
 }
 
 std::string rival_in_words(const SingleCause& cause) {

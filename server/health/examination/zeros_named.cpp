@@ -142,20 +142,23 @@ void Examination::tell_zeros(const ZerosFit& fit) {
   const auto count = static_cast<Index>(fit.zeros.size());
   const std::vector<Index> columns(fit.columns.begin(), fit.columns.begin() + count);
   const Estimate found{fit.at(columns), fit.covariance.topLeftCorner(count, count)};
+  const Eigen::MatrixXd over = working_.left_square(columns),
+                        here = square_here(there.by_cause(Eigen::all, columns),
+                                           RefittedRows(rows_.covariance, always_at(there)));
   SeenChange change;
   change.cause = effects_.causes()[fit.zeros.front()].cause;
   change.p_value = check_.p_value;
+  set_size(size_of(found, over), found, here, change);
   for (Index k = 0; k < count; ++k) {
-    const double scale = effects_.scale(columns[static_cast<std::size_t>(k)]);
-    change.zeros.push_back({effects_.causes()[fit.zeros[static_cast<std::size_t>(k)]].cause.joint,
-                            scale * found.numbers(k),
-                            2 * scale * std::sqrt(found.covariance(k, k))});
+    const auto zero = static_cast<std::size_t>(k);
+    const double scale = effects_.scale(columns[zero]);
+    const Size alone = size_of({found.numbers.segment(k, 1), found.covariance.block(k, k, 1, 1)},
+                               (change.at_these_poses ? here : over).block(k, k, 1, 1));
+    change.zeros.push_back({effects_.causes()[fit.zeros[zero]].cause.joint,
+                            scale * found.numbers(k), 2 * scale * std::sqrt(found.covariance(k, k)),
+                            alone.rms, alone.u95});
   }
   if (count > 1) change.cause.joint = -1;
-  set_size(size_of(found, working_.left_square(columns)), found,
-           square_here(there.by_cause(Eigen::all, columns),
-                       RefittedRows(rows_.covariance, always_at(there))),
-           change);
   tell_other_sets(fit, change);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     std::vector<Index> others = fit.columns;
@@ -185,24 +188,48 @@ void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) 
            square_here(there.by_cause(Eigen::all, columns), beside_base), change);
   tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, zeros)),
                      static_cast<std::size_t>(tool - causes.begin()), change);
-  const RefittedRows beside_all(rows_.covariance,
-                                joined(always_at(there), there.by_cause(Eigen::all, fit.columns)));
-  tell_zeros_in_tool(there, beside_base, beside_all, fit.zeros, change);
+  tell_zeros_in_tool(there, joined(always_at(there), there.by_cause(Eigen::all, zeros)), fit.zeros,
+                     change);
   check_.changed.push_back(std::move(change));
 }
 
-void Examination::tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before,
-                                     const RefittedRows& beside_tool,
+void Examination::tell_zeros_in_tool(const CheckRows& there, const Eigen::MatrixXd& others,
                                      const std::vector<std::size_t>& named, SeenChange& change) {
+  const RefittedRows beside_frames(rows_.covariance, always_at(there));
+  const RefittedRows beside_tool(
+      rows_.covariance, joined(others, there.by_cause(Eigen::all, effects_.tool_columns())));
   for (const Hypothesis& one : questions_.hypotheses) {
     if (one.pose >= 0 || std::find(named.begin(), named.end(), one.cause) != named.end()) continue;
     const CauseEffects::Entry& entry = effects_.causes()[one.cause];
     if (!is_zero(entry.cause)) continue;
     const Eigen::MatrixXd own = there.by_cause.col(entry.columns.front());
-    if (beside_tool.left(own).norm() >= kMadeUpFor * before.left(own).norm()) continue;
+    const double least = kMadeUpFor * beside_frames.left(own).norm();
+    if (beside_tool.left(own).norm() >= least || has_not_turned(there, others, one.cause, change))
+      continue;
     add_rival(entry.cause, change);
     doubt_.in_tool.push_back(entry.cause.joint);
   }
+}
+
+bool Examination::has_not_turned(const CheckRows& there, const Eigen::MatrixXd& others,
+                                 std::size_t zero, const SeenChange& tool) const {
+  constexpr int kShifts = 3;       // the first numbers of a tool
+  constexpr double kHidden = 0.2;  // of the tool's effect: a zero that does less changes no name
+  const std::vector<Index> column = effects_.causes()[zero].columns;
+  const std::vector<Index> shifts(effects_.tool_columns().begin(),
+                                  effects_.tool_columns().begin() + kShifts);
+  const Eigen::MatrixXd own = there.by_cause(Eigen::all, column);
+  const RefittedRows beside_frames(rows_.covariance, always_at(there));
+  const RefittedRows beside_shift(rows_.covariance,
+                                  joined(others, there.by_cause(Eigen::all, shifts)));
+  const Eigen::MatrixXd turns = beside_shift.left(own);
+  if (turns.norm() < kMadeUpFor * beside_frames.left(own).norm()) return false;
+  const Estimate turned = estimate(turns, beside_shift.left(there.residual), kWidestZero);
+  const double gained = turned.numbers(0) * turned.numbers(0) / turned.covariance(0, 0);
+  const double most = std::abs(turned.numbers(0)) + 2 * std::sqrt(turned.covariance(0, 0));
+  const Eigen::MatrixXd square =
+      tool.at_these_poses ? square_here(own, beside_frames) : working_.left_square(column);
+  return gained < kAlike && most * std::sqrt(square(0, 0)) < kHidden * tool.effect_rms;
 }
 
 void Examination::tell_other_sets(const ZerosFit& fit, SeenChange& change) const {
