@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/diagnose/tell/answers.h"
+
 namespace trammel {
 namespace {
 
@@ -99,6 +101,31 @@ TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
             "Missing from the simulation: backlash in joint 2 (20 um rms). Pose 6 (0.02 mm) and "
             "pose 9 (0.02 mm) fit none of the others, and single poses do not tell why: measure "
             "them and their neighbours again.");
+}
+
+TEST(Wording, CallsAPoseWrongOnlyWhereNothingIsMissing) {
+  const std::string sentence = sentence_for(with({found(kPose6, {unknown_cause()})}));
+  EXPECT_EQ(sentence.find("Pose 6 (0.02 mm) fits none of the others, and what the simulation lacks "
+                          "may be largest there"),
+            0U)
+      << sentence;
+  EXPECT_EQ(sentence.find("bad measurement"), std::string::npos) << sentence;
+}
+
+TEST(Wording, IsUnknownWhereMoreIsLeftThanAnyDoubtfulFindingExplains) {
+  Finding weights = found({"self_weight"}, {unknown_cause()});
+  weights.source = "self_weight";
+  Diagnosis diagnosis = with({weights, found(kPose6, {unknown_cause()})});
+  diagnosis.unexplained = {true, {}, 40e-6, 1e-6};
+  cause_search::tell_verdict(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown);
+  diagnosis.unexplained.rms = 10e-6;
+  cause_search::tell_verdict(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kAmbiguous);
+  diagnosis.unexplained.rms = 40e-6;
+  diagnosis.findings.front().could_also_be = {kDrift};
+  cause_search::tell_verdict(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kAmbiguous);
 }
 
 TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {

@@ -130,6 +130,15 @@ bool is_sure(const Finding& finding) {
 
 bool is_outlier(const Finding& finding) { return finding.source.empty(); }
 
+/// Whether it is a pose that is out, or may be part of something unknown that is larger.
+bool is_less_than_what_is_left(const Finding& finding, const Unexplained& left) {
+  const auto& rivals = finding.could_also_be;
+  return is_outlier(finding) ||
+         (finding.effect_rms < left.rms &&
+          std::any_of(rivals.begin(), rivals.end(),
+                      [](const Cause& rival) { return rival.cause == unknown_cause().cause; }));
+}
+
 }  // namespace
 
 Explained::Explained(const Cell& cell, SearchResult search)
@@ -190,7 +199,10 @@ void tell_findings(const Explained& explained, const PreparedBatch& prepared,
 void tell_verdict(Diagnosis& diagnosis) {
   const std::vector<Finding>& findings = diagnosis.findings;
   const bool left = diagnosis.unexplained.present;
-  if (findings.empty() || (left && std::all_of(findings.begin(), findings.end(), is_outlier))) {
+  const auto is_less = [&](const Finding& finding) {
+    return is_less_than_what_is_left(finding, diagnosis.unexplained);
+  };
+  if (findings.empty() || (left && std::all_of(findings.begin(), findings.end(), is_less))) {
     diagnosis.verdict = left ? Verdict::kUnknown : Verdict::kNothing;
     return;
   }

@@ -171,10 +171,10 @@ std::string bad_poses_said(const std::vector<const Finding*>& findings) {
   if (may_be_missing)
     return listed(poses) +
            (poses.size() > 1
-                ? " fit none of the others: bad measurements, or poses at which something is large "
-                  "that the simulation lacks: measure them and their neighbours again"
-                : " fits none of the others: a bad measurement, or a pose at which something is "
-                  "large that the simulation lacks: measure it and its neighbours again");
+                ? " fit none of the others, and what the simulation lacks may be largest there: "
+                  "measure them and their neighbours again, which tells that from wrong rows"
+                : " fits none of the others, and what the simulation lacks may be largest there: "
+                  "measure it and its neighbours again, which tells that from a wrong row");
   return listed(poses) + (poses.size() > 1 ? " fit none of the others, and single poses do not "
                                              "tell why: measure them and their neighbours again"
                                            : " fits none of the others, and a single pose does not "
