@@ -102,6 +102,7 @@ std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robo
         .at_row(stated.line)
         .of(stated.name)
         .beyond(stated.value, *ours)
+        .next("correct with the model of the robot that this controller moves")
         .value();
   }
   const double apart = std::abs(std::abs(stated.value) - std::abs(*ours));

@@ -447,7 +447,7 @@ TEST(RunTimeInform, WhatASensorOrASoftAxisMovesIsLeftUntilItEnds) {
 TEST(RunTimeInform, PulsesAreJointsWhereItIsToldHowManyMakeADegree) {
   const std::string text =
       job("C00000=0,-20000,20000,0,-30000,0\n", "MOVJ C00000 VJ=10.0\n", "PULSE");
-  EXPECT_TRUE(has(why(jbi(text), "C00000"), "--pulses-per-deg tells it"))
+  EXPECT_TRUE(has(why(jbi(text), "C00000"), "give --pulses-per-deg S,L,U,R,B,T"))
       << why(jbi(text), "C00000");
   ReadOptions read;
   read.pulses_per_deg = {1000, 1000, 1000, 1000, -1000, 500};
