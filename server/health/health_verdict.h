@@ -35,9 +35,9 @@ struct HealthOptions {
 
 /// A zero that a joint lost.
 struct LostZero {
-  int joint = 0;   ///< 0-based
-  double by = 0;   ///< rad
-  double u95 = 0;  ///< rad, U(k=2)
+  int joint = 0;          ///< 0-based
+  double by = 0;          ///< rad
+  double u95 = 0;         ///< rad, U(k=2)
   double effect_rms = 0;  ///< m: what this zero alone does, where the change's effect is told
   double effect_u95 = 0;  ///< m, U(k=2) of it
 };

@@ -133,10 +133,10 @@ bool is_outlier(const Finding& finding) { return finding.source.empty(); }
 /// Whether it is a pose that is out, or may be part of something unknown that is larger.
 bool is_less_than_what_is_left(const Finding& finding, const Unexplained& left) {
   const auto& rivals = finding.could_also_be;
-  return is_outlier(finding) ||
-         (finding.effect_rms < left.rms &&
-          std::any_of(rivals.begin(), rivals.end(),
-                      [](const Cause& rival) { return rival.cause == unknown_cause().cause; }));
+  return is_outlier(finding) || (finding.effect_rms < left.rms &&
+                                 std::any_of(rivals.begin(), rivals.end(), [](const Cause& rival) {
+                                   return rival.cause == unknown_cause().cause;
+                                 }));
 }
 
 }  // namespace

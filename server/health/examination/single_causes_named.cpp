@@ -215,9 +215,9 @@ void Examination::tell_change(const Named& named, const CheckTests& tests) {
   const Estimate zero =
       is_all ? found_alone(fits_, one.cause, entry.columns.front()).value_or(found) : found;
   if (std::find(zeros_.causes().begin(), zeros_.causes().end(), one.cause) != zeros_.causes().end())
-    change.zeros.push_back(
-        {entry.cause.joint, scale * zero.numbers(0), 2 * scale * std::sqrt(zero.covariance(0, 0)),
-         change.effect_rms, change.u95});
+    change.zeros.push_back({entry.cause.joint, scale * zero.numbers(0),
+                            2 * scale * std::sqrt(zero.covariance(0, 0)), change.effect_rms,
+                            change.u95});
   tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
   if (is_tool(named.hypothesis)) {
     Eigen::MatrixXd others = always_;
