@@ -398,11 +398,15 @@ double alone_of_zero(const CompensatedModel& model, int joint, double by,
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return std::numeric_limits<double>::quiet_NaN();
   const PhysicalModel& physics = model.parts().physics;
+  // The zero moves its own axis alone, whatever else the controller moves with it.
+  JointVector gears = JointVector::Zero(physics.cell->robot.size());
+  gears(joint) = by;
+  const JointVector moved = physics.cell->robot.commanded(gears);
   Eigen::Matrix3Xd effect(3, std::ssize(positions.measurements));
   for (Eigen::Index i = 0; i < effect.cols(); ++i) {
     PoseContext context = positions.measurements[static_cast<std::size_t>(i)].context;
     const Vector3 p_W = physics.pose_W(context).translation();
-    context.q(joint) += by;
+    context.q += moved;
     effect.col(i) = physics.pose_W(context).translation() - p_W;
   }
   return std::sqrt(mean_square(BeyondFrames(physics, positions)(effect)));
