@@ -1,46 +1,49 @@
 #include "clients/cam/scan.h"
 
+#include <algorithm>
+
 #include "server/base/letters.h"
 
 namespace trammel::cam {
 
 namespace {
 
-bool is_letter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c == '$' ||
-         static_cast<unsigned char>(c) >= 0x80;
-}
-
 class Scanner {
  public:
-  Scanner(std::string_view text, std::size_t begin, std::size_t end, int line,
-          const ScanOptions& options)
-      : text_(text.substr(0, end)), at_(begin), line_(line), options_(options) {}
+  Scanner(std::string_view text, std::size_t begin, std::size_t end, int line, const Lexis& lexis)
+      : text_(text.substr(0, end)), at_(begin), line_(line), comment_(end), lexis_(lexis) {}
 
-  std::vector<Piece> all() {
-    std::vector<Piece> pieces;
+  void read(Tokens& tokens) {
+    std::size_t last_end = 0;
+    bool is_value = false;  // what stands before
     while (skip_blanks()) {
-      const bool after_value = !pieces.empty() && pieces.back().end == at_ &&
-                               (pieces.back().kind != Piece::Kind::kSign || pieces.back().is(")") ||
-                                pieces.back().is("]"));
-      pieces.push_back(next(after_value));
+      const Token token = next(is_value && last_end == at_);
+      last_end = token.end;
+      is_value = token.kind != TokenKind::kSign || token.is(")") || token.is("]");
+      tokens.add(token);
     }
-    return pieces;
+    tokens.set_end(at_, line_);
   }
+  /// Where the last comment began.
+  [[nodiscard]] std::size_t comment() const { return comment_; }
 
  private:
-  [[nodiscard]] char peek(std::size_t ahead = 0) const {
+  [[nodiscard]] char peek(std::size_t ahead) const {
     return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0';
+  }
+  [[nodiscard]] bool is_letter(char c) const {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' ||
+           (c == '$' && lexis_.dollar_is_letter) || static_cast<unsigned char>(c) >= 0x80;
   }
 
   /// Whether there is anything left.
   bool skip_blanks() {
     for (; at_ < text_.size(); ++at_) {
       const char c = text_[at_];
-      if (!options_.comment.empty() && text_.substr(at_).starts_with(options_.comment)) {
-        const std::size_t end = text_.find('\n', at_);
-        if (end == std::string_view::npos) return false;
-        at_ = end;
+      if (!lexis_.comment.empty() && text_.substr(at_).starts_with(lexis_.comment)) {
+        comment_ = at_;
+        at_ = std::min(text_.find('\n', at_), text_.size());
+        if (at_ == text_.size()) return false;
       } else if (c != ' ' && c != '\t' && c != '\r' && c != '\n' && c != '\f' && c != '\0') {
         return true;
       }
@@ -49,42 +52,52 @@ class Scanner {
     return false;
   }
 
-  Piece next(bool after_value) {
-    Piece piece{Piece::Kind::kSign, at_, at_ + 1, line_, {}};
+  Token next(bool after_value) {
+    Token token{TokenKind::kSign, at_, at_ + 1, line_, {}};
     const char c = text_[at_];
-    const bool is_signed = (c == '-' || c == '+') && !after_value;
-    const std::size_t first = is_signed ? 1 : 0;
+    const bool has_sign = lexis_.numbers_have_signs && (c == '-' || c == '+') && !after_value;
+    const std::size_t first = has_sign ? 1 : 0;
     if (is_digit(peek(first)) || (peek(first) == '.' && is_digit(peek(first + 1)))) {
-      piece.kind = Piece::Kind::kNumber;
-      piece.end = number_end(at_ + first);
+      token.kind = TokenKind::kNumber;
+      token.end = number_end(at_ + first);
     } else if (is_letter(c)) {
-      piece.kind = Piece::Kind::kWord;
-      while (piece.end < text_.size() &&
-             (is_letter(text_[piece.end]) || is_digit(text_[piece.end])))
-        ++piece.end;
-    } else if (options_.quotes.find(c) != std::string_view::npos) {
-      piece.kind = Piece::Kind::kText;
-      while (piece.end < text_.size() && text_[piece.end] != c && text_[piece.end] != '\n')
-        ++piece.end;
-      if (piece.end < text_.size() && text_[piece.end] == c) ++piece.end;
+      token.kind = TokenKind::kWord;
+      while (token.end < text_.size() &&
+             (is_letter(text_[token.end]) || is_digit(text_[token.end])))
+        ++token.end;
+    } else if (lexis_.quotes.find(c) != std::string_view::npos) {
+      token.kind = TokenKind::kText;
+      token.end = quoted_end(at_, c);
+    } else if (!lexis_.long_sign.empty() && text_.substr(at_).starts_with(lexis_.long_sign)) {
+      token.end = at_ + lexis_.long_sign.size();
     }
-    piece.text = text_.substr(at_, piece.end - at_);
-    at_ = piece.end;
-    return piece;
+    token.text = text_.substr(at_, token.end - at_);
+    at_ = token.end;
+    return token;
   }
 
-  std::size_t number_end(std::size_t at) const {
+  [[nodiscard]] std::size_t number_end(std::size_t at) const {
     const auto digit = [&](std::size_t i) { return i < text_.size() && is_digit(text_[i]); };
+    const auto is = [&](std::size_t i, char a, char b) {
+      return i < text_.size() && (text_[i] == a || text_[i] == b);
+    };
     while (digit(at)) ++at;
-    if (at < text_.size() && text_[at] == '.') ++at;
+    if (is(at, '.', '.')) ++at;
     while (digit(at)) ++at;
-    if (at < text_.size() && (text_[at] == 'e' || text_[at] == 'E')) {
-      const std::size_t sign =
-          at + 1 < text_.size() && (text_[at + 1] == '+' || text_[at + 1] == '-') ? 2 : 1;
-      if (digit(at + sign)) {
-        at += sign;
-        while (digit(at)) ++at;
-      }
+    if (!is(at, 'e', 'E')) return at;
+    const std::size_t exponent = at + (is(at + 1, '+', '-') ? 2 : 1);
+    if (!digit(exponent)) return at;
+    for (at = exponent; digit(at);) ++at;
+    return at;
+  }
+
+  [[nodiscard]] std::size_t quoted_end(std::size_t at, char quote) const {
+    for (++at; at < text_.size() && text_[at] != '\n'; ++at) {
+      if (text_[at] != quote) continue;
+      const bool goes_on =
+          lexis_.doubled_quotes && at + 1 < text_.size() && text_[at + 1] == quote;
+      if (!goes_on) return at + 1;
+      ++at;
     }
     return at;
   }
@@ -92,14 +105,64 @@ class Scanner {
   std::string_view text_;
   std::size_t at_;
   int line_;
-  ScanOptions options_;
+  std::size_t comment_;
+  Lexis lexis_;
 };
 
 }  // namespace
 
-std::vector<Piece> pieces_of(std::string_view text, std::size_t begin, std::size_t end, int line,
-                             const ScanOptions& options) {
-  return Scanner(text, begin, end, line, options).all();
+std::size_t Tokens::find(std::string_view wanted, std::size_t from) const {
+  std::size_t at = from;
+  while (at < size() && !(*this)[at].is(wanted)) ++at;
+  return std::min(at, size());
 }
+
+Tokens Tokens::part(std::size_t first, std::size_t last) const {
+  Tokens made(text_);
+  for (std::size_t at = first; at < std::min(last, size()); ++at) made.add((*this)[at]);
+  made.set_end(end_, end_line_);
+  return made;
+}
+
+void Tokens::add(const Token& token) {
+  marks_.push_back({token.kind, static_cast<std::uint32_t>(token.begin),
+                    static_cast<std::uint32_t>(token.end), token.line});
+}
+
+Tokens tokens_of(std::string_view text, std::size_t begin, std::size_t end, int line,
+                 const Lexis& lexis) {
+  Tokens tokens(text);
+  Scanner(text, begin, end, line, lexis).read(tokens);
+  return tokens;
+}
+
+Tokens tokens_of(std::string_view text, const Lexis& lexis) {
+  return tokens_of(text, first_byte(text), text.size(), 1, lexis);
+}
+
+std::vector<TextLine> text_lines(std::string_view text) {
+  std::vector<TextLine> lines;
+  std::size_t begin = first_byte(text);
+  for (int number = 1; begin < text.size(); ++number) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back({begin, end, number, text.substr(begin, end - begin)});
+    begin = end + 1;
+  }
+  return lines;
+}
+
+std::vector<TokenLine> token_lines(std::string_view text, const Lexis& lexis) {
+  std::vector<TokenLine> lines;
+  for (const TextLine& line : text_lines(text)) {
+    TokenLine& made = lines.emplace_back(
+        TokenLine{line.begin, line.end, line.number, Tokens(text), line.end});
+    Scanner scanner(text, line.begin, line.end, line.number, lexis);
+    scanner.read(made.tokens);
+    made.comment = scanner.comment();
+  }
+  return lines;
+}
+
+std::size_t first_byte(std::string_view text) { return text.starts_with("\xEF\xBB\xBF") ? 3 : 0; }
 
 }  // namespace trammel::cam

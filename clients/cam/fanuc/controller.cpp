@@ -20,13 +20,13 @@ std::string why_not_by_row(const std::string& row, const Pose& X, const Told& to
 
 }  // namespace
 
-void Controller::note_register(const Pieces& statement, std::size_t equals, const std::string& name,
-                               const std::string& where, std::size_t file) {
+void Controller::note_register(const Assignment& assignment, const std::string& where,
+                               std::size_t file) {
+  const std::string& name = assignment.name;
   Register& set = registers[name];
-  const bool element =
-      equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
-  const std::optional<double> now = constant_at(statement, equals + 1);
-  const int index = element ? static_cast<int>(number(statement[4])) : 0;
+  const bool element = assignment.target[3].is(",") && assignment.target[4].is_number();
+  const std::optional<double> now = assignment.constant;
+  const int index = element ? static_cast<int>(value_in(assignment.target[4])) : 0;
   if (!element || !now || index < 1 || index > 6) {
     set.changed = fmt::format("{} is set at run time ({})", name, where);
     return;
@@ -76,17 +76,15 @@ Told Controller::setting(const std::string& name) {
 
 /// Of the controller's system variables.
 Told Controller::by_system(const std::string& name) {
-  const auto known = system.find(name);
-  if (known == system.end())
+  const ListedValue* listed = system.take(name);
+  if (listed == nullptr)
     return {{},
             fmt::format("{} is not in the files handed over: --frames tells its value", name),
             false,
             ""};
-  const SystemFrame& frame = known->second;
-  if (!frame.why_not.empty()) return {{}, frame.why_not, true, ""};
-  taken.emplace(name, frame.file);
-  return {frame.X,    "",        true, fmt::format("{} line {}", frame.file, frame.line),
-          frame.file, frame.line};
+  if (!listed->why_not.empty()) return {{}, listed->why_not, true, ""};
+  return {listed->X,    "",          true, fmt::format("{} line {}", listed->file, listed->line),
+          listed->file, listed->line};
 }
 
 ProgramFrame Controller::frame_of(const std::string& number_text, const ReadOptions& options) {

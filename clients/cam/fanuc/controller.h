@@ -46,13 +46,11 @@ struct Controller {
     int count = 0;
   };
   std::map<std::string, Statements> loads;    ///< of PAYLOAD[n]
-  std::map<std::string, SystemFrame> system;  ///< UFRAME[n] and UTOOL[n] of the system variables
-  std::map<std::string, std::string> taken;   ///< those of them that targets have, with the file
+  ListedValues system;                        ///< UFRAME[n] and UTOOL[n] of the system variables
   std::set<std::string> programs;             ///< that are read, by name
 
   /// `PR[5,1]=100`, `PR[5]=LPOS`, of the file of that number.
-  void note_register(const Pieces& statement, std::size_t equals, const std::string& name,
-                     const std::string& where, std::size_t file);
+  void note_register(const Assignment& set, const std::string& where, std::size_t file);
   /// A frame or tool by its number.
   [[nodiscard]] ProgramFrame frame_of(const std::string& number_text, const ReadOptions& options);
   /// `file`: of the program that has it.

@@ -4,26 +4,27 @@
 
 #include <cstdlib>
 
+#include "clients/cam/keep.h"
+
 namespace trammel::cam::fanuc {
 
 namespace {
 
-void read_groups(const Pieces& pieces, std::size_t begin, std::size_t end, Position& position) {
+void read_groups(const Tokens& tokens, std::size_t begin, std::size_t end, Position& position) {
   int group = 1;
   for (std::size_t at = begin; at + 2 < end; ++at) {
-    const std::string word(pieces[at].text);
-    if (pieces[at].kind != Piece::Kind::kWord) continue;
+    if (!tokens[at].is_word()) continue;
+    const std::string word(tokens[at].text);
+    const Token sign = tokens[at + 1], value = tokens[at + 2];
     Group& now = position.groups[group];
-    if (word.starts_with("GP") && pieces[at + 1].is(":")) {
+    if (word.starts_with("GP") && sign.is(":")) {
       group = std::atoi(word.c_str() + 2);
-      continue;
-    }
-    if (pieces[at + 1].is("=")) {
-      if (pieces[at + 2].kind == Piece::Kind::kNumber) now.values[word] = pieces[at + 2];
-    } else if (pieces[at + 1].is(":")) {
-      if (word == "UF") now.frame = std::string(pieces[at + 2].text);
-      if (word == "UT") now.tool = std::string(pieces[at + 2].text);
-      if (word == "CONFIG") now.config = std::string(pieces[at + 2].text);
+    } else if (sign.is("=")) {
+      if (value.is_number()) now.values[word] = value;
+    } else if (sign.is(":")) {
+      if (word == "UF") now.frame = value.text;
+      if (word == "UT") now.tool = value.text;
+      if (word == "CONFIG") now.config = value.text;
     }
   }
   if (position.groups.contains(1) && position.groups[1].values.empty() &&
@@ -34,21 +35,18 @@ void read_groups(const Pieces& pieces, std::size_t begin, std::size_t end, Posit
 }  // namespace
 
 std::vector<Position> positions_of(const std::string& text, const Part& part) {
-  const Pieces pieces = pieces_of(text, part.begin, part.end, part.line, {"", "'\""});
+  const Tokens tokens = tokens_of(text, part.begin, part.end, part.line, kLexis);
   std::vector<Position> positions;
-  for (std::size_t at = 0; at + 3 < pieces.size(); ++at) {
-    if (!pieces[at].is("P") || !pieces[at + 1].is("[") ||
-        pieces[at + 2].kind != Piece::Kind::kNumber)
-      continue;
+  for (std::size_t at = 0; at + 3 < tokens.size(); ++at) {
+    if (!tokens[at].is("P") || !tokens[at + 1].is("[") || !tokens[at + 2].is_number()) continue;
     Position position;
-    position.begin = pieces[at].begin;
-    position.line = pieces[at].line;
-    position.name = fmt::format("P[{}]", pieces[at + 2].text);
-    while (at < pieces.size() && !pieces[at].is("{")) ++at;
-    const std::size_t begin = at;
-    while (at < pieces.size() && !pieces[at].is("}")) ++at;
-    position.end = at < pieces.size() ? pieces[at].end : text.size();
-    read_groups(pieces, begin, at, position);
+    position.begin = tokens[at].begin;
+    position.line = tokens[at].line;
+    position.name = fmt::format("P[{}]", tokens[at + 2].text);
+    const std::size_t begin = tokens.find("{", at);
+    at = tokens.find("}", begin);
+    position.end = at < tokens.size() ? tokens[at].end : text.size();
+    read_groups(tokens, begin, at, position);
     positions.push_back(std::move(position));
   }
   return positions;
@@ -58,10 +56,10 @@ void note_external(int group, const Group& values, ProgramTarget& target) {
   for (int k = 1; k <= 6; ++k) {
     const auto extended = values.values.find(fmt::format("E{}", k));
     if (group == 1 && extended != values.values.end())
-      target.external[k - 1] = number(extended->second);
+      target.external[k - 1] = value_in(extended->second);
     const auto joint = values.values.find(fmt::format("J{}", k));
     if (group > 1 && joint != values.values.end())
-      target.external[6 * (group - 1) + k - 1] = number(joint->second);
+      target.external[6 * (group - 1) + k - 1] = value_in(joint->second);
   }
 }
 

@@ -13,7 +13,7 @@ namespace trammel::cam::fanuc {
 
 /// Values of one motion group of a position.
 struct Group {
-  std::map<std::string, Piece> values;
+  std::map<std::string, Token> values;
   std::string frame, tool, config;
 };
 

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "clients/cam/flow.h"
 #include "clients/cam/krl/lines.h"
 #include "clients/cam/krl/variables.h"
 
@@ -17,13 +18,27 @@ struct Routine {
   std::size_t file = 0, first = 0, last = 0;  ///< lines
 };
 
-/// What a line does to the order. Calls are not in it.
-[[nodiscard]] Step step_of(const std::vector<Token>& tokens);
+class Routines {
+ public:
+  /// Of several with one name the first is meant.
+  void add(Routine routine);
+  [[nodiscard]] Routine& last() { return all_.back(); }
+  [[nodiscard]] const std::vector<Routine>& all() const { return all_; }
+  [[nodiscard]] const Routine& operator[](std::size_t number) const { return all_[number]; }
+  /// nullptr: the files have none.
+  [[nodiscard]] const Routine* find(const std::string& name) const;
+  /// Procedures and functions, by their numbers, in their order.
+  [[nodiscard]] std::vector<std::size_t> called_by(const Tokens& tokens) const;
+
+ private:
+  std::vector<Routine> all_;
+  std::map<std::string, std::size_t, std::less<>> by_name_;
+};
 
 /// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set
 /// it. Returns the routines that are called and not in the files.
 [[nodiscard]] std::set<std::string> note_handed_over(const std::vector<std::vector<Line>>& lines,
-                                                     const std::vector<Routine>& routines,
+                                                     const Routines& routines,
                                                      Variables& names);
 
 }  // namespace trammel::cam::krl

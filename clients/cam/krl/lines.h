@@ -1,33 +1,26 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "clients/cam/scan.h"
+
 /// The lines of a KRL file, as far as targets need them. KRL ends a statement with its line.
 namespace trammel::cam::krl {
-
-enum class TokenKind { kWord, kNumber, kBits, kText, kSign };
-
-struct Token {
-  TokenKind kind = TokenKind::kSign;
-  std::size_t begin = 0, end = 0;
-  std::string text;  ///< of a word in upper case, else as it stands
-};
 
 struct Line {
   std::size_t begin = 0;  ///< first byte
   int number = 1;
-  std::vector<Token> tokens;  ///< without the comment
-  std::string_view comment;   ///< behind `;`
+  Tokens tokens;             ///< without the comment, in capitals
+  std::string_view comment;  ///< behind `;`, as it stands there
+
+  [[nodiscard]] std::string_view word() const { return tokens[0].text; }
 };
 
-[[nodiscard]] std::vector<Line> lines_of(std::string_view text);
-
-struct Field;
+/// `capitals`: the text in capitals. Both outlive the lines.
+[[nodiscard]] std::vector<Line> lines_of(std::string_view text, std::string_view capitals);
 
 /// What stands for a value: `{X 1,Y 2}`, `XP1[3]`, a number, or something else.
 struct Value {
@@ -44,7 +37,7 @@ struct Value {
 
 /// The operands of `a:b:c` from a token on; `next` is set behind them. Empty where it is no such
 /// expression.
-[[nodiscard]] std::vector<Value> operands_at(const std::vector<Token>& tokens, std::size_t at,
-                                             std::size_t* next);
+[[nodiscard]] std::vector<Value> operands_at(const Tokens& tokens, std::size_t at,
+                                             std::size_t* next = nullptr);
 
 }  // namespace trammel::cam::krl

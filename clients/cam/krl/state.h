@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cam/krl/statements.h"
 #include "clients/cam/krl/tools.h"
 #include "clients/cam/krl/variables.h"
 
@@ -24,10 +25,10 @@ struct State {
   auto operator<=>(const State&) const = default;
 };
 
-class Setting {
+class Settings {
  public:
-  Setting(const std::vector<std::vector<Line>>& lines, const Variables& names, Tools& tools,
-          Program& program)
+  Settings(const std::vector<std::vector<Line>>& lines, const Variables& names, Tools& tools,
+           Program& program)
       : lines_(lines), names_(names), tools_(tools), program_(program) {}
 
   /// What a line sets by itself.
@@ -41,16 +42,14 @@ class Setting {
   [[nodiscard]] bool by_hand() const { return sets_by_hand_; }
 
  private:
+  void apply(const Setting& setting, std::size_t f, std::size_t k, State& state);
+  void apply_part(const Setting& setting, const std::string& place, State& state);
+  void apply_one_with(const Setting& setting, std::size_t f, std::size_t k, State& state);
   void apply_fdat(const std::string& name, std::size_t f, State& state);
-  void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k,
-                  State& state) const;
-  void set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
-  static double speed_at(const std::vector<Token>& tokens, std::size_t at);
-  static double speed_of(const std::vector<Token>& tokens, std::size_t at);
-  void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state);
-  static std::string why_fixed(const std::vector<Token>& tokens, std::size_t at);
+  void apply_bas(const Bas& bas, std::size_t f, std::size_t k, State& state);
+  void set_sensor(const Tokens& tokens, std::size_t f, std::size_t k, State& state) const;
+  void set_soft(const Tokens& tokens, std::size_t f, std::size_t k, State& state) const;
   [[nodiscard]] std::string carried_at(std::size_t f, std::size_t k) const;
-  void set_with(std::size_t f, std::size_t k, std::size_t at, bool assigns, State& state);
 
   const std::vector<std::vector<Line>>& lines_;
   const Variables& names_;

@@ -85,18 +85,14 @@ class Stated {
 
   /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, `DECL EX_KIN $EX_KIN={ET1 #ERSYS,...}`
   void note_robot(std::size_t f, std::size_t k) {
-    const std::vector<Token>& tokens = lines_[f][k].tokens;
-    const auto has = [&](const char* word) {
-      return std::any_of(tokens.begin(), tokens.end(),
-                         [&](const Token& token) { return token.text == word; });
-    };
-    if (has("$EX_KIN") && has("ERSYS")) on_rail_ = names_.place(f, k);
-    if (tokens.size() < 3 || tokens[0].text != "$TRAFONAME" ||
-        tokens.back().kind != TokenKind::kText)
+    const Tokens& tokens = lines_[f][k].tokens;
+    if (tokens.has("$EX_KIN") && tokens.has("ERSYS")) on_rail_ = names_.place(f, k);
+    const Token name = tokens.back();
+    if (tokens.size() < 3 || !tokens[0].is("$TRAFONAME") || !name.is_text() || name.text[0] != '"')
       return;
-    const std::string& text = tokens.back().text;
-    program_.types.push_back({text.substr(1, text.size() - 2), "$TRAFONAME", program_.files[f].name,
-                              lines_[f][k].number});
+    const SourceFile& file = program_.files[f];
+    program_.types.push_back({file.text.substr(name.begin + 1, std::max<std::size_t>(name.text.size(), 2) - 2), "$TRAFONAME",
+                              file.name, lines_[f][k].number});
   }
 
   [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }

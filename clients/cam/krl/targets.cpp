@@ -4,18 +4,14 @@
 
 #include <algorithm>
 
-#include "clients/cam/number_text.h"
+#include "clients/cam/keep.h"
+#include "clients/cam/krl/statements.h"
 
 namespace trammel::cam::krl {
 
 namespace {
 
-/// Of a number that the program did not write.
-const NumberStyle kThreeDecimals = [] {
-  NumberStyle style;
-  style.decimals = 3;
-  return style;
-}();
+constexpr int kDecimals = 3;  // of a number that the program did not write
 
 }  // namespace
 
@@ -67,33 +63,29 @@ void Targets::rewrite(const Value& value, const std::array<const char*, 6>& fiel
     const Value& number = *value.field(fields[k]);
     const auto written =
         read_number(std::string_view(text).substr(number.begin, number.end - number.begin));
-    target.rewrites.push_back(
-        {{number.begin, number.end}, {}, {{k, written ? written->style : kThreeDecimals}}});
+    keep({number.begin, number.end}, k, written ? written->style : with_decimals(kDecimals),
+         target);
   }
 }
 
 /// The whole expression as one frame, with status, turns and external axes of its last operand.
 void Targets::fold(const Assigned& place, const Value* last, ProgramTarget& target) const {
   const std::string& text = program_.files[place.file].text;
-  target.folded = true;
-  Rewrite whole{{place.operands.front().begin, place.operands.back().end}, {"{X "}, {}};
+  const Span span{place.operands.front().begin, place.operands.back().end};
+  NewText whole(span, "{X ");
   for (std::size_t k = 0; k < kPose.size(); ++k) {
-    whole.slots.push_back({k, kThreeDecimals});
-    whole.texts.push_back(k + 1 < kPose.size() ? fmt::format(",{} ", kPose[k + 1]) : "");
+    if (k > 0) whole.text(fmt::format(",{} ", kPose[k]));
+    whole.number(k, kDecimals);
   }
   if (last != nullptr && last->kind == Value::Kind::kAggregate) {
     for (std::size_t k = 0; k < last->field_names.size(); ++k) {
       const std::string& name = last->field_names[k];
       if (name == "S" || name == "T" || (name.size() == 2 && name[0] == 'E'))
-        whole.texts.back() += fmt::format(",{} {}", name, last->field_values[k].number);
+        whole.text(fmt::format(",{} {}", name, last->field_values[k].number));
     }
   }
-  whole.texts.back() += "}";
-  target.comment_at = lines_[place.file][place.line].begin;
-  const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
-  target.comment = text.substr(target.comment_at, indent - target.comment_at) + "; trammel: was " +
-                   text.substr(whole.span.begin, whole.span.end - whole.span.begin);
-  target.rewrites.push_back(std::move(whole));
+  std::move(whole.text("}")).fold(target);
+  keep_original(text, span.begin, ";", text.substr(span.begin, span.end - span.begin), target);
 }
 
 /// Status, turns and external axes.
@@ -135,23 +127,23 @@ void Targets::note_readings(std::size_t f) {
     }
   }
   for (std::size_t k = 0; k < lines_[f].size(); ++k) {
-    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const Tokens& tokens = lines_[f][k].tokens;
     for (std::size_t at = 0; at < tokens.size(); ++at) {
-      if (tokens[at].kind == TokenKind::kWord && words_of_targets_.contains(tokens[at].text))
+      if (tokens[at].is_word() && words_of_targets_.contains(std::string(tokens[at].text)))
         note_reading(f, k, at);
     }
   }
 }
 
 void Targets::note_reading(std::size_t f, std::size_t k, std::size_t at) {
-  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  const Tokens& tokens = lines_[f][k].tokens;
   std::size_t end = at;
   const std::vector<Value> one = operands_at(tokens, at, &end);
   if (one.empty() || one[0].name.empty()) return;
   const std::string root = root_of(one[0].name);
   const bool number = root != one[0].name;
   const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
-  const bool plain = one.size() == 1 && tokens[at > 0 ? at - 1 : 0].text != ":";
+  const bool plain = one.size() == 1 && !tokens[at - 1].is(":");
   if (moves && !number && plain) return;  // the motion goes to it
   const auto own = names_.all().find({stem_of(program_.files[f].name), root});
   if (own != names_.all().end()) {
@@ -171,14 +163,14 @@ void Targets::add_reading(std::size_t f, std::size_t k, std::size_t at, bool num
   if (source.operands.empty() || (source.file == f && source.line == k)) return;
   const auto where = std::pair(source.file, source.operands[0].begin);
   if (!places_.contains(where)) return;
-  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  const Tokens& tokens = lines_[f][k].tokens;
   const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
   const std::string& text = program_.files[f].text;
-  static const std::set<std::string> kConditions = {"IF",   "WHILE", "UNTIL", "SWITCH",
-                                                    "CASE", "FOR",   "WAIT"};
+  static const std::set<std::string_view> kConditions = {"IF",   "WHILE", "UNTIL", "SWITCH",
+                                                         "CASE", "FOR",   "WAIT"};
   std::string by;
   for (std::size_t k2 = 1; k2 < at && !moves && !kConditions.contains(tokens[0].text); ++k2) {
-    if (tokens[k2].text != "=" || tokens[k2 - 1].kind != TokenKind::kWord) continue;
+    if (!tokens[k2].is("=") || !tokens[k2 - 1].is_word()) continue;
     by = text.substr(tokens[k2 - 1].begin, tokens[k2 - 1].end - tokens[k2 - 1].begin);
   }
   if (number && !moves) {
@@ -211,9 +203,8 @@ void Targets::list_unused() {
         std::any_of(program_.left.begin(), program_.left.end(),
                     [&](const LeftAlone& left) { return upper(left.name) == name; });
     if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
-    program_.left.push_back({names_.spelled(name, at.file, at.line), at.file,
-                             lines_[at.file][at.line].number, "",
-                             "no motion in these files goes to it"});
+    leave_unused(program_, names_.spelled(name, at.file, at.line), at.file,
+                 lines_[at.file][at.line].number);
   }
 }
 

@@ -25,6 +25,21 @@ std::size_t Tools::add_tool(ProgramTool tool) { return add_once(program_, std::m
 
 std::size_t Tools::add_frame(ProgramFrame frame) { return add_once(program_, std::move(frame)); }
 
+std::size_t Tools::unknown_tool(const std::string& why) {
+  ProgramTool tool;
+  tool.name = "$TOOL";
+  tool.why_not = why;
+  return add_tool(std::move(tool));
+}
+
+std::size_t Tools::unknown_base(const std::string& why) {
+  return add_frame({"$BASE", Pose::Identity(), why});
+}
+
+std::size_t Tools::unknown_load(const std::string& why) {
+  return add_load({"$LOAD", std::nullopt, "", why});
+}
+
 std::size_t Tools::tool_numbered(int number, std::size_t f) {
   if (number == 0) return add_tool({"TOOL_DATA[0]", "", 0, Pose::Identity(), std::nullopt, 0, ""});
   const std::string data = fmt::format("TOOL_DATA[{}]", number);

@@ -29,6 +29,10 @@ class Tools {
   void note_tool_name(const Line& line);
   std::size_t add_tool(ProgramTool tool);
   std::size_t add_frame(ProgramFrame frame);
+  /// `$TOOL`, `$BASE`, `$LOAD` where they are not known.
+  std::size_t unknown_tool(const std::string& why);
+  std::size_t unknown_base(const std::string& why);
+  std::size_t unknown_load(const std::string& why);
   std::size_t tool_numbered(int number, std::size_t f);
   std::size_t base_numbered(int number, std::size_t f);
   /// `$TOOL = ...`

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "clients/cam/number_text.h"
+#include "clients/cam/krl/statements.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
@@ -31,35 +31,6 @@ std::string stem_of(const std::string& name) { return upper(name.substr(0, name.
 /// `XP[3].X` -> `XP[3]`
 std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
 
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`:
-/// where what is done stands; 0: the line is neither.
-std::size_t done_later(const std::vector<Token>& tokens) {
-  const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
-  if (tokens.size() < first + 2 ||
-      (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER"))
-    return 0;
-  for (std::size_t at = first + 1; at + 1 < tokens.size(); ++at) {
-    if (tokens[at].text == "DO") return at + 1;
-  }
-  return 0;
-}
-
-bool is_motion(const std::string& word) {
-  static const std::set<std::string> kMotions = {"PTP",  "LIN",   "CIRC", "SPTP",
-                                                 "SLIN", "SCIRC", "SPL"};
-  return kMotions.contains(word);
-}
-
-bool is_relative(const std::string& word) {
-  return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
-}
-
-bool declares(const std::vector<Token>& tokens) {
-  static const std::set<std::string> kWords = {"DEF", "DEFFCT", "EXT", "EXTFCT"};
-  const std::size_t first = tokens.size() > 1 && tokens[0].text == "GLOBAL" ? 1 : 0;
-  return kWords.contains(tokens[first].text);
-}
-
 Variables::Variables(const std::vector<SourceFile>& files,
                      const std::vector<std::vector<Line>>& lines)
     : files_(files), lines_(lines) {}
@@ -71,27 +42,24 @@ void Variables::note_value(std::size_t f, std::size_t k) {
 
 void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
   const bool later = at > 0;
-  const std::vector<Token>& tokens = lines_[f][k].tokens;
-  static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS",
-                                               "FDAT", "LDAT",  "PDAT",  "LOAD", "INT",
-                                               "REAL", "BOOL",  "CHAR"};
+  const Tokens& tokens = lines_[f][k].tokens;
+  static const std::set<std::string_view> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS",
+                                                    "FDAT", "LDAT",  "PDAT",  "LOAD", "INT",
+                                                    "REAL", "BOOL",  "CHAR"};
   bool declared = false;
-  while (at < tokens.size() &&
-         (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
-    declared |= tokens[at].text == "DECL";
+  while (tokens[at].is("GLOBAL") || tokens[at].is("DECL") || tokens[at].is("CONST")) {
+    declared |= tokens[at].is("DECL");
     ++at;
   }
-  if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
-      tokens[at + 1].kind == TokenKind::kWord) {
+  if ((declared || kTypes.contains(tokens[at].text)) && tokens[at + 1].is_word()) {
     ++at;
-    declared_[tokens[at].text].insert(stem_of(files_[f].name));
+    declared_[std::string(tokens[at].text)].insert(stem_of(files_[f].name));
   }
-  if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text))
-    return;
+  if (!tokens[at].is_word() || is_motion(tokens[at].text)) return;
   std::size_t next = at;
   const std::vector<Value> name = operands_at(tokens, at, &next);
   if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
-  if (next >= tokens.size() || tokens[next].text != "=") return;
+  if (!tokens[next].is("=")) return;
   std::size_t end = next;
   std::vector<Value> operands = operands_at(tokens, next + 1, &end);
   const std::string root = root_of(name[0].name);
@@ -107,12 +75,10 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
 }
 
 void Variables::note_parameters(std::size_t f, std::size_t k, std::size_t at) {
-  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  const Tokens& tokens = lines_[f][k].tokens;
   for (; at + 1 < tokens.size(); ++at) {
-    if ((tokens[at].text != "(" && tokens[at].text != ",") ||
-        tokens[at + 1].kind != TokenKind::kWord)
-      continue;
-    const std::string& name = tokens[at + 1].text;
+    if ((!tokens[at].is("(") && !tokens[at].is(",")) || !tokens[at + 1].is_word()) continue;
+    const std::string name(tokens[at + 1].text);
     declared_[name].insert(stem_of(files_[f].name));
     variables_[{stem_of(files_[f].name), name}].changed =
         fmt::format("{} is a parameter ({})", shown(spelled(name, f, k)), place(f, k));
@@ -121,10 +87,10 @@ void Variables::note_parameters(std::size_t f, std::size_t k, std::size_t at) {
 
 void Variables::note_handed_over(std::size_t f, std::size_t k, std::size_t at,
                                  const std::string& to) {
-  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  const Tokens& tokens = lines_[f][k].tokens;
   std::size_t end = at;
   const std::vector<Value> name = operands_at(tokens, at, &end);
-  const bool alone = end < tokens.size() && (tokens[end].text == "," || tokens[end].text == ")");
+  const bool alone = tokens[end].is(",") || tokens[end].is(")");
   if (!alone || name.size() != 1 || name[0].kind != Value::Kind::kName) return;
   const std::string root = root_of(name[0].name);
   std::string& changed = variables_[{stem_of(files_[f].name), root}].changed;
@@ -172,8 +138,8 @@ std::string Variables::place(std::size_t f, std::size_t k) const {
 
 std::string Variables::spelled(const std::string& name, std::size_t f, std::size_t k) const {
   const std::string word = name.substr(0, name.find('['));
-  for (const Token& token : lines_[f][k].tokens) {
-    if (token.kind == TokenKind::kWord && token.text == word)
+  for (const Token token : lines_[f][k].tokens) {
+    if (token.is_word() && token.is(word))
       return files_[f].text.substr(token.begin, token.end - token.begin) + name.substr(word.size());
   }
   return name;

@@ -40,15 +40,6 @@ struct Variable {
 [[nodiscard]] std::string stem_of(const std::string& name);
 /// `XP[3].X` -> `XP[3]`
 [[nodiscard]] std::string root_of(const std::string& name);
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`:
-/// where what is done stands; 0: the line is neither.
-[[nodiscard]] std::size_t done_later(const std::vector<Token>& tokens);
-[[nodiscard]] bool is_motion(const std::string& word);
-/// `LIN_REL`
-[[nodiscard]] bool is_relative(const std::string& word);
-/// `DEF shift(p:IN)`, `EXT shift(E6POS:IN)`
-[[nodiscard]] bool declares(const std::vector<Token>& tokens);
-
 class Variables {
  public:
   /// Of files and their lines, which may still grow.

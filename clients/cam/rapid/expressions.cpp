@@ -1,5 +1,6 @@
 #include "clients/cam/rapid/expressions.h"
 
+#include <algorithm>
 #include <set>
 
 #include "clients/cam/number_text.h"
@@ -19,7 +20,7 @@ bool Expressions::is_reserved() const {
       "module", "endmodule", "proc",  "endproc",  "func", "endfunc", "trap",  "endtrap", "record",
       "local",  "task",      "const", "pers",     "var",  "if",      "endif", "elseif",  "else",
       "for",    "endfor",    "while", "endwhile", "test", "endtest", "case",  "default"};
-  return token().kind == TokenKind::kWord && kReserved.contains(word());
+  return token().is_word() && kReserved.contains(word());
 }
 
 bool Expressions::is_operator(const std::string& text) {
@@ -39,12 +40,12 @@ Expression Expressions::expression(int depth) {
 Expression Expressions::primary(int depth) {
   if (depth > kDeepest) return unknown();
   Expression made = unknown();
-  if (token().kind == TokenKind::kNumber) {
+  if (token().is_number()) {
     const auto number = read_number(bytes());
     made.kind = number ? Kind::kNumber : Kind::kUnknown;
     made.value = number ? number->value : 0;
     ++at_;
-  } else if (token().kind == TokenKind::kString) {
+  } else if (token().is_text()) {
     made.kind = Kind::kText;
     made.name = std::string(bytes());
     ++at_;
@@ -54,7 +55,7 @@ Expression Expressions::primary(int depth) {
     made.sign = '+';
     made.parts.push_back(expression(depth + 1));
     if (take(")") && made.parts[0].kind != Kind::kUnknown) made.kind = Kind::kUnary;
-  } else if (token().kind == TokenKind::kWord) {
+  } else if (token().is_word()) {
     name(made, depth);
   }
   made.end = std::max(last_end(), made.begin);
@@ -86,7 +87,7 @@ Expression Expressions::factor(int depth) {
   if (depth > kDeepest) return unknown();
   if (!is_sign("-") && !is_sign("+")) return primary(depth);
   Expression signed_one;
-  signed_one.begin = token().begin;
+  signed_one.begin = at_byte();
   signed_one.line = token().line;
   signed_one.sign = bytes()[0];
   ++at_;
@@ -105,7 +106,7 @@ Expression Expressions::factor(int depth) {
 
 Expression Expressions::unknown() {
   Expression none;
-  none.begin = none.end = token().begin;
+  none.begin = none.end = at_byte();
   none.line = token().line;
   return none;
 }
@@ -130,7 +131,7 @@ void Expressions::aggregate(Expression& made, int depth) {
 /// `-1.5,` or `1.5]` as the next part: most of a long program.
 bool Expressions::plain_number(Expression& made) {
   const std::size_t sign = is_sign("-") || is_sign("+") ? 1 : 0;
-  if (token(sign).kind != TokenKind::kNumber ||
+  if (!token(sign).is_number() ||
       (!is_sign(",", sign + 1) && !is_sign("]", sign + 1)))
     return false;
   const auto number = read_number(text_.substr(token().begin, token(sign).end - token().begin));
@@ -138,8 +139,8 @@ bool Expressions::plain_number(Expression& made) {
   if (made.parts.empty()) made.parts.reserve(4);
   Expression& part = made.parts.emplace_back();
   part.kind = Kind::kNumber;
-  part.begin = token().begin;
-  part.end = token(sign).end;
+  part.begin = at_byte();
+  part.end = static_cast<std::uint32_t>(token(sign).end);
   part.line = token().line;
   part.value = number->value;
   at_ += sign + 1;
@@ -190,7 +191,7 @@ void Expressions::suffixes(Expression& made, int depth) {
     Expression outer;
     outer.begin = made.begin;
     outer.line = made.line;
-    if (is_sign(".") && token(1).kind == TokenKind::kWord) {
+    if (is_sign(".") && token(1).is_word()) {
       ++at_;
       outer.kind = Kind::kField;
       outer.name = take_word();

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -8,32 +7,26 @@
 #include <vector>
 
 #include "clients/cam/rapid/syntax.h"
-#include "clients/cam/rapid/tokens.h"
+#include "clients/cam/scan.h"
 #include "server/base/letters.h"
 
 namespace trammel::cam::rapid {
 
+constexpr Lexis kLexis = {"!", "\"", true, false, false, ":="};
+
 /// Goes through the tokens of a module, and reads the expressions among them.
 class Expressions {
  protected:
-  explicit Expressions(std::string_view text) : text_(text), tokens_(tokens_of(text)) {}
+  explicit Expressions(std::string_view text) : text_(text), tokens_(tokens_of(text, kLexis)) {}
 
-  [[nodiscard]] const Token& token(std::size_t ahead = 0) const {
-    return tokens_[std::min(at_ + ahead, tokens_.size() - 1)];
-  }
-  [[nodiscard]] bool at_end() const { return token().kind == TokenKind::kEnd; }
-  [[nodiscard]] std::string_view bytes(std::size_t ahead = 0) const {
-    const Token& t = token(ahead);
-    return text_.substr(t.begin, t.end - t.begin);
-  }
-  /// A sign of two bytes is `:=`; no other begins so.
+  [[nodiscard]] Token token(std::size_t ahead = 0) const { return tokens_[at_ + ahead]; }
+  [[nodiscard]] bool at_end() const { return at_ >= tokens_.size(); }
+  [[nodiscard]] std::string_view bytes(std::size_t ahead = 0) const { return token(ahead).text; }
   [[nodiscard]] bool is_sign(std::string_view sign, std::size_t ahead = 0) const {
-    const Token& t = token(ahead);
-    return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() &&
-           text_[t.begin] == sign[0];
+    return token(ahead).is_sign(sign);
   }
   [[nodiscard]] std::string word(std::size_t ahead = 0) const {
-    return token(ahead).kind == TokenKind::kWord ? lower(bytes(ahead)) : std::string();
+    return token(ahead).is_word() ? lower(bytes(ahead)) : std::string();
   }
   bool take(std::string_view sign) {
     if (!is_sign(sign)) return false;
@@ -45,7 +38,12 @@ class Expressions {
     if (!text.empty()) ++at_;
     return text;
   }
-  [[nodiscard]] std::uint32_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
+  [[nodiscard]] std::uint32_t at_byte() const {
+    return static_cast<std::uint32_t>(token().begin);
+  }
+  [[nodiscard]] std::uint32_t last_end() const {
+    return at_ == 0 ? 0 : static_cast<std::uint32_t>(tokens_[at_ - 1].end);
+  }
   /// A word that begins or ends something wherever it stands: a statement that lacks its end goes
   /// no further.
   [[nodiscard]] bool is_reserved() const;
@@ -56,7 +54,7 @@ class Expressions {
   Expression primary(int depth);
 
   std::string_view text_;
-  std::vector<Token> tokens_;
+  Tokens tokens_;
   std::size_t at_ = 0;
 
  private:

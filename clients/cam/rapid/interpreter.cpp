@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "clients/cam/rapid/expressions.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -136,9 +137,7 @@ std::string Interpreter::text_of(const Expression& expression, const Scope& scop
       bytes.find('\0') == std::string_view::npos)
     return std::string(bytes);
   std::string shown;
-  for (const Token& token : tokens_of(bytes)) {
-    shown += text.substr(expression.begin + token.begin, token.end - token.begin);
-  }
+  for (const Token token : tokens_of(bytes, kLexis)) shown += token.text;
   return shown;
 }
 

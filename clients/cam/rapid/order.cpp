@@ -7,7 +7,6 @@
 #include <string>
 
 #include "clients/cam/rapid/motions.h"
-#include "clients/cam/rapid/tokens.h"
 #include "server/base/letters.h"
 
 namespace trammel::cam::rapid {

@@ -147,8 +147,7 @@ class Parser : private Expressions {
 
   /// `%"name"% p10;`. Heads of module files, `%%%`, and rubbish mean nothing.
   void skip_odd_statement() {
-    const bool of_head = is_sign("%", 1) || (at_ > 0 && tokens_[at_ - 1].kind == TokenKind::kSign &&
-                                             text_[tokens_[at_ - 1].begin] == '%');
+    const bool of_head = is_sign("%", 1) || tokens_[at_ - 1].is_sign("%");
     if (!is_sign(kLateCall) || of_head || routine_ < 0) {
       ++at_;
       return;
@@ -297,7 +296,7 @@ class Parser : private Expressions {
     }
     const std::size_t end = at_;
     for (at_ = begin; at_ < end; ++at_) {
-      const bool two_words = token().kind == TokenKind::kWord && at_ > begin &&
+      const bool two_words = token().is_word() && at_ > begin &&
                              (tokens_[at_ - 1].kind != TokenKind::kSign || is_closing(at_ - 1));
       if (two_words && !is_operator(word()) && !is_operator(word_at(at_ - 1))) {
         module_.conditions.back().end = token().begin;
@@ -310,14 +309,11 @@ class Parser : private Expressions {
     take(";");
   }
   [[nodiscard]] bool is_closing(std::size_t index) const {
-    const std::string_view sign =
-        text_.substr(tokens_[index].begin, tokens_[index].end - tokens_[index].begin);
-    return sign == ")" || sign == "]" || sign == "}";
+    const Token sign = tokens_[index];
+    return sign.is(")") || sign.is("]") || sign.is("}");
   }
   [[nodiscard]] std::string word_at(std::size_t index) const {
-    const Token& t = tokens_[index];
-    return t.kind == TokenKind::kWord ? lower(text_.substr(t.begin, t.end - t.begin))
-                                      : std::string();
+    return tokens_[index].is_word() ? lower(tokens_[index].text) : std::string();
   }
 
   /// `FOR i FROM a TO b DO`: i is a number that the loop decides.

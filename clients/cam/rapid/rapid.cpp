@@ -91,7 +91,7 @@ class Reader {
   /// Below the head of the module, else at the top.
   static MarkPlace mark_place(const std::string& text, std::size_t head_end) {
     const std::size_t end = head_end == 0 ? std::string::npos : text.find('\n', head_end);
-    const std::size_t top = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
+    const std::size_t top = first_byte(text);
     return {end == std::string::npos ? top : end + 1, "  ! "};
   }
 

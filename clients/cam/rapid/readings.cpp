@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "clients/cam/rapid/expressions.h"
 #include "clients/cam/rapid/motions.h"
-#include "clients/cam/rapid/tokens.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
@@ -164,22 +164,15 @@ void Readings::note_readings(std::size_t m, const Span& span, int routine, int l
   if (span.end <= span.begin) return;
   const std::string_view text =
       std::string_view(program_.files[m].text).substr(span.begin, span.end - span.begin);
-  const std::vector<Token> tokens = tokens_of(text);
-  const auto word = [&](std::size_t k) {
-    return k < tokens.size() ? text.substr(tokens[k].begin, tokens[k].end - tokens[k].begin)
-                             : std::string_view();
-  };
+  const Tokens tokens = tokens_of(text, kLexis);
   for (std::size_t k = 0; k < tokens.size(); ++k) {
-    if (tokens[k].kind != TokenKind::kWord || word(k + 1) == "(") continue;
-    if (k > 0 && (word(k - 1) == "." || word(k - 1) == "\\")) continue;
+    if (!tokens[k].is_word() || tokens[k + 1].is("(")) continue;
+    if (tokens[k - 1].is(".") || tokens[k - 1].is("\\")) continue;
     std::size_t behind = k + 1;
-    if (word(behind) == "{") {
-      while (behind < tokens.size() && word(behind) != "}") ++behind;
-      ++behind;
-    }
-    const int dots =
-        (word(behind) == "." ? 1 : 0) + (word(behind) == "." && word(behind + 2) == "." ? 1 : 0);
-    note_reading({m, routine}, std::string(word(k)), dots, line, by);
+    if (tokens[behind].is("{")) behind = tokens.find("}", behind) + 1;
+    const bool has_field = tokens[behind].is(".");
+    const int dots = (has_field ? 1 : 0) + (has_field && tokens[behind + 2].is(".") ? 1 : 0);
+    note_reading({m, routine}, std::string(tokens[k].text), dots, line, by);
   }
 }
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "clients/cam/flow.h"
-#include "clients/cam/rapid/tokens.h"
 
 /// What a RAPID module says, as far as targets need it. The whole language is not read: a statement
 /// that is not understood is passed over.

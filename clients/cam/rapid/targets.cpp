@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/cam/number_text.h"
+#include "clients/cam/keep.h"
 #include "server/base/units.h"
 
 namespace trammel::cam::rapid {
@@ -56,12 +56,8 @@ Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>&
 
 /// The line above the statement that keeps what was folded.
 void Targets::note_original(const Site& site, const Data& place, ProgramTarget& target) const {
-  const std::string& text = program_.files[site.module].text;
-  target.comment_at = line_begin(text, site.statement);
-  const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
-  std::string original = meaning_.text_of(*place.node, *place.scope);
-  target.comment =
-      text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
+  keep_original(program_.files[site.module].text, site.statement, "!",
+                meaning_.text_of(*place.node, *place.scope), target);
 }
 
 void Targets::note_external(const std::array<double, 6>& external, ProgramTarget& target) {
@@ -96,44 +92,26 @@ void Targets::rewrite(const Expression& expression, const Scope& scope, std::siz
           part.kind == Kind::kNumber
               ? read_number(std::string_view(text).substr(part.begin, part.end - part.begin))
               : std::nullopt;
-      NumberStyle style;
-      style.decimals = decimals;
       if (!written) target.folded = true;
-      target.rewrites.push_back(
-          {{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
+      keep({part.begin, part.end}, first + k, written ? written->style : with_decimals(decimals),
+           target);
     }
     return;
   }
-  target.folded = true;
-  Rewrite whole{{expression.begin, expression.end}, {"["}, {}};
-  add_numbers(first, count, decimals, whole);
-  whole.texts.back() += "]";
-  target.rewrites.push_back(std::move(whole));
-}
-
-/// Adds numbers with commas between.
-void Targets::add_numbers(std::size_t first, std::size_t count, int decimals, Rewrite& whole) {
-  for (std::size_t k = 0; k < count; ++k) {
-    NumberStyle style;
-    style.decimals = decimals;
-    whole.slots.push_back({first + k, style});
-    whole.texts.emplace_back(k + 1 < count ? "," : "");
-  }
+  NewText whole({expression.begin, expression.end}, "[");
+  std::move(whole.numbers(first, count, decimals, ",").text("]")).fold(target);
 }
 
 void Targets::rewrite_whole(const Expression& expression, const TargetValue& value,
                             ProgramTarget& target) {
-  target.folded = true;
-  Rewrite whole{{expression.begin, expression.end}, {"[["}, {}};
-  add_numbers(0, 3, value.decimals, whole);
-  whole.texts.back() += "],[";
-  add_numbers(3, 4, std::max(value.rotation_decimals, 6), whole);
+  NewText whole({expression.begin, expression.end}, "[[");
+  whole.numbers(0, 3, value.decimals, ",").text("],[");
+  whole.numbers(3, 4, std::max(value.rotation_decimals, 6), ",");
   std::vector<std::string> external;
   for (const double axis : value.external)
     external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
-  whole.texts.back() +=
-      fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
-  target.rewrites.push_back(std::move(whole));
+  whole.text(fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ",")));
+  std::move(whole).fold(target);
 }
 
 }  // namespace trammel::cam::rapid

@@ -49,7 +49,6 @@ class Targets {
   static Configuration configuration_of(const std::array<double, 4>& conf);
   void rewrite(const Expression& expression, const Scope& scope, std::size_t first,
                std::size_t count, int decimals, ProgramTarget& target) const;
-  static void add_numbers(std::size_t first, std::size_t count, int decimals, Rewrite& whole);
   static void rewrite_whole(const Expression& expression, const TargetValue& value,
                             ProgramTarget& target);
 

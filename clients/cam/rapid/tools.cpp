@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "clients/cam/cell_tools.h"
-#include "clients/cam/rapid/tokens.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"

@@ -4,21 +4,17 @@
 
 #include <algorithm>
 
+#include "clients/cam/keep.h"
 #include "server/base/letters.h"
 
 namespace trammel::cam {
 
 namespace {
 
-struct Field {
-  std::size_t begin = 0, end = 0;
-  std::string_view text;
-};
-
+/// The fields of a line, each with its place.
 struct Row {
-  std::size_t begin = 0;
   int line = 1;
-  std::vector<Field> fields;
+  std::vector<Token> fields;
 };
 
 /// Which columns hold the numbers of a pose.
@@ -27,12 +23,12 @@ struct Columns {
   std::vector<std::size_t> at;
 };
 
-Field trimmed(const std::string& text, std::size_t begin, std::size_t end) {
+Token field_at(const std::string& text, std::size_t begin, std::size_t end, int line) {
   while (begin < end && (text[begin] == ' ' || text[begin] == '\t' || text[begin] == '"')) ++begin;
   while (end > begin && (text[end - 1] == ' ' || text[end - 1] == '\t' || text[end - 1] == '\r' ||
                          text[end - 1] == '"'))
     --end;
-  return {begin, end, std::string_view(text).substr(begin, end - begin)};
+  return {TokenKind::kWord, begin, end, line, std::string_view(text).substr(begin, end - begin)};
 }
 
 /// `;` where a line has one, else a tab, else `,`.
@@ -45,24 +41,17 @@ char separator_of(std::string_view line) {
 
 std::vector<Row> rows_of(const std::string& text) {
   std::vector<Row> rows;
-  std::size_t begin = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
-  for (int number = 1; begin < text.size(); ++number) {
-    const std::size_t newline = text.find('\n', begin);
-    const std::size_t end = newline == std::string::npos ? text.size() : newline;
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first != std::string_view::npos && line[first] != '#') {
-      Row& row = rows.emplace_back();
-      row.begin = begin;
-      row.line = number;
-      const char separator = separator_of(line);
-      for (std::size_t at = begin; at <= end;) {
-        const std::size_t stop = std::min(text.find(separator, at), end);
-        row.fields.push_back(trimmed(text, at, stop));
-        at = stop + 1;
-      }
+  for (const TextLine& line : text_lines(text)) {
+    const std::size_t first = line.text.find_first_not_of(" \t\r");
+    if (first == std::string_view::npos || line.text[first] == '#') continue;
+    Row& row = rows.emplace_back();
+    row.line = line.number;
+    const char separator = separator_of(line.text);
+    for (std::size_t at = line.begin; at <= line.end;) {
+      const std::size_t stop = std::min(text.find(separator, at), line.end);
+      row.fields.push_back(field_at(text, at, stop, line.number));
+      at = stop + 1;
     }
-    begin = end + 1;
   }
   return rows;
 }
@@ -117,7 +106,7 @@ class Tables {
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) {
       const std::string& text = program_.files[f].text;
-      program_.mark_places.push_back({text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
+      program_.mark_places.push_back({first_byte(text), "# "});
       read_rows(f, rows_of(text));
     }
     return std::move(program_);
@@ -137,13 +126,8 @@ class Tables {
   /// Whether the row holds a pose. A row that does not is left as it is: a header, a remark.
   bool read_row(std::size_t f, const Row& row, const Columns& columns) {
     ProgramTarget target;
-    for (std::size_t k = 0; k < columns.at.size(); ++k) {
-      if (columns.at[k] >= row.fields.size()) return false;
-      const Field& field = row.fields[columns.at[k]];
-      const auto written = read_number(field.text);
-      if (!written) return false;
-      target.numbers.push_back(written->value);
-      target.rewrites.push_back({{field.begin, field.end}, {}, {{k, written->style}}});
+    for (const std::size_t column : columns.at) {
+      if (column >= row.fields.size() || !keep(row.fields[column], target)) return false;
     }
     target.coordinates = columns.coordinates;
     target.name = fmt::format("row {}", row.line);

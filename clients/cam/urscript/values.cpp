@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "clients/cam/number_text.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cam::urscript {
@@ -20,69 +19,68 @@ bool is_function_of_poses(const std::string& name) {
   return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
 }
 
-bool defines(const Piece& piece) {
-  return piece.is("def") || piece.is("thread") || piece.is("sec");
+bool defines(const Token& token) {
+  return token.is("def") || token.is("thread") || token.is("sec");
 }
+
+bool opens(const Token& token) { return defines(token) || token.is("if") || token.is("while"); }
 
 std::vector<double> numbers_in(const Value& value) {
   std::vector<double> numbers;
-  for (const Piece& piece : value.numbers)
-    numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
+  for (const Token& token : value.numbers) numbers.push_back(value_in(token));
   return numbers;
 }
 
-Values::Values(const std::vector<Piece>& pieces, std::string file)
-    : pieces_(pieces), file_(std::move(file)) {
-  for (std::size_t at = 0; at < pieces_.size(); ++at) {
+Values::Values(const Tokens& tokens, std::string file) : tokens_(tokens), file_(std::move(file)) {
+  for (std::size_t at = 0; at < tokens_.size(); ++at) {
     note_block(at);
     note_assignment(at);
   }
-  for (std::size_t at = 0; at < pieces_.size(); ++at) note_parameters(at);
+  for (std::size_t at = 0; at < tokens_.size(); ++at) note_parameters(at);
   for (auto& [name, variable] : variables_) find_order(variable);
 }
 
-/// The blocks that are open at a piece, one after the other.
+/// The blocks that are open at a token, one after the other.
 void Values::note_block(std::size_t at) {
-  if (pieces_[at].kind != Piece::Kind::kWord) return;
-  if (defines(pieces_[at]) || pieces_[at].is("if") || pieces_[at].is("while")) open_.push_back(at);
-  if (pieces_[at].is("end") && !open_.empty()) open_.pop_back();
+  if (!tokens_[at].is_word()) return;
+  if (opens(tokens_[at])) open_.push_back(at);
+  if (tokens_[at].is("end") && !open_.empty()) open_.pop_back();
 }
 
-/// The piece of the `def` or `thread` that is open; one behind all of them: none is.
+/// The token of the `def` or `thread` that is open; one behind all of them: none is.
 std::size_t Values::function_here() const {
   const auto own = std::find_if(open_.rbegin(), open_.rend(),
-                                [&](std::size_t block) { return defines(pieces_[block]); });
-  return own == open_.rend() ? pieces_.size() : *own;
+                                [&](std::size_t block) { return defines(tokens_[block]); });
+  return own == open_.rend() ? tokens_.size() : *own;
 }
 
 /// `global p1 = p[...]`; what is set in part is decided at run time.
 void Values::note_assignment(std::size_t at) {
-  if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
-  const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line ||
-                     pieces_[at - 1].is("global") || pieces_[at - 1].is("local");
+  if (!tokens_[at].is_word()) return;
+  const bool first = at == 0 || tokens_[at - 1].line != tokens_[at].line ||
+                     tokens_[at - 1].is("global") || tokens_[at - 1].is("local");
   if (!first) return;
-  const std::string name(pieces_[at].text);
+  const std::string name(tokens_[at].text);
   std::size_t equals = at + 1;
-  if (pieces_[equals].is("[")) {
-    while (equals < pieces_.size() && !pieces_[equals].is("=") &&
-           pieces_[equals].line == pieces_[at].line)
+  if (tokens_[equals].is("[")) {
+    while (equals < tokens_.size() && !tokens_[equals].is("=") &&
+           tokens_[equals].line == tokens_[at].line)
       ++equals;
   }
-  if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("="))
+  if (equals + 1 >= tokens_.size() || !tokens_[equals].is("=") || tokens_[equals + 1].is("="))
     return;
   Variable& variable = variables_[name];
   const bool again = variable.value.end > 0, in_part = equals != at + 1;
   const std::string why =
-      fmt::format("{} is set at run time ({} line {})", shown(name), file_, pieces_[at].line);
+      fmt::format("{} is set at run time ({} line {})", shown(name), file_, tokens_[at].line);
   std::size_t next = equals + 1;
   const Value value = value_at(next);
   if (in_part) variable.changed = why;
   if (again) variable.set_again = why;
   variable.value = value;
-  if (next < pieces_.size() && pieces_[next].line == value.line && !ends_here(next, value.line))
-    variable.value.kind = Value::Kind::kOther;
-  variable.is_global |= at > 0 && pieces_[at - 1].is("global");
-  variable.is_local |= at > 0 && pieces_[at - 1].is("local");
+  if (!ends_here(next, value.line)) variable.value.kind = Value::Kind::kOther;
+  variable.is_global |= tokens_[at - 1].is("global");
+  variable.is_local |= tokens_[at - 1].is("local");
   variable.functions.insert(function_here());
   assignments_.emplace(next, Assignment{name, variable.in_order.size()});
   variable.in_order.push_back(variable.value);
@@ -90,13 +88,13 @@ void Values::note_assignment(std::size_t at) {
 
 /// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
 void Values::note_parameters(std::size_t at) {
-  if (!pieces_[at].is("def") || at + 2 >= pieces_.size() || !pieces_[at + 2].is("(")) return;
-  for (std::size_t next = at + 3; next < pieces_.size() && !pieces_[next].is(")"); ++next) {
-    const bool begins = pieces_[next - 1].is("(") || pieces_[next - 1].is(",");
-    if (!begins || pieces_[next].kind != Piece::Kind::kWord) continue;
-    variables_[std::string(pieces_[next].text)].changed =
-        fmt::format("{} is a parameter of {} ({} line {})", shown(std::string(pieces_[next].text)),
-                    shown(std::string(pieces_[at + 1].text)), file_, pieces_[at].line);
+  if (!tokens_[at].is("def") || !tokens_[at + 2].is("(")) return;
+  for (std::size_t next = at + 3; next < tokens_.size() && !tokens_[next].is(")"); ++next) {
+    const bool begins = tokens_[next - 1].is("(") || tokens_[next - 1].is(",");
+    if (!begins || !tokens_[next].is_word()) continue;
+    variables_[std::string(tokens_[next].text)].changed =
+        fmt::format("{} is a parameter of {} ({} line {})", shown(std::string(tokens_[next].text)),
+                    shown(std::string(tokens_[at + 1].text)), file_, tokens_[at].line);
   }
 }
 
@@ -116,54 +114,62 @@ void Values::find_order(Variable& variable) {
 
 Value Values::value_at(std::size_t& at, int depth) const {
   Value value;
-  if (at >= pieces_.size() || depth > kDeepest) return value;
-  value.begin = pieces_[at].begin;
-  value.line = pieces_[at].line;
-  const bool pose = pieces_[at].is("p") && at + 1 < pieces_.size() && pieces_[at + 1].is("[");
-  if (pose || pieces_[at].is("[")) {
+  if (at >= tokens_.size() || depth > kDeepest) return value;
+  value.begin = tokens_[at].begin;
+  value.line = tokens_[at].line;
+  const bool pose = tokens_[at].is("p") && tokens_[at + 1].is("[");
+  if (pose || tokens_[at].is("[")) {
     at += pose ? 2 : 1;
     value.kind = pose ? Value::Kind::kPose : Value::Kind::kJoints;
-    bool is_number_due = true;
-    for (; at < pieces_.size() && !pieces_[at].is("]"); ++at) {
-      const bool is_number = pieces_[at].kind == Piece::Kind::kNumber;
-      if (is_number != is_number_due || (!is_number && !pieces_[at].is(",")))
-        value.kind = Value::Kind::kOther;
-      if (is_number) value.numbers.push_back(pieces_[at]);
-      is_number_due = !is_number_due;
-    }
-    if (value.numbers.size() != 6) value.kind = Value::Kind::kOther;
-    if (at < pieces_.size()) ++at;
-  } else if (pieces_[at].kind == Piece::Kind::kWord) {
+    read_list(at, value);
+  } else if (tokens_[at].is_word()) {
     value.kind = Value::Kind::kName;
-    value.name = std::string(pieces_[at++].text);
-    if (at < pieces_.size() && pieces_[at].is("(")) {
-      value.kind = Value::Kind::kCall;
-      ++at;
-      while (at < pieces_.size() && !pieces_[at].is(")")) {
-        if (pieces_[at].is(",")) {
-          ++at;
-          continue;
-        }
-        const std::size_t before = at;
-        const bool labelled = at + 2 < pieces_.size() && pieces_[at].kind == Piece::Kind::kWord &&
-                              pieces_[at + 1].is("=") && !pieces_[at + 2].is("=");
-        if (labelled) at += 2;
-        value.arguments.push_back(value_at(at, depth + 1));
-        if (labelled) value.arguments.back().label = std::string(pieces_[before].text);
-        if (at == before) ++at;
-      }
-      if (at < pieces_.size()) ++at;
-    }
+    value.name = std::string(tokens_[at++].text);
+    if (tokens_[at].is("(")) read_call(++at, value, depth);
   } else {
     ++at;
   }
-  value.end = at > 0 ? pieces_[at - 1].end : 0;
+  value.end = tokens_[at - 1].end;
   return value;
 }
 
+/// `1, 2, 3, 4, 5, 6]`
+void Values::read_list(std::size_t& at, Value& value) const {
+  bool is_number_due = true;
+  for (; at < tokens_.size() && !tokens_[at].is("]"); ++at) {
+    const bool is_number = tokens_[at].is_number();
+    if (is_number != is_number_due || (!is_number && !tokens_[at].is(",")))
+      value.kind = Value::Kind::kOther;
+    if (is_number) value.numbers.push_back(tokens_[at]);
+    is_number_due = !is_number_due;
+  }
+  if (value.numbers.size() != 6) value.kind = Value::Kind::kOther;
+  if (at < tokens_.size()) ++at;
+}
+
+/// `p1, qnear=q1)`
+void Values::read_call(std::size_t& at, Value& value, int depth) const {
+  value.kind = Value::Kind::kCall;
+  while (at < tokens_.size() && !tokens_[at].is(")")) {
+    if (tokens_[at].is(",")) {
+      ++at;
+      continue;
+    }
+    const std::size_t before = at;
+    const bool labelled =
+        tokens_[at].is_word() && tokens_[at + 1].is("=") && at + 2 < tokens_.size() &&
+        !tokens_[at + 2].is("=");
+    if (labelled) at += 2;
+    value.arguments.push_back(value_at(at, depth + 1));
+    if (labelled) value.arguments.back().label = std::string(tokens_[before].text);
+    if (at == before) ++at;
+  }
+  if (at < tokens_.size()) ++at;
+}
+
 bool Values::ends_here(std::size_t at, int line) const {
-  return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") ||
-         pieces_[at].is(")");
+  return at >= tokens_.size() || tokens_[at].line != line || tokens_[at].is(",") ||
+         tokens_[at].is(")");
 }
 
 Told<Value> Values::resolved(const Value& value, bool stored) const {

@@ -7,8 +7,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "clients/cam/keep.h"
 #include "clients/cam/program.h"
-#include "clients/cam/scan.h"
 
 /// What the expressions of a script mean, as far as they are constant.
 namespace trammel::cam::urscript {
@@ -27,7 +27,7 @@ struct Value {
   int line = 1;
   std::string name;
   std::string label = {};  ///< of an argument: `qnear=q`
-  std::vector<Piece> numbers;
+  std::vector<Token> numbers;
   std::vector<Value> arguments;
 };
 
@@ -38,7 +38,7 @@ struct Variable {
   /// only one.
   std::vector<Value> in_order = {};
   bool is_global = false, is_local = false;  ///< as any of its assignments says
-  std::set<std::size_t> functions = {};      ///< that set it, by the piece of their `def`
+  std::set<std::size_t> functions = {};      ///< that set it, by the token of their `def`
   std::string set_again = {};                ///< where
 };
 
@@ -55,17 +55,19 @@ struct Assignment {
 /// `pose_trans`, `pose_inv`, `pose_add`
 [[nodiscard]] bool is_function_of_poses(const std::string& name);
 /// `def`, `thread`
-[[nodiscard]] bool defines(const Piece& piece);
+[[nodiscard]] bool defines(const Token& token);
+/// `def`, `if`: it has an `end`.
+[[nodiscard]] bool opens(const Token& token);
 /// Of six in brackets.
 [[nodiscard]] std::vector<double> numbers_in(const Value& value);
 
 class Values {
  public:
-  /// Of the pieces of a script, which is called `file` in reasons. Finds what its variables are set
+  /// Of the tokens of a script, which is called `file` in reasons. Finds what its variables are set
   /// to.
-  Values(const std::vector<Piece>& pieces, std::string file);
+  Values(const Tokens& tokens, std::string file);
 
-  /// The value from a piece on; `at` is set behind it.
+  /// The value from a token on; `at` is set behind it.
   [[nodiscard]] Value value_at(std::size_t& at, int depth = 0) const;
   [[nodiscard]] bool ends_here(std::size_t at, int line) const;
   /// `stored`: it was made before, when a variable may have been another one.
@@ -74,7 +76,7 @@ class Values {
   /// What holds for the expressions that are asked for next; nullptr: not known.
   void assume(const Settings* settings) { now_ = settings; }
   [[nodiscard]] const std::map<std::string, Variable>& variables() const { return variables_; }
-  /// Assignments to variables that are set in order, by the piece behind them.
+  /// Assignments to variables that are set in order, by the token behind them.
   [[nodiscard]] const std::multimap<std::size_t, Assignment>& assignments() const {
     return assignments_;
   }
@@ -85,15 +87,17 @@ class Values {
  private:
   void note_block(std::size_t at);
   [[nodiscard]] std::size_t function_here() const;
+  void read_list(std::size_t& at, Value& value) const;
+  void read_call(std::size_t& at, Value& value, int depth) const;
   void note_assignment(std::size_t at);
   void note_parameters(std::size_t at);
   static void find_order(Variable& variable);
 
-  const std::vector<Piece>& pieces_;
+  const Tokens& tokens_;
   std::string file_;
   std::map<std::string, Variable> variables_;
   std::multimap<std::size_t, Assignment> assignments_;
-  std::vector<std::size_t> open_;  ///< pieces that open blocks, while assignments are noted
+  std::vector<std::size_t> open_;  ///< tokens that open blocks, while assignments are noted
   const Settings* now_ = nullptr;
 };
 
