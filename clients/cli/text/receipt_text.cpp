@@ -1,10 +1,12 @@
 #include "clients/cli/text/receipt_text.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <utility>
 
 #include "clients/cli/terminal/output.h"
 #include "server/base/plain_text.h"
@@ -195,20 +197,69 @@ std::string receipt_summary(const CorrectedProgram& program) {
   return text;
 }
 
+namespace {
+
+/// Rows that are left for one reason.
+struct Reason {
+  const ReceiptRow* first = nullptr;
+  std::size_t targets = 0, motions = 0;
+};
+
+std::string why_left(const ReceiptRow& row) {
+  return fmt::format("{}: {}{}", row.status, row.message,
+                     row.suggestion.empty() ? "" : "; " + row.suggestion);
+}
+
+/// The reason that leaves most motions first.
+std::vector<Reason> reasons_of(const CorrectedProgram& program) {
+  std::map<std::string, Reason> by_text;
+  for (const ReceiptRow& row : program.rows) {
+    if (row.corrected()) continue;
+    Reason& reason = by_text[why_left(row)];
+    if (reason.first == nullptr) reason.first = &row;
+    ++reason.targets;
+    reason.motions += std::max<std::size_t>(row.used_at.size(), 1);
+  }
+  std::vector<Reason> reasons;
+  for (const auto& [text, reason] : by_text) reasons.push_back(reason);
+  std::stable_sort(reasons.begin(), reasons.end(), [](const Reason& a, const Reason& b) {
+    return std::pair(a.motions, a.targets) > std::pair(b.motions, b.targets);
+  });
+  return reasons;
+}
+
+std::string by_reason(const CorrectedProgram& program, std::size_t most_lines) {
+  const std::vector<Reason> reasons = reasons_of(program);
+  std::string text;
+  for (std::size_t k = 0; k < std::min(reasons.size(), most_lines); ++k) {
+    const ReceiptRow& first = *reasons[k].first;
+    const std::string more =
+        reasons[k].targets > 1 ? fmt::format(" and {} more", reasons[k].targets - 1) : "";
+    text += fmt::format("  {} {} line {}{}: {}\n", first.name.empty() ? first.motion : first.name,
+                        first.file, first.line, more, why_left(first));
+  }
+  if (reasons.size() > most_lines)
+    text += fmt::format("  and {} more reasons\n", reasons.size() - most_lines);
+  if (program.moves_corrected == 0 && reasons.size() > 1 && reasons[0].motions > 1)
+    text += fmt::format("no motion is corrected; the first reason alone leaves {} of {} motions\n",
+                        reasons[0].motions, program.moves);
+  return text;
+}
+
+}  // namespace
+
 std::string left_alone_text(const CorrectedProgram& program) {
   constexpr std::size_t kLines = 10;
   const std::size_t left = program.left_alone();
   if (left == 0) return "";
   std::string text =
       fmt::format("{} of {} targets are left as they were:\n", left, program.rows.size());
-  std::size_t told = 0;
+  if (left > kLines) return text + by_reason(program, kLines);
   for (const ReceiptRow& row : program.rows) {
-    if (row.corrected() || ++told > kLines) continue;
-    text += fmt::format("  {} line {}: {}{}: {}{}\n", row.file, row.line,
-                        row.name.empty() ? "" : row.name + ": ", row.status, row.message,
-                        row.suggestion.empty() ? "" : "; " + row.suggestion);
+    if (row.corrected()) continue;
+    text += fmt::format("  {} line {}: {}{}\n", row.file, row.line,
+                        row.name.empty() ? "" : row.name + ": ", why_left(row));
   }
-  if (left > kLines) text += fmt::format("  and {} more\n", left - kLines);
   return text;
 }
 

@@ -20,6 +20,7 @@ namespace trammel::cli {
                                        const std::vector<Note>& of_model = {});
 /// `148 motions, 141 corrected; 60 targets: 55 ok, 5 refused`, and what is left with the reasons.
 [[nodiscard]] std::string receipt_summary(const cam::CorrectedProgram& program);
+/// A line a target; of more than ten a line a reason, with the one that leaves most motions first.
 [[nodiscard]] std::string left_alone_text(const cam::CorrectedProgram& program);
 
 }  // namespace trammel::cli
