@@ -132,9 +132,8 @@ TEST_F(ImportBackup, AWorkObjectWithTwoValuesIsLeftOutAndNamedWithBoth) {
     EXPECT_NE(notes.find(part), std::string::npos) << part << ": " << notes;
 }
 
-TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItIsNotAbbs) {
+TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItCannotReadIt) {
   const std::vector<std::pair<std::string, std::string>> others = {
-      {"KRC/R1/Mada/$machine.dat", "KUKA"},
       {"MD/sysframe.va", "FANUC"},
       {"JOBS/TRIM1.JBI", "Yaskawa"}};
   for (const auto& [name, maker] : others) {
@@ -148,6 +147,90 @@ TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItIsNotAbbs) {
     EXPECT_NE(said.find("the backup of a " + maker + " controller"), std::string::npos) << said;
     EXPECT_EQ(said.find("MOC.cfg"), std::string::npos) << said;
   }
+}
+
+class ImportKuka : public ImportBackup {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(file("backup/KRC/R1/Mada"));
+    std::filesystem::create_directories(file("backup/KRC/R1/System"));
+    folder_.write(machine, kMachine);
+    folder_.write(config, kConfig);
+  }
+  int make() {
+    return run({"-o", file("cell.yaml"), "--name", "cell-3", "--robot", kKuka, "--frames",
+                file("frames.csv"), "--json", file("j.json")});
+  }
+  std::string notes() const { return nlohmann::json::parse(text("j.json"))["notes"].dump(); }
+
+  static constexpr const char* kMachine =
+      "DEFDAT $MACHINE PUBLIC\n$TRAFONAME[]=\"#KR210R2700 EXTRA C4 FLR\"\n$NUM_AX=6\n"
+      "$LENGTH_A=350.0\n$LENGTH_B=1150.0\n"
+      "FRAME $ROBROOT={X 0.0,Y 0.0,Z 600.0,A 90.0,B 0.0,C 0.0}\n"
+      "REAL $SOFTN_END[12]\n$SOFTN_END[1]=-180.0\n$SOFTN_END[2]=-135.0\n"
+      "$SOFTN_END[3]=-115.0\n$SOFTN_END[4]=-345.0\n$SOFTN_END[5]=-120.0\n"
+      "$SOFTN_END[6]=-345.0\n$SOFTP_END[1]=180.0\n$SOFTP_END[2]=-10.0\n$SOFTP_END[3]=150.0\n"
+      "$SOFTP_END[4]=345.0\n$SOFTP_END[5]=120.0\n$SOFTP_END[6]=345.0\nENDDAT\n";
+  static constexpr const char* kConfig =
+      "DEFDAT $CONFIG PUBLIC\nDECL FRAME TOOL_DATA[16]\nDECL CHAR TOOL_NAME[16,24]\n"
+      "TOOL_DATA[1]={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\nTOOL_NAME[1,]=\"Drill end\"\n"
+      "LOAD_DATA[1]={M 100.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}\n"
+      "TOOL_DATA[2]={X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}\n"
+      "LOAD_DATA[2]={M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}\n"
+      "TOOL_DATA[3]={X 900.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}\nTOOL_TYPE[3]=#TCP\n"
+      "TOOL_DATA[4]={X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\n"
+      "BASE_DATA[1]={X 0.0,Y 2000.0,Z 600.0,A 90.0,B 0.0,C 0.0}\n"
+      "BASE_DATA[2]={X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nENDDAT\n";
+  const std::string kKuka = TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml";
+  const std::string machine = "backup/KRC/R1/Mada/$machine.dat",
+                    config = "backup/KRC/R1/System/$config.dat";
+};
+
+TEST_F(ImportKuka, MakesACellOfWhatTheControllerHas) {
+  ASSERT_EQ(make(), 0);
+  const Cell cell = read_cell(file("cell.yaml")).value();
+  ASSERT_TRUE(cell.X_WB);
+  EXPECT_LT((cell.X_WB->translation() - Vector3(0, 0, .6)).norm(), 1e-9);
+  EXPECT_LT((cell.X_WB->linear().col(0) - Vector3::UnitY()).norm(), 1e-9);
+  ASSERT_EQ(cell.tools.size(), 2u);
+  EXPECT_LT((cell.tools.at("Drill_end")->translation() - Vector3(.1, 0, .15)).norm(), 1e-9);
+  EXPECT_LT((cell.tools.at("tool_2")->translation() - Vector3(0, 0, .05)).norm(), 1e-9);
+  EXPECT_NEAR(cell.payloads.at("Drill_end").mass, 100, 1e-9);
+  ASSERT_EQ(cell.joint_ranges.size(), 6u);
+  EXPECT_NEAR(to_deg(cell.joint_ranges[1].first), -135, 1e-3);
+  EXPECT_NEAR(to_deg(cell.joint_ranges[1].second), -10, 1e-3);
+}
+
+TEST_F(ImportKuka, GivesBasesAsTheRobotSeesThem) {
+  ASSERT_EQ(make(), 0);
+  EXPECT_NE(text("frames.csv").find("robot_base,0,0,600,"), std::string::npos);
+  EXPECT_NE(text("frames.csv").find("BASE_DATA[1],2000,"), std::string::npos)
+      << text("frames.csv");
+  EXPECT_EQ(text("frames.csv").find("BASE_DATA[2]"), std::string::npos) << "it was never set";
+}
+
+TEST_F(ImportKuka, SaysWhatTheFilesDoNotTell) {
+  ASSERT_EQ(make(), 0);
+  EXPECT_FALSE(read_cell(file("cell.yaml"))->payloads.contains("tool_2"));
+  for (const char* part : {"tool tool_2 has no load", "TOOL_DATA[3]", "absolute accuracy"})
+    EXPECT_NE(notes().find(part), std::string::npos) << part << ": " << notes();
+}
+
+TEST_F(ImportKuka, TellsWhereACellDiffers) {
+  ASSERT_EQ(make(), 0);
+  EXPECT_TRUE(differing(file("cell.yaml")).empty());
+  change(config, "Z 150.0", "Z 153.5");
+  const std::vector<std::string> found = differing(file("cell.yaml"));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("3.500 mm"), std::string::npos) << found[0];
+}
+
+TEST_F(ImportKuka, RefusesAnotherRobotAndABackupWithoutTools) {
+  change(machine, "$LENGTH_B=1150.0", "$LENGTH_B=1300.0");
+  EXPECT_EQ(make(), 3) << "longer";
+  folder_.write(machine, kMachine);
+  folder_.write(config, "DEFDAT $CONFIG PUBLIC\nENDDAT\n");
+  EXPECT_EQ(make(), 3) << "no tool";
 }
 
 TEST_F(ImportBackup, RefusesTheBackupOfAnotherRobotThanTheRobotFileIsOf) {

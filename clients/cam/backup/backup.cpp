@@ -392,6 +392,7 @@ std::string unit_of_task(const std::string& parameters, const std::string& task)
 }
 
 StatedRobot stated_by(const ControllerRobot& robot) {
+  if (!robot.stated.numbers.empty() || !robot.stated.types.empty()) return robot.stated;
   StatedRobot stated;
   if (robot.carried_by.empty())
     stated.bases.push_back({robot.X_WB, "base_frame", robot.file, robot.line});
@@ -419,8 +420,8 @@ Result<ControllerCell> read_backup(const std::string& parameters, const std::str
 std::string cell_file_of(const ControllerCell& controller, const std::string& name,
                          const std::string& robot) {
   std::string text = fmt::format(
-      "# From the backup of an ABB controller: {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
-      shown(controller.unit), shown(controller.robot_type), name, robot);
+      "# From the backup of a controller ({}): {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
+      controller.maker, shown(controller.unit), shown(controller.robot_type), name, robot);
   text += fmt::format(
       "base: {}   # in the controller's world; of the tracker's: null finds it from the data\n",
       yaml_pose(controller.X_WB));

@@ -9,12 +9,13 @@
 #include "clients/cam/program.h"
 #include "server/robot/cell.h"
 
-/// A cell as an ABB controller has it: its backup holds the system parameters (SYSPAR/MOC.cfg) and
-/// the modules.
+/// A cell as its controller has it. The backup of an ABB holds the system parameters
+/// (SYSPAR/MOC.cfg) and the modules, that of a KUKA `$machine.dat` and `$config.dat`.
 namespace trammel::cam {
 
 /// A robot as the system parameters have it.
 struct ControllerRobot {
+  std::string maker = "ABB";
   std::string unit;                       ///< mechanical unit: `ROB_1`
   std::string robot_type;                 ///< as the parameters name it
   std::string file;                       ///< the parameters
@@ -27,6 +28,7 @@ struct ControllerRobot {
       limits;  ///< rad, of each axis; empty where the parameters do not say all
   bool controller_compensates = false;  ///< Absolute Accuracy is in use
   std::vector<std::string> notes;       ///< what was passed over, and why
+  StatedRobot stated = {};  ///< where the files say it in their own way (KUKA); else of the above
 };
 
 /// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only
@@ -64,6 +66,10 @@ struct ControllerCell : ControllerRobot {
                                                  const std::string& where,
                                                  const std::vector<SourceFile>& modules,
                                                  const std::string& unit);
+
+/// The cell of a KUKA, as its `$machine.dat` and `$config.dat` have it. Refuses files that name no
+/// tool. Which tools and loads are not known there is a note.
+[[nodiscard]] Result<ControllerCell> read_kuka_backup(const std::vector<SourceFile>& files);
 
 /// A cell file (YAML) of it. `robot`: the path of the robot file, as it is to stand there.
 [[nodiscard]] std::string cell_file_of(const ControllerCell& controller, const std::string& name,

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/cam/program.h"
@@ -12,5 +15,16 @@ namespace trammel::cam {
 /// `$TOOL`, `$BASE`, `BAS(#TOOL,n)`, FDAT and `WITH`, followed through calls and branches.
 /// `$machine.dat` says where the robot stands in $WORLD, and which robot it is.
 [[nodiscard]] Program read_krl(std::vector<SourceFile> files, const ReadOptions& options);
+
+/// What a KUKA's own `$machine.dat` and `$config.dat` say of its cell. Tools are seen from the
+/// flange, bases from the robot's base.
+struct KukaData {
+  StatedRobot stated;
+  std::map<int, ProgramTool> tools;  ///< that are set, with their loads; a reason where not known
+  std::map<int, ProgramFrame> bases;
+  std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty: not all are said
+  std::vector<std::string> notes;                 ///< on what is not told there
+};
+[[nodiscard]] KukaData read_kuka_data(const std::vector<SourceFile>& files);
 
 }  // namespace trammel::cam

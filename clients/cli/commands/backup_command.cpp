@@ -115,14 +115,13 @@ std::string robot_in(const BackupArguments& arguments) {
 struct Maker {
   const char* name;
   std::vector<const char*> endings;  ///< of paths, in lower case
-  const char* next;
+  const char* next;                  ///< empty: his backups are read
 };
 const Maker* maker_of(const std::string& folder) {
   static const std::vector<Maker> kMakers = {
       {"KUKA",
        {"$machine.dat", "$config.dat", ".src"},
-       "correct takes the folder as it is; write the cell by hand: $machine.dat names the robot, "
-       "$config.dat has its tools (TOOL_DATA) and loads (LOAD_DATA)"},
+       ""},
       {"FANUC",
        {".ls", ".tp", ".va", ".sv", "orderfil.dat"},
        "correct takes its .ls files; write the cell by hand: sysframe.va has the tools ($MNUTOOL) "
@@ -146,13 +145,35 @@ const Maker* maker_of(const std::string& folder) {
   return nullptr;
 }
 
-Result<std::string> parameters_of(const BackupArguments& arguments, const std::string& moc) {
-  Result<std::string> parameters = read_text_file(moc);
+/// `$machine.dat` and `$config.dat`, wherever they lie in the folder.
+Result<std::vector<cam::SourceFile>> kuka_files(const std::string& folder) {
+  std::error_code error;
+  std::vector<cam::SourceFile> files;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = lower(it->path().filename().string());
+    if (name != "$machine.dat" && name != "$config.dat") continue;
+    const std::string path = it->path().string();
+    files.push_back({fs::relative(path, folder, error).string(), TRY(read_text_file(path))});
+  }
+  std::sort(files.begin(), files.end(),
+            [](const auto& one, const auto& other) { return one.name < other.name; });
+  return files;
+}
+
+Result<cam::ControllerCell> controller_of(const BackupArguments& arguments) {
+  const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
+  const Result<std::string> parameters = read_text_file(moc);
   const Maker* maker = parameters ? nullptr : maker_of(arguments.backup);
-  if (maker == nullptr) return parameters;
-  return refused("it is the backup of a {} controller, and only those of ABB are read", maker->name)
-      .in(arguments.backup)
-      .next(maker->next);
+  if (maker != nullptr && *maker->next == '\0')
+    return cam::read_kuka_backup(TRY(kuka_files(arguments.backup)));
+  if (maker != nullptr)
+    return refused("it is the backup of a {} controller, and only those of ABB and KUKA are read",
+                   maker->name)
+        .in(arguments.backup)
+        .next(maker->next);
+  if (!parameters) return tl::make_unexpected(parameters.error());
+  return cam::read_backup(*parameters, moc, TRY(modules_of(arguments)), arguments.unit);
 }
 
 /// Which modules to take is for whoever asks to say, unless he has.
@@ -175,10 +196,7 @@ Status check_usage(const BackupArguments& arguments) {
 
 Result<Extent> import_backup(const BackupArguments& arguments) {
   TRY(check_usage(arguments));
-  const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
-  const std::string parameters = TRY(parameters_of(arguments, moc));
-  const auto modules = TRY(modules_of(arguments));
-  const auto controller = cam::read_backup(parameters, moc, modules, arguments.unit);
+  const auto controller = controller_of(arguments);
   if (!controller) return tl::make_unexpected(advised(controller.error(), arguments));
   if (!arguments.robot.empty()) {
     const Chain robot = TRY(read_robot(arguments.robot));
@@ -215,10 +233,11 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
 void add_backup_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<BackupArguments>();
   CLI::App* command = app.add_subcommand(
-      "import-backup", "Make a cell of an ABB controller's backup, or tell where a cell differs");
+      "import-backup", "Make a cell of the backup of an ABB or KUKA controller, or tell where a cell differs");
   command
       ->add_option("backup", arguments->backup,
-                   "Folder of the backup, with SYSPAR/MOC.cfg and RAPID")
+                   "Folder of the backup, with SYSPAR/MOC.cfg and RAPID (ABB) or $machine.dat and "
+                   "$config.dat (KUKA)")
       ->required();
   command->add_option("-o,--output", arguments->output,
                       "Cell file to write (YAML): base frame, tools, loads, axis ranges, whether "
