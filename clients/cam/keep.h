@@ -80,6 +80,7 @@ class ListedValues {
   void add(const std::string& name, ListedValue value);
   /// For a target; nullptr: no list has it.
   [[nodiscard]] const ListedValue* take(const std::string& name);
+  [[nodiscard]] const std::map<std::string, ListedValue>& all() const { return all_; }
   /// A sentence a list, of what was taken from it.
   [[nodiscard]] std::vector<std::string> notes() const;
 

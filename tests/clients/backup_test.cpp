@@ -132,19 +132,50 @@ TEST_F(ImportBackup, AWorkObjectWithTwoValuesIsLeftOutAndNamedWithBoth) {
     EXPECT_NE(notes.find(part), std::string::npos) << part << ": " << notes;
 }
 
-TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItCannotReadIt) {
-  const std::vector<std::pair<std::string, std::string>> others = {
-      {"MD/sysframe.va", "FANUC"},
-      {"JOBS/TRIM1.JBI", "Yaskawa"}};
-  for (const auto& [name, maker] : others) {
+TEST_F(ImportBackup, OfAFanucToolsAndFramesComeFromItsSystemVariables) {
+  std::filesystem::remove_all(file("backup"));
+  std::filesystem::create_directories(file("backup"));
+  folder_.write("backup/SYSFRAME.VA",
+                "[*SYSTEM*]$MNUFRAME  Storage: SHADOW\n    [1,1] =   'panel'\n"
+                "  X:  1800.000   Y:  -250.000   Z:   800.000\n"
+                "  W:      .000   P:      .000   R:      .000\n"
+                "[*SYSTEM*]$MNUTOOL  Storage: SHADOW\n    [1,2] = \n"
+                "  X:   100.000   Y:      .000   Z:   150.000\n"
+                "  W:      .000   P:   -45.000   R:      .000\n");
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--frames",
+                 file("frames.csv")}),
+            0);
+  const Cell cell = read_cell(file("cell.yaml")).value();
+  ASSERT_TRUE(cell.tools.contains("UTOOL[2]"));
+  EXPECT_LT((cell.tools.at("UTOOL[2]")->translation() - Vector3(.1, 0, .15)).norm(), 1e-9);
+  EXPECT_NE(text("frames.csv").find("UFRAME[1],1800,-250,800,1,0,0,0"), std::string::npos)
+      << text("frames.csv");
+  EXPECT_TRUE(differing(file("cell.yaml")).empty());
+}
+
+TEST_F(ImportBackup, OfAYaskawaToolsLoadsAndFramesComeFromItsConditionFiles) {
+  std::filesystem::remove_all(file("backup"));
+  std::filesystem::create_directories(file("backup"));
+  folder_.write("backup/TOOL.CND",
+                "//TOOL 0\n///NAME \n0.000,0.000,0.000,0.0000,0.0000,0.0000\n0.000,0.000,0.000\n"
+                "0.000\n0.000,0.000,0.000\n//TOOL 1\n///NAME SPINDLE\n"
+                "100.000,0.000,150.000,0.0000,-45.0000,0.0000\n0.000,0.000,100.000\n100.000\n"
+                "0.000,0.000,0.000\n");
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 0);
+  const Cell cell = read_cell(file("cell.yaml")).value();
+  ASSERT_TRUE(cell.tools.contains("TOOL[1]"));
+  EXPECT_NEAR(cell.payloads.at("TOOL[1]").mass, 100, 1e-9);
+}
+
+TEST_F(ImportBackup, RefusesListsWithoutATool) {
+  for (const char* name : {"$machine.dat", "sysframe.va", "TRIM1.JBI"}) {
     std::filesystem::remove_all(file("backup"));
-    std::filesystem::create_directories(
-        std::filesystem::path(file("backup/" + name)).parent_path());
-    folder_.write("backup/" + name, "x\n");
+    std::filesystem::create_directories(file("backup"));
+    folder_.write(std::string("backup/") + name, "x\n");
     testing::internal::CaptureStderr();
     EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
     const std::string said = testing::internal::GetCapturedStderr();
-    EXPECT_NE(said.find("the backup of a " + maker + " controller"), std::string::npos) << said;
+    EXPECT_NE(said.find("no tool in the controller's own lists"), std::string::npos) << said;
     EXPECT_EQ(said.find("MOC.cfg"), std::string::npos) << said;
   }
 }

@@ -2,15 +2,17 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "clients/cam/dialect.h"
 #include "clients/cam/program.h"
 #include "server/robot/cell.h"
 
 /// A cell as its controller has it. The backup of an ABB holds the system parameters
-/// (SYSPAR/MOC.cfg) and the modules, that of a KUKA `$machine.dat` and `$config.dat`.
+/// (SYSPAR/MOC.cfg) and the modules, that of another maker lists of its own.
 namespace trammel::cam {
 
 /// A robot as the system parameters have it.
@@ -67,9 +69,13 @@ struct ControllerCell : ControllerRobot {
                                                  const std::vector<SourceFile>& modules,
                                                  const std::string& unit);
 
-/// The cell of a KUKA, as its `$machine.dat` and `$config.dat` have it. Refuses files that name no
-/// tool. Which tools and loads are not known there is a note.
-[[nodiscard]] Result<ControllerCell> read_kuka_backup(const std::vector<SourceFile>& files);
+/// The names of the files that read_own_lists() takes, in lower case; empty: none are known.
+[[nodiscard]] std::set<std::string> own_lists_of(Dialect dialect);
+/// The cell as the controller's own lists have it: `$machine.dat` and `$config.dat` of a KUKA,
+/// SYSFRAME.VA of a FANUC, TOOL.CND and UFRAME.CND of a Yaskawa. Refuses lists without a tool. What
+/// they do not tell is a note.
+[[nodiscard]] Result<ControllerCell> read_own_lists(Dialect dialect,
+                                                    const std::vector<SourceFile>& files);
 
 /// A cell file (YAML) of it. `robot`: the path of the robot file, as it is to stand there.
 [[nodiscard]] std::string cell_file_of(const ControllerCell& controller, const std::string& name,

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "clients/cam/fanuc/statements.h"
-#include "clients/cam/fanuc/system_frames.h"
+#include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 
 /// What all programs of a FANUC controller share.

@@ -9,7 +9,6 @@
 #include "clients/cam/fanuc/controller.h"
 #include "clients/cam/fanuc/positions.h"
 #include "clients/cam/fanuc/statements.h"
-#include "clients/cam/fanuc/system_frames.h"
 #include "clients/cam/flow.h"
 #include "clients/cam/keep.h"
 #include "clients/cam/sites.h"

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 
 namespace trammel::cam {
@@ -10,5 +11,13 @@ namespace trammel::cam {
 /// and tool that they say. The values of UFRAME[n] and UTOOL[n] come from `UFRAME[n]=PR[m]` with a
 /// constant PR[m], or from the user. The world frame is taken as the robot's base.
 [[nodiscard]] Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options);
+
+namespace fanuc {
+
+/// `$MNUFRAME` and `$MNUTOOL` of group 1 in system variables that were saved as text (sysframe.va),
+/// by the names `UFRAME[1]`, `UTOOL[1]`. One that was never set is not there.
+[[nodiscard]] ListedValues system_frames(const std::vector<SourceFile>& files);
+
+}  // namespace fanuc
 
 }  // namespace trammel::cam

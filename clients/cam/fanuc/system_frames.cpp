@@ -1,4 +1,4 @@
-#include "clients/cam/fanuc/system_frames.h"
+#include "clients/cam/fanuc/fanuc.h"
 
 #include <fmt/format.h>
 

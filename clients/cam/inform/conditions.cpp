@@ -1,4 +1,4 @@
-#include "clients/cam/inform/conditions.h"
+#include "clients/cam/inform/inform.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "clients/cam/flow.h"
-#include "clients/cam/inform/conditions.h"
 #include "clients/cam/inform/job.h"
 #include "clients/cam/keep.h"
 #include "clients/cam/sites.h"

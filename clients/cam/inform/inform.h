@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 
 namespace trammel::cam {
@@ -10,5 +11,13 @@ namespace trammel::cam {
 /// RCONF. Pulses need the robot's gear data and are left. The values of TOOL[n] and USER[n] come
 /// from the user; frame BASE or ROBOT is the robot's base.
 [[nodiscard]] Program read_inform(std::vector<SourceFile> files, const ReadOptions& options);
+
+namespace inform {
+
+/// What Yaskawa's TOOL.CND and UFRAME.CND say, by the names `TOOL[0]`, `USER[1]`: a tool
+/// from the flange, a user frame from the robot's base. One without its six numbers is not there.
+[[nodiscard]] ListedValues conditions(const std::vector<SourceFile>& files);
+
+}  // namespace inform
 
 }  // namespace trammel::cam

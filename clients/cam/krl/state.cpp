@@ -57,7 +57,7 @@ void Settings::apply_part(const Setting& setting, const std::string& place, Stat
   const std::string why = fmt::format("a part of {} is set ({})", setting.name, place);
   if (setting.name == "$TOOL") state.tool = tools_.unknown_tool(why);
   if (setting.name == "$BASE") state.frame = tools_.unknown_base(why);
-  if (setting.name == "$LOAD") state.load = tools_.add_load({"$LOAD", std::nullopt, "", why});
+  if (setting.name == "$LOAD") state.load = tools_.unknown_load(why);
   if (setting.name == "$VEL") state.speed = setting.speed_mm_s.value_or(kSpeedUnknown);
   if (setting.name != "FDAT_ACT") return;
   const std::string by_itself = fmt::format(": FDAT_ACT is set by itself ({})", place);

@@ -4,6 +4,7 @@
 
 #include "clients/cam/backup/backup.h"
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/controller_files.h"
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
@@ -110,68 +111,32 @@ std::string robot_in(const BackupArguments& arguments) {
   return relative.empty() ? robot.string() : relative.string();
 }
 
-/// Another maker's backup, by the names of files that only his controllers have; nullptr: none is
-/// known.
-struct Maker {
-  const char* name;
-  std::vector<const char*> endings;  ///< of paths, in lower case
-  const char* next;                  ///< empty: his backups are read
-};
-const Maker* maker_of(const std::string& folder) {
-  static const std::vector<Maker> kMakers = {
-      {"KUKA",
-       {"$machine.dat", "$config.dat", ".src"},
-       ""},
-      {"FANUC",
-       {".ls", ".tp", ".va", ".sv", "orderfil.dat"},
-       "correct takes its .ls files; write the cell by hand: sysframe.va has the tools ($MNUTOOL) "
-       "and frames ($MNUFRAME) as UTOOL[n] and UFRAME[n] of --frames"},
-      {"Yaskawa",
-       {".jbi", ".prm", ".cnd"},
-       "correct takes its .JBI files; write the cell by hand: TOOL.CND has the tools, UFRAME.CND "
-       "the frames, as TOOL[n] and USER[n] of --frames"}};
+/// The dialect of another maker's backup, by the names of files that only his controllers have.
+std::optional<cam::Dialect> dialect_of(const std::string& folder) {
+  const auto has = [&](const std::string& file, cam::Dialect dialect) {
+    return cam::own_lists_of(dialect).contains(file) || cam::dialect_of_file(file) == dialect;
+  };
   std::error_code error;
-  std::vector<std::string> paths;
+  std::vector<std::string> files;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error))
-    paths.push_back(lower(it->path().filename().string()));
-  for (const Maker& maker : kMakers) {
-    for (const char* ending : maker.endings) {
-      if (std::any_of(paths.begin(), paths.end(),
-                      [&](const std::string& path) { return path.ends_with(ending); }))
-        return &maker;
-    }
+    files.push_back(lower(it->path().filename().string()));
+  for (const cam::Dialect dialect :
+       {cam::Dialect::kKrl, cam::Dialect::kFanuc, cam::Dialect::kInform}) {
+    if (std::any_of(files.begin(), files.end(),
+                    [&](const std::string& file) { return has(file, dialect); }))
+      return dialect;
   }
-  return nullptr;
-}
-
-/// `$machine.dat` and `$config.dat`, wherever they lie in the folder.
-Result<std::vector<cam::SourceFile>> kuka_files(const std::string& folder) {
-  std::error_code error;
-  std::vector<cam::SourceFile> files;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    const std::string name = lower(it->path().filename().string());
-    if (name != "$machine.dat" && name != "$config.dat") continue;
-    const std::string path = it->path().string();
-    files.push_back({fs::relative(path, folder, error).string(), TRY(read_text_file(path))});
-  }
-  std::sort(files.begin(), files.end(),
-            [](const auto& one, const auto& other) { return one.name < other.name; });
-  return files;
+  return std::nullopt;
 }
 
 Result<cam::ControllerCell> controller_of(const BackupArguments& arguments) {
   const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
   const Result<std::string> parameters = read_text_file(moc);
-  const Maker* maker = parameters ? nullptr : maker_of(arguments.backup);
-  if (maker != nullptr && *maker->next == '\0')
-    return cam::read_kuka_backup(TRY(kuka_files(arguments.backup)));
-  if (maker != nullptr)
-    return refused("it is the backup of a {} controller, and only those of ABB and KUKA are read",
-                   maker->name)
-        .in(arguments.backup)
-        .next(maker->next);
+  const auto dialect = parameters ? std::nullopt : dialect_of(arguments.backup);
+  if (dialect)
+    return cam::read_own_lists(
+        *dialect, TRY(files_called(cam::own_lists_of(*dialect), arguments.backup)));
   if (!parameters) return tl::make_unexpected(parameters.error());
   return cam::read_backup(*parameters, moc, TRY(modules_of(arguments)), arguments.unit);
 }
@@ -233,11 +198,12 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
 void add_backup_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<BackupArguments>();
   CLI::App* command = app.add_subcommand(
-      "import-backup", "Make a cell of the backup of an ABB or KUKA controller, or tell where a cell differs");
+      "import-backup", "Make a cell of a controller's backup (ABB, KUKA, FANUC, Yaskawa), or tell where a cell "
+      "differs");
   command
       ->add_option("backup", arguments->backup,
-                   "Folder of the backup, with SYSPAR/MOC.cfg and RAPID (ABB) or $machine.dat and "
-                   "$config.dat (KUKA)")
+                   "Folder of the backup, with SYSPAR/MOC.cfg and RAPID (ABB), $machine.dat and "
+                   "$config.dat (KUKA), SYSFRAME.VA (FANUC), TOOL.CND and UFRAME.CND (Yaskawa)")
       ->required();
   command->add_option("-o,--output", arguments->output,
                       "Cell file to write (YAML): base frame, tools, loads, axis ranges, whether "

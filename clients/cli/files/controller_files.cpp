@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "clients/cam/backup/backup.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -21,18 +22,6 @@ namespace fs = std::filesystem;
 
 /// ABB's system parameters.
 const std::set<std::string> kParameters = {"moc.cfg"};
-/// Frames and tools as a controller lists them, as text.
-struct Listing {
-  cam::Dialect dialect;
-  std::set<std::string> files;  ///< names, in lower case
-};
-const std::array<Listing, 2>& listings() {
-  static const std::array<Listing, 2> kAll = {
-      {{cam::Dialect::kFanuc, {"sysframe.va", "framevar.va"}},
-       {cam::Dialect::kInform, {"tool.cnd", "uframe.cnd"}}}};
-  return kAll;
-}
-
 /// What speaks of tools, frames or loads and is not read.
 struct NotRead {
   cam::Dialect dialect;
@@ -56,21 +45,6 @@ const std::array<NotRead, 5>& not_read() {
         "the installation is not read: tool and load are those that the script sets, or --frames "
         "and the cell tell"}}};
   return kAll;
-}
-
-/// The files of a folder that are called so, in lower case.
-Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
-                                                  const std::string& folder) {
-  std::vector<cam::SourceFile> found;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error))
-      continue;
-    std::string text = TRY(read_text_file(it->path().string(), kLargestProgram));
-    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
-  }
-  return found;
 }
 
 /// A sentence for each kind of file in the folder that the dialect leaves out.
@@ -99,6 +73,22 @@ std::vector<std::string> left_unread(cam::Dialect dialect, const std::string& fo
 
 }  // namespace
 
+Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
+                                                  const std::string& folder) {
+  std::vector<cam::SourceFile> found;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error))
+      continue;
+    std::string text = TRY(read_text_file(it->path().string(), kLargestProgram));
+    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
+  }
+  std::sort(found.begin(), found.end(),
+            [](const auto& one, const auto& other) { return one.name < other.name; });
+  return found;
+}
+
 bool is_of_the_controller(const std::string& name) {
   static const std::set<std::string> kFolders = {"system", "mada", "steu", "sysmod", "syspar"};
   static const std::set<std::string> kFiles = {"base.sys", "user.sys"};
@@ -117,10 +107,8 @@ Status read_values(const std::string& folder, ProgramFiles& program) {
     return {};
   };
   if (program.dialect == cam::Dialect::kRapid) return take(kParameters, program.parameters);
-  for (const Listing& listing : listings()) {
-    if (listing.dialect != program.dialect) continue;
-    TRY(take(listing.files, program.beside));
-  }
+  if (program.dialect != cam::Dialect::kKrl)  // which has them among its programs
+    TRY(take(cam::own_lists_of(program.dialect), program.beside));
   const std::vector<std::string> sentences = left_unread(program.dialect, folder);
   program.not_read.insert(program.not_read.end(), sentences.begin(), sentences.end());
   return {};

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "clients/cli/files/files_of_program.h"
 #include "server/base/result.h"
@@ -14,6 +16,10 @@ constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a f
 /// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat`
 /// and its folders System, Mada and Steu, ABB's system modules and parameters.
 [[nodiscard]] bool is_of_the_controller(const std::string& name);
+
+/// The files of a folder that are called so (in lower case), by their paths in it, sorted.
+[[nodiscard]] Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
+                                                                const std::string& folder);
 
 /// Adds what a folder has beside its programs, for their dialect: parameters, lists of frames and
 /// tools, and sentences on what is not read.

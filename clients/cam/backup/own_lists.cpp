@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include "clients/cam/backup/backup.h"
+#include "clients/cam/fanuc/fanuc.h"
+#include "clients/cam/inform/inform.h"
+#include "clients/cam/krl/krl.h"
+#include "server/base/letters.h"
+
+namespace trammel::cam {
+
+namespace {
+
+/// As a cell file may have it: `Tool 1` becomes `Tool_1`.
+std::string plain_name(const std::string& name) {
+  std::string plain;
+  for (const char c : name) {
+    const bool fits = (lower(c) >= 'a' && lower(c) <= 'z') || is_digit(c) || c == '_' || c == '-';
+    plain += fits ? c : '_';
+  }
+  return plain;
+}
+
+void add_tool(const std::string& name, StatedTool tool, ControllerCell& cell) {
+  if (tool.load && tool.load->mass <= 0) tool.load.reset();
+  if (!tool.load)
+    cell.notes.push_back(
+        fmt::format("tool {} has no load there: its payload is to be written by hand", name));
+  cell.tools.emplace(name, std::move(tool));
+}
+
+ControllerCell kuka_cell(const std::vector<SourceFile>& files) {
+  KukaData data = read_kuka_data(files);
+  ControllerCell cell;
+  cell.maker = "KUKA";
+  cell.robot_type = data.stated.types.empty() ? "no $TRAFONAME" : data.stated.types.front().type;
+  if (!data.stated.bases.empty()) cell.X_WB = data.stated.bases.front().X_WB;
+  cell.limits = std::move(data.limits);
+  cell.notes = std::move(data.notes);
+  for (const auto& [number, tool] : data.tools) {
+    const std::string name = plain_name(tool.name);
+    add_tool(cell.tools.contains(name) ? fmt::format("{}_{}", name, number) : name,
+             {*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line)}, cell);
+  }
+  for (const auto& [number, base] : data.bases) cell.frames.emplace(base.name, base.X_BO);
+  cell.stated = std::move(data.stated);
+  return cell;
+}
+
+/// Tools and frames are called as programs call them: `UTOOL[1]`, `USER[2]`.
+ControllerCell listed_cell(const ListedValues& lists, const char* maker) {
+  ControllerCell cell;
+  cell.maker = maker;
+  cell.robot_type = "no list names it";
+  for (const auto& [name, value] : lists.all()) {
+    const bool is_tool = name.find("TOOL[") != std::string::npos;
+    const bool is_set =
+        (value.load && value.load->mass > 0) || !same_place(value.X, Pose::Identity());
+    if (!value.why_not.empty())
+      cell.notes.push_back(fmt::format("{} is left out: {}", name, value.why_not));
+    else if (is_tool && is_set)
+      add_tool(name, {value.X, value.load, fmt::format("{} line {}", value.file, value.line)},
+               cell);
+    else if (!is_tool)
+      cell.frames.emplace(name, value.X);
+  }
+  cell.notes.emplace_back(
+      "where the robot stands and its limits are not in these lists: the base is taken as the "
+      "controller's world");
+  return cell;
+}
+
+}  // namespace
+
+std::set<std::string> own_lists_of(Dialect dialect) {
+  if (dialect == Dialect::kKrl) return {"$machine.dat", "$config.dat"};
+  if (dialect == Dialect::kFanuc) return {"sysframe.va", "framevar.va"};
+  if (dialect == Dialect::kInform) return {"tool.cnd", "uframe.cnd"};
+  return {};
+}
+
+Result<ControllerCell> read_own_lists(Dialect dialect, const std::vector<SourceFile>& files) {
+  Program as_it_is;
+  as_it_is.files = files;
+  TRY(check_files(as_it_is));
+  ControllerCell cell;
+  if (dialect == Dialect::kKrl && !files.empty()) cell = kuka_cell(files);
+  if (dialect == Dialect::kFanuc) cell = listed_cell(fanuc::system_frames(files), "FANUC");
+  if (dialect == Dialect::kInform) cell = listed_cell(inform::conditions(files), "Yaskawa");
+  cell.unit = "ROBOT";
+  cell.notes.emplace_back(
+      "whether the controller corrects the robot itself is not in these files: write "
+      "controller_compensates by hand");
+  if (cell.tools.empty())
+    return refused("no tool in the controller's own lists, a cell needs one").of("tooldata");
+  return cell;
+}
+
+}  // namespace trammel::cam
