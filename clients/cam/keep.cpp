@@ -7,9 +7,7 @@ namespace trammel::cam {
 
 std::optional<WrittenNumber> number_in(const Token& token) { return read_number(token.text); }
 
-double value_in(const Token& token) {
-  return number_in(token).value_or(WrittenNumber{}).value;
-}
+double value_in(const Token& token) { return number_in(token).value_or(WrittenNumber{}).value; }
 
 std::vector<double> values_in(const Tokens& tokens) {
   std::vector<double> values;
@@ -78,9 +76,9 @@ void ListedValues::add(const std::string& name, ListedValue value) {
   const auto [known, is_new] = all_.try_emplace(name, value);
   ListedValue& first = known->second;
   if (!is_new && first.why_not.empty() && !same_place(first.X, value.X))
-    first.why_not = fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", name,
-                                pose_text(first.X), first.file, first.line, pose_text(value.X),
-                                value.file, value.line);
+    first.why_not =
+        fmt::format("{} has two values: {} ({} line {}), {} ({} line {})", name, pose_text(first.X),
+                    first.file, first.line, pose_text(value.X), value.file, value.line);
 }
 
 const ListedValue* ListedValues::take(const std::string& name) {

@@ -94,8 +94,7 @@ class Scanner {
   [[nodiscard]] std::size_t quoted_end(std::size_t at, char quote) const {
     for (++at; at < text_.size() && text_[at] != '\n'; ++at) {
       if (text_[at] != quote) continue;
-      const bool goes_on =
-          lexis_.doubled_quotes && at + 1 < text_.size() && text_[at + 1] == quote;
+      const bool goes_on = lexis_.doubled_quotes && at + 1 < text_.size() && text_[at + 1] == quote;
       if (!goes_on) return at + 1;
       ++at;
     }
@@ -154,8 +153,8 @@ std::vector<TextLine> text_lines(std::string_view text) {
 std::vector<TokenLine> token_lines(std::string_view text, const Lexis& lexis) {
   std::vector<TokenLine> lines;
   for (const TextLine& line : text_lines(text)) {
-    TokenLine& made = lines.emplace_back(
-        TokenLine{line.begin, line.end, line.number, Tokens(text), line.end});
+    TokenLine& made =
+        lines.emplace_back(TokenLine{line.begin, line.end, line.number, Tokens(text), line.end});
     Scanner scanner(text, line.begin, line.end, line.number, lexis);
     scanner.read(made.tokens);
     made.comment = scanner.comment();

@@ -31,8 +31,9 @@ struct Token {
 /// What a dialect's bytes mean.
 struct Lexis {
   std::string_view comment;  ///< begins one that ends with its line; empty: there are none
-  std::string_view quotes;   ///< each of them encloses a text, which ends with its line at the latest
-  bool doubled_quotes = false;   ///< two quotes in a text stand for one
+  std::string_view
+      quotes;  ///< each of them encloses a text, which ends with its line at the latest
+  bool doubled_quotes = false;     ///< two quotes in a text stand for one
   bool numbers_have_signs = true;  ///< where no value stands before the sign
   bool dollar_is_letter = true;
   std::string_view long_sign = {};  ///< a sign of two bytes; empty: there is none
@@ -116,8 +117,8 @@ struct TextLine {
 struct TokenLine {
   std::size_t begin = 0, end = 0;
   int number = 1;
-  Tokens tokens;             ///< without the comment
-  std::size_t comment = 0;   ///< where that begins; `end`: there is none
+  Tokens tokens;            ///< without the comment
+  std::size_t comment = 0;  ///< where that begins; `end`: there is none
 };
 [[nodiscard]] std::vector<TokenLine> token_lines(std::string_view text, const Lexis& lexis);
 

@@ -235,8 +235,7 @@ TEST_F(ImportKuka, MakesACellOfWhatTheControllerHas) {
 TEST_F(ImportKuka, GivesBasesAsTheRobotSeesThem) {
   ASSERT_EQ(make(), 0);
   EXPECT_NE(text("frames.csv").find("robot_base,0,0,600,"), std::string::npos);
-  EXPECT_NE(text("frames.csv").find("BASE_DATA[1],2000,"), std::string::npos)
-      << text("frames.csv");
+  EXPECT_NE(text("frames.csv").find("BASE_DATA[1],2000,"), std::string::npos) << text("frames.csv");
   EXPECT_EQ(text("frames.csv").find("BASE_DATA[2]"), std::string::npos) << "it was never set";
 }
 

@@ -23,8 +23,7 @@ cam::CorrectedProgram program(int without_tool, int sensed) {
   for (int k = 0; k < sensed; ++k)
     made.rows.push_back(left("s" + std::to_string(k), 10 + k, "a sensor ends it", {10 + k}));
   for (int k = 0; k < without_tool; ++k)
-    made.rows.push_back(
-        left("p" + std::to_string(k), 50 + k, "it has no tool", {50 + k, 150 + k}));
+    made.rows.push_back(left("p" + std::to_string(k), 50 + k, "it has no tool", {50 + k, 150 + k}));
   made.moves = static_cast<std::size_t>(sensed + 2 * without_tool);
   return made;
 }

@@ -45,9 +45,9 @@ struct Controller {
     std::string first;  ///< where
     int count = 0;
   };
-  std::map<std::string, Statements> loads;    ///< of PAYLOAD[n]
-  ListedValues system;                        ///< UFRAME[n] and UTOOL[n] of the system variables
-  std::set<std::string> programs;             ///< that are read, by name
+  std::map<std::string, Statements> loads;  ///< of PAYLOAD[n]
+  ListedValues system;                      ///< UFRAME[n] and UTOOL[n] of the system variables
+  std::set<std::string> programs;           ///< that are read, by name
 
   /// `PR[5,1]=100`, `PR[5]=LPOS`, of the file of that number.
   void note_register(const Assignment& set, const std::string& where, std::size_t file);

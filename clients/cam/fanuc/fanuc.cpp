@@ -127,11 +127,10 @@ class File {
   /// Behind all motions.
   void finish() {
     for (const auto& [begin, position] : positions_) {
-      const bool listed = std::any_of(
-          program_.left.begin(), program_.left.end(),
-          [&, &name = position.name](const LeftAlone& left) {
-            return left.file == index_ && left.name == name;
-          });
+      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
+                                      [&, &name = position.name](const LeftAlone& left) {
+                                        return left.file == index_ && left.name == name;
+                                      });
       if (!used_.contains(begin) && !listed)
         leave_unused(program_, position.name, index_, position.line);
     }
@@ -260,14 +259,16 @@ class File {
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
     if (why.empty())
-      return add_once(program_, controller_.frame_of(number_text == "F" ? selected : number_text, options_));
-    return add_once(program_, ProgramFrame{fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why});
+      return add_once(program_,
+                      controller_.frame_of(number_text == "F" ? selected : number_text, options_));
+    return add_once(program_,
+                    ProgramFrame{fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why});
   }
   std::size_t tool_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UT", "UTOOL_NUM", number_text, selected);
     if (why.empty())
-      return add_once(program_, controller_.tool_of(number_text == "F" ? selected : number_text, options_,
-                                          program_.files[index_].name));
+      return add_once(program_, controller_.tool_of(number_text == "F" ? selected : number_text,
+                                                    options_, program_.files[index_].name));
     ProgramTool tool;
     tool.name = fmt::format("UTOOL[{}]", number_text);
     tool.why_not = why;
@@ -324,11 +325,11 @@ class File {
       const Position& position = positions_.at(begin);
       const auto group = position.groups.find(1);
       const Group robot = group == position.groups.end() ? Group{} : group->second;
-      sites_.add(index_, begin, known,
-                 {tool_of(robot.tool, with(selected.tool, selected.beside)),
-                  frame_of(robot.frame, with(selected.frame, selected.beside)),
-                  std::string(motion.kind), index_, line, program_.moves.size() - 1,
-                  motion.kind != "J"});
+      sites_.add(
+          index_, begin, known,
+          {tool_of(robot.tool, with(selected.tool, selected.beside)),
+           frame_of(robot.frame, with(selected.frame, selected.beside)), std::string(motion.kind),
+           index_, line, program_.moves.size() - 1, motion.kind != "J"});
       used_.insert(begin);
     }
     if (!any) leave_point(motion, line, name, fmt::format("{} is not in /POS", name));

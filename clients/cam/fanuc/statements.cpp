@@ -65,8 +65,11 @@ std::optional<Assignment> assignment_in(const Tokens& tokens) {
   const std::size_t begin = done_perhaps(tokens);
   const std::size_t equals = tokens.find("=", begin);
   if (equals >= tokens.size()) return std::nullopt;
-  Assignment made{indexed(tokens, begin), tokens.part(begin, equals),
-                  tokens.part(equals + 1, tokens.size()), begin > 0, {}};
+  Assignment made{indexed(tokens, begin),
+                  tokens.part(begin, equals),
+                  tokens.part(equals + 1, tokens.size()),
+                  begin > 0,
+                  {}};
   made.constant = constant_in(made.value);
   return made;
 }
@@ -119,11 +122,11 @@ std::string moved_by(const Token& word) {
   static const std::set<std::string_view> kDisplace = {"Offset",      "OFFSET",  "Tool_Offset",
                                                        "TOOL_OFFSET", "VOFFSET", "INC"},
                                           kSense = {"Skip", "SKIP", "Search"};
-  if (word.is("Track") || word.is("TRACK")) return fmt::format("{} moves it at run time", word.text);
+  if (word.is("Track") || word.is("TRACK"))
+    return fmt::format("{} moves it at run time", word.text);
   if (kDisplace.contains(word.text)) return fmt::format("{} displaces it at run time", word.text);
   if (word.is("RTCP")) return "the tool stands and the robot holds the work piece (RTCP)";
-  if (kSense.contains(word.text))
-    return fmt::format("a sensor may end the motion ({})", word.text);
+  if (kSense.contains(word.text)) return fmt::format("a sensor may end the motion ({})", word.text);
   return "";
 }
 
@@ -133,8 +136,8 @@ Part part_of(const std::string& text, std::string_view head) {
   Part part{text.size(), text.size(), 1};
   bool inside = false;
   for (const TextLine& line : text_lines(text)) {
-    const std::string_view word = line.text.substr(
-        std::min(line.text.find_first_not_of(" \t"), line.text.size()));
+    const std::string_view word =
+        line.text.substr(std::min(line.text.find_first_not_of(" \t"), line.text.size()));
     if (!word.starts_with('/')) continue;
     if (inside) {
       part.end = line.begin;
@@ -186,8 +189,8 @@ std::optional<Motion> motion_of(const Statement& statement) {
   // `L PAL_1[BTM] 100mm/sec FINE`
   const bool elsewhere = !tokens[1].is("P") && !tokens[1].is("PR");
   if (elsewhere && (!tokens[1].is_word() || !tokens[2].is("["))) return std::nullopt;
-  Motion motion{statement.word(), elsewhere ? tokens[1].text : std::string_view(), {},
-                speed_in(tokens)};
+  Motion motion{
+      statement.word(), elsewhere ? tokens[1].text : std::string_view(), {}, speed_in(tokens)};
   if (elsewhere) return motion;
   for (const Token token : tokens) {
     if (std::string by = moved_by(token); !by.empty()) motion.moved = std::move(by);
@@ -224,9 +227,8 @@ std::string started_beside(const Statement& statement) {
   if (statement.begins("MONITOR") && tokens.size() > 1 && !tokens[1].is("END"))
     return fmt::format("MONITOR {}", shown(tokens[1].text));
   const bool names = statement.begins("ERROR_PROG") || statement.begins("RESUME_PROG");
-  return names && tokens.size() > 2
-             ? fmt::format("{}={}", statement.word(), shown(tokens[2].text))
-             : "";
+  return names && tokens.size() > 2 ? fmt::format("{}={}", statement.word(), shown(tokens[2].text))
+                                    : "";
 }
 
 std::vector<std::string> loads_in(const Statement& statement) {

@@ -1,9 +1,9 @@
-#include "clients/cam/fanuc/fanuc.h"
-
 #include <fmt/format.h>
 
 #include <array>
 #include <optional>
+
+#include "clients/cam/fanuc/fanuc.h"
 
 namespace trammel::cam::fanuc {
 

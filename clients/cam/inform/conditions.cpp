@@ -1,9 +1,8 @@
-#include "clients/cam/inform/inform.h"
-
 #include <fmt/format.h>
 
 #include <utility>
 
+#include "clients/cam/inform/inform.h"
 #include "server/base/units.h"
 
 namespace trammel::cam::inform {

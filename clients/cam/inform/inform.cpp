@@ -180,8 +180,7 @@ class Job {
     if (!by_row) frame.X_BO = condition->X;
     frame.in_base = true;
   }
-  static std::string against(const ListedValue& condition, const std::string& row,
-                             const Pose& X) {
+  static std::string against(const ListedValue& condition, const std::string& row, const Pose& X) {
     if (!condition.why_not.empty()) return condition.why_not;
     return against_row(row, X, condition.X,
                        fmt::format("{} line {}", condition.file, condition.line));
@@ -229,10 +228,12 @@ class Job {
     if (robot.starts_with("RB") && robot != "RB1")
       return fmt::format("the job moves {}, another robot", shown(robot));
     if (motion.word == "IMOV") return "it is relative to where the robot is";
-    if (!displaced.shifted.empty()) return fmt::format("SFTON displaces it ({})", displaced.shifted);
+    if (!displaced.shifted.empty())
+      return fmt::format("SFTON displaces it ({})", displaced.shifted);
     if (!displaced.sensed.empty())
       return fmt::format("a sensor or a soft axis moves it: {}", displaced.sensed);
-    if (!text_.positions.contains(motion.position)) return "it is a variable, which any job may set";
+    if (!text_.positions.contains(motion.position))
+      return "it is a variable, which any job may set";
     return motion.position[0] == 'C' ? "" : "it moves external axes alone";
   }
 

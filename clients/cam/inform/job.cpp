@@ -130,8 +130,7 @@ Configuration configuration_of(const std::vector<int>& conf) {
 std::string Statement::sets() const {
   if (tokens.size() < 4 || (!begins("MFRAME") && !begins("SETTOOL"))) return "";
   const bool numbered = tokens.size() > 5 && tokens[2].is("#") && tokens[4].is_number();
-  return fmt::format("{}[{}]", begins("MFRAME") ? "USER" : "TOOL",
-                     numbered ? tokens[4].text : "*");
+  return fmt::format("{}[{}]", begins("MFRAME") ? "USER" : "TOOL", numbered ? tokens[4].text : "*");
 }
 
 std::vector<Step> Statement::steps() const {
@@ -145,8 +144,7 @@ std::vector<Step> Statement::steps() const {
       {"BREAK", Kind::kExit},     {"CONTINUE", Kind::kContinue}};
   if (begins("*")) return {{Kind::kLabel, std::string(whole_word)}};
   if (begins("RET") || begins("END")) return {{maybe ? Kind::kPlain : Kind::kReturn}};
-  if (!jumps_to.empty())
-    return {{maybe ? Kind::kJumpMaybe : Kind::kJump, std::string(jumps_to)}};
+  if (!jumps_to.empty()) return {{maybe ? Kind::kJumpMaybe : Kind::kJump, std::string(jumps_to)}};
   if (begins("JUMP")) return {{maybe ? Kind::kPlain : Kind::kReturn}};
   if (begins("CALL") && !job.empty()) {
     const Step call{Kind::kCall, std::string(job)};
@@ -165,8 +163,8 @@ std::optional<Motion> motion_of(const Statement& statement) {
     if (at > 1 && is_external(tokens[at])) motion.external.emplace_back(tokens[at].text);
     const bool ends = tokens[at].is("UNTIL") || tokens[at].is("SRCH");
     if (ends && motion.ended_by.empty()) motion.ended_by = tokens[at].text;
-    const auto speed = tokens[at].is("V") && tokens[at + 1].is("=") ? number_in(tokens[at + 2])
-                                                                    : std::nullopt;
+    const auto speed =
+        tokens[at].is("V") && tokens[at + 1].is("=") ? number_in(tokens[at + 2]) : std::nullopt;
     if (speed && !motion.speed_mm_s) motion.speed_mm_s = speed->value;
   }
   return motion;

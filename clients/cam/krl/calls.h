@@ -38,7 +38,6 @@ class Routines {
 /// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set
 /// it. Returns the routines that are called and not in the files.
 [[nodiscard]] std::set<std::string> note_handed_over(const std::vector<std::vector<Line>>& lines,
-                                                     const Routines& routines,
-                                                     Variables& names);
+                                                     const Routines& routines, Variables& names);
 
 }  // namespace trammel::cam::krl

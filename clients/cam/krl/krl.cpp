@@ -272,8 +272,8 @@ class Reader {
   krl::Settings settings_{lines_, names_, tools_, program_};
   krl::Targets targets_{lines_, names_, options_, program_};
   krl::Motions motions_{lines_, routines_, names_, tools_, settings_, targets_, program_};
-  std::set<std::string> elsewhere_;             ///< routines that are called and not in the files
-  std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine
+  std::set<std::string> elsewhere_;     ///< routines that are called and not in the files
+  std::map<std::size_t, Flow> orders_;  ///< of the lines of each routine
   std::map<std::tuple<std::size_t, State, bool>, State> ends_;
   std::vector<std::size_t> interrupts_;  ///< routines that come in between
   bool resumes_ = false;                 ///< an interrupt may end what it came in

@@ -70,9 +70,11 @@ class Reader {
     if (!names_.is_set(data, 0)) return;
     ProgramTool tool = program_.tools[tools_.tool_numbered(number, 0)];
     tool.name = called(tool_names_, number, fmt::format("tool_{}", number));
-    if (standing_.contains(number)) tool.why_not = "the tool stands and the robot holds the work piece";
+    if (standing_.contains(number))
+      tool.why_not = "the tool stands and the robot holds the work piece";
     if (!tool.why_not.empty()) {
-      data_.notes.push_back(fmt::format("{} ({}) is left out: {}", data, shown(tool.name), tool.why_not));
+      data_.notes.push_back(
+          fmt::format("{} ({}) is left out: {}", data, shown(tool.name), tool.why_not));
     } else if (tool_names_.contains(number) || !same_place(*tool.X_FT, Pose::Identity())) {
       data_.tools.emplace(number, std::move(tool));
     }

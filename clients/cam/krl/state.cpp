@@ -119,8 +119,7 @@ void Settings::set_sensor(const Tokens& tokens, std::size_t f, std::size_t k, St
   if (declares(tokens)) return;
   for (const std::string_view called : called_in(tokens)) {
     if (kBegins.contains(called))
-      state.sensed =
-          fmt::format("a sensor corrects the path ({}, {})", called, names_.place(f, k));
+      state.sensed = fmt::format("a sensor corrects the path ({}, {})", called, names_.place(f, k));
     if (kEnds.contains(called)) state.sensed.clear();
   }
 }
@@ -158,8 +157,7 @@ void Settings::apply_bas(const Bas& bas, std::size_t f, std::size_t k, State& st
   const std::string why = fmt::format("{} chooses it ({})", shown(bas.to.text), names_.place(f, k));
   if (bas.sets == "TOOL" || bas.sets == "EX_TOOL") {
     state.load = 0;
-    state.tool =
-        constant ? tools_.tool_numbered(number, f) : tools_.unknown_tool("$TOOL: " + why);
+    state.tool = constant ? tools_.tool_numbered(number, f) : tools_.unknown_tool("$TOOL: " + why);
   } else if (bas.sets == "CP_PARAMS" || bas.sets == "VEL_CP") {
     state.speed = bas.speed_mm_s.value_or(kSpeedUnknown);
   } else if (bas.sets == "INITMOV") {
@@ -172,8 +170,7 @@ void Settings::apply_bas(const Bas& bas, std::size_t f, std::size_t k, State& st
   } else if (bas.sets == "EX_BASE") {
     state.frame = tools_.unknown_base(carried_at(f, k));
   } else if (bas.sets == "BASE") {
-    state.frame =
-        constant ? tools_.base_numbered(number, f) : tools_.unknown_base("$BASE: " + why);
+    state.frame = constant ? tools_.base_numbered(number, f) : tools_.unknown_base("$BASE: " + why);
   }
 }
 

@@ -91,8 +91,9 @@ class Stated {
     if (tokens.size() < 3 || !tokens[0].is("$TRAFONAME") || !name.is_text() || name.text[0] != '"')
       return;
     const SourceFile& file = program_.files[f];
-    program_.types.push_back({file.text.substr(name.begin + 1, std::max<std::size_t>(name.text.size(), 2) - 2), "$TRAFONAME",
-                              file.name, lines_[f][k].number});
+    program_.types.push_back(
+        {file.text.substr(name.begin + 1, std::max<std::size_t>(name.text.size(), 2) - 2),
+         "$TRAFONAME", file.name, lines_[f][k].number});
   }
 
   [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }

@@ -47,12 +47,12 @@ struct Bas {
 
 /// `$TOOL=TOOL_DATA[1]`, `$BASE = SBASE(FP1.BASE_NO)`, `$VEL.CP=0.2`: of a line, or behind `WITH`.
 struct Setting {
-  std::string_view name;        ///< `$TOOL`
-  bool whole = false;           ///< no part of it alone
-  std::string_view function;    ///< `SBASE`; empty: none
-  Token argument;               ///< its first
-  std::vector<Value> operands;  ///< what it is set to
-  std::string_view constant;    ///< `#TCP` -> `TCP`, also as an argument; empty: none
+  std::string_view name;             ///< `$TOOL`
+  bool whole = false;                ///< no part of it alone
+  std::string_view function;         ///< `SBASE`; empty: none
+  Token argument;                    ///< its first
+  std::vector<Value> operands;       ///< what it is set to
+  std::string_view constant;         ///< `#TCP` -> `TCP`, also as an argument; empty: none
   std::optional<double> speed_mm_s;  ///< of `$VEL`
 };
 /// Empty: the line begins with none of them.

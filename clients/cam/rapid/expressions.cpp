@@ -131,8 +131,7 @@ void Expressions::aggregate(Expression& made, int depth) {
 /// `-1.5,` or `1.5]` as the next part: most of a long program.
 bool Expressions::plain_number(Expression& made) {
   const std::size_t sign = is_sign("-") || is_sign("+") ? 1 : 0;
-  if (!token(sign).is_number() ||
-      (!is_sign(",", sign + 1) && !is_sign("]", sign + 1)))
+  if (!token(sign).is_number() || (!is_sign(",", sign + 1) && !is_sign("]", sign + 1)))
     return false;
   const auto number = read_number(text_.substr(token().begin, token(sign).end - token().begin));
   if (!number) return false;

@@ -38,9 +38,7 @@ class Expressions {
     if (!text.empty()) ++at_;
     return text;
   }
-  [[nodiscard]] std::uint32_t at_byte() const {
-    return static_cast<std::uint32_t>(token().begin);
-  }
+  [[nodiscard]] std::uint32_t at_byte() const { return static_cast<std::uint32_t>(token().begin); }
   [[nodiscard]] std::uint32_t last_end() const {
     return at_ == 0 ? 0 : static_cast<std::uint32_t>(tokens_[at_ - 1].end);
   }

@@ -24,10 +24,15 @@ bool is_followed(const Token& word) {
 
 std::vector<Statement> statements_of(const Tokens& tokens, const Values& values) {
   using Kind = Step::Kind;
-  static const std::map<std::string_view, Kind> kWords = {
-      {"if", Kind::kIf},           {"elif", Kind::kCase},     {"else", Kind::kElse},
-      {"while", Kind::kWhile},     {"end", Kind::kEnd},       {"break", Kind::kExit},
-      {"continue", Kind::kContinue}, {"return", Kind::kReturn}, {"halt", Kind::kReturn}};
+  static const std::map<std::string_view, Kind> kWords = {{"if", Kind::kIf},
+                                                          {"elif", Kind::kCase},
+                                                          {"else", Kind::kElse},
+                                                          {"while", Kind::kWhile},
+                                                          {"end", Kind::kEnd},
+                                                          {"break", Kind::kExit},
+                                                          {"continue", Kind::kContinue},
+                                                          {"return", Kind::kReturn},
+                                                          {"halt", Kind::kReturn}};
   std::set<std::string, std::less<>> functions;
   for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
     if (tokens[at].is("def")) functions.emplace(tokens[at + 1].text);
@@ -43,10 +48,10 @@ std::vector<Statement> statements_of(const Tokens& tokens, const Values& values)
     if (defines(tokens[at]) && at + 1 < tokens.size()) {
       // A thread runs beside all others.
       const bool is_function = tokens[at].is("def");
-      statements.push_back(
-          {is_function ? Step{Kind::kRoutine, name}
-                       : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
-           at});
+      statements.push_back({is_function
+                                ? Step{Kind::kRoutine, name}
+                                : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
+                            at});
       ++at;  // not a call of it
     } else if (const auto word = kWords.find(tokens[at].text); word != kWords.end()) {
       statements.push_back({{word->second}, at});

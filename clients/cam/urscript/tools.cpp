@@ -4,7 +4,6 @@
 
 #include <utility>
 
-
 namespace trammel::cam::urscript {
 
 namespace {
@@ -50,8 +49,7 @@ std::size_t Loads::set(const Tokens& tokens, std::size_t at, std::size_t before,
     stated = *known;
   } else {
     if (known && tokens[at].is("set_payload_mass")) stated = *known;
-    constant =
-        tokens[next].is_number() && (tokens[next + 1].is(",") || tokens[next + 1].is(")"));
+    constant = tokens[next].is_number() && (tokens[next + 1].is(",") || tokens[next + 1].is(")"));
     if (constant) stated.mass = value_in(tokens[next]);
     next += 2;
   }

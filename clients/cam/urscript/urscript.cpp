@@ -152,7 +152,8 @@ class Script {
     const std::string& file = program_.files[index_].name;
     if (word.is("set_tcp")) {
       std::size_t next = at + 2;
-      state.tool = tools_.set(values_of_.pose_of_value(values_of_.value_at(next), 0), file, word.line);
+      state.tool =
+          tools_.set(values_of_.pose_of_value(values_of_.value_at(next), 0), file, word.line);
     }
     if (word.is("set_payload") || word.is("set_target_payload") || word.is("set_payload_mass") ||
         word.is("set_payload_cog"))
@@ -285,8 +286,7 @@ class Script {
            !tokens_[next].is(")");
          ++next) {
       const bool named = tokens_[next].is("v") && tokens_[next + 1].is("=");
-      const bool second =
-          next == first && tokens_[next].is_number() && tokens_[next + 1].is(",");
+      const bool second = next == first && tokens_[next].is_number() && tokens_[next + 1].is(",");
       if ((!named && !second) || !tokens_[next + 2].is_number()) continue;
       if (const auto speed = number_in(tokens_[next + 2]))
         program_.moves.back().speed_mm_s = to_mm(speed->value);
@@ -301,9 +301,9 @@ class Script {
                           (now->kind == Value::Kind::kCall && is_function_of_poses(now->name));
     if (!readable) {
       return leave_at(tokens_[at], name,
-                   now->kind == Value::Kind::kCall
-                       ? fmt::format("the function {} decides it", shown(now->name))
-                       : std::string("an expression decides it"));
+                      now->kind == Value::Kind::kCall
+                          ? fmt::format("the function {} decides it", shown(now->name))
+                          : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
     if (now->kind == Value::Kind::kCall)

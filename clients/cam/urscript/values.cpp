@@ -156,9 +156,8 @@ void Values::read_call(std::size_t& at, Value& value, int depth) const {
       continue;
     }
     const std::size_t before = at;
-    const bool labelled =
-        tokens_[at].is_word() && tokens_[at + 1].is("=") && at + 2 < tokens_.size() &&
-        !tokens_[at + 2].is("=");
+    const bool labelled = tokens_[at].is_word() && tokens_[at + 1].is("=") &&
+                          at + 2 < tokens_.size() && !tokens_[at + 2].is("=");
     if (labelled) at += 2;
     value.arguments.push_back(value_at(at, depth + 1));
     if (labelled) value.arguments.back().label = std::string(tokens_[before].text);

@@ -135,8 +135,8 @@ Result<cam::ControllerCell> controller_of(const BackupArguments& arguments) {
   const Result<std::string> parameters = read_text_file(moc);
   const auto dialect = parameters ? std::nullopt : dialect_of(arguments.backup);
   if (dialect)
-    return cam::read_own_lists(
-        *dialect, TRY(files_called(cam::own_lists_of(*dialect), arguments.backup)));
+    return cam::read_own_lists(*dialect,
+                               TRY(files_called(cam::own_lists_of(*dialect), arguments.backup)));
   if (!parameters) return tl::make_unexpected(parameters.error());
   return cam::read_backup(*parameters, moc, TRY(modules_of(arguments)), arguments.unit);
 }
@@ -198,7 +198,8 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
 void add_backup_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<BackupArguments>();
   CLI::App* command = app.add_subcommand(
-      "import-backup", "Make a cell of a controller's backup (ABB, KUKA, FANUC, Yaskawa), or tell where a cell "
+      "import-backup",
+      "Make a cell of a controller's backup (ABB, KUKA, FANUC, Yaskawa), or tell where a cell "
       "differs");
   command
       ->add_option("backup", arguments->backup,
