@@ -249,6 +249,7 @@ TEST(ErrorBudget, NamesWhatTooFewPosesCannotTellInOneLine) {
   const BudgetLine* untold = budget_of(model).line("untold");
   ASSERT_NE(untold, nullptr);
   EXPECT_GT(untold->with.size(), 3u);
+  EXPECT_NE(untold->name.find("poses tell it"), std::string::npos) << untold->name;
   for (const BudgetLine& line : budget_of(model).as_it_stands.lines)
     EXPECT_EQ(line.action, "") << line.line;
 }

@@ -130,6 +130,16 @@ BudgetLine named(LineKind kind, std::string name) {
   return line;
 }
 
+/// A position tells three numbers. Where there are too few of them, says how many poses there must
+/// be at least; as many as there are numbers to tell leave enough beside.
+BudgetLine untold_line(const Identified& found, int poses) {
+  const auto free = static_cast<int>((found.covariance.diagonal().array() > 0).count());
+  std::string name = "what these poses cannot tell";
+  if (3 * poses < free)
+    name += fmt::format(", {} positions for {} numbers: {} poses tell it", poses, free, free);
+  return named(LineKind::kUntold, std::move(name));
+}
+
 /// Adds sizes and share of a line that does `effect` to the poses, where the error is `total`.
 BudgetLine sized(BudgetLine line, const Eigen::Matrix3Xd& effect, const Eigen::Matrix3Xd& total) {
   const double whole = mean_square(total);
@@ -327,7 +337,7 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left,
   budget.poses = static_cast<int>(positions.measurements.size());
   const Datum datum = datum_of(found, contexts_of(positions));
   std::vector<BudgetItem> items = items_of(datum.model);
-  BudgetLine untold = named(LineKind::kUntold, "what these poses cannot tell");
+  BudgetLine untold = untold_line(found, budget.poses);
   fold(datum, items, untold);
   const std::vector<Parameter> parameters = datum.model.parameters();
   for (BudgetItem& item : items) {
