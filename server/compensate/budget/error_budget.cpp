@@ -1,5 +1,7 @@
 #include "server/compensate/budget/error_budget.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
