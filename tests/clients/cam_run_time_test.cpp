@@ -49,9 +49,7 @@ TEST(RunTimeRapid, WhereTheArmGivesWayOrAxis4IsHeldTargetsAreLeftUntilThatEnds) 
       {"SingArea\\LockAxis4", "SingArea\\Off", "holds axis 4"},
       {"SingArea\\LockAxis4", "SingArea\\Wrist", "holds axis 4"},
       {"FCAct tGun", "FCDeact", "a force decides"},
-      {"CSSAct\\RefFrame:=1,20", "CSSDeact", "the arm gives way"},
-      {"SoftAct 3,20", "SoftDeact", "a soft axis gives way"},
-      {"SoftAct\\MechUnit:=ROB_1,3,20", "SoftDeact\\Ramp:=150", "a soft axis gives way"}};
+      {"CSSAct\\RefFrame:=1,20", "CSSDeact", "the arm gives way"}};
   for (const auto& [begins, ends, reason] : ways) {
     const test::Corrected made =
         rapid(module_with(data, "    " + begins + ";\n" + kMove + "    " + ends + ";\n" + second));
@@ -64,6 +62,13 @@ TEST(RunTimeRapid, WhereTheArmGivesWayOrAxis4IsHeldTargetsAreLeftUntilThatEnds) 
     EXPECT_TRUE(is_corrected(
         rapid(module_with(data, std::string("    ") + harmless + ";\n" + kMove)), "p10"))
         << harmless;
+}
+
+TEST(RunTimeRapid, ASoftAxisIsANote) {
+  const test::Corrected made = rapid(module_with(
+      "  CONST robtarget p10" + kTarget, "    SoftAct 3,20;\n" + kMove + "    SoftDeact;\n"));
+  EXPECT_TRUE(is_corrected(made, "p10")) << why(made, "p10");
+  EXPECT_TRUE(has(notes(made), "SoftAct (m.mod line 5): a soft axis gives way")) << notes(made);
 }
 
 TEST(RunTimeRapid, ASeamThatASensorTracksIsLeft) {

@@ -76,6 +76,7 @@ class Reader {
       site = {};
     }
     readings_->list_unused();
+    note_soft_axes();
     return std::move(program_);
   }
 
@@ -239,6 +240,22 @@ class Reader {
         return scope->call->begin;
     }
     return data.node->begin;
+  }
+
+  /// A share of an axis' stiffness is taken away; where the tool is sent to stays the same.
+  void note_soft_axes() {
+    std::vector<std::string> places;
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (const Instruction& instruction : modules_[m].instructions) {
+        if (instruction.name == "softact")
+          places.push_back(meaning_->place_of(m, instruction.line));
+      }
+    }
+    if (places.empty()) return;
+    program_.notes.push_back(fmt::format(
+        "SoftAct ({}{}): a soft axis gives way by what the model does not know; its targets are "
+        "corrected as those of a stiff one",
+        places.front(), places.size() > 1 ? fmt::format(" and {} more", places.size() - 1) : ""));
   }
 
   // Places.

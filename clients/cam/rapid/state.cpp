@@ -16,14 +16,12 @@ struct GiveWay {
   const char* ends;            ///< as names of instructions begin
   const char* why;
 };
-const std::array<GiveWay, 4>& give_ways() {
-  static const std::array<GiveWay, 4> kAll = {
+const std::array<GiveWay, 3>& give_ways() {
+  static const std::array<GiveWay, 3> kAll = {
       {{"singarea", "lockaxis4", "singarea",
         "SingArea\\LockAxis4 holds axis 4, so that the orientation is not reached"},
        {"fcact", "", "fcdeact", "FCAct: a force decides where the tool goes"},
-       {"cssact", "", "cssdeact", "CSSAct: the arm gives way, and the model knows a stiff one"},
-       {"softact", "", "softdeact",
-        "SoftAct: a soft axis gives way, and the model knows a stiff one"}}};
+       {"cssact", "", "cssdeact", "CSSAct: the arm gives way, and the model knows a stiff one"}}};
   return kAll;
 }
 
