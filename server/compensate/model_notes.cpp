@@ -150,6 +150,7 @@ void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
 /// m: what is left of an axis of a training pose, or of a gauge, and what was stated for it.
 struct LeftOver {
   double left = 0, stated = 0;
+  bool is_of_gauges = false;
 };
 
 /// `rms` is of all rows. The discrepancy counts neither what the rows' own sigmas explain nor
@@ -175,8 +176,8 @@ LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   if (parts.training.poses > 0)
     worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), cell.tracker.sigma);
   if (!parts.training.gauges) return worst;
-  const LeftOver gauges =
-      left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
+  LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
+  gauges.is_of_gauges = true;
   return gauges.left * worst.stated > worst.left * gauges.stated ? gauges : worst;
 }
 
@@ -187,10 +188,15 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
   if (!(times >= kLeads)) return;
   notes.push_back(
       {"left_over_sigma", times >= kStops ? Severity::kStop : Severity::kWarning,
-       fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm an "
-                   "axis, stated {:.3f} mm): the intervals were widened to fit, so their coverage "
-                   "does not show that the model is right (trammel diagnose)",
-                   times, to_mm(worst.left), to_mm(worst.stated))});
+       fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm {}, "
+                   "stated {:.3f} mm): the intervals were widened to fit, so their coverage does "
+                   "not show that the model is right ({})",
+                   times, to_mm(worst.left), worst.is_of_gauges ? "a distance or touch" : "an axis",
+                   to_mm(worst.stated),
+                   worst.is_of_gauges
+                       ? "are the anchors where the cell file says, and their planes not askew? "
+                         "is the tool the one that was used?"
+                       : "trammel diagnose")});
 }
 
 /// What the physics leaves is the most that the instrument's own error can be. Where more is

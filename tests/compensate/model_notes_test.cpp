@@ -153,6 +153,9 @@ TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
   ASSERT_EQ(left(3.1).size(), 1U);
   ASSERT_EQ(left(500).size(), 1U);
   EXPECT_EQ(left(500).front().severity, Note::Severity::kStop);
+  EXPECT_NE(left(500).front().text.find("are the anchors where the cell file says"),
+            std::string::npos)
+      << "diagnose takes no distances: " << left(500).front().text;
 }
 
 TEST(ModelNotes, PositionsThatTheDrawingHasBetterThanTheInstrumentMeasuresWereComputed) {
