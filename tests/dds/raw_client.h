@@ -29,7 +29,7 @@ Bytes to_bytes(typename PubSubType::type sample) {
 }
 
 /// A type by name only: its samples are whatever bytes somebody hands over.
-class AnyBytesType final : public wire::dds::TopicDataType {
+class AnyBytesType : public wire::dds::TopicDataType {
  public:
   explicit AnyBytesType(const std::string& name) {
     setName(name.c_str());
@@ -101,7 +101,9 @@ class RawClient final : private wire::dds::DataWriterListener,
   [[nodiscard]] std::array<std::uint8_t, 16> writer_octets() const {
     return wire::octets_of(writer_->guid());
   }
-  void send(Bytes bytes) { writer_->write(&bytes); }
+  void send(Bytes bytes) {
+    if (!writer_->write(&bytes)) throw std::runtime_error("a request was not sent");
+  }
   void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
     header.request_id().writer_guid(wire::octets_of(writer_->guid()));
     header.request_id().sequence_number(sequence_number);
