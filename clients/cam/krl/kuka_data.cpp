@@ -2,6 +2,7 @@
 
 #include <deque>
 
+#include "clients/cam/keep.h"
 #include "clients/cam/krl/krl.h"
 #include "clients/cam/krl/lines.h"
 #include "clients/cam/krl/stated.h"

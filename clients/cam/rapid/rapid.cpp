@@ -18,6 +18,7 @@
 #include "clients/cam/rapid/state.h"
 #include "clients/cam/rapid/targets.h"
 #include "clients/cam/rapid/tools.h"
+#include "clients/cam/scan.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
