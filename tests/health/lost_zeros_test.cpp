@@ -109,6 +109,23 @@ std::vector<JointVector> spread_poses(int count, std::uint64_t seed) {
   return poses;
 }
 
+TEST(LostZeroOfADegree, LeavesNothingThatAnotherCauseExplains) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    for (const int joint : {3, 4, 5}) {
+      PlainCheck one{spread_poses(14, seed), from_deg(1) * JointVector::Unit(6, joint - 1), false};
+      one.seed = seed;
+      const HealthCheck check =
+          test::demand(checked(model_of_six_axes(), measured(test::irb120(), one)));
+      ASSERT_EQ(check.changed.size(), 1u) << check.sentence;
+      EXPECT_TRUE(is_zero_of(check.changed.front().cause, joint)) << check.sentence;
+      ASSERT_EQ(check.changed.front().zeros.size(), 1u) << check.sentence;
+      EXPECT_EQ(check.sentence.find("several joints"), std::string::npos) << check.sentence;
+      const LostZero& zero = check.changed.front().zeros.front();
+      EXPECT_NEAR(zero.by, from_deg(1), 1.5 * zero.u95) << check.sentence;
+    }
+  }
+}
+
 TEST(LostZerosOfSeveralJoints, HaveEachTheMillimetresThatACheckOfThatOneAloneTells) {
   PlainCheck several{spread_poses(14, 5), JointVector::Zero(6)};
   several.zeros << 0, 2e-3, -1.5e-3, 0, 2.5e-3, 0;

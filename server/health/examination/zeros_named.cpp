@@ -79,14 +79,23 @@ std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad
                         [&](const ZerosFit& a, const ZerosFit& b) { return cost(a) < cost(b); });
   const CheckTests& tests = healthy_.tests(bad);
   const CheckTests& of_all = healthy_.tests({});
+  const Eigen::VectorXd left = tests.rows().left(rows_.residual),
+                        all_left = of_all.rows().left(rows_.residual);
   const double off = distance_of(tests.rows());
-  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off < kFarOff;
+  // To first order a zero of a degree leaves what another cause then explains.
+  const auto is_linear = [&](std::size_t zero) {
+    for (std::size_t h = 0; h < questions_.causes; ++h)
+      if (questions_.hypotheses[h].cause == zero)
+        return left.squaredNorm() - (tests.directions()[h].transpose() * left).squaredNorm() <
+               best.left + kAlike;
+    return true;
+  };
+  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off < kFarOff &&
+                             is_linear(best.zeros.front());
   const int freedom = tests.rows().freedom() - best.numbers;
   if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft ||
       chi_square_tail(best.left, freedom) < limit)
     return std::nullopt;
-  const Eigen::VectorXd left = tests.rows().left(rows_.residual),
-                        all_left = of_all.rows().left(rows_.residual);
   const double of_bad = price(of_all.rows().freedom() - tests.rows().freedom());
   const double score = score_of(best, all_left.squaredNorm()) - of_bad;
   if (has_simpler(of_all, score) || are_bad_poses(score)) return std::nullopt;
