@@ -90,8 +90,8 @@ std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad
                best.left + kAlike;
     return true;
   };
-  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off < kFarOff &&
-                             is_linear(best.zeros.front());
+  const bool is_one_linear =
+      best.zeros.size() == 1 && !best.tool && off < kFarOff && is_linear(best.zeros.front());
   const int freedom = tests.rows().freedom() - best.numbers;
   if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft ||
       chi_square_tail(best.left, freedom) < limit)
