@@ -91,7 +91,9 @@ Result<ControllerCell> read_own_lists(Dialect dialect, const std::vector<SourceF
       "whether the controller corrects the robot itself is not in these files: write "
       "controller_compensates by hand");
   if (cell.tools.empty())
-    return refused("no tool in the controller's own lists, a cell needs one").of("tooldata");
+    return refused("no tool in the controller's own lists, a cell needs one")
+        .of("tooldata")
+        .next("$config.dat, SYSFRAME.VA or TOOL.CND has it");
   return cell;
 }
 
