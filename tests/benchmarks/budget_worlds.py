@@ -7,7 +7,7 @@ millimetres are, how often a pair that no pose can tell apart is named as one, a
 A world measures positions or full poses. Every third arm carries a load: its gearboxes give way, and one of them may be
 the gross error. Every third has a gear ripple in joint 3, which may be it, too. Each gross error is beyond what stands
 out, at 60 to 300 poses; with `--small` it is from 0.2 mrad and 0.2 mm on, at 20 to 400 poses. Lines that name others are
-not held against U: their value is of all of them together.
+held against nothing: they are of all of them together.
 
     tests/benchmarks/budget_worlds.py --trammel build/release/clients/cli/trammel --worlds 40 --healthy 20
 """
@@ -236,10 +236,12 @@ def budget_of(trammel, folder, world, rng):
 
 
 def hidden_value(key, error):
-    """As people read it: mm, deg, or the unit of a gearbox."""
+    """As people read it: mm, deg, or of a gearbox deg/kNm."""
     if isinstance(error, tuple):
         return float(np.linalg.norm(error))
-    return error if key.startswith(("length", "compliance")) else math.degrees(error)
+    if key.startswith("compliance"):
+        return math.degrees(1e6 * error)
+    return error if key.startswith("length") else math.degrees(error)
 
 
 class Counts:
@@ -271,13 +273,15 @@ class Counts:
                 print(f"{name}: {pair} is not named as a pair")
 
     def add_line(self, name, key, found, world, sizes, verbose):
+        if found["with"]:  # all of them together: no single error is hidden that the line could be held against
+            return
         is_near = abs(found["alone_rms_mm"] - sizes[found["line"]]) <= 0.05 * sizes[found["line"]]
         self.near += is_near
         self.lines += 1
         if verbose and not is_near:
             print(f"{name}: {key} alone {found['alone_rms_mm']:.4f} mm, hidden {sizes[found['line']]:.4f}")
         own = {number["name"]: number for number in found.get("numbers", [])}.get(key.partition(":")[2], found)
-        if found["with"] or own["value"] is None:  # the value is of all of them together, or there are several
+        if own["value"] is None:  # there are several numbers
             return
         self.values += 1
         hidden = hidden_value(key, world.errors[key])
