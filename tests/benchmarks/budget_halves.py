@@ -6,7 +6,7 @@ number of the budget that both halves tell against the other: they agree where t
 difference. Expected: 93 to 98 % of the numbers. Halves are drawn at random, or with `--blocks` are the first and the
 second half of the rows. The measurements are no part of this project; without them nothing is done.
 
-    tests/benchmarks/budget_halves.py --trammel build/release/clients/cli/trammel --data ../shared/data
+    tests/benchmarks/budget_halves.py --trammel build/release/clients/trammel --data ../shared/data
 """
 import argparse
 import json
@@ -61,7 +61,7 @@ def halves_of(rows, blocks, rng):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trammel", default="build/release/clients/cli/trammel")
+    parser.add_argument("--trammel", default="build/release/clients/trammel")
     parser.add_argument("--data", default="../shared/data")
     parser.add_argument("--poses", type=int, default=600, help="at most, of each arm")
     parser.add_argument("--repeats", type=int, default=3, help="random halves of each arm")

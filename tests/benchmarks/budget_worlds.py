@@ -9,7 +9,7 @@ the gross error. Every third has a gear ripple in joint 3, which may be it, too.
 out, at 60 to 300 poses; with `--small` it is from 0.2 mrad and 0.2 mm on, at 20 to 400 poses. Lines that name others are
 held against nothing: they are of all of them together.
 
-    tests/benchmarks/budget_worlds.py --trammel build/release/clients/cli/trammel --worlds 40 --healthy 20
+    tests/benchmarks/budget_worlds.py --trammel build/release/clients/trammel --worlds 40 --healthy 20
 """
 import argparse
 import json
@@ -294,7 +294,7 @@ class Counts:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trammel", default="build/release/clients/cli/trammel")
+    parser.add_argument("--trammel", default="build/release/clients/trammel")
     parser.add_argument("--worlds", type=int, default=40)
     parser.add_argument("--healthy", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
