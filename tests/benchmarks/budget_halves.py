@@ -46,7 +46,7 @@ def numbers_of(budget):
     numbers = {}
     for line in budget["lines"]:
         name = "+".join([line["line"], *sorted(line["with"])])
-        if line["value"] is None:
+        if line["value"] is None or line["kind"] in ("base", "tool"):  # told from where each half finds them
             continue
         for number in line.get("numbers") or [{"name": "", "value": line["value"], "u95": line["u95"]}]:
             numbers[name, number["name"]] = number["value"], number["u95"]

@@ -128,6 +128,27 @@ void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::Ve
   datum.covariance(kept, kept) = root * variance.asDiagonal() * root.transpose();
 }
 
+/// Widens the variance of each kept parameter by what is left at the poses that tell it, beside what
+/// is left on average. As many numbers as twice the parameters must have been measured.
+void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
+           const std::vector<PoseContext>& poses, const Eigen::Matrix3Xd& left) {
+  const double whole = left.squaredNorm();
+  if (whole <= 0 || left.size() < 2 * std::ssize(kept)) return;
+  const Eigen::MatrixXd J = jacobian_of(datum.model, poses)(Eigen::all, kept);
+  const Eigen::MatrixXd C = datum.covariance(kept, kept);
+  const Eigen::MatrixXd weights = C * J.transpose();  // K x 3N: what a position moves
+  Eigen::VectorXd wider = Eigen::VectorXd::Ones(std::ssize(kept));
+  for (Eigen::Index k = 0; k < wider.size(); ++k) {
+    double moved = 0;
+    for (Eigen::Index i = 0; i < left.cols(); ++i)
+      moved += std::pow(weights.row(k).segment<3>(3 * i).dot(left.col(i).transpose()), 2);
+    const double expected =
+        weights.row(k).squaredNorm() * whole / static_cast<double>(left.size());
+    if (expected > 0) wider(k) = std::sqrt(std::max(moved / expected, 1.0));
+  }
+  datum.covariance(kept, kept) = wider.asDiagonal() * C * wider.asDiagonal();
+}
+
 /// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that
 /// it is named after.
 std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index named,
@@ -144,7 +165,8 @@ std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index n
 
 }  // namespace
 
-Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
+Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
+               const Eigen::Matrix3Xd* left) {
   const PhysicalModel& physics = found.physics;
   const Eigen::VectorXd sizes = sizes_to_compare_by(physics);
   Datum datum{
@@ -181,6 +203,7 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
   }
   if (kept.empty()) return datum;
   settle(datum, kept, sizes, told.information(kept_of_free, kept_of_free));
+  if (left != nullptr) widen(datum, kept, poses, *left);
   return datum;
 }
 

@@ -30,7 +30,10 @@ struct Identified {
   const std::vector<IdentifiedParameter>& parameters;
   const Eigen::MatrixXd& covariance;  ///< P x P, SI
 };
-/// `poses`: those of the budget. What the measurements tell is taken from the covariance.
-[[nodiscard]] Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses);
+/// `poses`: those of the budget. What the measurements tell is taken from the covariance. `left`: 3
+/// x N, m, in W, what the physics leaves at these poses: where that is larger at the poses that
+/// tell a parameter than at others, its variance is larger, too (White 1980). Null: not measured.
+[[nodiscard]] Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
+                             const Eigen::Matrix3Xd* left = nullptr);
 
 }  // namespace trammel

@@ -337,7 +337,9 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left,
                       const MeasurementBatch& positions, const ToldBeside& beside) {
   ErrorBudget budget;
   budget.poses = static_cast<int>(positions.measurements.size());
-  const Datum datum = datum_of(found, contexts_of(positions));
+  const bool is_measured = !positions.measurements.front().context.served;
+  const Datum datum =
+      datum_of(found, contexts_of(positions), is_measured ? &left.physics : nullptr);
   std::vector<BudgetItem> items = items_of(datum.model);
   BudgetLine untold = untold_line(found, budget.poses);
   fold(datum, items, untold);
