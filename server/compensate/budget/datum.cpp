@@ -128,8 +128,8 @@ void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::Ve
   datum.covariance(kept, kept) = root * variance.asDiagonal() * root.transpose();
 }
 
-/// Widens the variance of each kept parameter by what is left at the poses that tell it, beside what
-/// is left on average. As many numbers as twice the parameters must have been measured.
+/// Widens the variance of each kept parameter by what is left at the poses that tell it, beside
+/// what is left on average. As many numbers as twice the parameters must have been measured.
 void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
            const std::vector<PoseContext>& poses, const Eigen::Matrix3Xd& left) {
   const double whole = left.squaredNorm();
@@ -142,8 +142,7 @@ void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
     double moved = 0;
     for (Eigen::Index i = 0; i < left.cols(); ++i)
       moved += std::pow(weights.row(k).segment<3>(3 * i).dot(left.col(i).transpose()), 2);
-    const double expected =
-        weights.row(k).squaredNorm() * whole / static_cast<double>(left.size());
+    const double expected = weights.row(k).squaredNorm() * whole / static_cast<double>(left.size());
     if (expected > 0) wider(k) = std::sqrt(std::max(moved / expected, 1.0));
   }
   datum.covariance(kept, kept) = wider.asDiagonal() * C * wider.asDiagonal();

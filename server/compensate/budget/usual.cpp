@@ -63,8 +63,8 @@ Eigen::VectorXd sizes_to_compare_by(const PhysicalModel& model) {
   const UsualSizes usual = usual_sizes(model.cell->robot);
   Eigen::VectorXd sizes(model.parameter_count());
   const auto& tools = model.cell->tools;
-  const bool finds_tools = std::any_of(tools.begin(), tools.end(),
-                                       [](const auto& tool) { return !tool.second; });
+  const bool finds_tools =
+      std::any_of(tools.begin(), tools.end(), [](const auto& tool) { return !tool.second; });
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
     for (const Parameter& parameter : source->parameters()) {
