@@ -154,6 +154,8 @@ std::vector<Step> Statement::steps() const {
   return {known == kWords.end() ? Step{} : Step{known->second}};
 }
 
+JobText job_of(std::string_view text) { return Reader(text).read(); }
+
 std::optional<Motion> motion_of(const Statement& statement) {
   static const std::set<std::string_view> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
   const Tokens& tokens = statement.tokens;
