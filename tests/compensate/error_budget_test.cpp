@@ -280,7 +280,7 @@ TEST(ErrorBudget, SaysWhatEachStepLeaves) {
   EXPECT_LT(steps[5].left_rms, 0.03e-3);
   const std::vector<std::string> words = remedies_in_words(budget_of(model), model.cell().robot);
   EXPECT_TRUE(std::any_of(words.begin(), words.end(), [](const std::string& line) {
-    return line.find("joint 4: +3.00") != std::string::npos;
+    return line.find("joint 4 (axis 4): +3.00") != std::string::npos;
   })) << fmt::format("{}", fmt::join(words, "\n"));
 }
 
