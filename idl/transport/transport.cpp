@@ -24,12 +24,6 @@ constexpr int kServersDepth = 16;
 // readers in every client.
 constexpr std::chrono::milliseconds kHeartbeat{10}, kStateHeartbeat{200};
 
-// So long the library waits for its own locks in a write. After its default, 100 ms, a thread that
-// a crowded machine stopped in the middle of one gives up on the clock of its HEARTBEATs, and that
-// writer never sends another one: what is lost on the way stays lost. No writer of ours waits for
-// its readers, so nothing else takes so long.
-constexpr std::chrono::milliseconds kLocks{60'000};
-
 /// The builtin plugins of DDS-Security. The governance says what is signed and encrypted.
 void set_security(dds::PropertyPolicyQos& properties, const Security& security) {
   const auto say = [&](const std::string& name, const std::string& value) {
@@ -75,7 +69,6 @@ void set_state_history(Qos& qos, int depth) {
 /// of them answer.
 void set_writer_times(dds::DataWriterQos& qos, std::chrono::milliseconds heartbeat) {
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-  qos.reliability().max_blocking_time = to_duration(kLocks);
   qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(heartbeat);
   qos.reliable_writer_qos().times.nackResponseDelay = to_duration(std::chrono::milliseconds(0));
   // None between the fragments of a sample: a reader of Cyclone DDS takes what stands in the first

@@ -29,7 +29,7 @@ Bytes to_bytes(typename PubSubType::type sample) {
 }
 
 /// A type by name only: its samples are whatever bytes somebody hands over.
-class AnyBytesType : public wire::dds::TopicDataType {
+class AnyBytesType final : public wire::dds::TopicDataType {
  public:
   explicit AnyBytesType(const std::string& name) {
     setName(name.c_str());
