@@ -1,7 +1,5 @@
 #include "server/compensate/budget/usual.h"
 
-#include <algorithm>
-
 #include "server/base/units.h"
 #include "server/error_sources/catalogue.h"
 
@@ -13,8 +11,6 @@ constexpr double kFrameShift = 0.1;  // m
 constexpr double kFrameTurn = 0.1;   // rad
 constexpr double kToolShift = 0.02;  // m
 constexpr double kToolTurn = 0.02;   // rad
-constexpr double kFoundFrame =
-    1.5;  // of a usual length or zero: a frame that was found from the data is where it was found
 
 /// m: the longest stretch of the drawing.
 double reach_of(const Chain& robot) {
@@ -62,20 +58,16 @@ std::optional<double> usual_value(const BudgetItem& item, const PhysicalModel& m
 Eigen::VectorXd sizes_to_compare_by(const PhysicalModel& model) {
   const UsualSizes usual = usual_sizes(model.cell->robot);
   Eigen::VectorXd sizes(model.parameter_count());
-  const auto& tools = model.cell->tools;
-  const bool finds_tools =
-      std::any_of(tools.begin(), tools.end(), [](const auto& tool) { return !tool.second; });
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
     for (const Parameter& parameter : source->parameters()) {
       const bool length = is_length(parameter);
-      const double found = kFoundFrame * (length ? usual.length : usual.zero);
       switch (source->cause().part) {
         case causes::Part::kBase:
-          sizes(k++) = !model.cell->X_WB ? found : length ? kFrameShift : kFrameTurn;
+          sizes(k++) = length ? kFrameShift : kFrameTurn;
           break;
         case causes::Part::kTool:
-          sizes(k++) = finds_tools ? found : length ? kToolShift : kToolTurn;
+          sizes(k++) = length ? kToolShift : kToolTurn;
           break;
         case causes::Part::kLinks:
           sizes(k++) = length ? usual.length : usual.zero;
