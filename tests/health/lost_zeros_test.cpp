@@ -169,7 +169,9 @@ TEST(LostZeroOfTheLastJoint, StandsBesideAToolThatMayHaveTurned) {
       const HealthCheck check =
           test::demand(checked(model_of_six_axes(), measured(test::irb120(), knocked)));
       ASSERT_FALSE(check.changed.empty()) << check.sentence;
-      if (zero > 0 || !orientation) {
+      const bool is_seen = zero > 5e-4;  // by orientations: 0.2 mrad do 9 um, a tenth of the
+                                         // tolerance, and less than these poses show
+      if (is_seen || !orientation) {
         EXPECT_TRUE(names_zero_of(check, 6)) << zero << orientation << ": " << check.sentence;
       }
       const bool is_told = std::any_of(

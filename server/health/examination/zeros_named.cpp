@@ -238,7 +238,8 @@ bool Examination::has_not_turned(const CheckRows& there, const Eigen::MatrixXd& 
   const double most = std::abs(turned.numbers(0)) + 2 * std::sqrt(turned.covariance(0, 0));
   const Eigen::MatrixXd square =
       tool.at_these_poses ? square_here(own, beside_frames) : working_.left_square(column);
-  return gained < kAlike && most * std::sqrt(square(0, 0)) < kHidden * tool.effect_rms;
+  const double hidden = most * std::sqrt(square(0, 0));
+  return gained < kAlike && hidden < std::min(kHidden * tool.effect_rms, options_.tolerance);
 }
 
 void Examination::tell_other_sets(const ZerosFit& fit, SeenChange& change) const {
