@@ -242,7 +242,8 @@ TEST_F(ImportKuka, GivesBasesAsTheRobotSeesThem) {
 TEST_F(ImportKuka, SaysWhatTheFilesDoNotTell) {
   ASSERT_EQ(make(), 0);
   EXPECT_FALSE(read_cell(file("cell.yaml"))->payloads.contains("tool_2"));
-  for (const char* part : {"tool tool_2 has no load", "TOOL_DATA[3]", "controller_compensates by hand"})
+  for (const char* part :
+       {"tool tool_2 has no load", "TOOL_DATA[3]", "controller_compensates by hand"})
     EXPECT_NE(notes().find(part), std::string::npos) << part << ": " << notes();
 }
 
