@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <map>
 #include <set>
 #include <thread>
@@ -341,11 +342,17 @@ TEST_F(SharedStoreAway, AHeartbeatWaitsForNoStandby) {
     postgres_.sql(url_, "SELECT pg_reload_conf()");
   };
   standbys("nobody");
-  const std::jthread asks(
-      [&] { static_cast<void>(store->add_batch(batch_of("lt-08"), job_of("lt-08"))); });
+  std::atomic<bool> waits{false};  // a write that gives up is followed by the next one until then
+  const std::jthread asks([&] {
+    for (int number = 8; !waits; ++number) {
+      const std::string id = fmt::format("lt-{:02}", number);
+      static_cast<void>(store->add_batch(batch_of(id), job_of(id)));
+    }
+  });
   while (postgres_.sql(
              url_, "SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == "0\n")
     continue;
+  waits = true;
   EXPECT_TRUE(demand(store->renew_claim(job)).is_held);
   EXPECT_TRUE(store->tell_presence({}));
   standbys("");
