@@ -52,7 +52,7 @@ struct Arguments {
   std::optional<std::uint16_t> http_port;
 };
 
-/// What it says instead of the server file.
+/// Puts the options of the command line over the server file.
 void put_over(ServerConfig& config, const Arguments& arguments) {
   if (arguments.store) config.store = *arguments.store;
   if (arguments.port) config.dds.port = *arguments.port;
@@ -251,7 +251,7 @@ Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service)
   return name;
 }
 
-/// What its acknowledgements are worth, as far as the database says it now.
+/// Says how safe acknowledgements are, as far as the database says it now.
 void tell_record(const Store& store) {
   const RecordState record = store.record();
   if (record.kind != "postgresql" || record.survives.empty()) return;

@@ -24,7 +24,7 @@ namespace {
 using SourceTree = std::map<std::string, std::string>;
 using Complaints = std::vector<std::string>;
 
-/// What the table of server/README.md says of a room or of a room's subfolder.
+/// The row of a room or of a room's subfolder in the table of server/README.md.
 struct Room {
   std::optional<int> floor;  ///< a room's; a subfolder stands on its room's
   bool all_is_door = false;
@@ -251,7 +251,7 @@ Complaints check_floors(const SourceTree& tree, const Rooms& rooms) {
   return complaints;
 }
 
-/// Whether the door of `folder` lets this header out.
+/// True if the door of `folder` lets this header out.
 bool is_door(const Rooms& rooms, const std::string& folder, const std::string& header) {
   const auto room = rooms.find(folder);
   return room == rooms.end() || room->second.all_is_door ||
@@ -525,7 +525,7 @@ Complaints check_mirror(const SourceTree& tree) {
   return complaints;
 }
 
-// How long functions are.
+// The length of functions.
 
 /// The most lines of a function, from the first of its declaration to its closing brace.
 constexpr int kMostLines = 60;
@@ -562,7 +562,7 @@ std::string outside_brackets(const std::string& text) {
   return outside;
 }
 
-/// What a brace opens, by the text between it and the statement before.
+/// The kind of scope that a brace opens, by the text between it and the statement before.
 enum class Opens { kScope, kFunction, kMember, kOther };
 Opens opened_by(const std::string& header) {
   static const std::regex kType(
@@ -617,7 +617,7 @@ std::vector<Function> functions_of(std::string_view text) {
   return functions;
 }
 
-/// Of server/ and clients/, those of three lines and more: shorter ones are names for an
+/// The functions of server/ and clients/ of three lines and more: shorter ones are names for an
 /// expression.
 std::vector<Function> functions_of(const SourceTree& tree) {
   std::vector<Function> all;

@@ -69,7 +69,7 @@ void raise(const api::Error& error) {
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
 }
 
-/// What Python raised while it was told of the progress; the work is given up then.
+/// The exception that Python raised while it was told of the progress; the work is given up then.
 class Told {
  public:
   explicit Told(py::object listener) : listener_(std::move(listener)) {}

@@ -90,7 +90,7 @@ bool says_another_domain(Bytes announcement, std::uint32_t domain) {
   return false;
 }
 
-/// What an announcement says of where and for how long its participant is there.
+/// The address and the lease that an announcement states for its participant.
 struct Place {
   std::vector<std::uint64_t> sockets;
   std::chrono::milliseconds lease{0};  // 0: not said

@@ -29,7 +29,7 @@ bool LostLeases::is_closed(const Participant& who, Time now) const {
 
 void LostLeases::awake(Time now) {
   const Time before{awake_.exchange(now.count())};
-  // What we announced last before we slept may have been sent this long before.
+  // Our last announcement before the sleep may have been sent this long before it.
   constexpr std::chrono::milliseconds kPeriod{200};
   if (before == Time{} || now - before < lease_ - kMargin - kPeriod) return;
   const MutexLock lock(mutex_);

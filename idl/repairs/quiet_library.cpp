@@ -10,7 +10,7 @@ std::atomic<int> living = 0;
 
 }  // namespace
 
-// What was said before is shown, and what was said meanwhile is not: the library tells its errors
+// Earlier messages are shown, messages written meanwhile are not: the library tells its errors
 // in a thread of its own.
 QuietLibrary::QuietLibrary() {
   eprosima::fastdds::dds::Log::Flush();

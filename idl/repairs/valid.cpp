@@ -4,7 +4,7 @@
 
 #include "idl/limits.h"
 
-// How each type of the IDL is laid out, member by member. tests/dds/safe_type_test.cpp holds it
+// The layout of each type of the IDL, member by member. tests/dds/safe_type_test.cpp holds it
 // against the types.
 
 namespace trammel::wire {

@@ -125,7 +125,7 @@ Status check_key(const Folder& folder, const X509& certificate) {
   return {};
 }
 
-/// What was signed by the authority of the permissions.
+/// The text that the authority of the permissions signed.
 Result<std::string> signed_text(const Folder& folder, const char* name, X509& authority) {
   const auto smime = TRY(folder.text(name));
   BIO* content = nullptr;

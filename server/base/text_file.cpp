@@ -97,7 +97,7 @@ void remove_parts(const std::vector<FileView>& files) {
   }
 }
 
-/// What to do about a file that cannot be written.
+/// Says what to do about a file that cannot be written.
 std::string other_place(const std::string& path) {
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();

@@ -134,7 +134,7 @@ Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
          rest.mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
 }
 
-/// The same of all folds; `progress` is told the share done.
+/// The misses of all folds; `progress` is told the share done.
 Result<Missed> missed(const BiasModel& model, const std::vector<Fold>& folds,
                       const std::function<bool(double)>& progress) {
   Missed error;
@@ -185,7 +185,7 @@ double hyperparameters_of(const BiasModel& model) {
   return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
 }
 
-/// Whether `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters
+/// True if `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters
 /// were found with the pose that is left out, so each of them raises the sum by one nat (Akaike
 /// 1974).
 bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
@@ -359,7 +359,7 @@ class Choosing {
     return {std::move(choice_), std::move(best_.model)};
   }
 
-  /// Whether the block `parameters` leaves clearly less than the same kernel without it.
+  /// True if the block `parameters` leaves clearly less than the same kernel without it.
   [[nodiscard]] bool learns_physics() const {
     const BiasCandidate& taken = choice_.candidates[best_.candidate];
     const auto plain = std::find_if(choice_.candidates.begin(), choice_.candidates.end(),
@@ -403,7 +403,7 @@ BiasProblem rows_of(const BiasProblem& problem, const std::vector<Index>& rows) 
           at(problem.features, rows)};
 }
 
-/// What `residual_without` says of the rows `some` without those at `rows` of them.
+/// The residuals by `residual_without` of the rows `some` without those at `rows` of them.
 std::optional<MatrixXd> left_of(const ResidualWithout& residual_without,
                                 const std::vector<Index>& some, const std::vector<Index>& rows) {
   const std::optional<MatrixXd> all = residual_without(at(some, rows));

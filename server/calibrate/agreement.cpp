@@ -146,7 +146,7 @@ class RowSearch {
     return rows;
   }
 
-  /// How far each row of `rows` is off, beside how far a good one may be.
+  /// The misfit of each row of `rows`, relative to what a good row may have.
   [[nodiscard]] Eigen::VectorXd farness(const CalibrationResult& found,
                                         const MeasurementBatch& rows) const {
     return farness_of(rows, residuals_of(found.model, rows, found.model.values),
@@ -170,7 +170,7 @@ class RowSearch {
     return equations >= kEquations * static_cast<double>(found.parameters.size());
   }
 
-  /// What is found of `sources` on the rows that fit it best.
+  /// The values of `sources` found on the rows that fit them best.
   [[nodiscard]] std::optional<CalibrationResult> concentrated(
       const MeasurementBatch& few, std::optional<CalibrationResult> start,
       const std::vector<std::string>& sources) const {

@@ -84,7 +84,7 @@ double price_of_scales(std::size_t sessions) {
   return kStretched + kStretchedOfSession * static_cast<double>(sessions - 1);
 }
 
-/// Whether the residuals of a session grow with the distance from its middle. The parameters have
+/// True if the residuals of a session grow with the distance from its middle. The parameters have
 /// taken a part of that, so it is only a reason to look.
 bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& located) {
   const Tracker& tracker = found.model.cell->tracker;
@@ -308,8 +308,8 @@ Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationPro
              : std::move(found);
 }
 
-/// Whether nothing that is to be found depends on which world it is told in: not where the
-/// instrument drifts to.
+/// True if nothing that is to be found depends on which world it is told in, as the drift of an
+/// instrument does.
 bool is_of_the_robot(const PhysicalModel& model) {
   return std::all_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
     return source->cause().scope != causes::Scope::kSession &&
@@ -413,7 +413,7 @@ std::vector<const CauseRecord*> may_be_added(const Cell& cell,
 
 namespace {
 
-/// Whether what goes with the temperature is as large as arms of metal have it, and of their sign:
+/// True if the effect of the temperature is as large as in arms of metal, and of their sign:
 /// less is wear that went with the seasons, or an instrument.
 bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   if (!added.needs.temperature) return true;
@@ -426,7 +426,7 @@ bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   return false;
 }
 
-/// Whether the data ask for what was added. Where it stands for what scales of the sessions explain
+/// True if the data ask for what was added. Where it stands for what scales of the sessions explain
 /// otherwise it needs no more than to be likelier, the scales at their price.
 bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& with) {
   if (!are_stretched(without.sessions) || are_stretched(with.sessions))

@@ -12,7 +12,7 @@ using Eigen::Index;
 ChangeKinds::ChangeKinds(const PhysicalModel& model, ChangesOf of) : probe_(model) {
   for (const CauseRecord* cause : all_causes()) {
     if (cause->lasting != causes::Lasting::kFromAPose) continue;
-    // What belongs to a session alone, such as where its tracker stood, is no change of the arm.
+    // A value of one session alone, such as where its tracker stood, is no change of the arm.
     if (cause->scope == causes::Scope::kSession && of == ChangesOf::kArm) continue;
     if (cause->scope != causes::Scope::kJoint) add_of_arm(*cause);
     for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j)

@@ -154,8 +154,8 @@ class ChangeSearch {
                        first_of(one.session + 1));
   }
 
-  /// What held in one session only: a reflector that sat elsewhere that day. Of the first session
-  /// that is a change at the second one, of the newest it is how the tool sits today.
+  /// Adds a change of one session only: a reflector that sat elsewhere that day. In the first
+  /// session that is a change at the second one, in the newest it is how the tool sits today.
   void add_alone(std::size_t session, double inflation, std::vector<Scored>& all) const {
     if (session + 1 >= sessions_.size()) return;
     Seen seen;
@@ -239,7 +239,7 @@ class ChangeSearch {
     return session < blocks_.size() ? &blocks_[session] : nullptr;
   }
 
-  /// Of each joint in each session.
+  /// Finds the middle of each joint in each session.
   void find_middles(const MeasurementBatch& batch) {
     std::vector<std::vector<double>> angles(joints_ * sessions_.size());
     for (const Measurement& m : batch.measurements) {
@@ -285,7 +285,7 @@ class ChangeSearch {
     }
   }
 
-  /// What the columns [first, first + count) gain beside all that is free.
+  /// The gain of the columns [first, first + count) beside all that is free.
   [[nodiscard]] double gain(Index first, Index count, const Seen& seen) const {
     const MatrixXd shared = seen.shared.middleRows(first, count);
     const MatrixXd explained = factor_.solve(shared.transpose());
@@ -304,7 +304,7 @@ class ChangeSearch {
     return {&kind, session, gained, gained - static_cast<double>(kind.count) * std::log(rows)};
   }
 
-  /// How much larger gains are than white noise would make them: the mean over single numbers
+  /// The factor by which gains exceed those of white noise: the mean over single numbers
   /// between halves of the poses. A session whose noise is in question tells nothing of that.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;

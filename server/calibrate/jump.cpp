@@ -65,7 +65,7 @@ struct KindSums {
   }
 };
 
-/// What a kind explains, and its size.
+/// The part that a kind explains, and its size.
 struct Fitted {
   double gain = 0;  // twice the log likelihood
   VectorXd size;    // in units of the priors
@@ -95,7 +95,7 @@ class JumpSearch {
     const std::vector<Scored> seen = all_scored(inflation_by_halves());
     const auto first = strongest_of(seen);
     if (first == seen.end()) return std::nullopt;
-    // What jumps differs between the halves, too: it is no sign that the rest is not white.
+    // A jump makes the halves differ, too: it is no sign that the rest is not white.
     const double inflation = without(*first).inflation_by_halves();
     const std::vector<Scored> all = all_scored(inflation);
     const auto best = strongest_of(all);
@@ -146,7 +146,7 @@ class JumpSearch {
     at_rest_ = factor_.solve(gradient);
   }
 
-  /// The same poses without what the jump did.
+  /// The search on these poses without what the jump did.
   [[nodiscard]] JumpSearch without(const Scored& jump) const {
     JumpSearch rest = *this;
     for (std::size_t i = jump.at; i < rest.poses_.size(); ++i) {
@@ -221,7 +221,7 @@ class JumpSearch {
     return {&kind, at, gain, gain - price, fitted.size};
   }
 
-  /// What the kind gains as something that grows slowly: with one of several lags, steadily, or
+  /// The gain of the kind as something that grows slowly: with one of several lags, steadily, or
   /// with the temperature.
   [[nodiscard]] double slow_gain(const ChangeKind& kind) const {
     const auto n = static_cast<double>(poses_.size());
@@ -308,7 +308,7 @@ class JumpSearch {
     return best;
   }
 
-  /// How much larger gains are than white noise makes them: the mean over single numbers between
+  /// The factor by which gains exceed those of white noise: the mean over single numbers between
   /// halves of the poses by each joint's angle.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;

@@ -43,7 +43,7 @@ constexpr std::size_t kMostTries =
 constexpr std::size_t kMostPositions =
     300;  // evenly drawn beyond: more do not make the base more certain
 
-/// What was measured of one tool.
+/// The measured orientations of one tool.
 struct Oriented {
   std::string tool;
   std::vector<const Measurement*> rows;
@@ -158,7 +158,7 @@ Result<BaseAndTool> located(const Positions& positions, const std::optional<Pose
   return BaseAndTool{X_WB, *X_FT};
 }
 
-/// What the positions tell of the base; `belong`: whether they are of these joints.
+/// The base as the positions tell it; `belong`: true if they are of these joints.
 struct Located {
   std::optional<Turned> turned;
   bool belong = true;
@@ -199,7 +199,7 @@ Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
 
 Quaternion as_it_is(const Quaternion& q) { return q; }
 
-/// Of the four columns one with the other sign, or two exchanged; or of a left-handed frame.
+/// Adds readings with one of four columns negated, with two exchanged, or of a left-handed frame.
 void add_columns(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
   const std::array<const char*, 4> columns = {"qx", "qy", "qz", "qw"};  // as Eigen counts
   const auto add = [&](const std::string& name, const auto& change) {
@@ -300,7 +300,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
   return all;
 }
 
-/// How well one way of reading fits, alone or together with the numbers as given.
+/// The fit of one way of reading, alone or together with the numbers as given.
 struct Judged {
   Quaternion q_FT = Quaternion::Identity();  ///< what the poses have in common
   std::vector<double> off;  ///< rad, of each pose: from the cell's tool, or from q_FT
@@ -324,7 +324,7 @@ std::string deg(double radians) {
   return fmt::format("{:.{}f} deg", to_deg(radians), radians < from_deg(10) ? 2 : 0);
 }
 
-/// Whether the orientations of one tool follow the joints, for one rotation of the base.
+/// Asks whether the orientations of one tool follow the joints, for one rotation of the base.
 class Question {
  public:
   Question(const Oriented& group, const Quaternion& q_WB, const Cell& cell)
@@ -365,7 +365,7 @@ class Question {
   static Failure doubted(const std::string& what, double off) {
     return refused("{}", what).of("qw,qx,qy,qz").beyond(to_deg(off), to_deg(kMostOff));
   }
-  /// Whether they fit so well that no other reading needs to be tried.
+  /// True if they fit so well that no other reading needs to be tried.
   bool follow() const { return given_.fit <= kWorthAsking && far_rows().empty(); }
   bool by_order() const { return all_[best_].by_order; }
   bool reads_better() const { return of_best_.fit < std::min(kMostOff, 0.5 * given_.fit); }
@@ -485,7 +485,7 @@ std::optional<Quaternion> by_orientations(const Oriented& group) {
   return Quaternion(found->X_WB.linear());
 }
 
-/// Whether the positions fit a base at `X_WB`, but for what a model of a robot may leave.
+/// True if the positions fit a base at `X_WB`, but for what a model of a robot may leave.
 bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented& group) {
   const Positions positions = positions_of(group);
   Eigen::Matrix3Xd p_F(3, positions.p_W.cols());

@@ -105,7 +105,7 @@ std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<st
   return chosen;
 }
 
-/// How what is anew depends on the poses and on the rest, to first order about the solution.
+/// Adds how the new values depend on the poses and on the rest, to first order about the solution.
 void add_dependence(Refit& refit, const CalibrationProblem& problem) {
   const CalibrationResult& found = refit.result;
   const std::vector<bool> none_held(static_cast<std::size_t>(found.model.values.size()), false);
@@ -201,7 +201,7 @@ Result<PhysicalModel> in_cell(const PhysicalModel& model, const std::shared_ptr<
 
 namespace {
 
-/// What to identify anew, and where it starts.
+/// The parameters to identify anew, and where they start.
 struct Anew {
   std::vector<std::string> sources;  ///< full names
   std::vector<bool> parameters;      ///< a flag each

@@ -59,8 +59,8 @@ double share_below(const std::vector<double>& rising, double value) {
 /// Grid of ln x, x about 1, by its place.
 double grid_value(int place, double stddev) { return kFarthest * stddev * place / kGrid; }
 
-/// Of these coordinates, if the stated deviations are wrong by `factor` and the tracker's sigma by
-/// `noise`.
+/// The log likelihood of these coordinates, if the stated deviations are wrong by `factor` and the
+/// tracker's sigma by `noise`.
 double log_likelihood(const std::vector<JudgingCoordinate>& coordinates, double factor,
                       double noise) {
   double sum = 0;
@@ -94,7 +94,7 @@ std::vector<JudgingCoordinate> coordinates_of(const CompensatedModel& model,
   return all;
 }
 
-/// Whether the model's own figures on held-out poses are of poses in its domain.
+/// True if the model's own figures on held-out poses are of poses in its domain.
 bool judges_domain(const std::optional<Evaluation>& held_out) {
   return held_out && held_out->poses > 0 && std::isfinite(held_out->compensated.rms) &&
          held_out->in_domain >= kMostlyInDomain * held_out->poses;
@@ -192,7 +192,7 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
     coordinates = coordinates_of(model, *batch);
     accuracy.judged_by_ = static_cast<int>(coordinates.size() / 3);
   } else if (judges_domain(held_out)) {
-    // Of these poses only the rms is known: each coordinate is taken as the mean of a pose of the
+    // Only the rms of these poses is known: each coordinate is taken as the mean of a pose of the
     // domain.
     const double squared = std::pow(held_out->compensated.rms, 2) / 3;
     double stated = 0;

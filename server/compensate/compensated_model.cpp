@@ -20,7 +20,7 @@ Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
 }
 
-/// What came before that pose.
+/// Checks the history of the pose.
 Status check_history(const PoseContext& context, Eigen::Index joints, std::size_t row) {
   if (context.before && context.before->size() != joints)
     return refused("model: pose {} of the bias came from {} joints, not {}", row,
@@ -42,7 +42,7 @@ Status check_history(const PoseContext& context, Eigen::Index joints, std::size_
   return {};
 }
 
-/// What an observation of the bias says of its pose, for `joints` joints; `row` counts from 1.
+/// Checks an observation of the bias of its pose, for `joints` joints; `row` counts from 1.
 Status check_context(const PoseContext& context, Eigen::Index joints, std::size_t row) {
   const auto not_finite = [](const std::optional<double>& value) {
     return value && !std::isfinite(*value);
@@ -128,7 +128,7 @@ Status check_origin(const ModelParts& parts) {
   return {};
 }
 
-/// Whether the parts are of one robot.
+/// Checks that the parts are of one robot.
 Status check_fit(const ModelParts& parts) {
   const int n = parts.physics.cell->robot.size();
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());

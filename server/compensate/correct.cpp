@@ -72,8 +72,8 @@ std::string direction_text(const Vector3& direction_B) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
 }
 
-/// Which way the flange cannot go, of the base; of fewer than six joints, which of the ways that
-/// they have.
+/// The direction in which the flange cannot go, in the base; with fewer than six joints, which of
+/// the directions that they have.
 std::string immovable(const Chain& robot, const JointVector& q) {
   const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeFullU);
@@ -83,7 +83,7 @@ std::string immovable(const Chain& robot, const JointVector& q) {
   return "it cannot move along " + direction_text(lost.head<3>()) + " of its base";
 }
 
-/// What is left of a rotation that the arm cannot turn away; empty: nothing.
+/// The part of a rotation that the arm cannot turn away; empty: nothing.
 std::string turn_left(const Chain& robot, const Vector3& missing_B) {
   if (missing_B.norm() < kTurnTold) return "";
   return fmt::format(
@@ -92,7 +92,7 @@ std::string turn_left(const Chain& robot, const Vector3& missing_B) {
       to_deg(missing_B.norm()), direction_text(missing_B));
 }
 
-/// Whether the arm passes a singularity, to another configuration, from one of these joints to the
+/// True if the arm passes a singularity, to another configuration, from one of these joints to the
 /// other: between two near places its Jacobians then differ in the sense of one motion.
 bool changes_configuration(const Chain& robot, const JointVector& from, const JointVector& to) {
   const Eigen::MatrixXd before = flange_motion(robot, from).jacobian;
@@ -134,7 +134,7 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
       has_blocks ? "its kernel" : "the learned bias");
 }
 
-/// How the arm comes to the target.
+/// The way in which the arm comes to the target.
 PoseContext way_to(const Target& target) {
   PoseContext context;
   context.direction = target.direction;
@@ -144,7 +144,7 @@ PoseContext way_to(const Target& target) {
   return context;
 }
 
-/// Of one measurement where the true position has this stddev an axis.
+/// Deviation of one measurement where the true position has this stddev an axis.
 double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
 
 /// rms of an error of this mean whose true value spreads by this stddev.
@@ -152,14 +152,14 @@ double rms(const Vector3& mean, const Vector3& stddev) {
   return std::sqrt(mean.squaredNorm() + stddev.squaredNorm());
 }
 
-/// The same of a rotation vector, rad; `stddev` is of one measurement by an instrument of this
+/// The rms of a rotation vector, rad; `stddev` is of one measurement by an instrument of this
 /// sigma.
 double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, double sigma) {
   if (!stddev) return mean.norm();
   return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
 }
 
-/// What to expect without correction.
+/// Sets the error to expect without correction.
 void expect_before(const ErrorPrediction& before, const Tracker& tracker, Correction& result) {
   result.error_before = rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(),
                             before.true_stddev_B);
@@ -172,7 +172,7 @@ void expect_before(const ErrorPrediction& before, const Tracker& tracker, Correc
   result.turn_after = result.turn_before;
 }
 
-/// What to expect where this much of the way is missing still. The standard deviation is that at
+/// Sets the error to expect where this much of the way is missing still. The deviation is that at
 /// the target: a correction moves it by far less than it is known.
 void expect_after(const ErrorPrediction& before, const Vector6& missing, const Tracker& tracker,
                   Correction& result) {
@@ -213,7 +213,7 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
     return now.missing.head<3>().norm() < options.tolerance &&
            now.missing.tail<3>().norm() < kRotationTolerance;
   };
-  // What was learned hardly changes over the way of a correction, and takes longer to compute than
+  // The learned bias hardly changes over the way of a correction, and takes longer to compute than
   // the physics. So it is taken from where it was asked for last, and asked for again once the
   // physics has settled.
   context = completed(std::move(context));

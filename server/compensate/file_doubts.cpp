@@ -15,7 +15,7 @@ namespace {
 
 using Severity = Note::Severity;
 
-/// How far a number of a robot may be off its drawing, SI, and how people read it.
+/// The most by which a number of a robot may be off its drawing, SI, and how people read it.
 struct Drawing {
   const char* symbol;
   double limit;
@@ -40,7 +40,7 @@ const Drawing* drawing_of(const std::string& name) {
   return nullptr;
 }
 
-/// Of an error source of the arm: its parameters that are farther off than a robot may be by more
+/// The parameters of an error source of the arm that are farther off than a robot may be by more
 /// than their uncertainty.
 std::string off_drawing(const PhysicalModel& model,
                         const std::vector<IdentifiedParameter>& parameters) {

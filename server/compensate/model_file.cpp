@@ -27,7 +27,7 @@ using Members = std::map<std::string, std::string_view>;
 /// Text of a file as a message may show it.
 std::string excerpt(std::string_view text) { return shown_short(text, 120); }
 
-/// Whether the file is of the format that is read.
+/// Checks that the file is of the format that is read.
 Status check_format(const Members& members, const std::string& where) {
   const auto said = members.find("trammel_model");
   if (said == members.end())
@@ -39,8 +39,8 @@ Status check_format(const Members& members, const std::string& where) {
       .with_text(excerpt(said->second));
 }
 
-/// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing
-/// one.
+/// Checks that the outermost keys are there, and no others: a damaged key must not pass for a
+/// missing one.
 Status check_keys(const Members& members, const std::string& where) {
   static const std::set<std::string_view> kKeys = {
       "content", "hash", "self_test", "self_test_hash", "stamp", "stamp_hash", "trammel_model"};
@@ -57,7 +57,7 @@ Status check_keys(const Members& members, const std::string& where) {
   return {};
 }
 
-/// Whether `by` is the hash of `of`, both as their bytes stand in the file.
+/// Checks that `by` is the hash of `of`, both as their bytes stand in the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by,
                   const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
@@ -67,8 +67,8 @@ Status check_hash(const Members& members, const std::string& of, const std::stri
       .of(by);
 }
 
-/// Whether no byte was changed since the file was written. Looks at the bytes, before anything is
-/// made of them.
+/// Checks that no byte was changed since the file was written. Looks at the bytes, before anything
+/// is made of them.
 Status check_undamaged(const Members& members, const std::string& where) {
   TRY(check_format(members, where));
   TRY(check_keys(members, where));

@@ -79,7 +79,7 @@ bool carries_nothing(const CompensatedModel::Parts& parts) {
   return !loaded && !cell.robot.has_link_masses();
 }
 
-/// What the model is without a source that does nothing, for people.
+/// Says what the model is without a source that does nothing, for people.
 std::string so_it_is(const CompensatedModel::Parts& parts, const ErrorSource& idle) {
   std::vector<std::string> others;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
@@ -100,7 +100,7 @@ std::string what_would_give_way() {
   return text;
 }
 
-/// What training added by itself.
+/// Adds notes on what training added by itself.
 void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto& added = source->cause().added_by_data;
@@ -169,7 +169,7 @@ double stated_of_gauges(const Cell& cell) {
   return stated > 0 ? stated : cell.tracker.sigma;
 }
 
-/// Of positions and of gauges, whichever is farther from what was stated.
+/// The residuals of positions or of gauges, whichever is farther from what was stated.
 LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   const Cell& cell = *parts.physics.cell;
   LeftOver worst{0, cell.tracker.sigma};
@@ -199,7 +199,7 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                        : "trammel diagnose")});
 }
 
-/// What the physics leaves is the most that the instrument's own error can be. Where more is
+/// The residual of the physics is the most that the instrument's own error can be. Where more is
 /// stated, an error of the arm is taken for the instrument's. Said where that changes a promise:
 /// without a bias it is promised with (hidden_by_sigma()), and that is for information.
 void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
@@ -288,7 +288,7 @@ void add_sessions(const CompensatedModel::Parts& parts, std::vector<Note>& notes
   }
 }
 
-/// How many numbers the training measured: coordinates, turns and distances.
+/// The number of values that the training measured: coordinates, turns and distances.
 long measured_numbers(const Evaluation& training) {
   const long turns = training.orientation ? 3L * training.orientation->poses : 0;
   return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);

@@ -191,8 +191,8 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
 
 namespace {
 
-/// How uncertain a pose is beside its bias: of the position, m and m², or of the rotation, rad and
-/// rad².
+/// The uncertainty of a pose beside its bias: of the position, m and m², or of the rotation, rad
+/// and rad².
 struct Uncertainty {
   Matrix3 identified;  ///< covariance that the parameters leave
   Matrix3 since;       ///< the part of it that was identified after the bias was learned

@@ -49,7 +49,7 @@ std::vector<SessionChange::Size> sizes_of(const IdentifiedTogether& found, const
   return sizes;
 }
 
-/// How far a zero has wandered: the sum of its steps.
+/// The total change of a zero: the sum of its steps.
 std::vector<SessionChange::Size> sum_of_steps(const IdentifiedTogether& found,
                                               const Change& change) {
   const std::vector<Eigen::Index> places = places_of(found.physics, change.steps);

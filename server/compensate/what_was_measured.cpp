@@ -85,7 +85,7 @@ Eigen::VectorXd beyond_outermost(const Eigen::MatrixXd& along) {
   return beyond;
 }
 
-/// How far other poses may be from the places.
+/// Sets the distance that other poses may have from the places.
 void add_reach(WhatWasMeasured& measured) {
   const Eigen::Matrix3Xd& places = measured.flange_B;
   if (places.cols() < 2) return;

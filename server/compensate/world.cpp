@@ -64,7 +64,7 @@ double left_of(const CompensatedModel& model, const MeasurementBatch& session,
   return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
 }
 
-/// Whether the rows were measured from where the model knows the session of that name to have
+/// True if the rows were measured from where the model knows the session of that name to have
 /// stood: names are used again.
 bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session,
                     const SessionSetting& known) {

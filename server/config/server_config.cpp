@@ -51,7 +51,7 @@ std::string server_id(const YamlMap& map, const std::string& key) {
   return id;
 }
 
-/// What the file agrees to. A word that cannot be read is refused by itself; the address is not
+/// The agreements of the file. A word that cannot be read is refused by itself; the address is not
 /// blamed for it.
 struct Consent {
   bool network = true;

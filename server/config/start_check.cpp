@@ -17,7 +17,7 @@ namespace trammel {
 
 namespace {
 
-/// Whether the section was read without errors. A value that was refused is not checked further.
+/// True if the section was read without errors. A value that was refused is not checked further.
 bool was_read(const ServerReading& server, const std::string& section) {
   return std::none_of(server.problems.begin(), server.problems.end(), [&](const Error& problem) {
     return problem.field.starts_with(section + ":");
@@ -32,7 +32,7 @@ Error at_key(const std::string& key, const std::string& path, Error found) {
   return Failure(std::move(found)).with_text(named).under(key).in(path).value();
 }
 
-/// What this program would make of the models in force.
+/// Looks at the models in force as this program would serve them.
 void look_at_cells(const ServerConfig& config, StartCheck& check) {
   const auto cells = cells_at_start(config.store, config.cells);
   if (!cells) {
@@ -73,7 +73,7 @@ class Verdict {
   void add(const char* key, const Status& status) {
     if (!status) check_.problems.push_back(at_key(key, path_, status.error()));
   }
-  /// What another process holds is no problem beside a copy of the store.
+  /// A file that another process holds is no problem beside a copy of the store.
   void add_holdable(const char* key, const Status& status) {
     if (store_ == StoreToCheck::kOwn || !is_held(status)) return add(key, status);
     check_.notes.push_back(fmt::format("{} is in use, which does not matter to this check: {}", key,

@@ -49,7 +49,7 @@ LineAmongSisters held_against(const BudgetNumber& own, const std::vector<BudgetN
   }
   const double mean = sum / n;
   for (const BudgetNumber& one : sisters) squares += (one.value - mean) * (one.value - mean);
-  // What is uncertain of each sister is part of what they differ by.
+  // The uncertainty of each sister is part of what they differ by.
   const double as_if = usual > 0 ? kAsIfRobots : 0;
   const double spread = (squares + as_if * std::pow(usual / kUsualDeviations, 2)) / (n - 1 + as_if);
   const double next = std::max(spread * (1 + 1 / n), uncertain / (n * n));

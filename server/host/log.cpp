@@ -75,7 +75,7 @@ class LogSink final : public spdlog::sinks::sink {
       std::make_unique<spdlog::pattern_formatter>();
 };
 
-/// How lines are written, beside the logger.
+/// The way in which lines are written, beside the logger.
 struct LogState {
   std::atomic<bool> json{false};
   Mutex mutex;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kHtml = "text/html; charset=utf-8";
 
-/// What the pages of the service have beside the style of all pages.
+/// The style that the pages of the service have beside the style of all pages.
 constexpr std::string_view kStyle = R"(
   :root { --good: #007a59; --dark: #b23c00; }
   h1 { margin-bottom: 16px; }

@@ -42,7 +42,7 @@ std::optional<Number> number_in(const std::string& word) {
   return number;
 }
 
-/// What a check found, with the way to its cell and its job.
+/// The findings of a check, with links to its cell and its job.
 HttpReply health_reply(const std::string& findings, const StoredJob& job) {
   const std::string links =
       fmt::format("<p>{} · {} · {} · {} · checked {} UTC</p>",
@@ -54,7 +54,7 @@ HttpReply health_reply(const std::string& findings, const StoredJob& job) {
   return page_reply({"Health of cell " + job.cell, health_sections(findings, links)});
 }
 
-/// What a diagnosis or a check found: a page, or as programs read it.
+/// The findings of a diagnosis or a check: a page, or as programs read it.
 HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_programs) {
   const auto asked = server.store.job(job);
   if (!asked) return refused_reply(asked.error());

@@ -12,7 +12,7 @@ using Where = ModelRegistry::Place::Where;
 constexpr int kMostAsked =
     20;  // dark cells whose last training the store is asked for, in one answer
 
-/// What all cells are looked up in, read once.
+/// The values in which all cells are looked up, read once.
 struct Known {
   std::map<std::string, ModelRegistry::Place> places;
   std::map<std::string, CellTrouble> troubles;
@@ -51,7 +51,7 @@ State state_at(Where where) {
   return where == Where::kComes ? State::kLoading : State::kOnDisk;
 }
 
-/// Of a cell that never had a model in force, as far as its last training tells.
+/// The readiness of a cell that never had a model in force, as far as its last training tells.
 CellReadiness untrained(const std::string& cell, const Watched& server, int* asked) {
   CellReadiness one{cell, State::kUntrained, 0, "there is no model: submit a batch"};
   if (++*asked > kMostAsked) return one;
@@ -92,7 +92,7 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
   return untrained(cell, server, asked);
 }
 
-/// What does not stop it from answering.
+/// Notes on what does not stop it from answering.
 std::vector<std::string> notes_of(const Watched& server) {
   std::vector<std::string> notes;
   const StoreState state = server.store.state();

@@ -68,7 +68,7 @@ HtmlRow server_row(const ServerInRecord& one) {
           one.is_gone || lacks_cells(one) ? "dark" : "served"};
 }
 
-/// What the servers that are there answer for a cell with: `version 3: first, second`.
+/// The versions with which the present servers answer for a cell: `version 3: first, second`.
 struct CellOfFleet {
   std::map<int, std::set<std::string>> by_version;
   std::set<std::string> why_not;

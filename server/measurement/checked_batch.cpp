@@ -58,7 +58,7 @@ bool earlier(const Measurement& a, const Measurement& b) {
   return std::pair(a.session, *a.context.time) < std::pair(b.session, *b.context.time);
 }
 
-/// Of each session by itself: its positions are in a frame of its own.
+/// Checks each session by itself: its positions are in a frame of its own.
 Status check_spreads(const MeasurementBatch& recorded, const Cell& cell, const std::string& where) {
   const MeasurementBatch batch = positions_of(recorded);
   if (!has_sessions(batch)) return check_spread(batch, cell, where);
@@ -85,7 +85,7 @@ std::vector<std::string> session_names(const MeasurementBatch& next) {
   return names;
 }
 
-/// What two rows have in common only if they are one measurement: all digits of joints and
+/// The numbers that two rows share only if they are one measurement: all digits of joints and
 /// position, and what was on the arm.
 using Fingerprint =
     std::tuple<std::vector<double>, std::array<double, 3>, std::string, std::string>;
@@ -97,7 +97,7 @@ Fingerprint fingerprint_of(const Measurement& m) {
           m.context.payload};
 }
 
-/// Whether each row of `batch` is one that `met` has; adds those that it has not.
+/// True for each row of `batch` that `met` has; adds those that it has not.
 std::vector<bool> copied_rows(const MeasurementBatch& batch, std::set<Fingerprint>& met) {
   std::vector<bool> copied;
   std::vector<Fingerprint> own;
@@ -202,7 +202,7 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   const std::string where = name_of(batch);
   if (batch.measurements.empty())
     return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
-  // Of a batch that was never a file, too, parts are known by the text of the whole.
+  // A batch that was never a file has a text as well: its parts are known by the text of the whole.
   if (batch.source_text.empty()) batch.source_text = to_csv(batch);
   std::string hash = batch_hash(batch);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);

@@ -19,7 +19,7 @@ bool is_in_order(const Rows& rows) {
          });
 }
 
-/// Whether the robot can have come to `now` from `before` by the sides of the gears that were
+/// True if the robot can have come to `now` from `before` by the sides of the gears that were
 /// recorded.
 bool may_come_from(const JointVector& before, const PoseContext& now, const Chain& robot) {
   if (before.size() != now.q.size()) return false;
@@ -39,8 +39,8 @@ void fill_before(const Rows& rows, const Chain& robot) {
   }
 }
 
-/// Of a body that follows by `lag`, `time` later, while the temperature went evenly from `from` to
-/// `to`.
+/// The state of a body that follows by `lag`, `time` later, while the temperature went evenly from
+/// `from` to `to`.
 double followed(double body, double from, double to, double time, double lag) {
   if (!(time > 0)) return body;
   const double behind = (to - from) / time * lag;  // how far it stays behind in the end

@@ -36,7 +36,7 @@ constexpr double kFollow =
 constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joints
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
-// What no robot is off by.
+// A larger zero error than any robot has.
 constexpr double kMostZero = from_deg(15);
 constexpr double kCertainZero = from_deg(4);  // its standard deviation is below that
 constexpr double kCertainBase = from_deg(1);

@@ -43,7 +43,7 @@ JointVector slope(const PoseContext& a, const PoseContext& b, const PoseContext&
   return first + second * (2 * time - *a.time - *b.time);
 }
 
-/// Of the rows [first, end), which are of one session.
+/// Fills in the rows [first, end), which are of one session.
 bool fill_velocity_of(MeasurementBatch& batch, std::size_t first, std::size_t end) {
   const auto at = [&](std::size_t i) {
     return batch.measurements.begin() + static_cast<std::ptrdiff_t>(i);

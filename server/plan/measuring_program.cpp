@@ -47,7 +47,7 @@ std::string comment(const std::string& sign, std::string text) {
   return (sign + " " + text).substr(0, kLineLength - 4);
 }
 
-/// Which joints are the six axes and which is the rail.
+/// The joints that are the six axes, and the one that is the rail.
 struct Axes {
   std::vector<int> turning;
   std::optional<int> rail;
@@ -90,7 +90,7 @@ std::string number(double value) {
   return text;
 }
 
-/// Which tool and payload must be mounted before this pose; empty where they are mounted already.
+/// The tool and payload to mount before this pose; empty where they are mounted already.
 std::string change_before(const Plan& plan, std::size_t i) {
   const PoseContext& now = plan.poses[i].context;
   if (i == 0) return "";

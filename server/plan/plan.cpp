@@ -50,7 +50,7 @@ constexpr int kCandidates = 4000;          // to choose from: the time of a plan
 constexpr int kCheckCandidates = 800;      // likewise, of a check: each is held against every cause
 constexpr int kWorkingPoses = 200;         // at which an effect is measured
 constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is hardly one
-// How many times larger than wanted a hypercube is drawn at most.
+// The factor by which a hypercube is drawn larger than wanted at most.
 constexpr int kLargestFactor = 512;  // of poses: fewer than 1 in 1000 fits then
 constexpr int kLargestDesignFactor =
     64;  // of candidates: they are more already, and each is linearised
@@ -163,7 +163,7 @@ struct Planning {
   bool twice = false;    // each pose from above and from below
   bool one_way = false;  // each pose from below
 
-  /// How the pose with this number is approached.
+  /// The ways in which the pose with this number is approached.
   [[nodiscard]] std::vector<Sides> ways(const JointVector& q, std::size_t number) const {
     const auto joints = static_cast<std::size_t>(q.size());
     if (twice) return {Sides(joints, -1), Sides(joints, 1)};

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// What a record of checks repeats of each.
+/// The keys of a check that a record of checks repeats.
 constexpr const char* kOfCheck[] = {"verdict",
                                     "why",
                                     "model",

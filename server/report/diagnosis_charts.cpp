@@ -25,7 +25,7 @@ double to_urad(double rad) { return rad * 1e6; }
 double rounded(double value, double step) { return std::round(value / step) * step; }
 double tenth_of_um(double m) { return rounded(to_um(m), 0.1); }
 
-/// What is needed to see a residual as a joint sees it.
+/// The values needed to see a residual as a joint sees it.
 class Arm {
  public:
   Arm(const Diagnosis& diagnosis, const Cell& cell) : diagnosis_(diagnosis), cell_(cell) {}
@@ -45,7 +45,7 @@ class Arm {
   [[nodiscard]] double gear_angle(Eigen::Index pose, int joint) const {
     return cell_.robot.gear_angles(context(pose).q)(joint);
   }
-  /// How the joint moves the tool, m/rad (m/m), in B.
+  /// The motion of the tool by the joint, m/rad (m/m), in B.
   [[nodiscard]] Vector3 lever_B(Eigen::Index pose, int joint) const {
     return cell_.robot.gear_jacobian(context(pose).q, p_FT(pose)).col(joint).head<3>();
   }
@@ -93,7 +93,7 @@ ordered_json waterfall(const Diagnosis& diagnosis) {
   return {{"names", names}, {"rms_um", rms}};
 }
 
-/// What was found of a joint and shows in its periodogram. A line that stands out may be another
+/// The finding of a joint that shows in its periodogram. A line that stands out may be another
 /// joint's.
 std::string found_in(const Periodogram& lines, const std::vector<Finding>& findings) {
   std::vector<std::string> orders;

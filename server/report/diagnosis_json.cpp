@@ -142,7 +142,7 @@ ordered_json next_poses_json(const Diagnosis& diagnosis) {
   return list;
 }
 
-/// What the next poses are for and what they are worth.
+/// The purpose and the worth of the next poses.
 ordered_json next_poses_worth_json(const Diagnosis& diagnosis) {
   const NextPoses& next = diagnosis.next_poses;
   ordered_json columns = ordered_json::array();

@@ -58,7 +58,7 @@ std::string p_value_shown(double p) {
   return p <= kLeastPValue ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
 }
 
-/// What stands behind the letter p: " = 0.02" or " < 10⁻⁶".
+/// The text behind the letter p: " = 0.02" or " < 10⁻⁶".
 std::string p_value_after_p(double p) {
   const std::string shown = p_value_shown(p);
   return (shown.front() == '<' ? " " : " = ") + html_text(shown);
@@ -86,7 +86,7 @@ std::string beginning_of(const Finding& finding) {
                      places.size(), place(places.front()), place(places.back()));
 }
 
-/// What else it could be, for people.
+/// The other causes that it could be, for people.
 std::string others_of(const Finding& finding) {
   return finding.whole ? all_in_words(finding.could_also_be)
                        : "part of it only: more than noise is left";
@@ -106,7 +106,7 @@ HtmlRow finding_row(const Finding& finding) {
           .kind = "found"};
 }
 
-/// What to do about it, below its figures.
+/// The row that says what to do about it, below its figures.
 HtmlRow action_row(const Finding& finding) {
   return {.cells = {"", "", html_text(as_sentence(finding.action) + beginning_of(finding))},
           .kind = "action",

@@ -29,7 +29,7 @@ ordered_json unlike_json(const Unlike& one) {
           {"sentence", to_string(one)}};
 }
 
-/// What its twins say of it; null where they are too few.
+/// The comparison with its twins; null where they are too few.
 ordered_json unlike_of(const std::vector<FleetEntry>& cells, std::size_t which) {
   const ModelParts& parts = cells[which].model->parts();
   const auto prior = learn_fleet_prior(parts.physics.cell->robot, members_but(cells, which));

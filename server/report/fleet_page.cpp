@@ -30,7 +30,7 @@ std::string verdict_of(const ordered_json& cell) {
   return verdict.empty() ? "not checked yet" : verdict;
 }
 
-/// What robots of its type say of it.
+/// The comparison with robots of its type.
 std::string twins_of(const ordered_json& cell) {
   if (!cell.is_object() || !cell.contains("unlike_twins")) return "no model in force";
   const ordered_json& unlike = cell["unlike_twins"];

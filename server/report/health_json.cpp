@@ -135,7 +135,7 @@ void add_line(const SeenChange& change, SizedLines& lines) {
   lines.emplace_back(change.effect_rms, std::move(line));
 }
 
-/// What changed since the model was made, in the shape of a budget: from what is off now to what a
+/// The change since the model was made, in the shape of a budget: from what is off now to what a
 /// healthy robot leaves. A check finds the base anew, so that all of it is beyond the base's frame.
 ordered_json change_budget_json(const HealthCheck& check, const CheckedWith* with) {
   SizedLines sized;

@@ -108,7 +108,7 @@ std::string value_in(const Track& track, int version, const Reading& reading) {
   return fmt::format("{} ± {}", value.value, value.expanded);
 }
 
-/// What is in force; of files, or where that has no parameters on record, the newest that has;
+/// The version in force; of files, or where that has no parameters on record, the newest that has;
 /// nullptr: none has.
 const VersionOnRecord* shown_version(const CellHistory& history) {
   const VersionOnRecord* newest = nullptr;

@@ -28,7 +28,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// What the page compares the model with.
+/// The models and batches that the page compares the model with.
 struct Compared {
   Evaluation evaluation;
   std::string text;  ///< of which poses
@@ -64,10 +64,10 @@ std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evalu
            {"compensated", &evaluation.compensated}}};
 }
 
-/// What is no gain is not shown as one.
+/// A gain that is none is not shown as one.
 bool is_doubtful(const Evaluation& evaluation) { return doubt_of_bias(evaluation).has_value(); }
 
-/// Of distances and touches: their values, where no position was measured.
+/// The tiles of distances and touches: their values, where no position was measured.
 std::string gauge_tiles(const GaugeFigures& gauges) {
   std::string html;
   for (const auto& [level, rms] :
@@ -235,7 +235,7 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
          html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
-/// What the charts are drawn from.
+/// The data that the charts are drawn from.
 ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluation,
                         const ShownPoses& shown, const std::optional<LearningCurve>& curve) {
   ordered_json data;
@@ -260,7 +260,7 @@ ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluat
   return data;
 }
 
-/// What stands for the compensated level where nothing was learned.
+/// The note in place of the compensated level where nothing was learned.
 std::string bias_note(const CompensatedModel::Parts& parts) {
   if (parts.bias) return "";
   const std::string why =
@@ -268,7 +268,7 @@ std::string bias_note(const CompensatedModel::Parts& parts) {
   return " No bias is learned, so calibrated and compensated are the same: " + why + ".";
 }
 
-/// What the three levels are, and why their errors are larger than what is promised.
+/// Explains the three levels, and why their errors are larger than what is promised.
 std::string reading_note(const CompensatedModel& model) {
   return fmt::format(
       " Nominal: the robot as drawn; calibrated: with the parameters that were identified; "

@@ -35,7 +35,7 @@ std::optional<double> nominal_of_link(const Chain& robot, const std::string& nam
   return symbol == "beta" ? std::optional(link.beta) : std::nullopt;
 }
 
-/// What the drawing or the cell file says where the parameter says by how much it is off; SI.
+/// The value of the drawing or the cell file where the parameter is an offset from it; SI.
 std::optional<double> stated(const CompensatedModel& model, const ErrorSource& source,
                              const std::string& name) {
   const causes::ActsOn on = source.cause().acts.on;

@@ -26,7 +26,7 @@ constexpr int kFewestToJudge =
 /// sqrt(2 k) is 22 % of it at 10), and nothing else says how far the model is off.
 constexpr double kFewestFreedom = 10;
 constexpr std::int64_t kDay = 86400;
-/// How long a model is taken for good where no check has told how fast its arm drifts, days.
+/// The time for which a model is taken for good where no check has told its drift, days.
 constexpr std::int64_t kFirstCheck = 30;
 constexpr int kFewestRepeats = 6;  // degrees of freedom
 /// RP of ISO 9283 is the mean distance from the barycentre and three of its standard
@@ -155,7 +155,7 @@ std::string iso_table(const CompensatedModel& model, const PositionAccuracy& acc
   return html_table({"iso", {"as ISO 9283 names it", "value", "of what"}, rows});
 }
 
-/// Whether a tolerance is held: yes and no only where the whole interval of the promise says so.
+/// Says if a tolerance is held: yes and no only where the whole interval of the promise says so.
 std::string held(const PositionAccuracy& accuracy, double tolerance) {
   if (accuracy.most() <= tolerance) return "yes";
   return accuracy.least() <= tolerance ? "cannot tell" : "no";
@@ -196,7 +196,7 @@ std::string tolerance_sentence(const PositionAccuracy& accuracy,
       rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()));
 }
 
-/// What the promise stands on, where that is little; it follows "in this volume".
+/// Says what the promise stands on, where that is little; it follows "in this volume".
 std::string hardly_judged(const PositionAccuracy& accuracy) {
   if (accuracy.judged_by() >= kFewestToJudge) return "";
   if (accuracy.judged_by() == 0) return ", by its training poses alone";
@@ -210,8 +210,8 @@ std::string from_that_side(const ModelParts& parts) {
   return side.empty() ? "" : ", for poses that the arm comes to " + side;
 }
 
-/// How many parameters the measurements determine: P - tr(prior^-1 posterior) (MacKay, Bayesian
-/// Interpolation, 1992), and where the instrument stood in each further session.
+/// The number of parameters that the measurements determine: P - tr(prior^-1 posterior) (MacKay,
+/// Bayesian Interpolation, 1992), and where the instrument stood in each further session.
 double determined(const ModelParts& parts) {
   double sum = parts.sessions.empty() ? 0 : 6 * (static_cast<double>(parts.sessions.size()) - 1);
   for (const IdentifiedParameter& one : parts.parameters)

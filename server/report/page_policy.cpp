@@ -26,7 +26,7 @@ std::vector<std::string> texts_of(std::string_view page, std::string_view name) 
   return texts;
 }
 
-/// What stands in the place of `{{name}}`, for texts that are the same on every page.
+/// The text in the place of `{{name}}`, for texts that are the same on every page.
 std::string shared_text(std::string_view text) {
   if (text == "{{chart_js}}") return std::string(embedded::chart_js);
   if (text == "{{view3d_js}}") return std::string(embedded::view3d_js);

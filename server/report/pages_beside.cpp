@@ -23,7 +23,7 @@ constexpr std::size_t kMostLinks = 40;  // of a page
 constexpr std::string_view kPlace = "<nav class=\"beside\"></nav>";
 constexpr std::string_view kMark = "<meta name=\"trammel-page\"";
 
-/// What links call a page of this kind, in their order.
+/// The names of pages of each kind in links, in their order.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kKinds = {
     {{"fleet", "fleet"},
      {"history", "history"},

@@ -30,7 +30,7 @@ double rounding_of(const std::vector<double>& values) {
   return step;
 }
 
-/// How far rounding to the digits that are shown may move joints and position, one standard
+/// The effect of rounding to the digits that are shown on joints and position, one standard
 /// deviation.
 struct Rounding {
   JointArray joints;    // rad (m)
@@ -75,7 +75,7 @@ std::vector<Frames> known_frames(const Cell& cell) {
   return all;
 }
 
-/// How far one arm is from what is shown.
+/// The distance of one arm from what is shown.
 struct Distance {
   double worst = 0;  // of what the rounding allows; up to 1 it explains all
   double position_rms = 0, position_max = 0, rotation_rms = 0, rotation_max = 0, position_limit = 0;

@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kEnd = "SELECT rows, hash FROM audit_end";
 constexpr int kRowsAtOnce = 2000;  // others use the store in between
 
-/// How the trail ends, as it was written with its last row.
+/// The end of the trail, as it was written with its last row.
 struct End {
   std::int64_t rows = 0;
   std::string hash;

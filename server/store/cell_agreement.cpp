@@ -6,7 +6,7 @@
 #include "server/store/server_rows.h"
 #include "server/store/store.h"
 
-// Whether the servers of a record mean the same by a cell: its files lie on each host.
+// Compares what the servers of a record mean by a cell: its files lie on each host.
 
 namespace trammel {
 namespace {
@@ -55,7 +55,7 @@ std::string why_not(const std::string& cell, const std::string& me, const Descri
       me);
 }
 
-/// What this server says of cells against what the record goes by.
+/// Compares what this server says of cells with what the record goes by.
 class Comparison {
  public:
   Comparison(Database& database, const Worker& worker, bool starts,

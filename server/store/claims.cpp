@@ -10,7 +10,7 @@
 #include "server/store/statements.h"
 #include "server/store/store.h"
 
-// Which server works on a job, and until when it is believed to live.
+// Claims say which server works on a job, and until when it is believed to live.
 
 namespace trammel {
 namespace {

@@ -1,4 +1,4 @@
-// What diagnoses and checks found.
+// The findings of diagnoses and checks.
 #include <algorithm>
 #include <limits>
 #include <utility>

@@ -107,7 +107,7 @@ Status FileConnection::transacted(const Job& job, bool* changed) {
 Status FileConnection::try_again() {
   if (is_in_order()) return {};
   return write([](Database& database) -> Status {
-    // Of an update that changes nothing SQLite writes nothing.
+    // SQLite writes nothing for an update that changes nothing.
     change(database, "INSERT INTO store_identity (id) VALUES ('')");
     change(database, "DELETE FROM store_identity WHERE id = ''");
     return {};

@@ -66,7 +66,7 @@ JobOutcome outcome_of(Rows& row) {
   return outcome;
 }
 
-/// What is asked, in a row of kJobColumns.
+/// The request in a row of kJobColumns.
 AskedJob asked_of(Rows& row) {
   const std::string kind = row.text(9);
   if (kind == "check") return AskedCheck{optional_number(row, 23)};
@@ -268,7 +268,7 @@ const char* asked_for(JobKind kind) {
   return "training asked";
 }
 
-/// What the audit trail says of it besides.
+/// The details that the audit trail records beside the request.
 std::string details_of(const AskedJob& asked) {
   const auto* training = std::get_if<AskedTraining>(&asked);
   if (training != nullptr && !training->level.empty()) return ", level " + training->level;
@@ -432,7 +432,7 @@ Status Store::set_job_running(std::int64_t id) {
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](Database& database) -> Status {
     TRY(check_held(database, connection_->worker, id));
-    // Of a job that was not begun no attempt is taken back: it would be another server's.
+    // A job that was not begun gets no attempt back: it would be another server's.
     const int changes = change(
         database,
         "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 AND state "

@@ -119,7 +119,7 @@ void record_figures(Database& database, std::int64_t activation, const JobOutcom
          activation, judged.before, judged.after, judged.limit, judged.why);
 }
 
-/// How the version that this activation put in force was judged: then, or when a job made it.
+/// Adds how the version that this activation put in force was judged: then, or when a job made it.
 void add_judgement(Database& database, const std::string& cell, const Activation& activation,
                    InForceRecord& record) {
   constexpr const char* kFigures =
@@ -137,7 +137,7 @@ void add_judgement(Database& database, const std::string& cell, const Activation
   record.judged_when_made = row.truth(4);
 }
 
-/// What the audit trail says of why it was done.
+/// The reason as the audit trail records it.
 std::string reason_of(const ChangeId& by, const std::optional<JobOutcome>& judged) {
   if (!judged || judged->why.empty()) return by.reason;
   return by.reason.empty() ? judged->why : by.reason + "; " + judged->why;
@@ -388,7 +388,7 @@ Result<std::map<std::string, int>> Store::versions_in_force() const {
 }
 
 void Store::copy_after_change(const std::string& cell) const {
-  // What was changed is stored: a copy that fails only makes the next fault worse.
+  // The change is stored: a copy that fails only makes the next fault worse.
   if (const Status copied = copy_model_in_force(cell); !copied)
     connection_->note_damage(
         fmt::format("cell {}: the model in force has no copy: {}", cell, sentence(copied.error())));

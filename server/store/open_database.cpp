@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What an attempt to open the file came to.
+/// The result of an attempt to open the file.
 struct Attempt {
   std::unique_ptr<SqliteDatabase> file;
   std::optional<Error> why_not;

@@ -40,7 +40,7 @@ void add_parts(const std::string& joined, Ids& ids) {
   }
 }
 
-/// What those versions were trained on, and what unfinished jobs take.
+/// The batches that those versions were trained on, and those that unfinished jobs take.
 Ids batches_needed(Database& database, const std::string& cell) {
   const Versions versions = versions_needed(database, cell);
   Ids needed;

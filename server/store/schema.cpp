@@ -100,7 +100,7 @@ Status prepare_file(Database& database, const std::string& path) {
   database.execute("PRAGMA synchronous = FULL");
   database.execute("PRAGMA foreign_keys = ON");
   database.execute("PRAGMA cell_size_check = ON");
-  // What is acknowledged is in the file itself, and not in its journal alone: that may get lost.
+  // Acknowledged changes are in the file itself, and not in its journal alone: that may get lost.
   database.execute("PRAGMA wal_autocheckpoint = 1");
   const std::int64_t schema = integer_of(database, "PRAGMA user_version");
   Transaction transaction(database, Transaction::For::kWriting);

@@ -25,7 +25,7 @@ constexpr std::size_t kCellDigits =
 constexpr const char* kEnding = ".json";
 constexpr const char* kPart = ".part";  // of a copy that is being written
 
-/// Of everything in the folder; empty where it cannot be read.
+/// The entries of the folder; empty where it cannot be read.
 std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::directory_entry> entries;
@@ -35,7 +35,7 @@ std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   return entries;
 }
 
-/// Of a server that was killed; nobody else writes copies there.
+/// Removes the parts of a server that was killed; nobody else writes copies there.
 void remove_parts(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : entries_of(folder)) {
@@ -55,7 +55,7 @@ bool read_number(std::string_view& text, Number* number) {
   return true;
 }
 
-/// What the name of a copy says; empty: it is none.
+/// The copy that a file's name tells; empty: it is none.
 std::optional<ServedCopies::Copy> copy_at(const fs::path& file) {
   const std::string name = file.filename().string();
   if (!name.ends_with(kEnding)) return std::nullopt;

@@ -12,7 +12,7 @@
 #include "server/store/statements.h"
 #include "server/store/store.h"
 
-// Which servers are there, by their heartbeats.
+// The servers that are there, by their heartbeats.
 
 namespace trammel {
 namespace {
@@ -27,7 +27,7 @@ std::string spelled(const std::map<std::string, CellAtServer>& cells) {
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-/// What a server of another program wrote may be otherwise: that is left out.
+/// The cells as a server spelled them; entries that another program wrote otherwise are left out.
 std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
   std::map<std::string, CellAtServer> cells;
   const auto json = nlohmann::json::parse(text, nullptr, false);

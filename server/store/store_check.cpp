@@ -93,7 +93,7 @@ Status check_file(const fs::path& path) {
   return check_header(path);
 }
 
-/// What else is wrong with it is seen when it is opened.
+/// Any other fault of the file is seen when it is opened.
 Status check_file_is_here(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error) || fs::file_size(path, error) == 0) return {};

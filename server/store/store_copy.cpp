@@ -73,7 +73,7 @@ Status make_room(Database& database, const std::string& place) {
   return {};
 }
 
-/// What the next row of its own gets for a number.
+/// Sets the number that the next row of its own gets.
 void count_on(Database& database) {
   constexpr std::array<std::pair<const char*, const char*>, 4> kCounted = {
       {{"jobs", "id"}, {"batches", "number"}, {"activations", "number"}, {"changes", "number"}}};

@@ -65,8 +65,8 @@ TEST(Mutex, WaitingEndsWhenAskedToStop) {
       << "what is ready is said to be, stopped or not";
 }
 
-/// What clang, as `deploy/check threads` calls it, says of a class with a guarded member and this
-/// body of a function.
+/// The answer of clang, as `deploy/check threads` calls it, to a class with a guarded member and
+/// this body of a function.
 test::Finished clang_on(const std::string& body) {
   const test::TemporaryFolder folder;
   const std::string source = folder.file("snippet.cpp");

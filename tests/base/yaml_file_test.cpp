@@ -16,7 +16,7 @@ std::string repeated(const std::string& part, int times) {
   return text;
 }
 
-/// What reading all keys of the text ends with.
+/// The result of reading all keys of the text.
 Result<std::size_t> keys_of(const std::string& text) {
   return read_yaml(text, "x.yaml", [](const YamlMap& map) { return map.keys().size(); });
 }

@@ -1,4 +1,4 @@
-// Whether the radius that a model's page promises for 95 % of fresh poses is right: 40 arms drawn
+// Checks the radius that a model's page promises for 95 % of fresh poses: 40 arms drawn
 // anew, each trained by itself and judged without noise on poses that nobody measured. The
 // tracker's true sigma is drawn within 10 % of the stated one; every second arm has a gear that its
 // model is not told of, so that the bias has something to learn.

@@ -1,4 +1,4 @@
-// What `diagnose --apply` is worth on another day. The second simulation hides an effect, its batch
+// The worth of `diagnose --apply` on another day. The second simulation hides an effect, its batch
 // is diagnosed and applied; then the same robot is measured on another day: it starts cold, the
 // instrument stands elsewhere, and what the instrument did the day before is gone. 1000 fresh noisy
 // poses judge the models without and with what was found, each with its base put where the fresh
@@ -36,7 +36,7 @@ struct Settings {
   std::string kinds;
 };
 
-/// What the instrument did, or a single pose, is of that day alone.
+/// True unless the effect is of that day alone: an instrument's, or that of a single pose.
 bool is_of_the_robot(const hidden::Effect& effect) {
   const std::string& cause = effect.cause.cause;
   return cause != "tracker_moved" && cause != "tracker_drift" && cause != "outlier";

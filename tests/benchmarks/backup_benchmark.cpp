@@ -1,4 +1,4 @@
-// What a backup of a large store costs those who ask: one client corrects one target after the
+// The cost of a backup of a large store for those who ask: one client corrects one target after the
 // other, a hundred a second, without and while `trammel backup` copies the store.
 // --mb N (of the store), --rounds N.
 #include <CLI/CLI.hpp>

@@ -253,7 +253,7 @@ void write(const Table& table, const std::string& path) {
   }
 }
 
-// Of the processor, as the script beside it counts: other programs run here too.
+// Processor seconds, as the script beside it counts: other programs run here too.
 double processor_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -272,7 +272,7 @@ double least_seconds(int repeats, const std::function<void()>& work) {
 
 using Figures = std::map<std::string, double>;
 
-// How good one output's predictions are, and what the model thinks of its data.
+// Judges one output's predictions, and what the model thinks of its data.
 void judge(const Table& train, const Table& test, Figures* figures) {
   const double centre = train.y.mean();
   const VectorXd noise_shape = VectorXd::Ones(train.y.size());

@@ -1,4 +1,4 @@
-// What share of seeds finds the best optimum of a bias: `bias_seeds_benchmark [--data FOLDER]
+// The share of seeds that find the best optimum of a bias: `bias_seeds_benchmark [--data FOLDER]
 // [--seeds N] [--coupled N]`. FOLDER (default ../shared/data) holds the measured UR10; where it is
 // not at hand, its rows are skipped.
 #include <algorithm>
@@ -21,7 +21,7 @@
 namespace trammel {
 namespace {
 
-// Of the processor: other programs run here too.
+// Processor seconds: other programs run here too.
 double processor_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);

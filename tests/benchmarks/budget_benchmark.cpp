@@ -1,4 +1,4 @@
-// How long the error budget of 300 poses takes beyond the fit, with and without a learned bias.
+// The time of the error budget of 300 poses beyond the fit, with and without a learned bias.
 #include <chrono>
 
 #include "server/compensate/budget/error_budget.h"

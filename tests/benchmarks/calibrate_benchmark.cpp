@@ -49,7 +49,7 @@ MeasurementBatch both_sides(const VirtualRobot& robot, int count, std::uint64_t 
   return batch;
 }
 
-/// How many identifiable directions lie within U(k=2) of the truth.
+/// The number of identifiable directions within U(k=2) of the truth.
 struct Coverage {
   int inside = 0, all = 0;
 };

@@ -1,5 +1,5 @@
-// What a daemon keeps up for long, with real clients: `endurance_benchmark [--minutes N] [--swaps
-// N] [--clients N]
+// The load that a daemon keeps up for long, with real clients: `endurance_benchmark [--minutes N]
+// [--swaps N] [--clients N]
 // [--restarts N] [swaps] [restart] [clients] [mixed]`; none named: all of them. Ends with 1 where
 // an answer was mixed, lost or wrong.
 #include <CLI/CLI.hpp>
@@ -64,7 +64,7 @@ class TwoModels {
   [[nodiscard]] std::unique_ptr<client::Session> session() {
     return test::demand(client::Session::open(daemon_.session_options()));
   }
-  /// Whether all items are what the model that they name says, bit for bit.
+  /// True if all items are what the model that they name says, bit for bit.
   [[nodiscard]] bool is_right(const std::vector<std::vector<double>>& joints,
                               const client::Answer<client::PredictedError>& answer) const {
     const CompensatedModel& model = models_.at(static_cast<std::size_t>(answer.model.version - 1));

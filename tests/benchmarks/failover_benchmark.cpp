@@ -1,4 +1,4 @@
-// How long no change is taken when the host of the record's primary is killed, frozen or cut off,
+// The time without changes when the host of the record's primary is killed, frozen or cut off,
 // and whether anything that was acknowledged is lost: a PostgreSQL of three hosts under Patroni
 // (deploy/patroni), two servers, clients that change something all the time. Needs root. --rounds N
 // (of each fault), --clients N, --faults kill,freeze,cut,mute,deaf.

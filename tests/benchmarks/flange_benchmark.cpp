@@ -105,7 +105,7 @@ CompensatedModel trained(World world, const std::vector<MeasuringPose>& poses,
   return demand(train(cell, batch, options));
 }
 
-/// Of the true error of one reflector at poses never measured.
+/// The true error of one reflector at poses never measured.
 struct Fresh {
   double rms_mm = 0;
   double inside = 0;  // share of coordinates inside their 95 %

@@ -1,4 +1,4 @@
-// What a cell costs a daemon: how long a start takes with many cells, how much memory a model
+// The cost of a cell for a daemon: how long a start takes with many cells, how much memory a model
 // needs, how long others wait for a swap, and how long a large store takes to open. One figure a
 // line. --cells N, --poses N, --store-gb N.
 #include <SQLiteCpp/SQLiteCpp.h>

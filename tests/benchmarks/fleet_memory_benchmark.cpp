@@ -99,7 +99,7 @@ double true_error(const hidden::TrainedRobot& robot, const CompensatedModel& mod
   return std::sqrt((truth - (X * predicted)).squaredNorm() / 400);
 }
 
-/// What the robots are drawn from, of the parameters that the fleet has.
+/// The distribution that the robots are drawn from, of the parameters that the fleet has.
 FleetPrior oracle_prior(const FleetPrior& learned, const Eigen::VectorXd& type, double spread) {
   constexpr int kEverybody = 1'000'000;
   FleetPrior oracle = learned;

@@ -1,4 +1,4 @@
-// How much worse than before a model in force gets when bad batches are submitted, and which gains
+// The damage to a model in force when bad batches are submitted, and the gains that
 // go in force by themselves. A line a case: true error after over before (the virtual robot's,
 // which the trainer never sees), over all seeds. --seeds N, --cases a,b: less of it.
 #include <CLI/CLI.hpp>
@@ -30,7 +30,7 @@ struct Outcome {
   std::string what;
 };
 
-/// What `attack` makes of a model of a good first day.
+/// The result of `attack` on a model of a good first day.
 Outcome outcome_of(const World& world, std::uint64_t seed,
                    const std::function<std::string(LearningCell&)>& attack) {
   LearningCell cell(world.cell);
@@ -61,7 +61,7 @@ std::string imported(LearningCell& cell, const World& world, std::uint64_t seed)
   return activated ? "activated" : sentence(activated.error());
 }
 
-/// What `days` make of a model from `first`; judged by the robot as it is at the end.
+/// The result of `days` for a model from `first`; judged by the robot as it is at the end.
 Outcome outcome(const World& world, const VirtualRobot& at_the_end,
                 const std::vector<MeasurementBatch>& days, const std::string& tool = {}) {
   LearningCell cell(world.cell);

@@ -1,4 +1,4 @@
-// What it costs to ask libtrammel and the Python package for 10,000 predictions, in processor time,
+// The cost of asking libtrammel and the Python package for 10,000 predictions, in processor time,
 // beside the rooms that the program `trammel` is made of: the same model, joints and portions, one
 // thread. All take turns, and the best of each counts.
 #include <time.h>

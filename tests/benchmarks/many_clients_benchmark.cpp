@@ -1,4 +1,4 @@
-// What many clients cost a server and the line to it: participants of DDS on another host (a
+// The cost of many clients for a server and the line to it: participants of DDS on another host (a
 // network namespace), each with a session that has been answered once and then only stays. Measured
 // on the line while they come and while nobody asks, in the server's memory, and after they have
 // gone.

@@ -1,4 +1,4 @@
-// Whether the first batch of a cell is looked at before anything is learned: mistakes of reading,
+// Checks of the first batch of a cell before anything is learned: mistakes of reading,
 // each with 10 seeds, and good batches of robots as they are delivered. --seeds N, --kind TEXT,
 // --good N: less of it; --verbose: every miss.
 #include <CLI/CLI.hpp>

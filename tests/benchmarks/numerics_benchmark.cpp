@@ -24,7 +24,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What of OpenBLAS is measured, by its Fortran names.
+/// The functions of OpenBLAS that are measured, by their Fortran names.
 struct OpenBlas {
   void (*factorise)(const char*, const int*, double*, const int*, int*) = nullptr;  // dpotrf
   void (*invert)(const char*, const int*, double*, const int*, int*) = nullptr;     // dpotri

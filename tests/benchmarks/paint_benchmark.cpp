@@ -1,4 +1,4 @@
-// How soon a browser shows the page of a model: Debian's chromium without a window, the page as a
+// Time until a browser shows the page of a model: Debian's chromium without a window, the page as a
 // file, each time in a window of its own. The page is that of a model of 300 poses with a learned
 // bias and a batch beside it, which is the heaviest kind.
 #include <CLI/CLI.hpp>

@@ -322,7 +322,7 @@ double processor_seconds(const rusage& used) {
   return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-/// Of work in a process of its own.
+/// The cost of work in a process of its own.
 Cost cost_of(const std::function<int()>& work) {
   const auto begun = std::chrono::steady_clock::now();
   const pid_t child = ::fork();
@@ -339,7 +339,7 @@ Cost cost_of(const std::function<int()>& work) {
 void tell_cost(int targets) {
   const test::TemporaryFolder folder;
   std::string model, program;
-  // What this process holds, a child holds: so another one trains.
+  // A child inherits what this process holds: so another process trains.
   static_cast<void>(cost_of([&] {
     folder.write("cell.model", serialize(trained(test::chapter_5_robot(test::cell_7()), 1)));
     folder.write("m.mod", contour(targets));

@@ -1,4 +1,4 @@
-// What recording costs those who ask: two servers of the same model, one records what it answers.
+// Cost of recording for those who ask: two servers of the same model, one records what it answers.
 // One client asks both in turn, for one target and for many; and how much disk a request takes.
 // --requests N (of one target, a round), --rounds N.
 #include <CLI/CLI.hpp>

@@ -1,4 +1,4 @@
-// What the service costs beside a raw Fast DDS echo of the same payload with the same threads,
+// The cost of the service beside a raw Fast DDS echo of the same payload with the same threads,
 // interleaved in one run: only the ratios count. `service_benchmark [--quick] [overhead] [load]
 // [training] [flood]`; none named: all but training. Models are trained once and kept in the build
 // folder.

@@ -1,4 +1,4 @@
-// What several set-ups of the tracker are worth: five sessions of 60 poses against 300 of one, a
+// The worth of several set-ups of the tracker: five sessions of 60 poses against 300 of one, a
 // zero lost between two of them, and what fifty sessions cost. The trainer never sees the virtual
 // robot's truth. --seeds N, --only a: less.
 #include <CLI/CLI.hpp>

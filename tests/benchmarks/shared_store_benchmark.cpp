@@ -1,4 +1,4 @@
-// What a PostgreSQL of the same host costs a server: to accept a batch, to see what is in force in
+// The cost of a PostgreSQL on the same host: to accept a batch, to see what is in force in
 // 10,000 cells, to start with 1,000 cells, to claim jobs, and until what one server puts in force
 // is served by another. A commit waits for the disk. One figure a line. --only
 // accept|list|ready|claims|served, --batches N that are there already.

@@ -1,4 +1,4 @@
-// What it costs to be watched: a scrape of a server of many cells over HTTP, and what counting
+// The cost of being watched: a scrape of a server of many cells over HTTP, and what counting
 // costs each request.
 #include <time.h>
 #include <unistd.h>

@@ -10,7 +10,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// What a complete physics leaves over: the tracker's noise.
+/// The residuals of a complete physics: the tracker's noise.
 BiasProblem noise_alone(Index count, std::uint64_t seed) {
   BiasProblem problem = smooth_problem(count, seed);
   std::mt19937_64 random(seed + 900);
@@ -194,7 +194,7 @@ TEST(ChooseBias, SaysHowFarItIsAndStopsWhenToldToWhileBlocksAreLeftOut) {
   const BiasProblem problem = noise_alone(60, 7);
   ASSERT_TRUE(choose_bias(problem, options));
   EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-  // Of five kernels the first: fitted at a tenth of the whole, each of its sixteen blocks left out
+  // The first of five kernels: fitted at a tenth of the whole, each of its sixteen blocks left out
   // by a fifth.
   EXPECT_EQ(std::count_if(shares.begin(), shares.end(),
                           [](double share) { return share > 0.1 && share <= 0.2; }),

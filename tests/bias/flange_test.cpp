@@ -64,7 +64,7 @@ BiasState state_of(const BiasProblem& problem) {
   return state;
 }
 
-/// The same by the book: all rows, three coordinates each, no reduction, no shared code.
+/// The posterior by the book: all rows, three coordinates each, no reduction, no shared code.
 class Plain {
  public:
   explicit Plain(const BiasState& state) : state_(state), n_(state.q.rows()) {
@@ -111,7 +111,7 @@ class Plain {
     VectorXd mean;  // offset included
     MatrixXd covariance;
   };
-  /// Of the function at a pose, from these rows.
+  /// The prediction of the function at a pose, from these rows.
   At predict(const JointVector& q, const BiasFeatures& features,
              const std::vector<Index>& from) const {
     const auto m = static_cast<Index>(from.size());

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Index;
 
-/// What geometry alone leaves over of the virtual robot: its compliance, in all joints' full
+/// The residuals of the virtual robot beyond geometry: its compliance, in all joints' full
 /// ranges.
 GpData sag_of_the_virtual_robot(int poses) {
   const auto cell = test::cell_7();

@@ -93,7 +93,7 @@ TEST_P(ServedVariance, IsNeverBelowTheExactOneAndHardlyAbove) {
   EXPECT_LT(rises[rises.size() / 2], 0.005);
 }
 
-// Whether a pose is in domain is told by the share of the prior variance that is left.
+// The share of the prior variance that is left tells whether a pose is in domain.
 TEST_P(ServedVariance, KeepsTheShareThatSaysWhatIsInDomain) {
   const GaussianProcess exact = process_of(GetParam(), VarianceForm::kExact);
   const GaussianProcess served = process_of(GetParam(), VarianceForm::kServed);

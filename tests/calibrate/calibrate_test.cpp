@@ -324,7 +324,7 @@ TEST(Calibrate, TellsTwoToolsAndTwoPayloadsApartInOneBatch) {
       calibrate(cell, {"base", "geometry", "compliance_linear", "tool", "payload"}, batch, {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LE(to_mm(result->rms), 0.0235);
-  // What two tools share is the last link's; their difference is known.
+  // The part that two tools share is the last link's; their difference is known.
   EXPECT_NEAR(parameter(*result, "tx[probe]").value - parameter(*result, "tx[spindle]").value,
               0.8e-3, 2e-5);
   EXPECT_NEAR(parameter(*result, "ty[probe]").value - parameter(*result, "ty[spindle]").value,
@@ -367,7 +367,7 @@ TEST(Calibrate, RefitsACauseThatTheModelDidNotHaveAndTheFormThatItHas) {
   ASSERT_TRUE(added) << added.error().message;
   EXPECT_LE(validation_rms_mm(*added, measured(robot, 300, 26)), 0.030);
   EXPECT_NEAR(parameter(*added, "tx").value, -1e-3, 5e-5);
-  // What is held is known or was not known before: of it nothing new is said.
+  // A parameter that is held is known or was not known before: nothing new is said of it.
   for (const UnidentifiableCombination& combination : added->unidentifiable) {
     const bool before =
         std::any_of(plain.unidentifiable.begin(), plain.unidentifiable.end(),

@@ -320,7 +320,7 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
             Refusal(good.where, 2).beyond(6, 7));
 }
 
-/// What a test expects of the numbers of `result` that are measured; the names of the others.
+/// Checks the numbers of `result` that are measured; returns the names of the others.
 std::string expect_measured(const CirclePointResult& result,
                             const std::map<std::string, double>& deviations) {
   std::string missing;
@@ -369,7 +369,7 @@ Chain scara() {
   return *Chain::make("scara", joints);
 }
 
-/// The same with Hayati rows.
+/// The SCARA with Hayati rows.
 Chain scara_in_hayati_rows() {
   std::vector<Joint> joints = joints_of(scara());
   joints[0].hayati = joints[1].hayati = true;

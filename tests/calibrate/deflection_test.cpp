@@ -37,7 +37,7 @@ Truth lower_arm() {
           {0.1, 0.4, 0.7, 1.0, 1.28}};
 }
 
-/// What the element does at x by itself, from the beam's differential equation: E I y'' = w (l - x)
+/// The element's own deflection at x, from the beam's differential equation: E I y'' = w (l - x)
 /// + M, integrated.
 Eigen::Vector2d own_deflection(const Truth& truth, double load, double x) {
   const double w = load * std::cos(truth.element.theta);

@@ -12,8 +12,8 @@
 #include "tests/support/demand.h"
 #include "tests/support/heavy_arm.h"
 
-// What real joints, rails and instruments do, hidden in the second simulation, which computes it by
-// other means.
+// Effects of real joints, rails and instruments, hidden in the second simulation, which computes
+// them by other means.
 namespace trammel {
 namespace {
 
@@ -71,7 +71,7 @@ bool is_identified(const CalibrationResult& result, const std::string& name) {
       [&](const IdentifiedParameter& p) { return p.parameter.name == name && p.identified; });
 }
 
-/// How often what was found lies within U(k=2) of the truth.
+/// The share of findings within U(k=2) of the truth.
 struct Coverage {
   int within = 0, all = 0;
   void add(const CalibrationResult& result, const std::map<std::string, double>& truth) {
@@ -215,7 +215,7 @@ TEST(JointPhysics, AnAxisThatWobblesIsNoAngleError) {
     EXPECT_EQ(is_identified(found, fmt::format("radial_x{}_-1", joint)), joint != 2)
         << "joint 2 turns half around";
     EXPECT_TRUE(is_identified(found, fmt::format("tilt_x{}_-1", joint)));
-    // What goes around once backwards, and the axial part.
+    // The part that goes around once backwards, and the axial part.
     const auto& x = bearing.shift_mm[0];
     const auto& y = bearing.shift_mm[1];
     const auto& a = bearing.tilt[0];

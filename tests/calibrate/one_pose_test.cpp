@@ -5,7 +5,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/three_reflectors.h"
 
-// What several reflectors of one pose share is one witness of the arm, however many they are.
+// The error that reflectors of one pose share is one witness of the arm, however many they are.
 
 namespace trammel {
 namespace {

@@ -15,7 +15,7 @@ namespace {
 using Quaternion = Eigen::Quaterniond;
 using Change = Matrix3 (*)(const Matrix3&);
 
-/// What is read where the file has (x, y, z, w) under `qw, qx, qy, qz`.
+/// The rotation that is read where the file has (x, y, z, w) under `qw, qx, qy, qz`.
 Matrix3 in_xyzw_order(const Matrix3& R) {
   const Quaternion q(R);
   return Quaternion(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
@@ -35,7 +35,7 @@ MeasurementBatch measured(const std::shared_ptr<const Cell>& cell, int poses, st
       .rows();
 }
 
-/// The same poses, each turned by up to `range` about a middle one.
+/// Poses, each turned by up to `range` about a middle one.
 MeasurementBatch within(double range, int poses, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> share(-range, range);

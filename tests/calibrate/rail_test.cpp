@@ -28,7 +28,7 @@ double aside_mm(double s_mm) { return 0.25 * std::sin(kTurn * s_mm / 4200 + 0.3)
 double up_mm(double s_mm) { return -0.3 * std::pow(std::sin(kTurn / 2 * s_mm / 4500), 2); }
 double roll(double s_mm) { return 8e-5 * std::cos(kTurn * s_mm / 5000); }
 
-/// Of B, whose z runs along the rail and whose y is up, in the world.
+/// The frame B, whose z runs along the rail and whose y is up, in the world.
 Eigen::Matrix4d rail_frame() {
   Eigen::Matrix4d frame = Eigen::Matrix4d::Identity();
   frame.block<3, 3>(0, 0) << 0, 0, 1, 1, 0, 0, 0, 1, 0;

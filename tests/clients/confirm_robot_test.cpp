@@ -27,7 +27,7 @@ Cell cell_with(const std::string& robot, const std::string& tools = "tools: {gri
   return *cell;
 }
 
-/// How a controller writes angles.
+/// The way in which a controller writes angles.
 enum class Angles { kKuka, kFanuc, kUniversalRobots, kStaubli };
 
 Vector3 angles_of(const Matrix3& R, Angles kind) {
@@ -54,7 +54,7 @@ struct Controller {
   int decimals = 3;
 };
 
-/// What the controller's screen shows at some poses, each number rounded as there.
+/// The controller's screen at some poses, each number rounded as there.
 std::string screen(const Controller& controller, int poses = 6, double reach_deg = 60) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> angle(-reach_deg, reach_deg);

@@ -1,4 +1,4 @@
-// What a controller keeps beside its programs is taken, or said not to be read.
+// Files that a controller keeps beside its programs are taken, or said not to be read.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -50,7 +50,7 @@ class ControllerFiles : public testing::Test {
   void copy(const std::string& program) const {
     fs::copy(kPrograms + program, folder_.file("in/" + program));
   }
-  /// What it ends with; what it says is in `said_`.
+  /// The exit code; the output is in `said_`.
   int correct(const std::string& input, const std::string& frames = "") {
     fs::remove_all(folder_.file("out"));
     const std::string model = folder_.file("cell.model"), output = folder_.file("out");

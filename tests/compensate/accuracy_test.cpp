@@ -13,8 +13,8 @@
 namespace trammel {
 namespace {
 
-/// Of |t| f, t ~ N(0, I), ln f ~ N(0, 0.2²), as much as a model's own deviation is doubted: 95 %
-/// are within.
+/// The radius that holds 95 % of |t| f, with t ~ N(0, I) and ln f ~ N(0, 0.2²): a model's own
+/// deviation is doubted as much.
 constexpr double kNinetyFive = 3.0539;
 
 constexpr double kScatter = 45e-6;  // m: more than the tracker is said to have

@@ -250,7 +250,7 @@ TEST_F(Compensated, AnArmThatStandsAskewInTheTrackersWorldIsPredictedInItsOwnBas
   const Evaluation evaluation = model.evaluate(test::measured(askew, 300, 32));
   EXPECT_LT(evaluation.compensated.rms, 0.5 * evaluation.calibrated.rms);
   EXPECT_LT(to_mm(evaluation.compensated.rms), 0.1);
-  // What the arm does in its own base does not depend on where the tracker stands.
+  // The motion of the arm in its own base does not depend on where the tracker stands.
   PoseContext context;
   context.q = inside();
   context.tool = context.payload = "spindle";
@@ -406,7 +406,7 @@ struct InAndOut {
   Honesty in_domain, out_of_domain;
 };
 
-/// Of the targets that `poses` are the nominal poses of.
+/// Corrects the targets that `poses` are the nominal poses of.
 void correct_all(const CompensatedModel& model, const VirtualRobot& robot,
                  const MeasurementBatch& poses, InAndOut& honesty) {
   for (const Measurement& m : poses.measurements) {

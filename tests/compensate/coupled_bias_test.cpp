@@ -329,7 +329,7 @@ TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   }
   // A first parameter of the base: x0, 2 mm of prior.
   EXPECT_NEAR(features.by_parameter.col(0).head(3).norm(), 2e-3, 1e-12);
-  // What the compliance of joint 3 does, beside a model that has it.
+  // The effect of the compliance of joint 3, beside a model that has it.
   const PhysicalModel with =
       test::demand(make_physical_model(robot_->truth.cell, {"base", "geometry", "compliance"}));
   PhysicalModel soft = with;

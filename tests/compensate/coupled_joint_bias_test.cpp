@@ -31,7 +31,7 @@ PoseContext at(const JointVector& q) {
   return context;
 }
 
-/// What gear 3 is off by, as the tool shows it. As this robot counts, the gear turns by the sum of
+/// The error of gear 3, as the tool shows it. As this robot counts, the gear turns by the sum of
 /// joints 2 and 3.
 Vector3 shown(const JointVector& q, const BiasFeatures& features) {
   return 3e-4 * std::sin(5 * (q(1) + q(2)) + 1) * features.by_joint.col(2).head<3>();

@@ -127,7 +127,7 @@ class Poses {
   std::mt19937_64 random_;
 };
 
-/// What a tracker sees of the arm as built.
+/// Measurements of the arm as built, by a tracker.
 std::string measured(const Arm& arm, int count) {
   Poses poses(arm, 11);
   std::string csv;

@@ -30,7 +30,7 @@ CompensatedModel model_of(const std::vector<std::string>& sources,
   return test::demand(CompensatedModel::make(std::move(parts)));
 }
 
-/// What is noted beside a robot file that nobody has confirmed, as it is of every cell here.
+/// The notes beside that of a robot file that nobody has confirmed, which every cell here has.
 std::vector<std::string> noted(const CompensatedModel& model) {
   std::vector<std::string> texts;
   for (const Note& note : notes_of(model))
@@ -237,7 +237,7 @@ Evaluation compared(double without, double with, std::optional<double> z) {
 TEST(DoubtOfBias, SaysThatABiasThatMakesItWorseDoesNotHelp) {
   EXPECT_EQ(doubt_of_bias(compared(22.9e-6, 23.3e-6, -4.0)).value(),
             "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 1000 poses");
-  // Of a model of before the pairs were kept.
+  // A model from before the pairs were kept.
   EXPECT_EQ(doubt_of_bias(compared(22.9e-6, 23.3e-6, {})).value(),
             "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 1000 poses");
 }

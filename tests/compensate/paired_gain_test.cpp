@@ -26,7 +26,7 @@ Eigen::Matrix3Xd heavy_tailed(Eigen::Index poses, double sigma, std::uint64_t se
   return errors;
 }
 
-/// How many of 2000 pairs of equally good models one is called better of.
+/// The number of 2000 pairs of equally good models in which one is called better.
 template <typename Errors>
 int called_better(const Errors& errors, Eigen::Index poses) {
   int better = 0;

@@ -59,7 +59,7 @@ class RotationBias : public testing::Test {
     options.bias = bias;
     return test::demand(train(robot_->truth.cell, batch, options));
   }
-  /// Of the targets that were corrected, rms of the true rotation angle to the pose wanted, rad.
+  /// The true rotation angle of corrected targets to the pose wanted, rms, rad.
   static double true_turn_after(const CompensatedModel& model) {
     double sum = 0;
     int count = 0;

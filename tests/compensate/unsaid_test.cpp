@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-/// Of cell-7 with that source at those values, everything else known.
+/// The model of cell-7 with that source at those values, everything else known.
 CompensatedModel model_of(const std::string& source, const std::vector<double>& values) {
   CompensatedModel::Parts parts;
   parts.physics = test::demand(make_physical_model(test::cell_7(), {source}));

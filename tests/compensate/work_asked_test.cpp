@@ -19,7 +19,7 @@ CompensatedModel trained(const VirtualRobot& robot, int poses, std::uint64_t see
       train(robot.truth.cell, test::demand(check_against_cell(batch, *robot.truth.cell)), options));
 }
 
-/// Of the cell's ranges, and some with joint 1 far beyond those of the training.
+/// Poses in the cell's ranges, and some with joint 1 far beyond those of the training.
 std::vector<PoseContext> work(const Cell& cell, int inside, int outside) {
   std::vector<PoseContext> poses;
   const Eigen::MatrixXd q = test::demand(plan_poses(cell, {inside + outside, 4}));

@@ -20,7 +20,7 @@ class ServerConfigTest : public testing::Test {
     folder_.write("cell-7.yaml", test::small_cell_yaml("cell-7"));
     folder_.write("cell-8.yaml", test::small_cell_yaml("cell-8"));
   }
-  /// What is said of the minimal file with `more` at its end.
+  /// The refusal of the minimal file with `more` at its end.
   Refusal refusal_for(const std::string& more) const { return refusal_of(kMinimal + more); }
   Refusal refusal_of(const std::string& text) const {
     return test::refusal_of(read_server_config(folder_.write("server.yaml", text)));

@@ -37,7 +37,7 @@ double resident_mb() {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
-/// Of one operation: sends bad requests, counts them, and compares the codes of the answers.
+/// Sends bad requests to one operation, counts them, and compares the codes of the answers.
 template <typename Operation>
 class Sender {
  public:
@@ -173,7 +173,7 @@ class BadRequests : public testing::Test {
     good.about().cell("cell-7");
     return Sender<Operation>(options_, std::move(good));
   }
-  /// Of everything that is stored.
+  /// The hash of everything that is stored.
   [[nodiscard]] std::string hash_of_store() const {
     std::string all;
     for (const char* name : {"trammel.db", "trammel.db-wal"}) {

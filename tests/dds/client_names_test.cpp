@@ -1,4 +1,4 @@
-// Which name a participant is given, and for how long.
+// The name that a participant is given, and for how long.
 #include "server/dds/client_names.h"
 
 #include <gtest/gtest.h>

@@ -54,7 +54,7 @@ class CountedSends final : public SenderResource {
   std::vector<std::uint32_t> ports_;
 };
 
-/// What the library would get.
+/// The messages that the library would get.
 class HeardMessages final : public rtps::TransportReceiverInterface {
  public:
   void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&,
@@ -135,7 +135,7 @@ class GuardedGate : public GateSending {
     return options;
   }
   GuardedGate() : GateSending(guarded()) {}
-  /// How many of them the library gets.
+  /// The number of them that the library gets.
   int heard(const PacketBytes& message) {
     const int before = heard_.messages;
     hear(message);

@@ -1,4 +1,4 @@
-// What each kind of packet meets at the guard. The packets that harm the library itself are in
+// The guard's answer to each kind of packet. The packets that harm the library itself are in
 // tests/end_to_end/hostile_packets_test.cpp.
 #include "idl/repairs/guard/guard.h"
 
@@ -387,7 +387,7 @@ PacketBytes goodbye() {
       ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   return from().data({0, kAnnouncer, 2, gone, {}}).bytes();
 }
-/// The same as Cyclone DDS says it: by a key, and in the inline QoS the status alone.
+/// The goodbye as Cyclone DDS says it: by a key, and in the inline QoS the status alone.
 PacketBytes goodbye_by_key(const Prefix& who, std::uint32_t by = kAnnouncer) {
   const std::uint16_t id = by == kAnnouncer ? 0x0050 : 0x005a;
   const PacketBytes status = ParameterList().add(0x0071, {0, 0, 0, 3}).bytes();
@@ -565,7 +565,7 @@ TEST(Guard, ASignedMessageMayRepeatItsHeaderAndNameNobodyElse) {
   EXPECT_EQ(fate(guard, signed_message(inner, names(kOther))), Dropped::kSource);
 }
 
-/// How a handshake by `speaker` begins, little endian.
+/// The beginning of a handshake by `speaker`, little endian.
 PacketBytes identities(const Prefix& speaker) {
   PacketBytes begin(4 + 96);
   begin[1] = 1;
@@ -871,7 +871,7 @@ TEST(Guard, WhatWasSentIsNotAskedForAgainWithoutEnd) {
   EXPECT_LT(all, 60) << "512 MB and half of what each may have";
 }
 
-/// How many numbers of an ACKNACK for kOther are left to be sent again; 0: it was dropped.
+/// The number of samples of an ACKNACK for kOther that are left to be sent again; 0: dropped.
 int asked_for(Guard& guard, const PacketBytes& acknack, Guard::Time now) {
   const auto passed = guard.check(acknack, kSocket, now);
   if (!passed) return 0;

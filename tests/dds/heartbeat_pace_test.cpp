@@ -1,4 +1,4 @@
-// Of what the library repeats to everybody, only as much leaves as says something.
+// Repetitions of the library to everybody leave only as far as they say something.
 #include "idl/repairs/heartbeat_pace.h"
 
 #include <gtest/gtest.h>
@@ -79,7 +79,7 @@ TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
       Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
 }
 
-/// What leaves of an offer that is made every 10 ms for so long.
+/// The number of messages that leave of an offer that is made every 10 ms for so long.
 int offered(HeartbeatPace& pace, HeartbeatPace::Time from, int milliseconds_long) {
   int left = 0;
   for (int ms = 0; ms < milliseconds_long; ms += 10) {

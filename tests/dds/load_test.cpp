@@ -57,7 +57,7 @@ class LoadTest : public testing::Test {
     return std::make_unique<Corrector>(options_.domain, options_.port, partition);
   }
 
-  /// What the server says of itself once it has counted so many answers.
+  /// The server's status once it has counted so many answers.
   [[nodiscard]] client::ServerStatus status_after(std::uint64_t requests) const {
     const auto session =
         client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
@@ -74,7 +74,7 @@ class LoadTest : public testing::Test {
   std::unique_ptr<DdsService> service_;
 };
 
-/// How many of the replies have each code.
+/// The number of replies with each code.
 template <typename Reply>
 std::map<wire::ResultCode, std::size_t> codes(const std::vector<Reply>& replies) {
   std::map<wire::ResultCode, std::size_t> counted;

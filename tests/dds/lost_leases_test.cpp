@@ -1,4 +1,4 @@
-// Of two participants neither keeps what the other one has forgotten.
+// Neither of two participants keeps what the other one has forgotten.
 #include "idl/repairs/lost_leases.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What is believed of what discovery servers tell.
+// The answers of discovery servers that are believed.
 #include "idl/transport/places.h"
 
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
-// What ROS 2 nodes send and get. That they meet the server under these names:
+// Messages that ROS 2 nodes send and get. That they meet the server under these names:
 // tests/end_to_end/interoperability_test.cpp.
 
 namespace trammel {
@@ -30,7 +30,7 @@ PredictErrors_ good_question() {
   return question;
 }
 
-/// What a server makes of the bytes; empty: dropped.
+/// The message that a server makes of the bytes; empty: dropped.
 template <typename PubSubType>
 std::optional<wire::ReceivedMessage<typename PubSubType::type>> received(
     Bytes bytes, std::size_t limit = 1 << 20) {

@@ -54,7 +54,7 @@ class CrashTest : public testing::Test {
     daemon_.kill();
     daemon_.start();
   }
-  /// Of the store of a service that is not running.
+  /// The job in the store of a service that is not running.
   StoredJob stored(std::int64_t job) {
     return Store::open(daemon_.store_path()).value()->job(job).value();
   }

@@ -55,7 +55,7 @@ std::vector<std::string> documents() {
   return all;
 }
 
-/// What is no line for a shell: other languages, tables, formulas, drawings.
+/// True if the line is one for a shell: no other language, table, formula or drawing.
 bool is_command(const std::string& line) {
   static constexpr std::array<std::string_view, 12> kPrograms = {
       "trammel ", "trammeld ", "deploy/",  "cmake ", "apt ",       "promtool ",
@@ -96,7 +96,7 @@ bool is_left_out(const std::string& line) {
                      [&](const auto& one) { return line.starts_with(one.first); });
 }
 
-/// What the lines of config/README.md find in the folder where they are typed.
+/// The files that the lines of config/README.md find in the folder where they are typed.
 constexpr const char* kFiles = R"(
 set -euo pipefail
 cell=config/cell-7.yaml

@@ -142,7 +142,7 @@ class ExportRobot : public testing::Test {
           file("robot.csv"), "--json", file("robot.json")});
   }
 
-  /// How far the URDF's tool is from ours at each pose of the plan, mm.
+  /// The distance of the URDF's tool from ours at each pose of the plan, mm.
   std::vector<double> distances_mm() const {
     const auto joints = read_urdf(test::read_file(file("robot.urdf")));
     const CsvTable plan = CsvTable::parse(test::read_file(file("plan.csv")), "plan.csv").value();

@@ -218,7 +218,7 @@ class FleetOfDyingServers : public Fleet {
     forced.force = true;
     for (const int version : {2, 1}) ASSERT_TRUE(session_->activate("cell-7", version, forced));
   }
-  /// What the session is told of a change whose server is killed once the transaction with
+  /// The session's answer to a change whose server is killed once the transaction with
   /// `statement` is committed, before it hears of it. The server is started again.
   template <typename Ask>
   auto told_by_another(const std::string& statement, const Ask& ask) -> decltype(ask()) {

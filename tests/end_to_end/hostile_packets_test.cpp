@@ -30,7 +30,7 @@ constexpr std::size_t kMuchMemory_mib = 300;
 /// False when it could not be carried out.
 using Attack = std::function<bool(RawParticipant&)>;
 
-/// How the participant is after it: empty when it goes on as before.
+/// The state of the participant after it: empty when it goes on as before.
 std::string harm_of(const Attack& attack, bool guarded) {
   Victim victim(guarded);
   RawParticipant attacker(victim.port(), Victim::kDomain);
@@ -159,7 +159,7 @@ TEST(HostilePackets, FourBillionPropertiesOfAToken) {
   expect_only_the_library_is_harmed_by(announces(0x1001, words({1, 0, 30'000'000, 0})));
 }
 
-/// What a daemon says of itself to a client.
+/// The daemon's answers to a client about itself.
 std::string answers_of(const test::Daemon& daemon) {
   const auto session = client::Session::open(daemon.session_options());
   if (!session) return session.error().message;

@@ -101,7 +101,7 @@ TEST_F(Interoperability, ACycloneDdsClientIsAnsweredBesideAsManyParticipantsAsAD
   EXPECT_EQ(client.exit_code, 0) << client.err;
 }
 
-/// The same server where ROS 2 nodes are answered, too.
+/// The server with ROS 2 nodes answered, too.
 class Ros2 : public Interoperability {
  protected:
   Ros2() { service_.stop(); }

@@ -165,7 +165,7 @@ class BadLineTest : public NetworkTest {
         elsewhere({"export", "--model", "cell-7", "-o", folder_.file("cell.model")});
     ASSERT_EQ(fetched.exit_code, 0) << fetched.out << fetched.err;
   }
-  /// What this host makes of the program with the model's file.
+  /// The program as this host corrects it with the model's file.
   [[nodiscard]] std::string corrected_here(const std::string& program) const {
     const auto done =
         test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "correct", "--model",

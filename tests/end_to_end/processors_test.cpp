@@ -28,7 +28,7 @@ class Processors : public testing::Test {
     run("TRAMMEL_NUMERICS=", {"simulate", "--cell", kCell, "--truth", kTruth, "--plan",
                               folder_.file("plan.csv"), "-o", batch_});
   }
-  /// What the model leaves that is trained there.
+  /// The error that the model leaves that is trained there.
   [[nodiscard]] double left_mm(const std::string& setting) const {
     run(setting, {"train", "--cell", kCell, "--batch", batch_, "--level", "M2", "--bias", "se",
                   "-o", model_});

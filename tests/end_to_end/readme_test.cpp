@@ -1,4 +1,4 @@
-// What the README tells somebody new to type does what it says.
+// The lines that the README tells somebody new to type do what it says.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What a service has recorded is asked again.
+// Recorded calls of a service are asked again.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -80,7 +80,7 @@ class RollingUpdate : public testing::Test {
     }
     return false;
   }
-  /// What this program says where it does not start.
+  /// The reason that this program gives where it does not start.
   static std::string why_not(const Server& server, const std::string& program) {
     const auto ended = test::run(server.command_line(program));
     EXPECT_EQ(ended.exit_code, 3) << ended.err;

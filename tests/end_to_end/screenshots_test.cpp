@@ -54,7 +54,7 @@ constexpr const char* kLook = R"(
     text: document.body.innerText
   };)";
 
-/// What a shell types to make every page that the command line writes.
+/// Lines for a shell that make every page that the command line writes.
 constexpr const char* kRun = R"(
 set -euo pipefail
 measured() { trammel simulate --cell cell.yaml --truth "$TRUTH" --plan "$1" --seed "$2" -o "$3"; }

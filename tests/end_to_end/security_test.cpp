@@ -100,7 +100,7 @@ class SecurityTest : public testing::Test {
   test::Daemon daemon_;
 };
 
-/// What calls are about.
+/// The context of calls.
 client::CallContext cell_7() {
   client::CallContext context;
   context.cell = "cell-7";
@@ -109,7 +109,7 @@ client::CallContext cell_7() {
 
 using Calls = std::map<std::string, std::function<Error(client::Session&)>>;
 
-/// What came of a call; an error of no code where it was done.
+/// The outcome of a call; an error of no code where it was done.
 template <typename Value>
 Error said(const Result<Value>& result) {
   return result ? Error{} : result.error();

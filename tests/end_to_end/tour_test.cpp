@@ -50,7 +50,7 @@ bool is_number(const std::string& text, double* value) {
   return !text.empty() && *end == '\0';
 }
 
-/// Whether both texts have the same words and nearly the same numbers.
+/// True if both texts have the same words and nearly the same numbers.
 testing::AssertionResult alike(const std::string& shown, const std::string& printed) {
   static const std::regex kDate(
       "\\b20[0-9]{2}-[0-9]{2}-[0-9]{2}([T ][0-9]{2}:[0-9]{2}(:[0-9]{2})?Z?)?"),

@@ -1,4 +1,4 @@
-// What systemd does with the unit of the daemon, and what the demo does beside another server.
+// The daemon's unit under systemd, and the demo beside another server.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -24,7 +24,7 @@ void put_everywhere(std::string& text, const std::string& what, const std::strin
     text.replace(at, what.size(), by);
 }
 
-/// What the unit runs before it starts, as /bin/sh gets it, with this build's daemon and this
+/// The start check of the unit, as /bin/sh gets it, with this build's daemon and this
 /// server file.
 std::string start_check(const std::string& server_file) {
   const std::string unit = test::read_file(TRAMMEL_SOURCE_DIR "/deploy/trammeld.service");

@@ -29,7 +29,7 @@ std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::s
   return threads;
 }
 
-/// Whether every thread but the first has a name of its own before long: until then it has that of
+/// True if every thread but the first has a name of its own before long: until then it has that of
 /// the process.
 bool all_are_named(pid_t process) {
   const auto deadline = std::chrono::steady_clock::now() + kLimit;
@@ -39,7 +39,7 @@ bool all_are_named(pid_t process) {
   return true;
 }
 
-/// Whether a client gets an answer.
+/// True if a client gets an answer.
 bool answers(const test::Daemon& daemon) {
   const auto status = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--service",
                                  "--port", std::to_string(daemon.port()), "--domain",
@@ -47,7 +47,7 @@ bool answers(const test::Daemon& daemon) {
   return status.exit_code == 0;
 }
 
-/// What the process ends with once its thread is stopped; empty when it goes on.
+/// The exit code of the process once its thread is stopped; empty when it goes on.
 std::optional<int> end_without(test::Process& process, pid_t thread,
                                std::chrono::milliseconds limit) {
   test::StoppedThread stopped(thread);

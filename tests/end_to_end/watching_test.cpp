@@ -213,7 +213,7 @@ class ReloadOfCellsTest : public testing::Test {
     ASSERT_TRUE(over) << sentence(over.error());
     ASSERT_EQ(over->stage, "done") << over->what;
   }
-  /// Of the model that answers; 0: none does.
+  /// The version of the model that answers; 0: none does.
   [[nodiscard]] static int version(client::Session& session, const std::string& cell) {
     client::CallContext context;
     context.cell = cell;

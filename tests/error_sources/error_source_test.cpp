@@ -74,7 +74,7 @@ std::vector<std::string> specs_of(const Cell& cell) {
   return specs;
 }
 
-/// Of cell-7; and some that say more.
+/// The specifications of cell-7; and some that say more.
 const std::vector<std::string>& every_spec() {
   static const std::vector<std::string> kSpecs = [] {
     std::vector<std::string> specs = {
@@ -87,7 +87,7 @@ const std::vector<std::string>& every_spec() {
   return kSpecs;
 }
 
-/// Of a robot on a rail alone.
+/// The specifications of a robot on a rail alone.
 const std::vector<std::string>& rail_specs() {
   static const std::vector<std::string> kSpecs = [] {
     std::vector<std::string> specs = specs_of(*cell_on_a_rail());
@@ -405,7 +405,7 @@ TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
     ASSERT_TRUE(map) << spelled_map(0, spectrum);
     EXPECT_GT((*map)->parameters().back().prior_scale, 0);
   }
-  // What a model of before means by it.
+  // The meaning that a model of before gives it.
   const ErrorSourcePtr before = *make_error_source("joint_map:3", *cell);
   ASSERT_EQ(before->parameters().size(), 96U);
   EXPECT_EQ(before->parameters()[95].prior_scale, 3e-4 / 65);

@@ -1,4 +1,4 @@
-// The same targets for clang's libFuzzer; the environment variable TRAMMEL_FUZZ_TARGET names one.
+// Targets for clang's libFuzzer; the environment variable TRAMMEL_FUZZ_TARGET names one.
 #include <cctype>
 #include <cstdint>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// What comes over the wire: every type, every request with its handler, what a session makes of
-// replies; and the server file.
+// Messages that come over the wire: every type, every request with its handler, what a session
+// makes of replies; and the server file.
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -51,7 +51,7 @@ std::optional<typename PubSubType::type> sample_of(std::string_view bytes, std::
   return sample;
 }
 
-/// What a session would make of the parts of a reply or a state.
+/// Reads the parts of a reply or a state as a session would.
 template <typename Sample>
 void convert(const Sample& sample) {
   if constexpr (requires { client::error_of(sample.header()); })
@@ -245,7 +245,7 @@ std::vector<std::string> server_files() {
       "log: {level: info, file: log.txt}\n"};
 }
 
-/// What a server says it found, as the command line tells it.
+/// Reads the findings of a server as the command line tells them.
 std::string read_findings(std::string_view bytes) {
   const std::string text(bytes);
   if (const Status small = check_json_limits(text, "findings"); !small)
@@ -285,7 +285,7 @@ Target request_target(const char* name) {
   return {name, ask<Operation>, mutate_cdr, samples<typename Operation::Request>};
 }
 
-/// What the guard makes of a packet; what passes must be whole.
+/// Gives a packet to the guard; what passes must be whole.
 std::string guard_packet(std::string_view bytes) {
   static wire::Guard guard(
       static_cast<std::uint32_t>(wire::kMaxTextSample));  // remembers what it has seen

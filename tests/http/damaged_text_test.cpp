@@ -23,7 +23,7 @@ using test::demand;
 constexpr int kFirst = 40, kInForce = 41,
               kOfOthers = 77;  // training poses, which tell the models apart
 
-/// What is in a store's row of a model.
+/// A store's row of a model.
 struct Row {
   std::string text, hash;
 };

@@ -1,4 +1,4 @@
-// What a server shows of the others of its record.
+// The page on which a server shows the others of its record.
 #include "server/http/servers_page.h"
 
 #include <gtest/gtest.h>

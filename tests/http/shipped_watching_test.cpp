@@ -36,7 +36,7 @@ std::set<std::string> names_told() {
   server.figures.dropped_packets = {{"fragment", 0}};
   server.figures.work = {{"cell-7", {}}};
   server.figures.not_recorded = 0;
-  // Of a batch whose rows have no times the age of the data is not known.
+  // The age of the data is not known for a batch whose rows have no times.
   const Watched watched = server.watched();
   Metrics metrics(watched);
   JobProgress ended;

@@ -43,7 +43,7 @@ Cell make_cell(std::optional<Pose> X_FT) {
 
 Cell make_cell() { return make_cell(make_pose(Matrix3::Identity(), Vector3(.06, -.19, .17))); }
 
-/// What a tracker sees of `poses` random poses whose joints fill `share` of a quarter turn each.
+/// A tracker's view of `poses` random poses whose joints fill `share` of a quarter turn each.
 MeasurementBatch make_batch(const Cell& cell, int poses, double share, const Vector3& p_FT) {
   MeasurementBatch batch;
   batch.id = "lt-07";

@@ -185,7 +185,7 @@ TEST_P(EveryBuild, TrianglesSurvivePacking) {
   }
 }
 
-// What one processor learns, another predicts with.
+// A model that one processor learns predicts on another.
 TEST_P(EveryBuild, AgreesWithTheBaselineToRounding) {
   const Index n = 200;
   MatrixXd a = MatrixXd::Zero(padded_rows(n), 7);

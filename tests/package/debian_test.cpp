@@ -70,7 +70,7 @@ class Debian : public testing::Test {
     }
   }
 
-  /// Whether libtrammel and the Python package are in this build.
+  /// True if libtrammel and the Python package are in this build.
   static bool has_library() {
     return fs::exists(TRAMMEL_BINARY_DIR "/clients/library/libtrammel.so");
   }

@@ -38,7 +38,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// What the packages libtrammel0.1, libtrammel-dev and trammel would install, and the examples
+/// The files that libtrammel0.1, libtrammel-dev and trammel would install, and the examples
 /// built from that alone.
 class Library : public testing::Test {
  protected:

@@ -98,7 +98,7 @@ void expect_directions_are_those_of_the_bump(const Cell& cell, const Plan& plan)
   }
 }
 
-/// How much more often joint `j` of a plan comes from below than from above.
+/// The excess of approaches of joint `j` from below over those from above in a plan.
 int more_from_below(const Plan& plan, std::size_t j) {
   int sum = 0;
   for (const PlannedPose& pose : plan.poses) sum += pose.context.direction[j];

@@ -36,7 +36,7 @@ class ModelPage : public testing::Test {
         check_against_cell(batch_, *cell_, drawn(validation_share, 1)).value();
     return train(cell_, checked, options).value();
   }
-  /// What the charts of the page are drawn from.
+  /// The data that the charts of the page are drawn from.
   static nlohmann::json chart_data(const std::string& page) {
     const std::string opening = "<script type=\"application/json\" id=\"data\">";
     const std::size_t from = page.find(opening) + opening.size();

@@ -1,4 +1,4 @@
-// What tells two descriptions of a cell apart.
+// The differences that tell two descriptions of a cell apart.
 #include "server/robot/cell_description.h"
 
 #include <gtest/gtest.h>

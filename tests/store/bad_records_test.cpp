@@ -31,7 +31,7 @@ std::set<std::string> batches_of(Store& store) {
   return ids;
 }
 
-/// The same database for another role, perhaps with a password.
+/// The URL of the database for another role, perhaps with a password.
 std::string as(std::string url, const std::string& who) {
   return url.replace(url.find("postgres@"), 8, who);
 }
@@ -202,7 +202,7 @@ TEST_F(BadRecord, APoolerThatSharesConnectionsByTransactionMayStandBetween) {
 TEST_F(BadRecord, ProgramsOfTwoBuildsWorkOnOneSchema) {
   const auto old = open(url_);
   ASSERT_TRUE(old->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
-  // What a newer program's `store init` adds while older ones go on: it says from which schema on
+  // A newer program's `store init` adds this while older ones go on: it says from which schema on
   // programs may.
   say("ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';ALTER TABLE models ADD COLUMN "
       "weight BIGINT;CREATE TABLE job_colours (job BIGINT PRIMARY KEY REFERENCES jobs (id));UPDATE "

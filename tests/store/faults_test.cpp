@@ -1,4 +1,4 @@
-// What is left of a store, and what it goes on doing, after faults of the disk.
+// The state of a store, and what it goes on doing, after faults of the disk.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -27,7 +27,7 @@ using test::job_of;
 
 constexpr std::streamoff kPage = 4096;
 
-/// Of a page and more.
+/// A batch of more than a page.
 StoredBatch batch(const std::string& id) {
   return test::batch_of(id, "q1_deg\n" + id + std::string(3000, '0') + "\n", "client:" + id);
 }
@@ -533,7 +533,7 @@ TEST_F(StoreFaults, AJournalThatIsLostDamagedOrCutLosesNothing) {
   }
 }
 
-/// What another program may do to the file while the store is open, and how that is taken back.
+/// Another program's change of the file while the store is open, and how that is taken back.
 /// `kept` is the file as it was just before.
 struct Meddling {
   const char* name;

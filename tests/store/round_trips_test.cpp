@@ -1,4 +1,4 @@
-// How often a change goes to the database and back. In a plant's network that is what it waits for,
+// The number of round trips of a change to the database. In a plant's network it waits for them,
 // besides the disk.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Which servers a record has, what each of them does, and whether they mean the same by a cell.
+// The servers of a record, what each of them does, and whether they mean the same by a cell.
 #include "server/store/servers.h"
 
 #include <gtest/gtest.h>

@@ -251,7 +251,7 @@ TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
   EXPECT_TRUE(demand(store->batches("cell-7")).empty());
 }
 
-/// What takes the whole database away has one of its own.
+/// A test that takes the whole database away has one of its own.
 class SharedStoreAway : public testing::Test {
  protected:
   test::Postgres postgres_;

@@ -53,7 +53,7 @@ class StoreCopyTest : public testing::Test {
     }
     EXPECT_EQ(a.audit_hash, b.audit_hash);
   }
-  /// What is served, and what else a client sees.
+  /// The version that is served, and what else a client sees.
   std::string seen(const std::string& place) {
     const auto store = demand(Store::open(place));
     std::string all =

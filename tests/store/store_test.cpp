@@ -53,7 +53,7 @@ class StoreTest : public testing::TestWithParam<std::string>, protected StoreOfB
 INSTANTIATE_TEST_SUITE_P(, StoreTest, testing::Values("file", "postgresql"),
                          [](const auto& kind) { return kind.param; });
 
-/// What is said of files alone.
+/// Tests of files alone.
 class StoreFileTest : public testing::Test, protected StoreOfBatches {
  protected:
   StoreFileTest() : StoreOfBatches("") {}

@@ -28,7 +28,7 @@ bool same_place(const Cause& said, const HiddenCause& cause) {
   return cause.joint == 0 || said.joint + 1 == cause.joint;
 }
 
-/// Whether `said` means the cause hidden at `place`, and where it begins, `said` says where: near
+/// True if `said` means the cause hidden at `place`, and where it begins, `said` says where: near
 /// enough.
 bool means(const Cause& said, const HiddenCase& hidden, std::size_t place) {
   const HiddenCause& cause = hidden.truth.causes[place];
@@ -46,8 +46,8 @@ std::optional<std::size_t> place_of(const Cause& said, const HiddenCase& hidden)
   return std::nullopt;
 }
 
-/// What a reader is left with: where something was found, what it is said to be; where nothing was,
-/// what the batch is said not to tell.
+/// The causes that a reader is left with: where something was found, what it is said to be; where
+/// nothing was, what the batch is said not to tell.
 std::vector<Cause> left_open(const Diagnosis& diagnosis) {
   std::vector<Cause> all;
   for (const Finding& finding : diagnosis.findings) {
@@ -136,7 +136,7 @@ void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgem
   judgement.right_or_open = static_cast<int>(std::count(mentioned.begin(), mentioned.end(), true));
 }
 
-/// What an effect whose circumstance nobody recorded still depends on.
+/// The dependence of an effect whose circumstance nobody recorded.
 std::string traceable_dependence(const HiddenCause& cause) {
   return cause.joint > 0 ? fmt::format("q{}", cause.joint) : "time";
 }

@@ -47,7 +47,7 @@ std::vector<hidden::MeasuringPose> as_poses(const std::vector<JointVector>& join
   return poses;
 }
 
-/// Whether the hidden simulation can make it without being told more.
+/// True if the hidden simulation can make it without being told more.
 bool can_be_made(const HiddenCause& cause) {
   if (cause.cause == "geometry" || cause.cause == "compliance") {
     const auto& all = hidden::arm_parameters();
@@ -58,7 +58,7 @@ bool can_be_made(const HiddenCause& cause) {
   return cause.cause != "joint_map" && cause.cause != "outlier";
 }
 
-/// What is named besides the truth.
+/// The causes that are named besides the truth.
 std::vector<HiddenCause> confounded_with(const Diagnosis& diagnosis, const HiddenCause& truth,
                                          int poses) {
   std::vector<HiddenCause> others;

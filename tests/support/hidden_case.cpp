@@ -78,7 +78,7 @@ std::vector<std::string> draw_mixture(int count, Random& random) {
   return names;
 }
 
-/// Which effects a kind means, and what is asked.
+/// Finds the effects that a kind means, and what is asked.
 void understand(Draft& draft) {
   const std::string& kind = draft.spec.kind;
   draft.truth.kind = kind;
@@ -111,7 +111,7 @@ void understand(Draft& draft) {
   }
 }
 
-/// What the cell models already, and how it is measured, so that the effects can be told.
+/// Sets what the cell models already, and how it is measured, so that the effects can be told.
 void arrange(Draft& draft) {
   const auto has = [&](const std::string& name) { return contains(draft.names, name); };
   World& world = draft.world;
@@ -286,7 +286,7 @@ MatrixXd lengthened(MatrixXd columns) {
   return columns;
 }
 
-/// What the cell's own sources and all effects but one can make at the poses that are learned from.
+/// The motions that the cell's own sources and all effects but one can make at the training poses.
 MatrixXd nuisance_of(const World& world, std::size_t but, const std::vector<MeasuringPose>& poses) {
   MatrixXd columns = directions_of(arm_columns(world, poses)) * 1e3;
   for (std::size_t k = 0; k < world.effects.size(); ++k) {
@@ -368,7 +368,7 @@ Matrix3d turn_of(const Vector3d& vector) {
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
-/// What the effects do at each pose happens at another one instead: sizes stay, all relations are
+/// Moves the effects at each pose to another pose: sizes stay, all relations are
 /// gone.
 void permute(const Frames& still, Frames& moved, Random& random) {
   std::vector<std::size_t> from(moved.size());
@@ -385,7 +385,7 @@ void permute(const Frames& still, Frames& moved, Random& random) {
   moved = permuted;
 }
 
-/// Of Student's distribution of four degrees of freedom, brought to unit variance.
+/// A draw of Student's distribution of four degrees of freedom, brought to unit variance.
 double heavy_factor(Random& random) {
   double square = 0;
   for (int k = 0; k < 4; ++k) square += std::pow(normal(random), 2);

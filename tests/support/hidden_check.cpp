@@ -15,8 +15,8 @@ using Eigen::VectorXd;
 
 constexpr int kWorkingPoses = 300;
 
-/// How much larger than usual one reading's noise is: 1, or so that each coordinate has Student's t
-/// of variance 1.
+/// The factor by which one reading's noise exceeds the usual: 1, or so that each coordinate has
+/// Student's t of variance 1.
 double disturbance(const RobotSpec& spec, Random& random) {
   const auto freedom = static_cast<int>(spec.tail_freedom);
   if (freedom <= 2) return 1;
@@ -79,7 +79,7 @@ VectorXd positions(const Frames& frames) {
   return all;
 }
 
-/// What a motion of the base makes of positions, and one of the tool.
+/// The changes of positions by a motion of the base, and by one of the tool.
 MatrixXd frame_columns(const TrainedRobot& robot, const std::vector<MeasuringPose>& poses,
                        bool new_tool) {
   const Frames still = frames_at(robot.world, poses, {});

@@ -277,7 +277,7 @@ Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
-/// How far something slow has come, 0 to 1 at most, by the share of the batch's time: it warms up
+/// The course of something slow, 0 to 1 at most, by the share of the batch's time: it warms up
 /// and settles, or goes with the day and comes back.
 std::function<double(double)> draw_course(Random& random) {
   if (whole(random, 0, 1) == 1) {

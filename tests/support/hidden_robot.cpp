@@ -43,7 +43,7 @@ Matrix4d link_frame(const Link& link, double q) {
 Vector3d origin(const Matrix4d& frame) { return frame.block<3, 1>(0, 3); }
 Matrix3d axes(const Matrix4d& frame) { return frame.block<3, 3>(0, 0); }
 
-/// How far gearboxes have turned and links have bent.
+/// The angles by which gearboxes have turned and links have bent.
 struct Deflection {
   Joints joints = Joints::Zero();
   std::array<Matrix4d, kJoints> bends;
@@ -68,7 +68,7 @@ std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q,
 
 Vector3d weight_of(const Load& load) { return {0, 0, -kWeight * load.mass_kg}; }
 
-/// What weighs: the payload at the last frame, each link at its own.
+/// The weights: the payload at the last frame, each link at its own.
 struct Weight {
   Vector3d at, force;
   std::size_t last;  ///< joint that still feels it
@@ -111,7 +111,7 @@ Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& ar
   return moments;
 }
 
-/// How the foot tilts under the moment of all that weighs.
+/// The tilt of the foot under the moment of all that weighs.
 Matrix4d tilt_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm) {
   Vector3d moment = Vector3d::Zero();
   for (const Weight& weight : weights_in(frames, arm))

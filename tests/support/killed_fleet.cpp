@@ -116,7 +116,7 @@ class Predictor {
   std::jthread thread_;
 };
 
-/// What is killed, stopped and started again.
+/// The servers that are killed, stopped and started again.
 class Fleet {
  public:
   explicit Fleet(std::uint64_t seed) : random_(seed), url_(database_.new_store()) {
@@ -290,7 +290,7 @@ std::vector<std::int64_t> acknowledged(const std::string& history) {
   return times;
 }
 
-/// How long it took from a loss until a change was acknowledged that was made afterwards.
+/// Adds the time from a loss until a change was acknowledged that was made afterwards.
 void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& history,
                 KillOutcome& outcome) {
   const auto times = acknowledged(history);
@@ -310,8 +310,8 @@ void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& histo
   }
 }
 
-/// What the record says that nobody asked for: models, and what was put in quarantine. Not before
-/// the second that the trail says.
+/// Adds what the record says that nobody asked for: models, and what was put in quarantine. Not
+/// before the second that the trail says.
 void add_inner_changes(const Fleet& fleet, History& history) {
   const auto since_unix = std::chrono::system_clock::now().time_since_epoch();
   const std::int64_t offset =
@@ -336,7 +336,7 @@ void add_inner_changes(const Fleet& fleet, History& history) {
                  {"invoke", invoked(row.at(2))}});
 }
 
-/// What is there in the end, of one cell, as the record says.
+/// The state of one cell in the end, as the record says.
 json end_of(const Fleet& fleet, const std::string& cell) {
   json end = {{"op", "end"},
               {"cell", cell},
@@ -376,7 +376,7 @@ bool wait_until(const std::function<bool()>& holds, seconds limit) {
   return true;
 }
 
-/// How many servers do not serve in the end what is in force, though they were given time.
+/// The number of servers that do not serve in the end what is in force, though they had time.
 int served_otherwise(const Fleet& fleet) {
   int others = 0;
   for (std::size_t i = 0; i < kServing; ++i) {
@@ -455,7 +455,7 @@ void train_first(const Fleet& fleet, History& history) {
   }
 }
 
-/// How long the jobs of a cell waited since then (Unix time, s) though nobody worked for it.
+/// Adds the time that jobs of a cell waited since then (Unix time, s) though nobody worked for it.
 void add_idle_times(const Fleet& fleet, std::int64_t since, KillOutcome& outcome) {
   const auto rows = fleet.rows(fmt::format(
       "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) "

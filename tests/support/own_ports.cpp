@@ -18,7 +18,7 @@ constexpr int kBlocks = 1500;
 constexpr int kFirstPort = 20000;
 constexpr int kDomains = 48;  // the ports that DDS derives from them end below kFirstPort
 
-/// Whether this process has the number of that kind now: others see it by an abstract socket, which
+/// True if this process has the number of that kind now: others see it by an abstract socket, which
 /// the kernel lets go with the process. tests/python/test_trammel.py uses the same names.
 bool reserve(const char* kind, int number) {
   sockaddr_un name{};

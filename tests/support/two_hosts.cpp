@@ -48,7 +48,7 @@ int open_interface() {
   return -1;
 }
 
-/// The same in a namespace of that name, by a thread that goes there and ends.
+/// Opens an interface in a namespace of that name, by a thread that goes there and ends.
 int open_interface_in(const std::string& name) {
   int end = -1;
   std::thread([&] {

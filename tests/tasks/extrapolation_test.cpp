@@ -103,7 +103,7 @@ TEST(Extrapolation, ABiasWithParametersErrsFarOutAsPhysicsDoesAndSaysSo) {
     EXPECT_GT(band.coverage_95, 0.91) << band.from << " to " << band.to;
     EXPECT_LT(band.stddev, 3 * band.rms) << band.from << " to " << band.to;
   }
-  // What faded as a whole erred by 4 mm there, the physics identified as M3 errs by 0.05 mm.
+  // The bias that faded as a whole erred by 4 mm there, the physics identified as M3 by 0.05 mm.
   EXPECT_LT(to_mm(figures.bands.back().rms), 0.15);
   EXPECT_GT(figures.bands.back().stddev, 3 * figures.bands.front().stddev);
   EXPECT_GT(figures.caught, 0.987 * figures.outsiders);

@@ -1,5 +1,5 @@
-// What may take the place of a good model by itself: batches that would make it worse, and batches
-// that are a gain. Each is measured on the virtual robot, by its true error before and after.
+// Tries batches that would make a good model worse, which it must outlive by itself, and
+// batches that are a gain. Each is measured on the virtual robot: its true error before and after.
 #include "server/tasks/accept/gate.h"
 
 #include <gtest/gtest.h>

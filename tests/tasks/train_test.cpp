@@ -118,7 +118,7 @@ TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
   batch.id = "warm";
   const std::string level = "M3,thermal_growth,backlash:1,backlash:2,backlash:3";
   const CompensatedModel model = test::demand(train(cell, batch, quick(level, "none")));
-  // The same robot, another day: nobody says how warm it is or from where it comes.
+  // A batch of the same robot on another day: nobody says how warm it is or from where it comes.
   for (Measurement& m : batch.measurements) {
     m.context.temperature.reset();
     m.context.direction.clear();

@@ -30,7 +30,7 @@ namespace {
 constexpr std::size_t kPosesTogether =
     1000;  // poses that a model predicts between two updates of the progress
 
-/// What predict and correct have in common.
+/// The arguments that predict and correct share.
 struct ApplyArguments {
   std::string model, input, tool, payload, output, json;
   ServiceOptions service;
@@ -116,7 +116,7 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
       answer.model.id, std::move(answer.items), {}, {}, std::move(answer.model.notes)};
 }
 
-/// What --covariance and --orientation ask for.
+/// Adds the uncertainties that --covariance and --orientation ask for.
 Status add_uncertainties(Predictions& predictions, const ApplyArguments& arguments) {
   for (const client::PredictedError& item : predictions.items) {
     if (arguments.covariance) predictions.together.push_back(joint_uncertainty(item));
@@ -178,7 +178,7 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
                      std::move(answer.model.notes)};
 }
 
-/// What correct is asked for, a program or a table of targets.
+/// The arguments of correct, for a program or a table of targets.
 struct CorrectArguments : ApplyArguments {
   std::vector<std::string> inputs;
   std::string receipt, report, format, frames, task;
@@ -289,7 +289,7 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   return model;
 }
 
-/// How a program is read.
+/// Adds the options that say how a program is read.
 void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
                          std::vector<std::string>& idle_axes, std::string& task,
                          std::vector<double>& pulses_per_deg) {
@@ -327,7 +327,7 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
       ->group(group);
 }
 
-/// What predict is asked for: joints, or a program.
+/// The arguments of predict, for joints or a program.
 struct PredictArguments : ApplyArguments {
   std::vector<std::string> inputs;
   std::string format, frames, task;

@@ -18,7 +18,7 @@ struct AuditArguments {
   ServiceOptions service;
 };
 
-/// Of each server its own.
+/// The audit trail of each server.
 Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArguments& arguments) {
   std::vector<std::pair<std::string, AuditTrail>> all;
   if (!arguments.store.empty()) {

@@ -63,8 +63,8 @@ Result<nlohmann::ordered_json> found_by(client::Session& session, const std::str
   return check_of(found.findings_json, fmt::format("what job {} found", job));
 }
 
-/// What the measurements are called: a file without its folder and ending, or the id that the
-/// service has them by.
+/// The name of the measurements: a file without its folder and ending, or the id under which the
+/// service stores them.
 std::string batch_name(const std::string& batch) {
   return std::filesystem::path(batch).stem().string();
 }
@@ -137,7 +137,7 @@ Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of,
                       with_pages_beside(health_page(found.dump(), of), arguments.report));
 }
 
-/// What earlier checks said.
+/// Tells what earlier checks found.
 Status tell_health(client::Session& session, const std::string& cell,
                    const CheckArguments& arguments) {
   const auto cells = TRY(health_at(session, cell, 0));
@@ -181,7 +181,7 @@ Result<Extent> check_at_service(const CheckArguments& arguments) {
   return extent_of(json, arguments);
 }
 
-/// What checks before this one saw of the arm's drift: files that `--json` wrote.
+/// The drift that earlier checks saw, read from files that `--json` wrote.
 Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& files) {
   std::vector<DriftSeen> all;
   for (const std::string& file : files) {

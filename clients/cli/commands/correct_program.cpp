@@ -110,7 +110,7 @@ Result<Corrected> correct_by_service(const cam::Program& program,
       });
 }
 
-/// What is written: to each path its text. What stands for standard output is among them.
+/// The text for each path that is written, standard output among them.
 using Texts = std::vector<TextFile>;
 
 /// The files, and beside each that is changed what it was before.

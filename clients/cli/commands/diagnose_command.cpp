@@ -114,7 +114,7 @@ Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) 
   return Extent::kPart;
 }
 
-/// What the repair since the model of --since did; its section of the page.
+/// Tells what the repair since the model of --since did; its section of the page.
 Result<std::string> tell_since(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                const DiagnoseArguments& arguments, ordered_json& json) {
   if (arguments.since.empty()) return std::string();

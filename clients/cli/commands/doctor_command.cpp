@@ -41,7 +41,7 @@ struct DoctorArguments {
 
 enum class State { kGood, kNote, kBad };
 
-/// What one look found, and what to do about it.
+/// A finding of one look, and what to do about it.
 struct Found {
   std::string check;
   State state = State::kGood;
@@ -70,7 +70,7 @@ class Udp {
     return ::bind(socket_, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) == 0 ? 0
                                                                                            : errno;
   }
-  /// Whether a datagram to itself comes back.
+  /// True if a datagram sent to itself comes back.
   [[nodiscard]] bool hears_itself() {
     socklen_t size = sizeof place_;
     if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&place_), &size) != 0) return false;
@@ -106,7 +106,7 @@ Found network(const std::string& host) {
   return {"network", State::kGood, fmt::format("datagrams arrive on {}", host), ""};
 }
 
-/// Whether a trammel server of this host holds the port: its name in the abstract namespace.
+/// True if a trammel server of this host holds the port: its name in the abstract namespace.
 bool held_by_server(const std::string& host, std::uint16_t port) {
   std::ifstream sockets("/proc/net/unix");
   const std::string wanted = fmt::format("@trammel-dds-{}-{}", host, port);
@@ -214,7 +214,7 @@ Found leftovers(const std::vector<fs::path>& folders) {
           fmt::format("delete them: rm {}", fmt::join(left, " "))};
 }
 
-/// What a change that a server of this record has acknowledged is safe from.
+/// Says which failures an acknowledged change survives with this record.
 void look_at_record(const std::string& url, std::vector<Found>& found) {
   const auto store = Store::open(url);
   const RecordState record = store ? (*store)->record() : RecordState();

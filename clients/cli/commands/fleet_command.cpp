@@ -31,7 +31,7 @@ Result<ordered_json> fleet_of_files(const std::vector<std::string>& paths) {
   return fleet_json(cells);
 }
 
-/// Of every server; their bytes come from outside.
+/// The answers of every server; their bytes come from outside.
 Result<ordered_json> fleet_of_service(const FleetArguments& arguments) {
   const auto session = TRY(open_session(arguments.service));
   const auto texts = TRY(session->fleet());

@@ -34,7 +34,7 @@ const std::map<std::string, BehindCoordinates> kBehind = {
     {"fixed-xyz", BehindCoordinates::kFixedXyz},
     {"euler-zyx", BehindCoordinates::kEulerZyx}};
 
-/// What an option says; nothing when it was not given.
+/// The value of an option; nothing when it was not given.
 template <typename T>
 std::optional<T> said(const std::map<std::string, T>& words, const std::string& word) {
   const auto at = words.find(word);

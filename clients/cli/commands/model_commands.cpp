@@ -79,8 +79,8 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
                         causes_in_words(refit)));
 }
 
-/// What robots of the cell's type have in common, by the models of `paths`; empty where nobody
-/// wants to know.
+/// The parameters that robots of the cell's type share, by the models of `paths`; empty where no
+/// paths are given.
 Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths,
                                               const Cell& cell) {
   const CellRules rules = TRY(rules_of(cell));
@@ -120,7 +120,7 @@ nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
   return json;
 }
 
-/// What began in the middle of the batch, beside all that the model has.
+/// A change that began in the middle of the batch, beside all that the model has.
 std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatch& batch) {
   auto cell = std::make_shared<Cell>(*model.parts().physics.cell);
   cell->model.error_sources.clear();

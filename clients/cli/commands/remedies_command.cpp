@@ -62,7 +62,7 @@ nlohmann::ordered_json poses_json(const JointList& list) {
   return {{"columns", std::move(columns)}, {"poses", std::move(poses)}};
 }
 
-/// How to see afterwards whether it helped.
+/// Tells how to see afterwards whether it helped.
 std::string proof_text(const RemediesArguments& arguments) {
   return fmt::format(
       "afterwards: measure the poses of {}, then trammel diagnose --cell CELL --batch AFTER "

@@ -28,7 +28,7 @@ struct ReplayArguments {
   ServiceOptions service;
 };
 
-/// How an item is answered now, beside then.
+/// The difference between an item's answer now and then.
 struct Different {
   double by_mm =
       0;  ///< infinite where one has a number or a pose to command and the other has none
@@ -36,7 +36,7 @@ struct Different {
   std::string what;
 };
 
-/// What came of all of them.
+/// The results of all replayed items.
 struct Replayed {
   std::size_t requests = 0, items = 0, different = 0;
   double largest_mm = 0;
@@ -57,7 +57,7 @@ bool has_command(const client::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
 }
 
-/// What neither knows does not differ.
+/// The difference of two numbers; none where both are unknown.
 double apart(double a, double b) {
   if (std::isfinite(a) && std::isfinite(b)) return std::abs(a - b);
   return std::isfinite(a) == std::isfinite(b) ? 0 : INFINITY;

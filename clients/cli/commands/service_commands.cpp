@@ -42,7 +42,7 @@ Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
-/// What a user of a version should know; 0: of the one in force. Nothing where the service does not
+/// Notes for users of a version; 0: of the version in force. Nothing where the service does not
 /// say.
 Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell,
                                            int version) {
@@ -54,7 +54,7 @@ Result<std::vector<Note>> notes_of_version(client::Session& session, const std::
   return asked == models.end() ? std::vector<Note>() : asked->notes;
 }
 
-/// What a user of the model should know that the job put in force.
+/// Notes for users of the model that the job put in force.
 Result<std::vector<Note>> notes_of_made(client::Session& session, const client::JobStatus& job) {
   if (!put_in_force(job)) return std::vector<Note>();
   return notes_of_version(session, job.cell, job.model_version);
@@ -265,8 +265,8 @@ Status cancel(client::Session& session, const ServiceArguments& arguments) {
   return write_json(arguments.json, {{"job", arguments.job}, {"is", "cancelled"}});
 }
 
-/// What the service says of what is in force in the cell, with the figures it was judged by; null
-/// where it does not.
+/// The model in force in the cell, as the service tells it, with the figures it was judged by; null
+/// where it tells none.
 ordered_json in_force_at(client::Session& session, const std::string& cell) {
   const auto cells = health_at(session, cell, 1);
   if (!cells) return nullptr;
@@ -307,7 +307,7 @@ Status rollback(client::Session& session, const ServiceArguments& arguments) {
   return now_in_force(session, cell, version, arguments);
 }
 
-/// What a stored version is, as train tells of a new one.
+/// Shows a stored version as train shows a new one.
 Status show_model(client::Session& session, const ServiceArguments& arguments) {
   const ModelReference asked = TRY(parse_model_reference(arguments.model));
   const auto text = TRY(session.export_model(asked.cell, asked.version));
@@ -318,7 +318,7 @@ Status show_model(client::Session& session, const ServiceArguments& arguments) {
   return write_json(arguments.json, model_json(model));
 }
 
-/// What a user of a model should know that a service hands out or has taken; nothing of one that
+/// Notes for users of a model that a service hands out or has taken; nothing for a model that
 /// only the service reads.
 std::vector<Note> notes_of_file(const std::string& text) {
   const auto model = deserialize(text, "the model");
@@ -388,7 +388,7 @@ void add_any_cell(CLI::App& command, ServiceArguments& arguments) {
                      "Cell id, or a cell file (.yaml) that names it; left out: all cells");
 }
 
-/// What a person who decides says besides.
+/// Adds the options with which a person explains a decision.
 void add_decision(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--reason", arguments.reason, "Why, for the audit trail");
   command
@@ -406,7 +406,7 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
       ->capture_default_str();
 }
 
-/// What a job that runs may be asked.
+/// Adds the commands for running jobs.
 void add_running_jobs(ServiceCommands& commands) {
   commands.add("watch", "Follow a training or a diagnosis until it is done, and say how it ended",
                watch, [](CLI::App& command, ServiceArguments& arguments) {
@@ -427,7 +427,7 @@ void add_running_jobs(ServiceCommands& commands) {
       });
 }
 
-/// What is in force, what may be learned from, and models as files.
+/// Adds the commands for what is in force, for what may be learned from, and for model files.
 void add_model_changes(ServiceCommands& commands) {
   commands.add("activate", "Put a stored version of a cell's model in force", activate,
                [](CLI::App& command, ServiceArguments& arguments) {

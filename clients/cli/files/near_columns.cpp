@@ -26,7 +26,7 @@ std::vector<std::string> optional_columns(TableKind kind) {
   return names;
 }
 
-/// Whether one letter was inserted, left out or changed, or two neighbours are swapped.
+/// True if one letter was inserted, left out or changed, or two neighbours are swapped.
 bool differ_by_one(std::string_view a, std::string_view b) {
   while (!a.empty() && !b.empty() && a.front() == b.front()) a.remove_prefix(1), b.remove_prefix(1);
   while (!a.empty() && !b.empty() && a.back() == b.back()) a.remove_suffix(1), b.remove_suffix(1);

@@ -291,7 +291,7 @@ Status check_pulses(const ProgramFiles& files, const std::vector<double>& pulses
   return {};
 }
 
-/// What an ABB backup says of its robot.
+/// The robots that an ABB backup names.
 Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
   std::vector<cam::ControllerRobot> robots;
   for (const cam::SourceFile& parameters : files.parameters) {

@@ -90,7 +90,7 @@ Result<RecordedCall> parse_record(const json& record) {
   }
 }
 
-/// What was read so far.
+/// The state of the reading so far.
 struct ReadSoFar {
   std::size_t requests = 0;
   DamagedLines damaged;

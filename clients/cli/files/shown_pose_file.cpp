@@ -17,7 +17,7 @@ namespace {
 
 Matrix3 turn(int axis, double angle) { return rotation_exp(angle * Vector3::Unit(axis)); }
 
-/// What three angles may mean, by the makers that show them so.
+/// A meaning of three angles, by the makers that show them so.
 struct Meaning {
   const char* text;
   Matrix3 (*rotation)(const Vector3& angles);

@@ -37,7 +37,7 @@ ordered_json pose_json(const client::PoseMm& pose) {
           {"qx", pose.qx},     {"qy", pose.qy},     {"qz", pose.qz}};
 }
 
-/// Whether there is a pose to command. If not, no numbers are written: a program could take them
+/// True if there is a pose to command. If not, no numbers are written: a program could take them
 /// for a command.
 bool has_command(const client::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
@@ -227,7 +227,7 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
 
 namespace {
 
-/// Of corrections_csv() without the columns of the target file.
+/// The columns of corrections_csv() without those of the target file.
 std::vector<std::string> correction_columns(const Corrections& corrections) {
   std::vector<std::string> columns = {"row", "status", "x_mm", "y_mm", "z_mm",
                                       "qw",  "qx",     "qy",   "qz"};

@@ -34,7 +34,7 @@ Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
   });
 }
 
-/// What a service found, read and told; its bytes come from outside.
+/// The findings of a service, read and told; its bytes come from outside.
 struct Findings {
   ordered_json json;
   std::string text;

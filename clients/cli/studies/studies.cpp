@@ -79,7 +79,7 @@ class Laboratory {
   std::uint64_t seed_of(std::uint64_t draw, std::uint64_t part) const {
     return 64 * options_.seed + 2 * draw + part;
   }
-  /// Of the next step of work.
+  /// The options of the next step of work.
   TrainOptions options(const std::string& stage) {
     TrainOptions train_options;
     train_options.seed = options_.seed;
@@ -105,7 +105,7 @@ void add_calibrated(const std::string& level, const CompensatedModel& model, con
                         .figures = figures_of(error.residual_B.transpose())});
 }
 
-/// What is left where the bias is applied at every pose, in domain or not. 3 x N, m.
+/// The error left where the bias is applied at every pose, in domain or not. 3 x N, m.
 Eigen::Matrix3Xd left_by_bias(const CompensatedModel& model, const MeasurementBatch& batch) {
   const BiasProblem error = leftover(model.parts().physics, batch);
   if (!model.bias()) return error.residual_B.transpose();  // none helped
@@ -183,7 +183,7 @@ Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& stud
   return {};
 }
 
-/// How the learned bias converges with the poses it learns from.
+/// Runs the study of how the learned bias converges with the poses it learns from.
 Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>& levels,
                           Study& study) {
   const RangesDeg& ranges = kBiasStudies.back().ranges;
@@ -204,7 +204,7 @@ Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>
   return {};
 }
 
-/// How the complete physical model converges with the poses it is identified from.
+/// Runs the study of how the complete physical model converges with the poses of identification.
 Status run_calibration_sizes(Laboratory& laboratory, const std::string& level, Study& study) {
   const auto validation = TRY(laboratory.measure(kCalibrationRanges, kValidationPoses,
                                                  kFullRangeValidationDraw, "validation"));
@@ -230,7 +230,7 @@ Result<InverseResult> nominal_joints(const Cell& cell, const Pose& X_FT, const T
   return inverse_kinematics(cell.robot, X_BF, *target.seed);
 }
 
-/// The same for every hole, in the file's order.
+/// The nominal joints of every hole, in the file's order.
 Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT,
                                        const std::vector<TargetRow>& holes) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(holes.size()), cell.robot.size());

@@ -139,7 +139,7 @@ class HelpFormat : public CLI::Formatter {
   }
 };
 
-/// How many columns a text takes: bytes that continue a character count nothing.
+/// The number of columns that a text takes: bytes that continue a character count nothing.
 std::size_t columns(const std::string& text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));

@@ -20,21 +20,21 @@ namespace fs = std::filesystem;
 
 bool is_standard_output(const std::string& path) { return path == "-" || path == "/dev/stdout"; }
 
-/// Whether writing one would change the other. Devices do not count: nothing is read back from
+/// True if writing one file would change the other. Devices do not count: nothing is read back from
 /// them.
 bool same_file(const std::string& a, const std::string& b) {
   if (is_standard_output(a) || is_standard_output(b))
     return is_standard_output(a) && is_standard_output(b);
   std::error_code error;
   if (fs::is_character_file(a, error)) return false;
-  // Of what is not there yet `p` and `./p` are the same as absolute paths only.
+  // Names of a file that does not exist yet, `p` and `./p`, are the same only as absolute paths.
   const auto place = [&](const std::string& path) {
     return fs::weakly_canonical(fs::absolute(path, error), error);
   };
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
-/// Whether this process has written a result to standard output. A second one after it would not be
+/// True if this process has written a result to standard output. A second one after it would not be
 /// valid JSON.
 bool& standard_output_is_taken() {
   static bool taken = false;
@@ -82,7 +82,7 @@ Status write_json(const std::string& path, const nlohmann::ordered_json& value) 
 }
 
 std::string json_text(const nlohmann::ordered_json& value) {
-  // What JSON leaves as it is may still control a terminal; its escapes are JSON's own.
+  // Characters that JSON leaves alone may still control a terminal; its escapes are JSON's own.
   return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) +
          "\n";
 }

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::array<std::string_view, 11> kOutputs = {
     "--output", "--report", "--receipt",  "--residuals", "--next-poses", "--rapid",
     "--krl",    "--fanuc",  "--urscript", "--frames",    "--json"};
-/// What a command may write over by design, or judges by itself.
+/// The options whose files a command may write over by design, or judges by itself.
 constexpr std::array<std::string_view, 2> kJudgedElsewhere = {"--cell-out", "--store"};
 
 template <typename Names>
@@ -119,7 +119,7 @@ bool same_folder(const fs::path& a, const fs::path& b) {
   return place(a) == place(b);  // with a slash behind it or not
 }
 
-/// Whether the output is, or lies in, a folder that the command makes.
+/// True if the output is, or lies in, a folder that the command makes.
 bool comes_into(const std::string& made, const std::string& path) {
   if (made.empty()) return false;
   std::error_code error;

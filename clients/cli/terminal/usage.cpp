@@ -78,8 +78,8 @@ bool is_option(const std::string& word) {
   return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
 }
 
-/// What kind of file each option takes, by its ending, and the keys that stand at the top of this
-/// kind alone.
+/// The kind of file that each option takes, by its ending, and the keys that stand at the top of
+/// this kind alone.
 struct FileKind {
   const char* option;  ///< nullptr: none takes it
   std::array<const char*, 4> endings;
@@ -160,7 +160,7 @@ std::string of_missing_file(const std::string& file, const CLI::App& command) {
                      fs::current_path(error).string());
 }
 
-/// What the option takes that named this file, where its ending is that of another kind; else
+/// The kind of file that the option takes, where `file` has the ending of another kind; else
 /// empty.
 std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
   std::error_code ignored;
@@ -175,8 +175,8 @@ std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
                      right->option);
 }
 
-/// What the option takes that named this file, where keys that are wrong are those of one other
-/// kind; else empty.
+/// The kind of file that the option takes, where the wrong keys are those of one other kind;
+/// else empty.
 std::string of_other_keys(const Error& error, const CLI::Option& option) {
   const FileKind* taken = kind_taken_by(option);
   std::set<const FileKind*> kinds;
@@ -257,7 +257,7 @@ bool is_number(const std::string& word) {
   return !word.empty() && end == word.c_str() + word.size();
 }
 
-/// What is wrong with a word that stands where `option` takes a number; empty where it is one.
+/// Says what is wrong with a word where `option` takes a number; empty where it is one.
 std::string no_number(const CLI::App& app, const std::string& command, const std::string& option,
                       const std::string& word) {
   const CLI::App* of = command_of(app, command);

@@ -68,7 +68,7 @@ std::string p_text(const ordered_json& value) {
   return p <= kLeastPValue ? "< 1e-6" : fmt::format("{:.2g}", p);
 }
 
-/// What the finding is called, `single bad pose, pose p28` or, in doubt, something less.
+/// The name of the finding, `single bad pose, pose p28` or, in doubt, something less.
 std::string name_of(const ordered_json& finding) {
   return called(cause_of(finding), !finding.at("could_also_be").empty());
 }
@@ -153,7 +153,7 @@ std::string suspects_text(const ordered_json& suspects) {
   return text;
 }
 
-/// What is said of a cause, and of which others or joints.
+/// A sentence about a cause, and the other causes or joints that it concerns.
 struct Saying {
   std::string what, of;
 };
@@ -193,7 +193,7 @@ std::string unseen_lines(const ordered_json& unseen) {
   return text;
 }
 
-/// What a cause would need to show, empty where nothing is said.
+/// Says what a cause would need to show; empty where nothing is said.
 std::string need_of(const ordered_json& unseen, const std::string& name) {
   for (const ordered_json& one : unseen) {
     const std::string joint =
@@ -203,7 +203,7 @@ std::string need_of(const ordered_json& unseen, const std::string& name) {
   return "";
 }
 
-/// Whether nothing at all of the cause shows, which is said elsewhere.
+/// True if nothing at all of the cause shows, which is said elsewhere.
 bool is_never_shown(const ordered_json& unseen, const std::string& name) {
   return std::any_of(unseen.begin(), unseen.end(), [&](const ordered_json& one) {
     const std::string joint =
@@ -257,7 +257,7 @@ std::string next_poses_text(const ordered_json& diagnosis) {
   return text;
 }
 
-/// What is left of a pose, as one length: it stands beside the other errors.
+/// The residual of a pose as one length: it stands beside the other errors.
 std::string noise_line(const ordered_json& diagnosis) {
   const double noise = diagnosis.at("noise_mm"), root = std::sqrt(3.0);
   return fmt::format(

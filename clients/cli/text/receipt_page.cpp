@@ -128,7 +128,7 @@ ordered_json points(const CorrectedProgram& program) {
   std::stable_sort(path.begin(), path.end(),
                    [](const ReceiptRow* a, const ReceiptRow* b) { return a->order < b->order; });
   ordered_json all = ordered_json::array();
-  // Of a long program those that went wrong, and so many of the others that their path still reads.
+  // A long program shows the targets that went wrong, and so many others that its path still reads.
   const std::size_t step = path.size() / kMostPoints + 1;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const ReceiptRow& row = *path[i];

@@ -131,7 +131,7 @@ std::string parameter_head() {
   return text + "\n";
 }
 
-/// What a level identified, in brackets where only a combination of it and others is known.
+/// The parameters that a level identified, in brackets where only a combination is known.
 std::string identified_text(const StudyParameter& parameter, const char* level, double factor) {
   const auto found = parameter.identified.find(level);
   if (found == parameter.identified.end()) return "-";

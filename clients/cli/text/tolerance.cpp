@@ -26,7 +26,7 @@ double inside(double r, double mean, double stddev) {
                            stddev / (mean * std::sqrt(2 * kPi)) * tail);
 }
 
-/// Of an error with this rms.
+/// The share of errors with this rms that lie inside the tolerance.
 double share_inside(double tolerance, double rms, double sigma) {
   const double mean = std::sqrt(std::max(0.0, rms * rms - 3 * sigma * sigma));
   return inside(tolerance, mean, sigma);

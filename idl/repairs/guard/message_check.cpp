@@ -214,7 +214,7 @@ bool MessageCheck::is_unproven(std::uint32_t writer) const {
          (writer == kAnnouncer || writer == kPublications || writer == kSubscriptions);
 }
 
-/// Whether it speaks for an endpoint whose words are all proven, and proves nothing: anybody could
+/// True if it speaks for an endpoint whose words are all proven, and proves nothing: anybody could
 /// have sent it, to make a reader skip what it has not read.
 bool MessageCheck::lacks_proof(const Submessage& submessage) const {
   if (!received_.secured || signed_) return false;

@@ -115,7 +115,7 @@ class CompositeKernel : public Kernel {
   using ConstTable = Eigen::Ref<const Eigen::ArrayXXd, 0, Eigen::OuterStride<>>;
 
  private:
-  // How many log amplitudes stand before the parameters of a part: 0 or 1.
+  // The number of log amplitudes before the parameters of a part: 0 or 1.
   virtual Index amplitudes(std::size_t part) const = 0;
   // `total` before any part, and with one more part.
   virtual double neutral() const = 0;

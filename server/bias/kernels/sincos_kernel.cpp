@@ -24,7 +24,7 @@ class SincosKernel : public Kernel {
   Index parameter_count(Index joints) const override { return inner_->parameter_count(joints); }
   Index feature_count(Index joints) const override { return inner_->feature_count(2 * joints); }
 
-  // Of cosine and sine of a joint the one that spreads more decides.
+  // The larger spread of a joint's cosine and sine decides.
   SearchBox search_box(const MatrixXd& q) const override {
     const SearchBox both = inner_->search_box(sincos(q));
     SearchBox box{VectorXd::Constant(parameter_count(q.cols()), -HUGE_VAL),

@@ -138,7 +138,7 @@ class FlangeOutputs final : public BiasOutputs {
     return features;
   }
 
-  /// What each joint vector adds to the mean of each number of the twist.
+  /// Weighs what each joint vector adds to the mean of each number of the twist.
   void weigh(const VectorXd& alpha) {
     const Index count = views_.q.rows();
     weights_ = AlignedMatrix(padded_rows(count), 6);
@@ -167,7 +167,7 @@ class FlangeOutputs final : public BiasOutputs {
     return twist;
   }
 
-  /// Of the three coordinates of each target (rows of `q`) with all numbers: size x 3 M.
+  /// Covariance of the three coordinates of each target (rows of `q`) with all numbers: size x 3 M.
   MatrixXd cross_covariance(const MatrixXd& q, const std::vector<BiasFeatures>& features,
                             Index first) const {
     const Index count = views_.q.rows();

@@ -29,7 +29,7 @@ VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
   return wanted == VarianceForm::kLearned ? VarianceForm::kCompressed : wanted;
 }
 
-/// What stands at one joint vector belongs to one expert, so that it is left out together.
+/// Groups of the rows at one joint vector, which belong to one expert to be left out together.
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters,
                                                const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());

@@ -29,7 +29,7 @@ constexpr Index kFinerPoints =
     400;  // at least, to look for finer length scales: fewer cannot show them
 constexpr Index kAroundPoints =
     2000;  // at most, to look around on: each try costs as much as a start
-// How many optima are kept.
+// The number of optima that are kept.
 constexpr std::size_t kCarried = 5;  // from the first searches: each is carried at full cost
 constexpr std::size_t kRivals = 3;   // of one output before the last stage
 // In natural logarithms.

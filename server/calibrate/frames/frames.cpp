@@ -35,7 +35,7 @@ std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, con
 
 namespace {
 
-/// What was measured of one tool, and where the nominal flange was.
+/// The measured poses of one tool, and where the nominal flange was.
 struct ToolPoses {
   std::vector<Vector3> points_W;
   std::vector<Pose> X_BF;
@@ -45,7 +45,7 @@ struct ToolPoses {
     return Eigen::Map<const Eigen::Matrix3Xd>(points_W.front().data(), 3,
                                               static_cast<Eigen::Index>(points_W.size()));
   }
-  /// Whether orientations are used: three at least, and of half the poses.
+  /// True if orientations are used: three at least, and of half the poses.
   [[nodiscard]] bool full() const {
     return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points_W.size();
   }

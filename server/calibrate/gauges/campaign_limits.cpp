@@ -17,7 +17,7 @@ namespace {
 constexpr double kSameMotion = 1e-6;   // m: singular values of a metre's arm
 constexpr double kShortStroke = 0.05;  // of the length
 
-/// What a known anchor holds of a motion of everything [shift; turn] in W: one row an equation.
+/// The equations by which a known anchor holds a motion of all [shift; turn] in W, one a row.
 Eigen::MatrixXd held_by(const Anchor& anchor) {
   Eigen::Matrix<double, 3, 6> motion;  // of the anchor's point
   motion << Matrix3::Identity(), -skew(*anchor.p_W);
@@ -97,7 +97,7 @@ void add_untold_base(const MeasurementBatch& batch, CalibrationResult& found) {
   found.unidentifiable.insert(found.unidentifiable.begin(), std::move(base));
 }
 
-/// How well the lengths of all links together are known, as a share of themselves; nothing where
+/// Standard deviation of the length of all links together, as a share of itself; nothing where
 /// the model has none.
 std::optional<double> stddev_of_size(const CalibrationResult& found) {
   const Chain& robot = found.model.cell->robot;

@@ -22,7 +22,7 @@ constexpr double kLeastBeside =
 constexpr int kRefinements = 50;
 constexpr double kLastStep = 1e-9;  // m
 
-/// What was measured to one anchor.
+/// The lengths measured to one anchor.
 struct Lengths {
   std::vector<Vector3> points_W;
   std::vector<double> lengths;  ///< m, from the anchor's point
@@ -44,7 +44,7 @@ std::map<std::string, Lengths> lengths_of(const PhysicalModel& model,
   return all;
 }
 
-/// How the points spread: their mean, and singular vectors and rms along them, largest first.
+/// The spread of the points: their mean, and singular vectors and rms along them, largest first.
 struct Spread {
   Vector3 mean = Vector3::Zero();
   Matrix3 axes = Matrix3::Identity();
@@ -138,7 +138,7 @@ Vector3 place_of(const Lengths& of, const Spread& spread) {
 /// m: a touch of that little from the middle of what is touched is a touch of the point itself.
 constexpr double kAtThePoint = 1e-3;
 
-/// Whether the tool's point stands at one and the same anchor in all rows, wherever that is.
+/// True if the tool's point stands at one and the same anchor in all rows, wherever that is.
 bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batch) {
   return !batch.measurements.empty() &&
          std::all_of(
@@ -152,7 +152,7 @@ bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batc
              });
 }
 
-/// What tells an unknown tool in place of gauges.
+/// Says what tells an unknown tool in place of gauges.
 std::string way_to_the_tool(const PhysicalModel& model, const MeasurementBatch& batch) {
   constexpr const char* kHow =
       "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and "

@@ -26,7 +26,7 @@ constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step lea
 constexpr double kMostDamping = 1e9;
 constexpr double kNoDamping = 1e-6;
 
-// Of numbers of which the poses show the product alone, damped steps follow a bent valley for a
+// Where the poses show only the product of numbers, damped steps follow a bent valley for a
 // hundred steps, and all that falls is how well the priors like it.
 constexpr double kIdleFall = 0.05;  // nat a step
 constexpr double kFirstIdleShare =

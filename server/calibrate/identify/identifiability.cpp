@@ -55,7 +55,7 @@ UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd&
   }
   const std::string names = joined(combination.parameters);
   if (combination.parameters.size() > 1) {
-    // Of an anchor or a zero of an instrument, `ax[a1]`, `zero[a1]`: they move no tool.
+    // Parameters of an anchor or of a zero of an instrument, `ax[a1]`, `zero[a1]`, move no tool.
     const bool instruments = std::any_of(
         combination.parameters.begin(), combination.parameters.end(), [](const std::string& name) {
           return name.starts_with("zero[") || (name.size() > 3 && name[0] == 'a' && name[2] == '[');

@@ -32,12 +32,12 @@ Eigen::MatrixXd root_of_posterior(const Eigen::MatrixXd& information) {
       .value_or(Eigen::MatrixXd::Identity(P, P));
 }
 
-/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1.
+/// The number of parameters that the data, not the priors, decide: the trace of N (N + 1)^-1.
 double freedom_of(const Eigen::MatrixXd& information) {
   return static_cast<double>(information.rows()) - root_of_posterior(information).squaredNorm();
 }
 
-/// How many of them measurements with the information `part` of it decide.
+/// The number of them that measurements with the information `part` of it decide.
 double freedom_of(const Eigen::MatrixXd& part, const Eigen::MatrixXd& information) {
   const Eigen::MatrixXd root = root_of_posterior(information);
   return (root * part).cwiseProduct(root).sum();
@@ -79,7 +79,7 @@ Status check_positions_belong(const MeasurementBatch& batch, double rms) {
           "position");
 }
 
-/// The same of gauges.
+/// Checks the same for gauges.
 Status check_gauges_belong(const MeasurementBatch& batch, double rms) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Measurement& m : batch.measurements) {
@@ -110,8 +110,8 @@ Status check_belongs(const MeasurementBatch& batch, const Residuals& r) {
                                 rms_of_most(r.position.colwise().squaredNorm().transpose()));
 }
 
-/// How well the directions are seen: their number, and the least and geometric mean of their
-/// singular values.
+/// Adds the observability of the directions: their number, and the least and geometric mean of
+/// their singular values.
 void add_observability(const Information& seen, std::size_t poses, CalibrationResult& result) {
   double least = std::numeric_limits<double>::infinity();
   double log_sum = 0;
@@ -177,14 +177,14 @@ void take_over_sessions(const MeasurementBatch& given, Identified& now, Measurem
   batch = moved(given, now.sessions, tracker.sigma, tracker.sigma_rotation);
 }
 
-/// How many numbers the sessions took from the data.
+/// The number of parameters that the sessions took from the data.
 double freedom_of_sessions(const CalibrationProblem& problem) {
   if (!has_sessions(problem.batch)) return 0;
   return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
-/// What the means of the positions at one joint vector tell of the parameters, each mean as sure as
-/// one of them.
+/// The information about the parameters in the mean positions at one joint vector, each mean as
+/// sure as one of them.
 Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const ScaledParameters& s,
                                      const Weights& weights, const Residuals& r,
                                      const Eigen::VectorXd& x) {
@@ -204,7 +204,7 @@ Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const Sc
   return sum;
 }
 
-/// How many parameters were fitted to either kind at the minimum under `weights`. Few parameters
+/// The number of parameters fitted to either kind at the minimum under `weights`. Few parameters
 /// beside many equations, and several sessions, are shared out by number; else positions may have
 /// decided most of them, and are fitted much closer than orientations.
 Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
@@ -225,7 +225,7 @@ Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, con
   return {all - decided, decided};
 }
 
-/// How many parameters were fitted to the means of the positions at one joint vector.
+/// The number of parameters fitted to the means of the positions at one joint vector.
 double fitted_to_means(const CalibrationProblem& problem, const ScaledParameters& s,
                        const Identified& now) {
   const Eigen::MatrixXd means =

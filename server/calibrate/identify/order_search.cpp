@@ -82,8 +82,8 @@ PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>
   return less;
 }
 
-/// What a joint does to what was measured: weighted residual along its column, and weighted square
-/// of the column.
+/// The effect of a joint on the measurements: weighted residual along its column, and weighted
+/// square of the column.
 struct AlongJoint {
   double q = 0, along = 0, square = 0;
 };
@@ -105,8 +105,8 @@ AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joi
           column.squaredNorm() / variance};
 }
 
-/// Of a gauge that is told against another pose, as if the joint did nothing there: enough to find
-/// an order.
+/// The effect on a gauge told against another pose, as if the joint did nothing there: enough to
+/// find an order.
 AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint, double residual,
                     double variance) {
   const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);

@@ -141,7 +141,7 @@ double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Inde
          1.5 * (std::log(2 * kPi * of_sum) + (seen.count - 1) * std::log(2 * kPi * own));
 }
 
-/// Of so many axes, the part that no parameter was fitted to.
+/// The share of so many axes that no parameter was fitted to.
 double share_left(double freedom, double axes) {
   return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0;
 }

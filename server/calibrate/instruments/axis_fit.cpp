@@ -209,7 +209,7 @@ Disagreement disagreement(const AxisFit& fit, const JointArcs& group, int sense)
   return found;
 }
 
-/// The same circles about the opposite direction.
+/// The fit of the same circles about the opposite direction.
 AxisFit reversed(const AxisFit& fit) {
   AxisFit turned = fit;
   turned.n = -fit.n;

@@ -167,7 +167,7 @@ void describe_circles(const JointArcs& group, const AxisFit& fit, double varianc
   }
 }
 
-/// The same robot with other links.
+/// The robot with other links.
 Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& links) {
   std::vector<Joint> joints;
   for (int i = 0; i < robot.size(); ++i) {

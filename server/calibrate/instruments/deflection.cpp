@@ -51,7 +51,7 @@ Eigen::Vector2d along(const DeflectionElement& element) {
 /// outward.
 Eigen::Vector2d swung(const Eigen::Vector2d& r) { return {r.y(), -r.x()}; }
 
-/// Which columns the linear model has; where each element's begin.
+/// The columns of the linear model; where each element's begin.
 struct Layout {
   struct Columns {
     int compliance = 0, flexibility = -1, offset = 0, load_bias = -1;
@@ -372,7 +372,7 @@ struct BothModels {
   }
 };
 
-/// Whether the foot of the element moves with the load, where nobody asked for a load bias.
+/// Judges whether the foot of the element moves with the load, where nobody asked for a load bias.
 void judge_load_bias(const BothModels& models, ElementResult& element) {
   if (!models.beams.contains(element.element) || models.load_biases.contains(element.element))
     return;

@@ -62,7 +62,7 @@ Result<std::optional<double>> read_sigma(const CsvTable& table, std::size_t row,
   return from_mm(number);
 }
 
-/// Whether the row is one of validation; empty where nothing says it.
+/// True if the row is one of validation; empty where nothing says it.
 Result<std::optional<bool>> read_set(const CsvTable& table, std::size_t row,
                                      std::optional<std::size_t> column) {
   if (!column || table.field(row, *column).empty()) return std::nullopt;

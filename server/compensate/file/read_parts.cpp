@@ -301,7 +301,7 @@ Status read_bias(const Json& content, const std::string& where, ModelParts& part
   return {};
 }
 
-/// Whether the cause is a function of the angle of a joint that a coupling concerns, or turns it.
+/// True if the cause is a function of the angle of a joint that a coupling concerns, or turns it.
 bool is_of_coupled_joint(const ErrorSource& source, const Chain& robot) {
   const CauseRecord& cause = source.cause();
   const bool turns =
@@ -314,7 +314,7 @@ bool is_of_coupled_joint(const ErrorSource& source, const Chain& robot) {
                      });
 }
 
-/// What a model has of coupled joints, as its file spells it; empty where it has nothing.
+/// The learned causes of coupled joints, as the file spells them; empty where there are none.
 std::string learned_of_coupled_joints(const ModelParts& parts) {
   const Chain& robot = parts.physics.cell->robot;
   const auto of_coupled = [&](const ErrorSourcePtr& source) {

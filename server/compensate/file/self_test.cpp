@@ -101,7 +101,7 @@ Difference worst_of(const ErrorPrediction& now, const Json& stated) {
                            });
 }
 
-/// Whether the numbers are lengths of this world.
+/// True if the numbers are lengths of this world.
 bool possible(const ErrorPrediction& prediction) {
   const double most = prediction.X_BT_predicted.matrix().norm() + prediction.error_B.norm() +
                       prediction.stddev_B.norm();

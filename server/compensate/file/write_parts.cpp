@@ -185,7 +185,7 @@ Json json_of(const ModelProvenance& provenance) {
   return json;
 }
 
-/// What the calibration found.
+/// Adds the findings of the calibration.
 void add_calibration(const ModelParts& parts, Json& content) {
   content["covariance"] = matrix_json(parts.covariance);
   content["parameters"] = list_of(parts.parameters);

@@ -82,7 +82,7 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   return columns;
 }
 
-/// Whether the row has anything in one of these columns.
+/// True if the row has anything in one of these columns.
 bool says(const CsvTable& table, std::size_t row, const std::vector<std::size_t>& columns) {
   return std::any_of(columns.begin(), columns.end(),
                      [&](std::size_t column) { return !table.field(row, column).empty(); });
@@ -144,7 +144,7 @@ Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& co
   return {};
 }
 
-/// What was measured: a gauge, or a position.
+/// Reads what was measured: a gauge, or a position.
 Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns,
                      Measurement& measurement) {
   const bool gauged = says(table, row, columns.distance) || says(table, row, columns.touch);

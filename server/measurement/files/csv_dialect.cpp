@@ -43,7 +43,7 @@ Record first_record(std::string_view text) {
   return {text, {}};
 }
 
-/// Whether the tab at `at` only pads another separator.
+/// True if the tab at `at` only pads another separator.
 bool is_padding(std::string_view record, std::size_t at) {
   const auto before = at == 0 ? std::string_view::npos : record.find_last_not_of(" \t", at - 1);
   const auto after = record.find_first_not_of(" \t\r", at);

@@ -27,7 +27,7 @@ constexpr const char* kTwoCommas =
 constexpr const char* kThousands =
     "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
 
-/// Whether the values of a row may stand in a table.
+/// Checks that the values of a row may stand in a table.
 Status check_values(const CsvTable::Row& row, const std::string& where) {
   if (row.fields.size() > CsvTable::kMostColumns)
     return failure(ErrorCode::kTooLarge, "more than {} values in one row", CsvTable::kMostColumns)
@@ -149,7 +149,7 @@ bool says_nothing(const CsvTable::Row& row) {
                      [](const std::string& field) { return field.empty(); });
 }
 
-/// Whether most of the row's values are numbers with a point, as measured ones are.
+/// True if most of the row's values are numbers with a point, as measured ones are.
 bool is_numbers(const CsvTable::Row& row) {
   const auto numbers =
       std::count_if(row.fields.begin(), row.fields.end(), [](const std::string& field) {

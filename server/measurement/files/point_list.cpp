@@ -32,7 +32,7 @@ std::string last_component(const std::string& name) {
   return at == std::string::npos ? name : name.substr(at + 2);
 }
 
-/// Of a moment as programs write it, taken for UTC; nothing where it may be read in two ways.
+/// The Unix time of a moment as programs write it, taken for UTC; nothing if it is ambiguous.
 std::optional<double> unix_time_of(const std::string& text) {
   if (is_number(text)) return std::stod(text);
   static const std::regex kYearFirst(
@@ -110,7 +110,7 @@ class PointReader {
   }
 
  private:
-  /// What the software of trackers writes beside coordinates.
+  /// Finds the columns that the software of trackers writes beside coordinates.
   [[nodiscard]] Status find_beside() {
     auto quaternion = TRY(table_.all_or_none({"qw", "qx", "qy", "qz"}));
     auto axes = TRY(table_.all_or_none({kU95Axes.begin(), kU95Axes.end()}));

@@ -45,7 +45,7 @@ double counted_rms(std::vector<double> all, std::size_t* count) {
   return std::sqrt(sum / static_cast<double>(n));
 }
 
-/// What of an arm is free: base, tool points, then the arm's deviations.
+/// The free numbers of an arm: base, tool points, then the arm's deviations.
 class Layout {
  public:
   Layout(const NumberTable& table, const Cell& cell, ToolPoints points) : robot_(cell.robot) {
@@ -80,7 +80,7 @@ class Layout {
   [[nodiscard]] int arm_at() const { return kBaseParameters + 3 * static_cast<int>(tools_.size()); }
   [[nodiscard]] int arm_size() const { return static_cast<int>(stddev_.size()); }
   [[nodiscard]] int size() const { return arm_at() + arm_size(); }
-  /// Of the arm's deviations; 0: it has none of this kind.
+  /// The prior deviations of the arm's numbers; 0: it has none of this kind.
   [[nodiscard]] const Eigen::VectorXd& stddev() const { return stddev_; }
 
  private:
@@ -189,7 +189,7 @@ class Fitting {
     return best;
   }
 
-  /// How well it fits.
+  /// Judges how well it fits.
   void assess(ArmFit& fit) const {
     std::size_t count = 0;
     fit.off = counted_rms(distances(table_, cell_, fit), &count);

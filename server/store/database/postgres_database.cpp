@@ -61,7 +61,7 @@ DatabaseError error_of(const PGresult* answer) {
           fmt::format("PostgreSQL error {}", code)};
 }
 
-/// What comes over the line first is the highest byte.
+/// The byte that comes over the line first is the highest.
 template <typename Number>
 Number from_wire(const char* bytes) {
   Number value{};
@@ -149,7 +149,7 @@ class Bound {
   std::vector<int> lengths_, formats_;
 };
 
-/// Whether the socket is ready by the deadline.
+/// True if the socket is ready by the deadline.
 bool is_ready(int socket, short events, std::chrono::steady_clock::time_point deadline) {
   pollfd one{socket, events, 0};
   for (;;) {
@@ -184,7 +184,7 @@ bool is_of_certificates(const std::string& told) {
 }
 
 /// A server that answered and lets nobody in now will do so later; any other refusal is for good.
-/// Of a connection that is not there libpq has no SQLSTATE, so these are the server's own words,
+/// Without a connection libpq has no SQLSTATE, so these are the server's own words,
 /// and libpq's.
 bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;

@@ -11,7 +11,7 @@
 namespace trammel {
 namespace {
 
-/// What a connection is told where the URL says nothing else: a line that is dead is noticed.
+/// The settings of a connection where the URL says nothing else: a line that is dead is noticed.
 constexpr std::array<std::pair<const char*, const char*>, 6> kDefaults = {
     {{"application_name", "trammel"},
      {"client_encoding", "UTF8"},

@@ -26,7 +26,7 @@ bool is(const Event& event, const Named& name) {
   return kind && (event.joint == 0 || name.joint == event.joint);
 }
 
-/// What every arm has from the first day on, and no cell file lists.
+/// True if every arm has the cause from the first day on, and no cell file lists it.
 bool is_of_every_arm(const Named& name) {
   return name.cause == "gear_transmission" && name.joint <= 4;
 }
