@@ -151,7 +151,7 @@ void log_call(const CallReport& call) {
   }
 }
 
-/// What would end the process though it can go on: a pipe that nobody reads any more, a file that
+/// Ignores signals that would end the process though it can go on: a pipe nobody reads, a file that
 /// may grow no further. Both are errors of the call that met them. The processes that compute get
 /// the signals as they were.
 void ignore_what_calls_report() {
