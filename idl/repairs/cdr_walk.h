@@ -16,7 +16,7 @@ namespace trammel::wire {
 
 using namespace v2;
 
-/// Whether the text is printable ASCII without spaces.
+/// True if the text is printable ASCII without spaces.
 [[nodiscard]] bool is_token(std::string_view text);
 
 /// Why a sample cannot be used.
@@ -28,11 +28,11 @@ struct Fault {
   std::optional<double> value, limit;
 };
 
-/// Of a request of another contract than CONTRACT_VERSION.
+/// The fault of a request of another contract than CONTRACT_VERSION.
 [[nodiscard]] Fault fault_of_contract(std::uint32_t contract_version);
 
-/// What a text may hold. None holds a NUL: it would end there for one maker's DDS, and not for
-/// another's.
+/// The characters that a text may hold. None holds a NUL: it would end there for one maker's DDS,
+/// and not for another's.
 enum class Text {
   kAny,    ///< of a file: its reader judges it
   kPlain,  ///< a name, or a sentence: UTF-8 without control characters

@@ -30,16 +30,16 @@ struct Relay;  // guard/relay.h
 /// DDS 2.9 does not.
 [[nodiscard]] std::string domain_mark(std::uint32_t domain);
 
-/// Whether an RTPS message holds the announcement of a participant of another domain. Never reads
+/// True if an RTPS message holds the announcement of a participant of another domain. Never reads
 /// beyond `message`, also when it is malformed.
 [[nodiscard]] bool is_of_another_domain(std::span<const unsigned char> message,
                                         std::uint32_t domain);
 
-/// Whether it holds a participant's announcement at all.
+/// True if it holds a participant's announcement at all.
 [[nodiscard]] bool is_announcement(std::span<const unsigned char> message);
 
-/// What a participant that is its own peer receives from itself. It proves that the threads of the
-/// library run.
+/// The messages that a participant that is its own peer receives from itself. They prove that the
+/// threads of the library run.
 struct HeardOfItself {
   std::atomic<std::uint64_t> announcements{0};  ///< received and processed
   /// Entity id of one of its reliable writers, first octet highest; 0: none. The gate drops the
@@ -48,7 +48,7 @@ struct HeardOfItself {
   std::atomic<std::uint32_t> first_lost_of{0};
 };
 
-/// Whether the library hears already. A participant announces itself while it is being made, and
+/// Tells if the library hears already. A participant announces itself while it is being made, and
 /// the library drops what is answered before that is done: of the handshake of certificates the
 /// next attempt comes a second later. Thread-safe.
 class Hearing {

@@ -31,7 +31,7 @@ class HeartbeatPace {
   static constexpr std::chrono::milliseconds kBetween{20}, kBetweenQuestions{2}, kNewSeries{1000};
   static constexpr std::chrono::milliseconds kPatience{500}, kBetweenUnanswered{200};
 
-  /// Whether a message of our own is to leave. False only for one that holds nothing but a
+  /// True if a message of our own is to leave. False only for one that holds nothing but a
   /// HEARTBEAT of discovery to everybody, soon after another of the same writer, nothing but a
   /// question for the first sample of a writer, or nothing but a HEARTBEAT to one that does not
   /// answer.

@@ -32,7 +32,7 @@ class LostLeases {
 
   /// Call at whatever happens, before anything else: finds that nothing happened for too long.
   void awake(Time now);
-  /// Whether a message of the participant is to be heard.
+  /// True if a message of the participant is to be heard.
   [[nodiscard]] bool lets_in(const Prefix& prefix, Time now);
   /// A participant's announcement that was let in: where it listens (address and port), and its
   /// lease.

@@ -92,7 +92,7 @@ class SafeType : public PubSubType {
   Mutex key_mutex_;  // the key buffer in PubSubType
 };
 
-/// What a request asks for, without its header: the bytes behind it. Their padding depends on where
+/// The content of a request without its header: the bytes behind it. Their padding depends on where
 /// they begin.
 struct ContentId {
   std::size_t hash = 0;

@@ -11,7 +11,7 @@
 
 #include "server/base/result.h"
 
-/// What every participant of ours has, whatever it is for.
+/// The settings of every participant of ours, whatever it is for.
 namespace trammel::wire {
 
 namespace dds = eprosima::fastdds::dds;

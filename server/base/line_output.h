@@ -10,7 +10,7 @@ namespace trammel {
 
 /// Lines to a descriptor that others may have stopped reading: a pipe, a terminal, a socket. Never
 /// waits, and never raises a signal of its own (a process that ignores SIGPIPE gets none at all).
-/// What does not go is dropped, and the next line that goes says how many were. Thread-safe.
+/// Drops lines that do not go; the next line that goes says how many were. Thread-safe.
 class LineOutput {
  public:
   /// `descriptor` stays open and its flags, which other processes may share, stay as they are.
@@ -25,7 +25,7 @@ class LineOutput {
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
-  /// Whether all of it went.
+  /// True if all of it went.
   [[nodiscard]] bool put(std::string_view text) TRAMMEL_REQUIRES(mutex_);
   /// Bytes that went at once; below 0: none.
   [[nodiscard]] long put_part(std::string_view part) const;

@@ -22,10 +22,10 @@ inline constexpr Eigen::Index kMostFlangeNumbers = 4000;
 /// The features of `n` observations for a kernel with blocks.
 [[nodiscard]] Status check_features(const std::string& kernel,
                                     const std::vector<BiasFeatures>& features, Eigen::Index n);
-/// The same for a bias at the flange: whether the joint vectors are few enough.
+/// Checks the same for a bias at the flange: that the joint vectors are few enough.
 [[nodiscard]] Status check_flange(const Eigen::MatrixXd& q,
                                   const std::vector<BiasFeatures>& features);
-/// Whether the hyperparameters of `state` have the shape that `bias` asks for, and its features
+/// Checks that the hyperparameters of `state` have the shape that `bias` asks for, and its features
 /// where it has blocks.
 [[nodiscard]] Status check_hyperparameters(const BiasState& state, const SpelledBias& bias);
 

@@ -9,7 +9,7 @@
 #include "server/bias/kernels/linear_block.h"
 #include "server/robot/pose.h"
 
-/// What a bias learns from, what it predicts, and what must be kept to restore it.
+/// The data that a bias learns from, that it predicts, and that must be kept to restore it.
 namespace trammel {
 
 inline constexpr Eigen::Index kCoordinates = 3;  ///< x, y, z: what a bias predicts
@@ -64,7 +64,7 @@ struct BiasState {
   std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };
 
-/// How the fit went.
+/// The figures of the fit.
 struct BiasFitReport {
   Eigen::VectorXd
       log_likelihood;  ///< nat: of each coordinate, or one number where blocks couple them

@@ -7,7 +7,7 @@
 
 #include "server/calibrate/calibration.h"
 
-/// Which rows of a batch agree on one arm, where many are bad.
+/// Finds the rows of a batch that agree on one arm, where many are bad.
 namespace trammel {
 
 struct Agreement {

@@ -34,13 +34,13 @@ class ChangeKinds {
 
   [[nodiscard]] const std::vector<ChangeKind>& kinds() const { return kinds_; }
   [[nodiscard]] const PhysicalModel& probe() const { return probe_; }
-  /// Of the probe's parameters: those of the model, and those of the kinds, in the order of
+  /// The probe's parameters: those of the model, and those of the kinds, in the order of
   /// kinds().
   [[nodiscard]] std::vector<Eigen::Index> own() const;
   [[nodiscard]] std::vector<Eigen::Index> changes() const { return places_; }
 
  private:
-  /// Of several tools each by itself, where the cause takes one.
+  /// Adds each of several tools by itself, where the cause takes one.
   void add_of_arm(const CauseRecord& cause);
   void add(const CauseRecord& cause, int joint, const std::string& behind = "");
 

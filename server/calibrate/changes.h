@@ -6,7 +6,7 @@
 
 #include "server/calibrate/calibration.h"
 
-/// What has changed on the arm between two sessions of one batch.
+/// Finds changes of the arm between two sessions of one batch.
 namespace trammel {
 
 /// A cause that began between two sessions and lasts since.
@@ -23,7 +23,7 @@ struct Change {
   std::vector<std::string> steps =
       {};  ///< of a wandering zero: its sources, one for each session but the first
 
-  /// What it adds to a model's list.
+  /// The error sources that it adds to a model's list.
   [[nodiscard]] std::vector<std::string> sources() const {
     return steps.empty() ? std::vector{source} : steps;
   }
@@ -40,7 +40,7 @@ struct Change {
 [[nodiscard]] std::optional<Change> strongest_change(const CalibrationResult& found,
                                                      const MeasurementBatch& batch);
 
-/// The same, with no session taken to be noisier than the others: what looks like a noisy session
+/// A change, with no session taken to be noisier than the others: what looks like a noisy session
 /// may be a change. Empty where none is noisier. It is only a proposal, since a session that is
 /// noisy looks like a change as well.
 [[nodiscard]] std::optional<Change> change_instead_of_noise(const CalibrationResult& found,

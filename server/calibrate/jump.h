@@ -7,8 +7,8 @@
 
 #include "server/calibrate/calibration.h"
 
-/// What begins in the middle of a batch of one set-up: a joint that loses its zero, a tool or a
-/// tracker that is knocked.
+/// Finds what begins in the middle of a batch of one set-up: a joint that loses its zero, a tool or
+/// a tracker that is knocked.
 namespace trammel {
 
 struct Jump {
@@ -37,7 +37,7 @@ struct Jump {
 [[nodiscard]] std::optional<Jump> jump_within(const CalibrationResult& found,
                                               const MeasurementBatch& batch);
 
-/// The same of a batch that nothing was identified on yet, with the sources that `cell` lists.
+/// Finds a jump in a batch that nothing was identified on yet, with the sources that `cell` lists.
 /// Empty also where they cannot be identified on it.
 [[nodiscard]] std::optional<Jump> jump_within(const std::shared_ptr<const Cell>& cell,
                                               const MeasurementBatch& batch);

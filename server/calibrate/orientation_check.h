@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/measurement/measurement.h"
 
-/// Whether the measured orientations belong to the commanded joints, asked before anything is
+/// Checks that the measured orientations belong to the commanded joints, asked before anything is
 /// identified from them.
 ///
 /// The model is R_WT = R_WB R_BF(q) R_FT, to the few degrees that a nominal chain may be off. R_WB
@@ -22,7 +22,7 @@
 /// does not fit.
 namespace trammel {
 
-/// What speaks against the orientations of `batch` (checked against `cell`): how far they are off
+/// Reasons against the orientations of `batch` (checked against `cell`): how far they are off
 /// (`value`, deg), the reading that would fit (`text`, `as xyzw`), the first row where not all of
 /// them are, and the question that whoever measured them can answer (`next`); nothing where they
 /// follow the joints, where fewer than 3 poses of a tool have one, and where the positions do not

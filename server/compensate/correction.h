@@ -29,7 +29,7 @@ struct Target {
   std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
   std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
   bool joint_target = false;        ///< X_BT is not set: the nominal pose at `seed` is wanted
-  /// How the arm comes there, as in PoseContext; neutral where it is not known.
+  /// The approach of the arm, as in PoseContext; neutral where it is not known.
   std::vector<int> direction = {};
   std::optional<double> temperature = {};  ///< degrees Celsius
   std::optional<double> time = {};         ///< s

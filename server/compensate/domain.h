@@ -11,11 +11,11 @@ struct Domain {
   double prior_share_limit = 0;  ///< of BiasPrediction::prior_share, at the edge
   double margin = 0.05;  ///< of a joint's range, for in_range(): WhatWasMeasured::range_margin()
 
-  /// Whether every joint is within the range of the training poses, or at most the margin of it
+  /// True if every joint is within the range of the training poses, or at most the margin of it
   /// beyond. Ranges alone hold poses that are far from all of them: WhatWasMeasured::is_near() is
   /// asked beside.
   [[nodiscard]] bool in_range(const JointVector& q) const;
-  /// How much of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of
+  /// The share of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of
   /// range, or where nearly as little is known as without data. Smooth in q and in `prior_share`.
   [[nodiscard]] double bias_weight(const JointVector& q, double prior_share) const;
   /// The variance by which one coordinate of the residual grows outside the range, m²: Σ_j (slope_j

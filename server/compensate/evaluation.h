@@ -5,7 +5,7 @@
 
 #include "server/robot/pose.h"
 
-/// How far predictions are from what was measured.
+/// Figures of how far predictions are from measurements.
 namespace trammel {
 
 /// Figures of the position errors |measured - predicted| of some poses, m.
@@ -13,7 +13,7 @@ struct ErrorFigures {
   double rms = 0, mean = 0, p997 = 0, max = 0;
   Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
 };
-/// Of no position: none of them is a number.
+/// The figures of no position: none of them is a number.
 [[nodiscard]] ErrorFigures no_figures();
 /// For the errors in the columns of `e_B` (3 x N, m, not empty).
 [[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);

@@ -23,7 +23,7 @@ namespace trammel {
                                                  const MissingAt& missing_at,
                                                  const CorrectOptions& options);
 
-/// Whether these joints of inverse_kinematics_of_few(), kUnreachable, bring the tool's point to
+/// True if these joints of inverse_kinematics_of_few(), kUnreachable, bring the tool's point to
 /// where it is wanted.
 [[nodiscard]] bool point_is_reached(const Chain& robot, const Pose& X_BT, const Pose& X_FT,
                                     const JointVector& q);

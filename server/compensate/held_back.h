@@ -18,7 +18,7 @@ enum class HeldBack {
 /// kNo where there is no such reason.
 [[nodiscard]] HeldBack held_back_of(std::string_view text);
 
-/// Whether the batch of such a model is doubtful: no later training learns from it until a model
+/// True if the batch of such a model is doubtful: no later training learns from it until a model
 /// that learned from it has been in force.
 [[nodiscard]] constexpr bool is_doubt(HeldBack reason) {
   return reason == HeldBack::kStopNote || reason == HeldBack::kStepLimit;

@@ -19,7 +19,7 @@
 
 namespace trammel {
 
-/// How some sources of a finished model were identified anew.
+/// The sources of a finished model that were identified anew.
 struct RefitRecord {
   std::string model;                 ///< id of the model that it started from
   std::vector<std::string> sources;  ///< as they were named
@@ -67,7 +67,7 @@ struct ModelParts {
   double observability_index = 0;  ///< see CalibrationResult, as the next two
   std::vector<SuspectPose> suspects;
   std::vector<double> cost_record;
-  /// Of several sessions: what belongs to each, the newest last, in whose world the base stands;
+  /// The settings of several sessions, the newest last, in whose world the base stands;
   /// empty: there was one.
   std::vector<SessionSetting> sessions;
   bool sessions_as_given =

@@ -8,13 +8,13 @@
 
 namespace trammel {
 
-/// What a training takes from the cell file, where nothing else was asked for.
+/// The settings that a training takes from the cell file, where nothing else was asked for.
 struct SpecUse {
   bool error_sources = true;
   bool bias = true;
 };
 
-/// What a training would refuse of the cell's own `model`: a bias that is none, an error source
+/// The errors of the cell's own `model` for a training: a bias that is none, an error source
 /// that is unknown, stands twice or asks for what the cell has not. Each error is kRefused and
 /// names `file`, row and key.
 [[nodiscard]] std::vector<Error> check_model_spec(const Cell& cell, const std::string& file,

@@ -7,10 +7,10 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// Whether what a model leaves over is noise, or a function of something.
+/// Tells if the residual of a model is noise, or a function of something.
 namespace trammel {
 
-/// What residuals look like in one order of the poses: that of the rows, or that of one joint's
+/// The residuals in one order of the poses: that of the rows, or that of one joint's
 /// angle. Noise changes its sign as often as a coin does; what wanders with the order changes it
 /// less often (Wald and Wolfowitz, On a test whether two samples are from the same population,
 /// 1940).

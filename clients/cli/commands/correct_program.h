@@ -9,7 +9,7 @@
 
 namespace trammel::cli {
 
-/// What `correct` is asked for where the input is a program.
+/// The arguments of `correct` where the input is a program.
 struct CorrectProgramArguments {
   std::vector<std::string> inputs;
   std::string model, tool, payload, format, output, receipt, report, json, frames;

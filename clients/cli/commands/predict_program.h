@@ -9,7 +9,7 @@
 
 namespace trammel::cli {
 
-/// What `predict` is asked for where the input is a program.
+/// The arguments of `predict` where the input is a program.
 struct PredictProgramArguments {
   std::vector<std::string> inputs;
   std::string model, tool, payload, format, output, json, frames;

@@ -8,12 +8,12 @@
 #include "clients/cli/files/files_of_program.h"
 #include "server/base/result.h"
 
-/// What a controller keeps beside its programs.
+/// Files that a controller keeps beside its programs.
 namespace trammel::cli {
 
 constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a file
 
-/// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat`
+/// True if a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat`
 /// and its folders System, Mada and Steu, ABB's system modules and parameters.
 [[nodiscard]] bool is_of_the_controller(const std::string& name);
 
@@ -25,7 +25,7 @@ constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a f
 /// tools, and sentences on what is not read.
 [[nodiscard]] Status read_values(const std::string& folder, ProgramFiles& program);
 
-/// Whether --frames names a controller's own list, or what one keeps in binary form.
+/// True if --frames names a controller's own list, or one that it keeps in binary form.
 [[nodiscard]] bool is_listing(const std::string& path);
 /// A controller's own list of frames and tools, as --frames names it. Refuses one of another kind
 /// of controller.

@@ -9,11 +9,11 @@ namespace trammel::cli {
 
 enum class TableKind { kBatch, kTargets, kJoints };
 
-/// Of each column that is nearly one that such a table may have and has not, a sentence:
+/// A sentence for each column that is nearly one that such a table may have and has not:
 /// `b.csv: column temprature_c is not known and is left aside; temperature_c was meant?`.
 [[nodiscard]] std::vector<std::string> near_columns(const std::vector<std::string>& columns,
                                                     TableKind kind, const std::string& where);
-/// The same for the header of a table's text, on standard error.
+/// Tells them for the header of a table's text, on standard error.
 void tell_near_columns(const std::string& text, TableKind kind, const std::string& where);
 
 }  // namespace trammel::cli

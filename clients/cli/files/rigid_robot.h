@@ -6,11 +6,11 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// What of a model holds at every pose: links, base and tools. Programs that know no more than
+/// The part of a model that holds at every pose: links, base and tools. Programs that know only
 /// kinematics (URDF) can carry it; the rest is told with its size.
 namespace trammel::cli {
 
-/// What rigid kinematics leaves out of a model.
+/// The part of a model that rigid kinematics leaves out.
 struct LeftOut {
   std::string source;        ///< as a list of error sources has it; `bias` is what was learned
   std::string plain;         ///< for people

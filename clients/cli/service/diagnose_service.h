@@ -9,7 +9,7 @@
 
 namespace trammel::cli {
 
-/// What `trammel diagnose` was asked.
+/// The arguments of `trammel diagnose`.
 struct DiagnoseArguments {
   std::string cell, report, next_poses, json, model, cell_out, since;
   std::vector<std::string> batches;  ///< at a service one at most
@@ -23,12 +23,12 @@ void say(const std::string& text, const DiagnoseArguments& arguments);
 
 /// Page, next poses and JSON, where they are asked for.
 [[nodiscard]] Outputs outputs_of(const DiagnoseArguments& arguments);
-/// What was found, with everything else that was put into `outputs`; says why there are no next
-/// poses where there are none.
+/// Writes the findings, with everything else that was put into `outputs`; says why there are no
+/// next poses where there are none.
 [[nodiscard]] Status write_diagnosis(const nlohmann::ordered_json& json, std::string page,
                                      Outputs& outputs, const DiagnoseArguments& arguments);
 
-/// Whether --strict asks for a model that lacks nothing and this one lacks something, which it says
+/// True if --strict asks for a model that lacks nothing and this one lacks something, which it says
 /// on standard error.
 [[nodiscard]] bool leaves_open(const nlohmann::ordered_json& json,
                                const DiagnoseArguments& arguments);

@@ -9,7 +9,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/model_file.h"
 
-/// What programs need of a model, whether it is a file or behind a service.
+/// The answers that programs need of a model, whether it is a file or behind a service.
 namespace trammel::cli {
 
 [[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);

@@ -19,7 +19,7 @@ struct StudyOptions {
   std::uint64_t seed = 1;           ///< of all draws
   std::vector<TargetRow> holes;     ///< of the drilling study
   std::optional<std::string> bias;  ///< kernel to learn with instead of the cell's
-  /// What is being done and the share done of all in [0, 1]; return false to give up.
+  /// The step of work and the share done of all in [0, 1]; return false to give up.
   std::function<bool(const std::string& stage, double share)> progress;
 };
 

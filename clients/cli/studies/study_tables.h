@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-/// What the source prints about its studies (chapters 5 and 7), and what is aimed at. Units as
+/// Tables of the source's studies (chapters 5 and 7), and the values that are aimed at. Units as
 /// printed.
 namespace trammel::cli {
 

@@ -9,7 +9,7 @@ namespace CLI {
 class App;
 }
 
-/// What people would say with every command, from one file.
+/// Options that people would give with every command, from one file.
 namespace trammel::cli {
 
 /// The file that TRAMMEL_DEFAULTS names, else `trammel/defaults` in XDG_CONFIG_HOME or ~/.config;

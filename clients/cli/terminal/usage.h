@@ -11,7 +11,7 @@ class App;
 class ParseError;
 }  // namespace CLI
 
-/// What is wrong with a command line, as data with a next step.
+/// The faults of a command line, as data with a next step.
 namespace trammel::cli {
 
 /// A command or an option among `words` (without the program's name) that does not exist, with the
@@ -22,7 +22,7 @@ namespace trammel::cli {
 /// An option that names a file or a cell and was given an empty word; nothing where none was.
 [[nodiscard]] std::optional<Error> empty_word(const CLI::App& command);
 
-/// What the parser found: field is the option, `next` where to read about it.
+/// The error of the parser: field is the option, `next` where to read about it.
 [[nodiscard]] Error usage_error(const CLI::App& app, const CLI::ParseError& error,
                                 const std::string& command);
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-/// What `trammel help TOPIC` and the ends of `--help` say.
+/// The texts of `trammel help TOPIC` and of the ends of `--help`.
 namespace trammel::cli {
 
 struct HelpTopic {

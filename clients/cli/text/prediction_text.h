@@ -13,7 +13,7 @@ namespace trammel::cli {
 /// true error along the base's axes.
 [[nodiscard]] std::string prediction_csv(const cam::PredictedProgram& program);
 [[nodiscard]] nlohmann::ordered_json prediction_json(const cam::PredictedProgram& program);
-/// How many targets, how large the errors; and what nothing can be said of.
+/// The number of targets, the size of the errors, and the targets of which nothing can be said.
 [[nodiscard]] std::string prediction_summary(const cam::PredictedProgram& program);
 
 }  // namespace trammel::cli

@@ -9,7 +9,7 @@
 
 namespace trammel::cli {
 
-/// Of every target of the program.
+/// The expected error of every target of the program.
 [[nodiscard]] std::vector<ExpectedError> expected_errors(const cam::CorrectedProgram& program);
 
 /// The receipt as one self-contained page: verdict, figures, path in 3D, targets. `tolerance_mm` 0:

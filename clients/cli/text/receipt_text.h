@@ -8,7 +8,7 @@
 #include "clients/cli/text/receipt_page.h"
 #include "server/base/note.h"
 
-/// What became of a program, for people and programs.
+/// The receipt of a corrected program, for people and programs.
 namespace trammel::cli {
 
 /// One row a target: `file,line,name,motion,used_at,tool,frame,status`, the numbers before and

@@ -18,7 +18,7 @@ namespace trammel::cli {
 /// CSV: part, parameter, unit, nominal, calibrated, correction, u95; mm and deg. u95 is empty where
 /// nothing was identified.
 [[nodiscard]] std::string robot_table(const CompensatedModel& model, const RigidRobot& robot);
-/// What is left out, for people.
+/// The parts that are left out, for people.
 [[nodiscard]] std::string left_out_text(const RigidRobot& robot);
 [[nodiscard]] nlohmann::ordered_json robot_json(const CompensatedModel& model,
                                                 const RigidRobot& robot);

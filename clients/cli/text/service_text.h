@@ -6,7 +6,7 @@
 
 #include "clients/session/session.h"
 
-/// What a service says of its servers, models, jobs and batches, for people (dates in UTC) and for
+/// Texts of a service on its servers, models, jobs and batches, for people (dates in UTC) and for
 /// programs.
 namespace trammel::cli {
 
@@ -28,7 +28,7 @@ namespace trammel::cli {
 /// (`reachable` false). `of_record`: as servers_text() takes them.
 void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordered_json& servers);
 
-/// Of `record` as a server says it; empty where that is a file beside the server.
+/// The text of `record` as a server says it; empty where that is a file beside the server.
 [[nodiscard]] std::string record_text(const nlohmann::ordered_json& record);
 
 /// The servers of the record as one of them tells; null: it cannot say. Empty where the record is a
@@ -49,14 +49,14 @@ void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordere
 /// service says so. `said`: its `in_force` of the cell (READ_HEALTH), from outside; null: nothing.
 [[nodiscard]] nlohmann::ordered_json in_force_json(const std::string& cell, int version,
                                                    const nlohmann::ordered_json& said);
-/// The same for people.
+/// The text for people.
 [[nodiscard]] std::string in_force_text(const nlohmann::ordered_json& now);
 
-/// Whether the job put the model that it made in force, whatever is in force now.
+/// True if the job put the model that it made in force, whatever is in force now.
 [[nodiscard]] bool put_in_force(const client::JobStatus& job);
-/// How a job ended that did not fail.
+/// The end of a job that did not fail.
 [[nodiscard]] std::string ended_text(const client::JobStatus& job);
-/// What to do next where a job did not put a model in force, by its verdict; empty where there is
+/// The next step where a job did not put a model in force, by its verdict; empty where there is
 /// nothing.
 [[nodiscard]] std::string next_step(const client::JobStatus& job);
 

@@ -6,7 +6,7 @@
 #include "server/calibrate/instruments/circle_point.h"
 #include "server/calibrate/instruments/deflection.h"
 
-/// What was measured of a robot's geometry and stiffness, told to people and to programs.
+/// The measured geometry and stiffness of a robot, told to people and to programs.
 namespace trammel::cli {
 
 /// Three tables: how well the arcs fit, lengths, angles (the source's Tables 4.3, 4.4 and 4.5),

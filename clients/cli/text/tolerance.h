@@ -10,14 +10,14 @@
 
 namespace trammel::cli {
 
-/// Of one target, mm; not finite: not known.
+/// The expected error of one target, mm; not finite: not known.
 struct ExpectedError {
   double before_mm = 0, after_mm = 0;  ///< rms
   double sigma_mm = 0;                 ///< of each axis
   bool in_domain = true;               ///< near enough to the training data
 };
 
-/// How many targets are inside a tolerance about their wanted positions.
+/// The number of targets inside a tolerance about their wanted positions.
 struct ToleranceVerdict {
   double tolerance_mm = 0;
   std::size_t targets = 0;                         ///< whose error is known
@@ -33,7 +33,7 @@ struct ToleranceVerdict {
 /// `tolerance 0.2 mm: 33 of 35 targets are inside with 95 % or more (before: 0); 34.1 are expected
 /// inside`
 [[nodiscard]] std::string verdict_text(const ToleranceVerdict& verdict);
-/// What `correct --strict` holds targets to, before it writes anything. `left_alone` says which
+/// Conditions of `correct --strict` on targets, before it writes anything. `left_alone` says which
 /// targets would be left as they were, a line each behind its heading; empty: none. Refuses those,
 /// and with a tolerance each target that is not inside with 95 %, whose error is not known, or that
 /// is out of domain; says how many.

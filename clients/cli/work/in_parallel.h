@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <functional>
 
-/// What one command computes on all processors.
+/// The work that one command computes on all processors.
 namespace trammel::cli {
 
 /// Calls `work(i)` for each i below `count`, in any order, from several threads at once; ends when

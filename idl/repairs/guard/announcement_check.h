@@ -40,7 +40,7 @@ class NamedSockets {
   std::size_t count_ = 0;
 };
 
-/// How an announcement says that its sender can be reached, and for how long.
+/// The sockets at which an announcement says its sender can be reached, and for how long.
 struct Reachable {
   std::uint32_t lease_seconds = kUsualLeaseSeconds;  ///< kLongestLeaseSeconds at most
   Bytes lease{};                                     ///< where it stands; empty: none is said

@@ -11,9 +11,9 @@
 
 namespace trammel::wire {
 
-/// How many endpoints each participant has announced. The library keeps some kilobytes of each
-/// until it is said to have gone or its participant's lease is over, and asks each writer that it
-/// reads from for its first sample time and again.
+/// The number of endpoints that each participant has announced. The library keeps some kilobytes of
+/// each until it is said to have gone or its participant's lease is over, and asks each writer that
+/// it reads from for its first sample time and again.
 class EndpointWatch {
  public:
   static constexpr std::size_t kMostOfServer =

@@ -32,7 +32,7 @@ class Guard {
                  std::vector<Relay> relays = {}, Proof proof = Proof::kNone,
                  std::size_t most_endpoints = EndpointWatch::kMostOfServer);
 
-  /// What of a message that was received from `socket` (address and port) the library may see: all
+  /// The part of a message received from `socket` (address and port) that the library may see: all
   /// of it, as a rule. Empty: nothing. Valid until the calling thread's next call.
   [[nodiscard]] std::optional<Bytes> check(Bytes message, std::uint64_t socket,
                                            Time now = std::chrono::steady_clock::now());

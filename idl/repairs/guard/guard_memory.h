@@ -13,7 +13,7 @@
 
 namespace trammel::wire {
 
-/// What the guard remembers of those who send, and of what was sent.
+/// The guard's memory of senders, and of what was sent.
 struct GuardMemory {
   explicit GuardMemory(std::size_t most_endpoints) : endpoints(most_endpoints) {}
 

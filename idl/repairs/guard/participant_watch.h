@@ -44,7 +44,7 @@ class ParticipantWatch {
   void spoke(Bytes prefix, Time now);
   void left(Bytes prefix);
   [[nodiscard]] bool is_there(Bytes prefix, Time now);
-  /// Whether the participant has announced that it listens there: its endpoints listen nowhere
+  /// True if the participant has announced that it listens there: its endpoints listen nowhere
   /// else.
   [[nodiscard]] bool listens_at(Bytes prefix, std::uint64_t socket, Time now);
 

@@ -4,7 +4,7 @@
 
 namespace trammel::wire {
 
-/// What participants prove by DDS-Security.
+/// The facts that participants prove by DDS-Security.
 enum class Proof : std::uint8_t {
   kNone,
   kOfIdentity,  ///< who they are, and what they say of endpoints

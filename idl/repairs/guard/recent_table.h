@@ -27,7 +27,7 @@ inline EndpointKey key_of(Bytes prefix, std::uint32_t entity) {
   return key;
 }
 
-/// What is known of the endpoints heard last. Of fixed size: the one not heard for longest makes
+/// The values known of the endpoints heard last. Of fixed size: the one not heard for longest makes
 /// room.
 template <typename Value, std::size_t kSets>
 class RecentTable {
@@ -62,7 +62,7 @@ class RecentTable {
       if (entry.used && entry.key == key) entry = Entry();
     }
   }
-  /// Of all values.
+  /// The number of all values.
   template <typename Counts>
   [[nodiscard]] std::size_t count(const Counts& counts) const {
     std::size_t number = 0;

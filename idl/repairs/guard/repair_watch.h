@@ -12,7 +12,7 @@
 
 namespace trammel::wire {
 
-/// How much of what our writers have sent is asked for again. The library sends it whenever it is
+/// The share of our writers' samples that is asked for again. The library sends it whenever it is
 /// asked, in the one thread that sends all of it again: a question of 60 bytes may cost a gigabyte,
 /// and the thread is away for seconds. What is asked for is charged with the bytes that it has.
 class RepairWatch {
@@ -22,7 +22,7 @@ class RepairWatch {
   /// socket holds.
   static constexpr double kAtOnce = 128e6, kPerSecond = 64e6;  ///< of one participant
   static constexpr double kAllAtOnce = 512e6, kAllPerSecond = 256e6;
-  /// What is left may be exceeded by as much as comes back within this time: by the largest sample,
+  /// The budget may be exceeded by as much as comes back within this time: by the largest sample,
   /// in any case.
   static constexpr double kDebtSeconds = 2;
   static constexpr std::size_t kHistory =
@@ -38,7 +38,7 @@ class RepairWatch {
       sizes.largest_before = std::max(sizes.largest_before, place.bytes);
     place = {number, static_cast<std::uint32_t>(sample_bytes)};
   }
-  /// What the library may send where somebody asks for this number. Of one that has left the
+  /// The bytes that the library may send where somebody asks for this number. For one that left the
   /// histories of requests and replies it sends nothing; announcements of endpoints it keeps, and
   /// they are small.
   [[nodiscard]] double bytes_of(std::uint32_t writer, std::int64_t number, Time now) {
@@ -49,8 +49,8 @@ class RepairWatch {
     const bool is_kept = number < place.number && (writer & kBuiltIn) == kBuiltIn;
     return is_kept ? sizes->largest_before : 0;
   }
-  /// How many bytes the participant may be sent again now, 0: none, its reader has to ask anew.
-  /// Whoever has asked for little is sent it also where all together have asked for too much.
+  /// The number of bytes that the participant may be sent again now; 0: none, its reader has to ask
+  /// anew. Whoever has asked for little is sent it also where all together have asked for too much.
   [[nodiscard]] double allowed(Bytes prefix, Time now) {
     Bucket& own = buckets_.at(key_of(prefix, 0), now);
     own.refill(kAtOnce, kPerSecond, now);

@@ -21,7 +21,7 @@ class SequenceWatch {
   /// Under half a second on a slow host: who stands still for longer than a lease takes himself for
   /// one that slept.
   static constexpr std::int64_t kHeartbeatStep = std::int64_t{1} << 20;
-  /// Of a signed message, which passes whole or not at all: what an honest writer skips at most
+  /// For a signed message, which passes whole or not at all: the most that an honest writer skips
   /// when it is met again.
   static constexpr std::int64_t kSignedStep = std::int64_t{1} << 22;
   static constexpr std::int64_t kGapStep = std::int64_t{1} << 17;
@@ -31,7 +31,7 @@ class SequenceWatch {
   void confirmed(const EndpointKey& writer, std::int64_t number, Time now) {
     known_.at(writer, now).confirmed = number;
   }
-  /// What `first` of a HEARTBEAT may be at most, in steps of so many numbers.
+  /// The most that `first` of a HEARTBEAT may be, in steps of so many numbers.
   [[nodiscard]] std::int64_t heartbeat(const EndpointKey& writer, std::int64_t first,
                                        std::int64_t step, Time now);
   /// The part of GAP [start, end) that may pass; empty: none now.
@@ -50,7 +50,7 @@ class SequenceWatch {
     std::uint32_t count = 0;
     bool counted = false;
   };
-  /// How much of `wanted` the budget allows; each number costs `weight`.
+  /// The part of `wanted` that the budget allows; each number costs `weight`.
   std::int64_t granted(std::int64_t wanted, std::int64_t step, std::int64_t weight, Time now);
 
   RecentTable<Known, 1024> known_;

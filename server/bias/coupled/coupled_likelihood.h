@@ -31,7 +31,7 @@ struct CoupledHyperparameters {
   Eigen::VectorXd blocks;
 };
 
-/// What follows from one set of hyperparameters.
+/// The values that follow from one set of hyperparameters.
 struct CoupledSolution {
   std::vector<AlignedMatrix> eliminated;  ///< D: [-M⁻¹ .; y M⁻¹; Hᵀ M⁻¹ ...], lower triangle
   std::vector<AlignedMatrix> features;  ///< D: the kernel's, of all points

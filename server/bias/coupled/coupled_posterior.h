@@ -35,7 +35,7 @@ class CoupledPosterior {
   /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
-  /// Of how many outputs only the points near a target say what it is uncertain by.
+  /// The number of outputs of which only the points near a target say how uncertain they are.
   [[nodiscard]] Eigen::Index outputs_from_near_points() const;
 
   /// p: ŵ of the columns of H, not scaled.
@@ -63,7 +63,7 @@ class CoupledPosterior {
                        const CoupledSolution& solution);
   /// Takes `explained_` of an output from few of its points, where these stand for all.
   void explain_by_few(std::size_t output, const Eigen::VectorXd& noise);
-  /// What one output contributes at some targets.
+  /// The contribution of one output at some targets.
   struct Part {
     Eigen::MatrixXd R;      // p x M: R_dᵀ
     Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
@@ -73,13 +73,13 @@ class CoupledPosterior {
   [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
   [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns,
                              Eigen::Index d) const;
-  // The same from the points near each target.
+  // Computes the part from the points near each target.
   [[nodiscard]] Part near_part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns,
                                   Eigen::Index d) const;
   // R A⁻¹ Rᵀ of target i.
   [[nodiscard]] Eigen::MatrixXd shared_covariance(const std::vector<Part>& parts,
                                                   Eigen::Index i) const;
-  // Of a few targets at once.
+  // Predicts a few targets at once.
   void predict_few(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns,
                    std::vector<CoupledPrediction>* out) const;
 

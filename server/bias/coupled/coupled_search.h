@@ -12,7 +12,7 @@ struct CoupledSearchResult {
   bool given_up = false;   ///< `progress` returned false; nothing else is set
 };
 
-/// What is searched: blocks, and the data with their columns.
+/// The task of the search: blocks, and the data with their columns.
 struct CoupledTask {
   const LinearBlocks& blocks;
   const CoupledData& data;

@@ -23,7 +23,7 @@ inline constexpr std::size_t kTwistKernels =
 [[nodiscard]] std::vector<Eigen::VectorXd> twist_parameters(const CoupledHyperparameters& at);
 [[nodiscard]] Vector6 twist_variance(const CoupledHyperparameters& at);
 
-/// What follows from one set of hyperparameters.
+/// The values that follow from one set of hyperparameters.
 struct FlangeSolution {
   std::vector<AlignedMatrix> features;    ///< of each kernel
   std::vector<AlignedMatrix> covariance;  ///< of each kernel, M x M, without amplitude
@@ -61,7 +61,7 @@ class FlangeLikelihood {
 
  private:
   void add_prior(const Eigen::VectorXd& x, ObjectiveValue* out) const;
-  /// Of each kernel, M x M, lower triangle: the derivative of minus the log likelihood by its
+  /// For each kernel, M x M, lower triangle: the derivative of minus the log likelihood by its
   /// entries. And by log σ_n.
   [[nodiscard]] std::vector<AlignedMatrix> by_covariance(const FlangeSolution& solution,
                                                          const Vector6& variance) const;

@@ -8,9 +8,9 @@
 /// The arm's error at the flange, seen through levers (README.md).
 namespace trammel {
 
-/// Of the six numbers of a twist [position; rotation], each row a number that was seen of it.
+/// Rows, each of which is a number that was seen of a twist [position; rotation].
 using TwistRows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6>;
-/// What one coordinate of each row sees of the twist.
+/// The part of the twist that one coordinate of each row sees.
 using TwistRow = Eigen::Matrix<double, 3, 6>;
 
 /// All rows of one joint vector, brought to as few numbers as tell the same of the twist: rows /
@@ -32,9 +32,9 @@ struct FlangeViews {
       Vector3::Zero();  ///< where the position part of the twist is: the mean lever
 };
 
-/// How an observation sees the twist at `reference_F`: [I  -[R_BF (lever - reference)]x].
+/// The view of the twist at `reference_F` by an observation: [I  -[R_BF (lever - reference)]x].
 [[nodiscard]] TwistRow seen_through(const BiasFeatures& features, const Vector3& reference_F);
-/// Whether not all levers are the same, to a millimetre.
+/// True if not all levers are the same, to a millimetre.
 [[nodiscard]] bool has_several_levers(const std::vector<BiasFeatures>& features);
 
 /// Rows with the same joints become one view.

@@ -4,13 +4,13 @@
 
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// How many harmonics the block `joint_map` has in a bias.
+/// The number of harmonics that the block `joint_map` has in a bias.
 namespace trammel {
 
 /// As many as that many observations can tell.
 [[nodiscard]] Eigen::Index harmonics_for(Eigen::Index observations);
 
-/// Of a model with these hyperparameters of blocks, for an arm of that many joints. Empty: a model
+/// The number in a model with these hyperparameters, for an arm of that many joints. Empty: a model
 /// from before the power was learned.
 [[nodiscard]] std::optional<Eigen::Index> harmonics_in(const Eigen::VectorXd& block_hyperparameters,
                                                        Eigen::Index joints);

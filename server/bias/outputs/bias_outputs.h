@@ -8,14 +8,14 @@
 #include "server/bias/coupled/coupled_search.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// What a BiasModel predicts with: D outputs that are silent, independent, coupled by blocks, or
+/// The outputs that a BiasModel predicts with: D silent, independent, coupled by blocks, or
 /// seen at the flange.
 namespace trammel {
 
 /// Outputs that share a unit: the coordinates of a position, or of a rotation.
 inline constexpr Eigen::Index kOfOneUnit = 3;
 
-/// What outputs learn from.
+/// The data that outputs learn from.
 struct OutputData {
   Eigen::MatrixXd q;                   ///< N x n, rad
   Eigen::MatrixXd y;                   ///< N x D, offset removed
@@ -59,7 +59,7 @@ class BiasOutputs {
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_variance() const = 0;
   [[nodiscard]] virtual Eigen::VectorXd leave_one_out_share() const = 0;
 
-  /// What of `y` (N x D, instead of the observations) these points miss by when they are predicted
+  /// The error of `y` (N x D, instead of the observations) at these points when they are predicted
   /// from all others; empty where only conditioning anew says it.
   [[nodiscard]] virtual std::optional<Eigen::MatrixXd> left_out_error(
       const Eigen::MatrixXd& /*y*/, const std::vector<Eigen::Index>& /*points*/) const {

@@ -14,7 +14,7 @@ namespace trammel {
 [[nodiscard]] std::vector<std::vector<Eigen::Index>> halved(const Eigen::MatrixXd& table,
                                                             Eigen::Index most);
 
-/// The same in parts of whole poses, at most `most` of them each, by the first row of each pose.
+/// Halves in parts of whole poses, at most `most` of them each, by the first row of each pose.
 [[nodiscard]] std::vector<std::vector<Eigen::Index>> halved(const Eigen::MatrixXd& table,
                                                             const std::vector<PoseGroup>& poses,
                                                             Eigen::Index most);

@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// How the points near a target tell its mean: Σ weights y, with the weights (R + noise)⁻¹ r of
+/// Weights of the points near a target in its mean, Σ weights y; they are (R + noise)⁻¹ r of
 /// these points.
 struct NearWeights {
   std::vector<Eigen::Index> points;  ///< rising

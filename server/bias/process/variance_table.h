@@ -24,9 +24,9 @@ class VarianceTable {
   VarianceTable() = default;
   /// `features` of `size` points; `root` holds G in its lower triangle.
   VarianceTable(PointFeatures features, Eigen::Index size, AlignedMatrix root);
-  /// The same, G row after row, row i of i + 1 entries.
+  /// A table from G row after row, row i of i + 1 entries.
   VarianceTable(PointFeatures features, Eigen::Index size, const std::vector<double>& rows);
-  /// The same with G rounded to single precision: half the memory, and half the time. Each variance
+  /// The table with G rounded to single precision: half the memory, half the time. Each variance
   /// is larger by `rounding` (in units of σ_f²), so that it is not below the exact one.
   [[nodiscard]] VarianceTable in_single_precision(double rounding) const;
 

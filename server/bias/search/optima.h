@@ -14,7 +14,7 @@ struct Optimum : BfgsResult {
 [[nodiscard]] Optimum improved(ProfiledLikelihood* likelihood, const Eigen::VectorXd& start,
                                const Eigen::MatrixXd& inverse_hessian, const BfgsOptions& options);
 
-/// The same without a known Hessian: it starts as a multiple of the identity.
+/// Searches without a known Hessian: it starts as a multiple of the identity.
 [[nodiscard]] Optimum searched(ProfiledLikelihood* likelihood, const Eigen::VectorXd& start,
                                const BfgsOptions& options);
 
@@ -25,7 +25,7 @@ void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now);
 
 /// log σ_n (m), mean over the outputs.
 [[nodiscard]] double log_noise(const Optimum& optimum);
-/// Whether one takes clearly more of the data for noise than the other.
+/// True if one takes clearly more of the data for noise than the other.
 [[nodiscard]] bool other_kind(const Optimum& a, const Optimum& b);
 
 /// The different ones, best first, `most` at most, without those that cannot win any more. One more

@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-/// What searches from several starts have in common.
+/// The parts that searches from several starts share.
 namespace trammel {
 
 /// Ends within so many nat of each other are the same optimum: a tenth of what would make one

@@ -18,7 +18,7 @@ struct TriedCause {
   std::string why;  ///< for people, one clause
 };
 
-/// What a training with `error_sources: auto` tried, the largest gain first.
+/// The causes that a training with `error_sources: auto` tried, the largest gain first.
 struct CauseChoice {
   double held_out = 0;  ///< m, with all that was taken
   std::vector<TriedCause> tried;

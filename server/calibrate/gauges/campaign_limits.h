@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// How many motions of the base, of 6, leave all that was measured as it is: gauges to anchors
+/// The number of motions of the base, of 6, that leave all readings as they are: gauges to anchors
 /// whose places are unknown tell none of them, one known point leaves the turns about it, two those
 /// about the line through them.
 [[nodiscard]] int untold_motions(const PhysicalModel& model, const MeasurementBatch& batch);

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What speaks against learning from the distances and touches of `batch` (checked against `cell`):
+/// Reasons not to learn from the distances and touches of `batch` (checked against `cell`):
 /// they are in another unit, all of them or some rows, or touches count the other way. Distances
 /// are asked of the arm as drawn, which is some mm off where they are metres; touches, which are
 /// mm, of the arm that they themselves show. Empty where they follow the joints, or where no other

@@ -37,7 +37,7 @@ struct Minimum {
       {};  ///< of several sessions: what moves the measurements of each into W
 };
 
-/// Whether Huber's loss is used: not before the discrepancy is known, since nothing can be called
+/// True if Huber's loss is used: not before the discrepancy is known, since nothing can be called
 /// an outlier then.
 [[nodiscard]] bool is_robust(const CalibrateOptions& options, const Weights& weights);
 

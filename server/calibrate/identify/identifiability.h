@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// What the data tell of the parameters: singular values and right singular vectors of the Jacobian
-/// in units of sigma and of the priors, smallest first.
+/// The information of the data about the parameters: singular values and right singular vectors of
+/// the Jacobian in units of sigma and of the priors, smallest first.
 struct Information {
   Eigen::VectorXd singular_values;
   Eigen::MatrixXd directions;  ///< columns

@@ -13,7 +13,7 @@ namespace trammel {
 void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights,
                    const MeasurementBatch& batch, std::vector<SessionSetting>& sessions);
 
-/// Whether measurements have nearly the same sigmas under both.
+/// True if measurements have nearly the same sigmas under both.
 [[nodiscard]] bool are_as_noisy(const std::vector<SessionSetting>& now,
                                 const std::vector<SessionSetting>& before, const Tracker& tracker);
 

@@ -25,7 +25,7 @@ struct AxisFit {
   [[nodiscard]] Vector3 centre(std::size_t arc) const { return c + height[arc] * n; }
 };
 
-/// What an axis leaves over, m, and how that changes.
+/// The residual of an axis, m, and its derivative.
 struct Linearised {
   Eigen::VectorXd residual;  ///< per point: from the plane, from the circle
   Eigen::MatrixXd jacobian;  ///< by the small changes of an AxisFit

@@ -7,11 +7,11 @@
 
 #include "server/base/result.h"
 
-/// What reflectors along an arm did while weights hung from its flange, as measured.
+/// Readings of reflectors along an arm while weights hung from its flange, as measured.
 namespace trammel {
 
-/// What one reflector did under one load, against the arm without load. x horizontal and outward, z
-/// up.
+/// The motion of one reflector under one load, against the arm without load. x horizontal and
+/// outward, z up.
 struct DeflectionReading {
   int element = 0;                                  ///< number of the joint, from 1
   double load = 0;                                  ///< N, straight down
@@ -22,7 +22,7 @@ struct DeflectionReading {
   int row = 0;
 };
 
-/// How an element stood while the loads hung.
+/// The pose of an element while the loads hung.
 struct DeflectionElement {
   int element = 0;
   double theta = 0;   ///< rad, of the link above the horizontal

@@ -15,7 +15,7 @@ struct AxisLine {
   Vector3 n = Vector3::Zero(), c = Vector3::Zero();
 };
 
-/// Whether the joint slides.
+/// True if the joint slides.
 [[nodiscard]] bool slides(const Chain& robot, int joint);
 /// The first and the last joint that turn. What stands before or behind them no arc shows.
 struct TurningJoints {
@@ -25,7 +25,7 @@ struct TurningJoints {
 /// the next axis: arcs do not tell how it leads from the one axis to the other.
 [[nodiscard]] Result<TurningJoints> turning_joints(const Chain& robot);
 
-/// The same robot with a Hayati row wherever an axis is parallel to the next one and both are
+/// The robot with a Hayati row wherever an axis is parallel to the next one and both are
 /// measured; what such a row had as d stands in the row behind it. `notes`: which rows those are.
 [[nodiscard]] Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
                                              std::vector<Note>& notes);

@@ -17,8 +17,8 @@ struct LinearEquations {
   double count = 0;
 };
 
-/// What a batch says of small changes of all parameters, in units of `scaled.scale`. Poses far off
-/// count for less, as in identification.
+/// The information of a batch about small changes of all parameters, in units of `scaled.scale`.
+/// Poses far off count for less, as in identification.
 struct LinearArm {
   ScaledParameters scaled;
   std::array<LinearEquations, 2> kinds;  ///< of positions and gauges; of orientations

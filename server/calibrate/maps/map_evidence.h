@@ -7,8 +7,8 @@
 #include "server/error_sources/joint_map.h"
 #include "server/numerics/bfgs.h"
 
-/// How likely a batch is under spectra of the joints' maps, with all parameters integrated out to
-/// first order.
+/// The likelihood of a batch under spectra of the joints' maps, with all parameters integrated out
+/// to first order.
 namespace trammel {
 
 /// A map among the parameters of a model: sine and cosine of harmonic 1, 2, ... from `first` on.
@@ -35,7 +35,7 @@ class MapEvidence {
     Eigen::MatrixXd covariance;
   };
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& logs) const;
-  /// Of the map with that number, with as many harmonics as it has columns for.
+  /// The spectrum of the map with that number, with as many harmonics as it has columns for.
   [[nodiscard]] MapSpectrum spectrum(const Eigen::VectorXd& logs, std::size_t map) const;
   /// By what the sigmas of each kind are to be multiplied.
   [[nodiscard]] std::array<double, 2> noise(const Eigen::VectorXd& logs) const;

@@ -37,11 +37,11 @@ struct SessionBlock {
   [[nodiscard]] SessionMotion motion(const Eigen::VectorXd& step, double damping = 0) const;
 };
 
-/// What is left of the shared parameters' normal equations once the sessions are eliminated.
+/// Leaves the shared parameters' normal equations once the sessions are eliminated.
 void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information,
                Eigen::VectorXd& gradient, double damping = 0);
 
-/// What is to be done to what was measured, to equal this motion of what is predicted.
+/// The change of measurements that equals this motion of the predictions.
 [[nodiscard]] Similarity measured_by(const SessionMotion& motion, const Vector3& centre_W);
 
 }  // namespace trammel

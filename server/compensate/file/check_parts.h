@@ -5,9 +5,9 @@
 
 namespace trammel::model_file {
 
-/// Whether what a file holds can be a model: rigid frames; a covariance that is symmetric, positive
-/// semidefinite and as large as there are parameters; finite numbers within the limits of their
-/// kind. A bias is checked where it is restored.
+/// Checks that the values of a file can be a model: rigid frames; a covariance that is symmetric,
+/// positive semidefinite and as large as there are parameters; finite numbers within the limits of
+/// their kind. A bias is checked where it is restored.
 [[nodiscard]] Status check_parts(const ModelParts& parts);
 
 }  // namespace trammel::model_file

@@ -45,7 +45,7 @@ template <typename Whole>
   return whole_from<Whole>(json.at(key));
 }
 
-/// How many of something there are: whole and not below 0.
+/// A count: whole and not below 0.
 [[nodiscard]] int count_from(const Json& json, const char* key);
 [[nodiscard]] const Json& list_from(const Json& json);
 [[nodiscard]] std::vector<double> numbers_from(const Json& json);

@@ -3,11 +3,11 @@
 /// Words of the model file that are written in one place and checked in another.
 namespace trammel::model_file {
 
-/// What is written and read.
+/// The format that is written and read.
 inline constexpr int kFormat = 2;
-/// How a bias with blocks fades beyond the domain: its kernel alone does.
+/// The way in which a bias with blocks fades beyond the domain: its kernel alone does.
 inline constexpr const char* kFades = "kernel";
-/// What causes of coupled joints are functions of, and turn: the angles of the gears
+/// The angles that causes of coupled joints are functions of, and turn: those of the gears
 /// (server/robot/README.md).
 inline constexpr const char* kAngles = "gears";
 

@@ -8,10 +8,10 @@
 
 namespace trammel::model_file {
 
-/// How far a prediction may be from the stated one: another processor adds and multiplies in
-/// another order, and another release may compute the same in another way. kSelfTestMetres always;
-/// of the error kErrorShare; of a standard deviation kStddevShare. Files from before may state
-/// standard deviations that are too large by kStatedMoreShare.
+/// The most by which a prediction may differ from the stated one: another processor adds and
+/// multiplies in another order, and another release may compute the same in another way.
+/// kSelfTestMetres always; of the error kErrorShare; of a standard deviation kStddevShare. Files
+/// from before may state standard deviations that are too large by kStatedMoreShare.
 constexpr double kSelfTestMetres = 1e-9;
 constexpr double kErrorShare = 1e-8;
 constexpr double kStddevShare = 1e-3;
@@ -21,7 +21,7 @@ constexpr double kStatedMoreShare = 0.03;
 /// range and one beside it.
 [[nodiscard]] nlohmann::json self_test_of(const CompensatedModel& model);
 
-/// Whether the model predicts what `self_test` states. Throws exceptions of nlohmann as
+/// Checks that the model predicts what `self_test` states. Throws exceptions of nlohmann as
 /// parts_from() does.
 [[nodiscard]] Status check_self_test(const CompensatedModel& model,
                                      const nlohmann::json& self_test);

@@ -30,7 +30,7 @@ class CellYear {
   void judge_name(const std::vector<Named>& names, int week, YearScore& score);
   [[nodiscard]] bool is_as_modelled(int week) const;
   void measure(int week, int poses);
-  /// What a new model in force did to the true error.
+  /// Counts the effect of a new model in force on the true error.
   void count_step(double before, int version_before, int week, YearScore& score);
   void drill(int week, YearScore& score);
   [[nodiscard]] double oracle_error(int week);

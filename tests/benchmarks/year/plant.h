@@ -36,9 +36,9 @@ class Arm {
   [[nodiscard]] const std::string& cell_yaml() const { return cell_yaml_; }
   [[nodiscard]] const std::shared_ptr<const Cell>& cell() const { return cell_; }
   [[nodiscard]] const std::vector<Event>& events() const { return events_; }
-  /// Whether something that happens at once happens in that week.
+  /// True if something that happens at once happens in that week.
   [[nodiscard]] bool is_hit(int week) const;
-  /// Whether something slow is going on by then.
+  /// True if something slow is going on by then.
   [[nodiscard]] bool is_wearing(int week) const;
   [[nodiscard]] double temperature(int week) const;  ///< of the hall, degrees Celsius
 

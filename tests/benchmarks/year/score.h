@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-/// How a year went, by the truth.
+/// The score of a year, by the truth.
 namespace trammel::year {
 
 /// An arm in a week; m, rms.

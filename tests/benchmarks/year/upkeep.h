@@ -9,7 +9,7 @@
 #include "server/compensate/compensated_model.h"
 #include "tests/benchmarks/year/plant.h"
 
-/// What a metrologist does in a week, by what the service says and nothing else.
+/// The work of a metrologist in a week, by what the service says and nothing else.
 namespace trammel::year {
 
 /// A cause as a check or a diagnosis calls it.
@@ -18,7 +18,7 @@ struct Named {
   int joint = 0;  ///< 1-based; 0: none
 };
 
-/// What the service said of a cell in a week.
+/// The service's answers on a cell in a week.
 struct Said {
   bool changed = false, cannot_tell = false;
   bool in_force = false;  ///< a diagnosis has put a model in force
@@ -27,7 +27,7 @@ struct Said {
   std::string sentence = {};
 };
 
-/// What became of a batch.
+/// The fate of a batch.
 struct Taken {
   std::string verdict;  ///< of its job, or the error's sentence
   int version = 0;      ///< that it made; 0: none
@@ -81,7 +81,7 @@ class Driller {
   [[nodiscard]] std::vector<Hole> drill(int week, int count, std::uint64_t seed) const;
   /// m, rms over the joint ranges of what the model in force gets wrong of the arm.
   [[nodiscard]] std::optional<double> error_in_force(int week) const;
-  /// The same of a model that nobody serves.
+  /// The true error of a model that nobody serves.
   [[nodiscard]] double error_of(const CompensatedModel& model, int week) const;
 
  private:
