@@ -11,11 +11,11 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr std::size_t kFewest = 4;      // poses that show a habit
-constexpr std::size_t kMost = 500;      // nobody jogs to more
-constexpr double kStep = 0.5;           // mm: plain coordinates are multiples of it
-constexpr double kSame = 1e-4;          // mm: below any written digit
-constexpr double kSameRotation = 5e-5;  // rad: a jogged wrist comes back to 1e-4 at best
+constexpr std::size_t kFewestPositions = 4;  // poses that show a habit
+constexpr std::size_t kMost = 500;           // nobody jogs to more
+constexpr double kStep = 0.5;                // mm: plain coordinates are multiples of it
+constexpr double kSame = 1e-4;               // mm: below any written digit
+constexpr double kSameRotation = 5e-5;       // rad: a jogged wrist comes back to 1e-4 at best
 constexpr double kNearest = 20;     // mm: paths of CAM systems have their points closer together
 constexpr std::size_t kTenth = 10;  // of the poses, or one, may look drawn by chance
 
@@ -58,7 +58,8 @@ std::string note_on_taught_targets(const Program& program) {
     if (!is_joints(target.coordinates) && !target.folded)
       poses.push_back(pose_of(target.coordinates, target.numbers));
   }
-  if (poses.size() < kFewest || poses.size() > kMost || usual_step(poses) < kNearest) return "";
+  if (poses.size() < kFewestPositions || poses.size() > kMost || usual_step(poses) < kNearest)
+    return "";
   std::size_t drawn = 0;
   for (std::size_t k = 0; k < poses.size(); ++k) drawn += looks_drawn(poses, k) ? 1 : 0;
   if (drawn > std::max<std::size_t>(1, poses.size() / kTenth)) return "";

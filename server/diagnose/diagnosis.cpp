@@ -54,6 +54,10 @@ Cause cause_at(const CauseRecord& record, int joint) {
   return cause;
 }
 
+void add(std::vector<Cause>& causes, const Cause& cause) {
+  if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
+}
+
 Cause unknown_cause(int joint) {
   return cause_at(cause_that_stands_for(causes::StandsFor::kNoKnownCause), joint);
 }

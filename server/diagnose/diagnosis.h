@@ -47,6 +47,8 @@ struct Cause {
 [[nodiscard]] Cause cause_at(const CauseRecord& record, int joint = -1);
 /// Something is there, of `joint` (-1: of any), and no known cause is it.
 [[nodiscard]] Cause unknown_cause(int joint = -1);
+/// Adds a cause that is not yet among `causes`.
+void add(std::vector<Cause>& causes, const Cause& cause);
 
 /// A number found, in the unit people read it in.
 struct Estimate {

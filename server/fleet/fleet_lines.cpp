@@ -15,7 +15,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAsIfRobots = 3;       // that have what is usual for a line
+constexpr double kAsIfUsual = 3;        // that have what is usual for a line
 constexpr double kUsualDeviations = 2;  // what is usual is exceeded in one of twenty cases
 
 /// Where base and tool stand is no matter of the arm; what is left has no value.
@@ -50,7 +50,7 @@ LineAmongSisters held_against(const BudgetNumber& own, const std::vector<BudgetN
   const double mean = sum / n;
   for (const BudgetNumber& one : sisters) squares += (one.value - mean) * (one.value - mean);
   // The uncertainty of each sister is part of what they differ by.
-  const double as_if = usual > 0 ? kAsIfRobots : 0;
+  const double as_if = usual > 0 ? kAsIfUsual : 0;
   const double spread = (squares + as_if * std::pow(usual / kUsualDeviations, 2)) / (n - 1 + as_if);
   const double next = std::max(spread * (1 + 1 / n), uncertain / (n * n));
   LineAmongSisters line;
@@ -100,7 +100,7 @@ std::vector<LineAmongSisters> lines_among_sisters(const ErrorBudget& own,
     const std::optional<LineAmongSisters> farthest = farthest_of(line, sisters, usual);
     if (!farthest) continue;
     all.push_back(*farthest);
-    chance.push_back(two_sided(farthest->z, farthest->robots - 1 + (usual > 0 ? kAsIfRobots : 0)));
+    chance.push_back(two_sided(farthest->z, farthest->robots - 1 + (usual > 0 ? kAsIfUsual : 0)));
   }
   const double asked = static_cast<double>(all.size()) * (static_cast<double>(sisters.size()) + 1);
   for (std::size_t k = 0; k < all.size(); ++k) all[k].differs = asked * chance[k] <= kFalseFleets;

@@ -9,7 +9,7 @@ namespace {
 using State = CellReadiness::State;
 using Where = ModelRegistry::Place::Where;
 
-constexpr int kMostAsked =
+constexpr int kMostCellsAsked =
     20;  // dark cells whose last training the store is asked for, in one answer
 
 /// The values in which all cells are looked up, read once.
@@ -54,7 +54,7 @@ State state_at(Where where) {
 /// The readiness of a cell that never had a model in force, as far as its last training tells.
 CellReadiness untrained(const std::string& cell, const Watched& server, int* asked) {
   CellReadiness one{cell, State::kUntrained, 0, "there is no model: submit a batch"};
-  if (++*asked > kMostAsked) return one;
+  if (++*asked > kMostCellsAsked) return one;
   const auto jobs = server.store.recent_jobs(cell, 1);
   if (!jobs) return {cell, State::kUnreadable, 0, sentence(jobs.error())};
   const auto last = std::find_if(jobs->rbegin(), jobs->rend(), [](const StoredJob& job) {

@@ -13,8 +13,8 @@ constexpr double kWorstCounts =
     4;  // power of the mean over the signals: towards the largest of them
 constexpr double kWeakPrior =
     1e-6;  // of base and tool, per squared sigma: so that few poses have an inverse
-constexpr int kRounds = 3;           // of exchanges
-constexpr double kLeastGain = 1e-3;  // of the criterion
+constexpr int kRounds = 3;                 // of exchanges
+constexpr double kWorthAnExchange = 1e-3;  // of the criterion
 
 /// Effects at one pose, over sigma: of base and tool (f columns) and of the signals (s columns).
 struct Whitened {
@@ -63,9 +63,9 @@ struct Sums {
 };
 
 /// Small where every signal is seen well: sum of (needed / lambda)^4.
-class Criterion {
+class NeededVariances {
  public:
-  explicit Criterion(Eigen::VectorXd needed) : needed_(std::move(needed)) {}
+  explicit NeededVariances(Eigen::VectorXd needed) : needed_(std::move(needed)) {}
   [[nodiscard]] double of(const Sums& sums) const {
     constexpr double kBlind = 1e-6;  // of what is needed
     const Eigen::ArrayXd strength = sums.strengths().array().max(kBlind * needed_.array());
@@ -81,7 +81,7 @@ class Criterion {
   Eigen::VectorXd needed_;
 };
 
-std::size_t best_of(const Criterion& criterion, const Sums& sums,
+std::size_t best_of(const NeededVariances& criterion, const Sums& sums,
                     const std::vector<Whitened>& poses, const std::vector<bool>& taken,
                     double* value) {
   std::size_t best = 0;
@@ -95,7 +95,7 @@ std::size_t best_of(const Criterion& criterion, const Sums& sums,
 }
 
 /// Takes one pose out after the other and puts the best one in.
-void exchange(const Criterion& criterion, const std::vector<Whitened>& poses, Sums& sums,
+void exchange(const NeededVariances& criterion, const std::vector<Whitened>& poses, Sums& sums,
               std::vector<bool>& taken, std::vector<std::size_t>& chosen) {
   double value = criterion.of(sums);
   for (int round = 0; round < kRounds; ++round) {
@@ -107,7 +107,7 @@ void exchange(const Criterion& criterion, const std::vector<Whitened>& poses, Su
       sums.add(poses[one]);
       taken[one] = true;
     }
-    if (value > (1 - kLeastGain) * before) return;
+    if (value > (1 - kWorthAnExchange) * before) return;
   }
 }
 
@@ -163,7 +163,7 @@ Result<CheckDesign> check_design(const CauseEffects& effects,
     const auto& entry = effects.causes()[signals[static_cast<std::size_t>(s)].cause];
     needed(s) = needed_strength(freedom_of(entry, count), test);
   }
-  const Criterion criterion(needed);
+  const NeededVariances criterion(needed);
   Sums sums = sums_for(effects, signals, test);
   std::vector<bool> taken(poses.size(), false);
   CheckDesign design;

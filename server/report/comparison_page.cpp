@@ -15,7 +15,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kWorthARow = 1e-3;  // of the difference
+constexpr double kWorthALine = 1e-3;  // of the difference
 
 /// A paragraph for each line of a text.
 std::string paragraphs(const std::string& text) {
@@ -31,7 +31,7 @@ std::string lines_table(const BudgetView& view) {
   std::vector<HtmlRow> rows;
   for (const BudgetLine& line : view.lines) {
     const bool within = !line.value || std::abs(line.value->value) <= line.value->u95;
-    if (std::abs(line.share) < kWorthARow && within) continue;
+    if (std::abs(line.share) < kWorthALine && within) continue;
     rows.push_back({{html_text(line.name), value_html(line),
                      bar_of(longest > 0 ? line.alone_rms / longest : 0, "budget_bar") +
                          fmt::format("{:.4f}", to_mm(line.alone_rms)),

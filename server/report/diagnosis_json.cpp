@@ -16,10 +16,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json length_json(const std::optional<double>& length) {
-  return length ? ordered_json(to_mm(*length)) : ordered_json(nullptr);
-}
-
 ordered_json figures_or_null(const std::optional<ErrorFigures>& figures) {
   return figures ? figures_json(*figures) : ordered_json(nullptr);
 }

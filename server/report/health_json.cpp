@@ -11,6 +11,7 @@
 #include "server/compensate/budget/error_budget.h"
 #include "server/compensate/model_notes.h"
 #include "server/report/budget_json.h"
+#include "server/report/figures_json.h"
 #include "server/report/note_json.h"
 
 namespace trammel {
@@ -19,18 +20,14 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kShownSizes = 5;  // for people: those that are hardest to see
-constexpr std::size_t kShownLines = 6;  // for people: of what changed
+constexpr std::size_t kShownSizes = 5;    // for people: those that are hardest to see
+constexpr std::size_t kShownChanges = 6;  // for people: of what changed
 
 /// The measurements of a check and the model that they were held against.
 struct CheckedWith {
   const CheckedBatch& batch;
   const CompensatedModel& model;
 };
-
-ordered_json length_json(const std::optional<double>& length) {
-  return length ? ordered_json(to_mm(*length)) : ordered_json(nullptr);
-}
 
 ordered_json cause_json(const SingleCause& cause) {
   ordered_json json = {{"cause", cause.record->spelling}};
@@ -150,7 +147,7 @@ ordered_json change_budget_json(const HealthCheck& check, const CheckedWith* wit
   std::stable_sort(sized.begin(), sized.end(), by_size);
   std::vector<std::string> sentences;
   for (const auto& [size, line] : sized)
-    if (sentences.size() < kShownLines) sentences.push_back(sentence(line));
+    if (sentences.size() < kShownChanges) sentences.push_back(sentence(line));
   BudgetLine rest = change_line("rest", LineKind::kRest, -1, "what a healthy robot leaves");
   rest.alone_rms = check.expected_rms;
   sized.emplace_back(check.expected_rms, std::move(rest));

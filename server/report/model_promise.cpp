@@ -20,7 +20,7 @@ namespace trammel {
 
 namespace {
 
-constexpr int kFewestToJudge =
+constexpr int kFewestToPromise =
     10;  // fresh poses: with fewer the promise says by how many it was tested
 /// Degrees of freedom of the residuals: with fewer their rms may be wrong by half and more (1 /
 /// sqrt(2 k) is 22 % of it at 10), and nothing else says how far the model is off.
@@ -198,7 +198,7 @@ std::string tolerance_sentence(const PositionAccuracy& accuracy,
 
 /// Says what the promise stands on, where that is little; it follows "in this volume".
 std::string hardly_judged(const PositionAccuracy& accuracy) {
-  if (accuracy.judged_by() >= kFewestToJudge) return "";
+  if (accuracy.judged_by() >= kFewestToPromise) return "";
   if (accuracy.judged_by() == 0) return ", by its training poses alone";
   return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(),
                      accuracy.judged_by() == 1 ? "" : "s");
@@ -255,7 +255,7 @@ std::optional<std::string> why_no_promise(const CompensatedModel& model,
           ? std::string("none was held out")
           : fmt::format("{} that {} not trained on are too few", accuracy->judged_by(),
                         accuracy->judged_by() == 1 ? "was" : "were"),
-      kFewestToJudge);
+      kFewestToPromise);
 }
 
 std::string rounded_up_mm(double length) {

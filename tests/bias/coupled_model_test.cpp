@@ -54,7 +54,7 @@ BiasModel fit(const BiasProblem& problem, const std::string& kernel) {
   return *std::move(model);
 }
 
-void expect_same_predictions(const BiasModel& a, const BiasModel& b) {
+void expect_same_coupled_predictions(const BiasModel& a, const BiasModel& b) {
   const BiasProblem targets = gear_problem(70, 99);
   const auto from_a = a.predict_all(targets.q, targets.features);
   const auto from_b = b.predict_all(targets.q, targets.features);
@@ -121,7 +121,7 @@ TEST(CoupledModel, WhatRestsOnPosesNearbyIsTheSameWhoeverAsksAndEndsFarFromThem)
 TEST(CoupledModel, RestoresBitForBit) {
   const auto restored = BiasModel::restore(fitted().state());
   ASSERT_TRUE(restored.has_value()) << restored.error().message;
-  expect_same_predictions(fitted(), *restored);
+  expect_same_coupled_predictions(fitted(), *restored);
   EXPECT_EQ(fitted().leave_one_out_mean_B(), restored->leave_one_out_mean_B());
   EXPECT_EQ(fitted().report().noise_stddev, restored->report().noise_stddev);
 }
@@ -147,7 +147,7 @@ TEST(CoupledModel, GrowsAsIfConditionedAnewAndRefitsFromWhereItWas) {
   const BiasModel few = fit(part_of(all, 0, 120), "se + joint_map");
   const auto grown = few.with(part_of(all, 120, 30));
   ASSERT_TRUE(grown.has_value()) << grown.error().message;
-  expect_same_predictions(*grown, *BiasModel::restore(grown->state()));
+  expect_same_coupled_predictions(*grown, *BiasModel::restore(grown->state()));
   const auto refitted = grown->refit({});
   ASSERT_TRUE(refitted.has_value()) << refitted.error().message;
   EXPECT_LE(refitted->report().evaluations, 15);

@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSignal = 3e-5;  // m, of the first output; the others differ
-constexpr double kNoise = 2e-5;   // m, likewise
+constexpr double kSignal = 3e-5;        // m, of the first output; the others differ
+constexpr double kCoupledNoise = 2e-5;  // m, likewise
 
 MatrixXd turns(Index count, std::uint64_t seed) {
   return random_joints(count, seed, 3) * (std::numbers::pi / 1.2);
@@ -27,7 +27,7 @@ VectorXd uneven_noise(Index count) {
   return shape;
 }
 
-/// Gear errors times the Jacobian, noise of kNoise.
+/// Gear errors times the Jacobian, noise of kCoupledNoise.
 MatrixXd gear_residual(const MatrixXd& q, double noise, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   MatrixXd y(q.rows(), 3);
@@ -53,7 +53,7 @@ CoupledHyperparameters some_hyperparameters(const LinearBlocks& blocks) {
   CoupledHyperparameters at;
   for (int d = 0; d < 3; ++d) {
     const VectorXd scales = Eigen::Vector3d(0.1 + 0.1 * d, 0.3 - 0.1 * d, 0.2);
-    at.outputs.push_back({scales, std::log(kSignal) + 0.3 * d, std::log(kNoise) - 0.2 * d});
+    at.outputs.push_back({scales, std::log(kSignal) + 0.3 * d, std::log(kCoupledNoise) - 0.2 * d});
   }
   at.blocks = blocks.start();
   for (Index k = 0; k < at.blocks.size(); ++k)
@@ -160,7 +160,7 @@ class EveryBlock : public testing::TestWithParam<Case> {
   LinearBlocks blocks() const { return made(GetParam().which); }
   CoupledData data() const {
     const MatrixXd q = turns(GetParam().count, 41);
-    return arm_data(blocks(), q, gear_residual(q, kNoise, 42), uneven_noise(q.rows()));
+    return arm_data(blocks(), q, gear_residual(q, kCoupledNoise, 42), uneven_noise(q.rows()));
   }
 };
 
@@ -278,7 +278,7 @@ void expect_gradient_of_differences(const CoupledLikelihood& likelihood, const V
 TEST_P(EveryBlock, GradientEqualsCentralDifferences) {
   const LinearBlocks blocks = this->blocks();
   CoupledPrior prior;  // that all pull
-  prior.noise_stddev = VectorXd::Constant(3, 3 * kNoise);
+  prior.noise_stddev = VectorXd::Constant(3, 3 * kCoupledNoise);
   prior.noise_spread = 0.5;
   prior.parameter_centre = Eigen::Vector3d(1.0, 0.5, -0.5);
   prior.signal_centre = VectorXd::Constant(3, std::log(1e-4));
@@ -308,7 +308,7 @@ TEST(CoupledPosterior, PassesOverPosesThatAreTooFarAwayToMatterAndNoOthers) {
     output.log_signal_stddev = std::log(5 * kSignal);
   }
   const CoupledData data =
-      arm_data(blocks, q, gear_residual(q, kNoise, 54), uneven_noise(q.rows()));
+      arm_data(blocks, q, gear_residual(q, kCoupledNoise, 54), uneven_noise(q.rows()));
   const auto fast = CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at);
   const auto exact =
       CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at, VarianceForm::kExact);
@@ -335,7 +335,8 @@ struct ServedCase {
   LinearBlocks blocks = made(Blocks::kBoth);
   MatrixXd q = turns(400, 71);
   CoupledHyperparameters at = some_hyperparameters(blocks);
-  CoupledData data = arm_data(blocks, q, gear_residual(q, kNoise, 72), uneven_noise(q.rows()));
+  CoupledData data =
+      arm_data(blocks, q, gear_residual(q, kCoupledNoise, 72), uneven_noise(q.rows()));
 
   explicit ServedCase(double signal_over_noise) {
     for (GpHyperparameters& output : at.outputs)
@@ -402,7 +403,7 @@ TEST(CoupledPosterior, SaysThatAnErrorOfTheFirstJointIsAcrossTheArmAndNotAlongIt
   at.blocks[2] = at.blocks[4] = std::log(1e-8);  // the other two joints are true
   const auto posterior = CoupledPosterior::condition(
       make_kernel("se"), blocks,
-      arm_data(blocks, q, gear_residual(q, kNoise, 52), VectorXd::Ones(40)), at);
+      arm_data(blocks, q, gear_residual(q, kCoupledNoise, 52), VectorXd::Ones(40)), at);
   ASSERT_TRUE(posterior.has_value());
   const JointVector target = Eigen::Vector3d(0.7, 0.4, -0.9);
   const Matrix3 covariance =

@@ -23,11 +23,11 @@ const Vector3 kB(-0.05, 0.09, 0.2);
 const Vector3 kC(-0.05, -0.09, 0.25);
 const Vector3 kNew(0.08, -0.12, 0.35);
 
-BiasModel fit(const BiasProblem& problem, const std::string& kernel) {
+BiasModel fit_flange(const BiasProblem& problem, const std::string& kernel) {
   BiasOptions options;
   options.kernel = kernel;
   options.starts = 4;
-  auto model = BiasModel::fit(problem, options);
+  auto model = BiasModel::fit_flange(problem, options);
   if (!model) throw std::runtime_error(model.error().message);
   return *std::move(model);
 }
@@ -265,8 +265,8 @@ double rms_at(const BiasModel& model, const MatrixXd& q, const Vector3& lever_F)
 TEST(Flange, ThreeReflectorsTeachRotationSoThatAFourthIsPredictedAsWellAsByItsOwnTraining) {
   const MatrixXd q = random_joints(150, 11);
   const MatrixXd fresh = random_joints(300, 12);
-  const BiasModel three = fit(seen_problem(q, {kA, kB, kC}, 11), "se + flange");
-  const BiasModel own = fit(seen_problem(q, {kNew}, 12), "se");
+  const BiasModel three = fit_flange(seen_problem(q, {kA, kB, kC}, 11), "se + flange");
+  const BiasModel own = fit_flange(seen_problem(q, {kNew}, 12), "se");
   double by_own = 0;
   for (Index i = 0; i < fresh.rows(); ++i) {
     const JointVector at = fresh.row(i);
@@ -291,9 +291,10 @@ double inside_at(const BiasModel& model, const MatrixXd& q, const Vector3& lever
 TEST(Flange, ItsIntervalsCoverALeverThatWasNeverMeasuredAsAPlainKernelCoversItsOwn) {
   const MatrixXd q = random_joints(120, 21);
   const MatrixXd fresh = random_joints(400, 22);
-  const double plain = inside_at(fit(seen_problem(q, {kNew}, 21), "se"), fresh, kNew);
-  EXPECT_GT(inside_at(fit(seen_problem(q, {kA}, 21), "se + flange"), fresh, kNew), plain - 0.03);
-  EXPECT_GT(inside_at(fit(seen_problem(q, {kA, kB, kC}, 21), "se + flange"), fresh, kNew),
+  const double plain = inside_at(fit_flange(seen_problem(q, {kNew}, 21), "se"), fresh, kNew);
+  EXPECT_GT(inside_at(fit_flange(seen_problem(q, {kA}, 21), "se + flange"), fresh, kNew),
+            plain - 0.03);
+  EXPECT_GT(inside_at(fit_flange(seen_problem(q, {kA, kB, kC}, 21), "se + flange"), fresh, kNew),
             plain - 0.03);
 }
 
@@ -301,8 +302,8 @@ TEST(Flange, OfOneLeverItIsAsGoodAsAKernelWithoutLeversAndAnotherLeverIsLessSure
   const MatrixXd q = random_joints(120, 31);
   const MatrixXd fresh = random_joints(200, 32);
   const BiasProblem problem = seen_problem(q, {kA}, 31);
-  const BiasModel plain = fit(problem, "se");
-  const BiasModel flange = fit(problem, "se + flange");
+  const BiasModel plain = fit_flange(problem, "se");
+  const BiasModel flange = fit_flange(problem, "se + flange");
   double by_plain = 0;
   for (Index i = 0; i < fresh.rows(); ++i) {
     const JointVector at = fresh.row(i);
@@ -330,8 +331,8 @@ TEST(Flange, ToolsOnPosesOfTheirOwnTellTheSameArm) {
   both.sigma.tail(80) = second.sigma;
   both.features.insert(both.features.end(), second.features.begin(), second.features.end());
   const MatrixXd fresh = random_joints(300, 43);
-  const BiasModel flange = fit(both, "se + flange");
-  const BiasModel plain = fit(both, "se");
+  const BiasModel flange = fit_flange(both, "se + flange");
+  const BiasModel plain = fit_flange(both, "se");
   for (const Vector3& lever_F : {kA, far})
     EXPECT_LT(rms_at(flange, fresh, lever_F), 0.9 * rms_at(plain, fresh, lever_F));
   EXPECT_GT(flange.report().log_likelihood.sum(), plain.report().log_likelihood.sum() + 50);
@@ -352,7 +353,7 @@ TEST(Flange, IsChosenWhereThereAreSeveralLeversAndNotAskedWhereThereIsOne) {
 
 TEST(Flange, ARestoredModelAnswersBitForBit) {
   const BiasModel model =
-      fit(seen_problem(random_joints(40, 61), {kA, kB}, 61), "matern52 + flange");
+      fit_flange(seen_problem(random_joints(40, 61), {kA, kB}, 61), "matern52 + flange");
   const auto restored = BiasModel::restore(model.state());
   ASSERT_TRUE(restored.has_value()) << restored.error().message;
   const JointVector at = random_joints(1, 62).row(0);
@@ -380,7 +381,7 @@ TEST(Flange, MorePosesThanItsMatrixHoldsAreRefusedInWords) {
   const BiasProblem problem = seen_problem(random_joints(700, 71), {kA, kB, kC}, 71);
   BiasOptions options;
   options.kernel = "se + flange";
-  const auto model = BiasModel::fit(problem, options);
+  const auto model = BiasModel::fit_flange(problem, options);
   ASSERT_FALSE(model.has_value());
   EXPECT_EQ(refusal_of(model), Refusal("", {}, "bias").beyond(700 * 6, kMostFlangeNumbers));
 }

@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Case {
+struct ServedVarianceCase {
   const char* kernel;
   double length;  // scale of every joint, rad, over a range of 2.4 rad
   double noise;   // variance, relative to the signal's
@@ -22,11 +22,11 @@ struct Case {
   Index joints = 6;
 };
 
-std::string name_of(const testing::TestParamInfo<Case>& info) {
+std::string name_of(const testing::TestParamInfo<ServedVarianceCase>& info) {
   return std::to_string(info.index) + "_" + info.param.layout;
 }
 
-MatrixXd poses_of(const Case& of) {
+MatrixXd poses_of(const ServedVarianceCase& of) {
   MatrixXd q = random_joints(of.poses, 91, of.joints);
   const std::string layout = of.layout;
   if (layout == "twice") q.bottomRows(of.poses / 2) = q.topRows(of.poses / 2);
@@ -41,7 +41,7 @@ MatrixXd poses_of(const Case& of) {
   return q;
 }
 
-GaussianProcess process_of(const Case& of, VarianceForm form) {
+GaussianProcess process_of(const ServedVarianceCase& of, VarianceForm form) {
   const MatrixXd q = poses_of(of);
   VectorXd shape(of.poses);
   for (Index i = 0; i < of.poses; ++i) shape[i] = 0.5 + 0.25 * static_cast<double>(i % 5);
@@ -56,7 +56,7 @@ GaussianProcess process_of(const Case& of, VarianceForm form) {
 }
 
 // Training poses, poses near them and between them, the whole range, and beyond it.
-MatrixXd targets_of(const Case& of) {
+MatrixXd targets_of(const ServedVarianceCase& of) {
   const MatrixXd q = poses_of(of);
   const Index n = std::min<Index>(120, of.poses);
   const Eigen::RowVectorXd middle = 0.5 * (q.colwise().maxCoeff() + q.colwise().minCoeff());
@@ -72,7 +72,7 @@ MatrixXd targets_of(const Case& of) {
   return targets;
 }
 
-class ServedVariance : public testing::TestWithParam<Case> {};
+class ServedVariance : public testing::TestWithParam<ServedVarianceCase> {};
 
 TEST_P(ServedVariance, IsNeverBelowTheExactOneAndHardlyAbove) {
   const GaussianProcess exact = process_of(GetParam(), VarianceForm::kExact);
@@ -122,19 +122,27 @@ TEST_P(ServedVariance, IsTheSameAloneAndAmongOthersServedOrLearned) {
 
 INSTANTIATE_TEST_SUITE_P(
     Kernels, ServedVariance,
-    testing::Values(
-        Case{"se", 0.9, 0.07, 700, "scattered"}, Case{"se", 0.9, 0.005, 500, "scattered"},
-        Case{"se", 0.05, 0.07, 400, "scattered"}, Case{"se", 8.0, 1e-6, 400, "scattered"},
-        Case{"se", 0.5, 3.0, 400, "scattered"}, Case{"se", 0.6, 1e-7, 300, "scattered"},
-        Case{"se", 0.7, 0.02, 500, "twice"}, Case{"se", 0.3, 0.02, 500, "clusters"},
-        Case{"se", 1.5, 20.0, 500, "clusters"}, Case{"se", 0.7, 0.02, 400, "flat"},
-        Case{"se", 0.4, 0.05, 400, "line"}, Case{"se", 0.3, 10.0, 1200, "scattered"},
-        Case{"se", 1.5, 5.0, 600, "scattered"}, Case{"se", 0.6, 1e3, 500, "scattered"},
-        Case{"se", 0.9, 0.07, 50, "scattered"}, Case{"se", 1.5, 0.02, 600, "rail", 7},
-        Case{"matern52", 1.0, 0.05, 500, "scattered"}, Case{"matern32", 0.8, 0.3, 400, "twice"},
-        Case{"rational_quadratic", 1.0, 0.05, 400, "scattered"},
-        Case{"matern52", 3.0, 80.0, 500, "rail", 7},
-        Case{"se * matern32", 1.5, 0.1, 300, "scattered"}),
+    testing::Values(ServedVarianceCase{"se", 0.9, 0.07, 700, "scattered"},
+                    ServedVarianceCase{"se", 0.9, 0.005, 500, "scattered"},
+                    ServedVarianceCase{"se", 0.05, 0.07, 400, "scattered"},
+                    ServedVarianceCase{"se", 8.0, 1e-6, 400, "scattered"},
+                    ServedVarianceCase{"se", 0.5, 3.0, 400, "scattered"},
+                    ServedVarianceCase{"se", 0.6, 1e-7, 300, "scattered"},
+                    ServedVarianceCase{"se", 0.7, 0.02, 500, "twice"},
+                    ServedVarianceCase{"se", 0.3, 0.02, 500, "clusters"},
+                    ServedVarianceCase{"se", 1.5, 20.0, 500, "clusters"},
+                    ServedVarianceCase{"se", 0.7, 0.02, 400, "flat"},
+                    ServedVarianceCase{"se", 0.4, 0.05, 400, "line"},
+                    ServedVarianceCase{"se", 0.3, 10.0, 1200, "scattered"},
+                    ServedVarianceCase{"se", 1.5, 5.0, 600, "scattered"},
+                    ServedVarianceCase{"se", 0.6, 1e3, 500, "scattered"},
+                    ServedVarianceCase{"se", 0.9, 0.07, 50, "scattered"},
+                    ServedVarianceCase{"se", 1.5, 0.02, 600, "rail", 7},
+                    ServedVarianceCase{"matern52", 1.0, 0.05, 500, "scattered"},
+                    ServedVarianceCase{"matern32", 0.8, 0.3, 400, "twice"},
+                    ServedVarianceCase{"rational_quadratic", 1.0, 0.05, 400, "scattered"},
+                    ServedVarianceCase{"matern52", 3.0, 80.0, 500, "rail", 7},
+                    ServedVarianceCase{"se * matern32", 1.5, 0.1, 300, "scattered"}),
     name_of);
 
 TEST(ServedVarianceOfScatteredPoses, IsThePriorFarFromAllData) {

@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/refit.h"
 #include "server/plan/plan.h"
+#include "tests/support/calibrated.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/one_point.h"
@@ -25,7 +26,7 @@ using test::chapter_5_robot;
 using test::demand;
 using test::measured;
 
-const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
+const std::vector<std::string> kCalibrateM3 = {"base", "geometry", "compliance"};
 
 double validation_rms_mm(const CalibrationResult& result, const MeasurementBatch& batch) {
   double sum = 0;
@@ -33,14 +34,6 @@ double validation_rms_mm(const CalibrationResult& result, const MeasurementBatch
     sum += (m.p_W - result.model.pose_W(m.context).translation()).squaredNorm();
   }
   return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
-}
-
-const IdentifiedParameter& parameter(const CalibrationResult& result, const std::string& name) {
-  const auto found =
-      std::find_if(result.parameters.begin(), result.parameters.end(),
-                   [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
-  EXPECT_NE(found, result.parameters.end()) << name;
-  return *found;
 }
 
 TEST(Calibrate, ReachesTheFiguresOfEveryLevelOnPosesItNeverSaw) {
@@ -56,13 +49,14 @@ TEST(Calibrate, ReachesTheFiguresOfEveryLevelOnPosesItNeverSaw) {
   EXPECT_NEAR(level("M0", {}), 9.7, 0.3);
   EXPECT_NEAR(level("M1", {"base"}), 4.2, 0.3);
   EXPECT_NEAR(level("M2", {"base", "geometry"}), 3.9, 0.3);
-  EXPECT_LE(level("M3", kM3), 0.0245);
+  EXPECT_LE(level("M3", kCalibrateM3), 0.0245);
 }
 
 TEST(Calibrate, ThreePositionsAPoseAreEnough) {
   const auto cell = cell_7();
   const VirtualRobot robot = chapter_5_robot(cell);
-  const Result<CalibrationResult> result = calibrate(cell, kM3, measured(robot, 120, 3, false), {});
+  const Result<CalibrationResult> result =
+      calibrate(cell, kCalibrateM3, measured(robot, 120, 3, false), {});
   ASSERT_TRUE(result);
   EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 4)), 0.0265);
 }
@@ -85,7 +79,7 @@ TEST(Calibrate, FindsAnUnknownBaseAndTool) {
   VirtualRobot robot = chapter_5_robot(cell);
   robot.truth.X_WB = make_pose(rotation_exp({0.1, -0.2, 2.2}), {4, -2, 0.3});
   robot.truth.tools["spindle"] = make_pose(rotation_exp({0.5, 0.4, -0.3}), {0.12, -0.05, 0.2});
-  std::vector<std::string> specs = kM3;
+  std::vector<std::string> specs = kCalibrateM3;
   specs.push_back("tool");
   for (const bool orientation : {true, false}) {
     const Result<CalibrationResult> result =
@@ -133,7 +127,7 @@ TEST(Calibrate, OnePointSeenWithAToolThatIsOffTellsHowTheBaseIsTurnedByHowTheToo
 
 TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
   const Result<CalibrationResult> result =
-      calibrate(cell_7(), kM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
+      calibrate(cell_7(), kCalibrateM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
   ASSERT_TRUE(result);
   EXPECT_EQ(result->rank, 33);
   ASSERT_EQ(result->unidentifiable.size(), 3u);
@@ -148,9 +142,9 @@ TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
   EXPECT_TRUE(named({"gamma0", "q1"}));
   EXPECT_TRUE(named({"d1", "z0"}));
   EXPECT_TRUE(named({"C6"}));
-  EXPECT_FALSE(parameter(*result, "q1").identified);
-  EXPECT_FALSE(parameter(*result, "C6").identified);
-  EXPECT_TRUE(parameter(*result, "d4").identified);
+  EXPECT_FALSE(test::parameter(*result, "q1").identified);
+  EXPECT_FALSE(test::parameter(*result, "C6").identified);
+  EXPECT_TRUE(test::parameter(*result, "d4").identified);
 }
 
 TEST(Calibrate, StatesUncertaintiesThatFitItsErrors) {
@@ -169,7 +163,7 @@ TEST(Calibrate, StatesUncertaintiesThatFitItsErrors) {
         calibrate(cell, {"base", "geometry", "compliance_linear"}, measured(robot, 60, seed), {});
     ASSERT_TRUE(result);
     for (const auto& [name, truth] : truths) {
-      const IdentifiedParameter& p = parameter(*result, name);
+      const IdentifiedParameter& p = test::parameter(*result, name);
       sum += std::pow((p.value - truth) / p.stddev, 2);
       ++count;
     }
@@ -181,7 +175,7 @@ TEST(Calibrate, NeverMakesAComplianceNegative) {
   const auto cell = cell_7();
   for (const std::uint64_t seed : {8, 9, 10}) {
     const Result<CalibrationResult> result =
-        calibrate(cell, kM3, measured(chapter_5_robot(cell), 60, seed), {});
+        calibrate(cell, kCalibrateM3, measured(chapter_5_robot(cell), 60, seed), {});
     ASSERT_TRUE(result);
     for (const IdentifiedParameter& p : result->parameters) {
       if (p.parameter.name.starts_with("C")) {
@@ -199,7 +193,7 @@ TEST(Calibrate, EstimatesWhatTheModelCannotExplain) {
   ASSERT_TRUE(result);
   EXPECT_NEAR(result->discrepancy, result->rms / std::sqrt(3), 0.1 * result->discrepancy);
   const Result<CalibrationResult> complete =
-      calibrate(cell, kM3, measured(chapter_5_robot(cell), 200, 11), {});
+      calibrate(cell, kCalibrateM3, measured(chapter_5_robot(cell), 200, 11), {});
   EXPECT_LT(complete->discrepancy, 4e-6);
 }
 
@@ -248,8 +242,9 @@ TEST(Calibrate, FewPosesTellHowFarPositionsAreOffThatAreFittedCloserThanOrientat
       m.R_WT =
           (rotation_exp(kOff * Vector3(normal(random), normal(random), normal(random))) * *m.R_WT)
               .eval();
-    positions += demand(calibrate(cell, kM3, shifted, {})).discrepancy / kOff / kSeeds;
-    rotations += demand(calibrate(cell, kM3, turned, {})).discrepancy_rotation / kOff / kSeeds;
+    positions += demand(calibrate(cell, kCalibrateM3, shifted, {})).discrepancy / kOff / kSeeds;
+    rotations +=
+        demand(calibrate(cell, kCalibrateM3, turned, {})).discrepancy_rotation / kOff / kSeeds;
   }
   EXPECT_NEAR(positions, 1, 0.06);
   EXPECT_NEAR(rotations, 1, 0.06);
@@ -265,7 +260,8 @@ TEST(Calibrate, WeighsAPointByItsOwnSigma) {
     m.p_W +=
         1e-3 * Vector3(std::sin(double(i)), std::cos(2.0 * double(i)), std::sin(3.0 * double(i)));
   }
-  EXPECT_LE(validation_rms_mm(*calibrate(cell, kM3, batch, {}), measured(robot, 300, 13)), 0.0255);
+  EXPECT_LE(validation_rms_mm(*calibrate(cell, kCalibrateM3, batch, {}), measured(robot, 300, 13)),
+            0.0255);
 }
 
 TEST(Calibrate, ListsABadPoseAndIsNotPulledByIt) {
@@ -273,13 +269,13 @@ TEST(Calibrate, ListsABadPoseAndIsNotPulledByIt) {
   const VirtualRobot robot = chapter_5_robot(cell);
   MeasurementBatch batch = measured(robot, 120, 15);
   batch.measurements[40].p_W += Vector3(0, 0.4e-3, 0);
-  const Result<CalibrationResult> result = calibrate(cell, kM3, batch, {});
+  const Result<CalibrationResult> result = calibrate(cell, kCalibrateM3, batch, {});
   ASSERT_TRUE(result);
   ASSERT_EQ(result->suspects.size(), 1u);
   EXPECT_EQ(result->suspects[0].pose_id, batch.measurements[40].pose_id);
   EXPECT_NEAR(to_mm(result->suspects[0].distance), 0.4, 0.06);
   EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 16)), 0.0245);
-  EXPECT_TRUE(calibrate(cell, kM3, measured(robot, 120, 15), {})->suspects.empty());
+  EXPECT_TRUE(calibrate(cell, kCalibrateM3, measured(robot, 120, 15), {})->suspects.empty());
 }
 
 TEST(Calibrate, FindsTheOrdersOfGearsItWasNotTold) {
@@ -296,9 +292,9 @@ TEST(Calibrate, FindsTheOrdersOfGearsItWasNotTold) {
       cell, {"base", "geometry", "compliance_linear", "gear_transmission:1", "gear_transmission:4"},
       measured(robot, 200, 17), {});
   ASSERT_TRUE(result) << result.error().message;
-  EXPECT_NEAR(parameter(*result, "order1").value, 63.4, 0.1);
-  EXPECT_NEAR(parameter(*result, "order4").value, 28.7, 0.1);
-  EXPECT_NEAR(parameter(*result, "gear_sin1").value, 3e-5, 4e-6);
+  EXPECT_NEAR(test::parameter(*result, "order1").value, 63.4, 0.1);
+  EXPECT_NEAR(test::parameter(*result, "order4").value, 28.7, 0.1);
+  EXPECT_NEAR(test::parameter(*result, "gear_sin1").value, 3e-5, 4e-6);
   EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 18)), 0.0255);
 }
 
@@ -325,13 +321,15 @@ TEST(Calibrate, TellsTwoToolsAndTwoPayloadsApartInOneBatch) {
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LE(to_mm(result->rms), 0.0235);
   // The part that two tools share is the last link's; their difference is known.
-  EXPECT_NEAR(parameter(*result, "tx[probe]").value - parameter(*result, "tx[spindle]").value,
-              0.8e-3, 2e-5);
-  EXPECT_NEAR(parameter(*result, "ty[probe]").value - parameter(*result, "ty[spindle]").value,
-              -0.5e-3, 2e-5);
+  EXPECT_NEAR(
+      test::parameter(*result, "tx[probe]").value - test::parameter(*result, "tx[spindle]").value,
+      0.8e-3, 2e-5);
+  EXPECT_NEAR(
+      test::parameter(*result, "ty[probe]").value - test::parameter(*result, "ty[spindle]").value,
+      -0.5e-3, 2e-5);
   // One mass scales the compliances; two masses leave their ratio known: neither may be off alone.
-  EXPECT_NEAR(parameter(*result, "mass[light]").value / 30,
-              parameter(*result, "mass[spindle]").value / 100, 0.01);
+  EXPECT_NEAR(test::parameter(*result, "mass[light]").value / 30,
+              test::parameter(*result, "mass[spindle]").value / 100, 0.01);
 }
 
 TEST(Calibrate, RefitsTheToolAndLeavesTheRobotAlone) {
@@ -349,8 +347,8 @@ TEST(Calibrate, RefitsTheToolAndLeavesTheRobotAlone) {
   EXPECT_LE(validation_rms_mm(*second, measured(robot, 300, 22)), 0.030);
   for (const IdentifiedParameter& p : second->parameters) {
     if (p.parameter.name.starts_with("t")) continue;
-    EXPECT_EQ(p.value, parameter(first, p.parameter.name).value) << p.parameter.name;
-    EXPECT_EQ(p.stddev, parameter(first, p.parameter.name).stddev) << p.parameter.name;
+    EXPECT_EQ(p.value, test::parameter(first, p.parameter.name).value) << p.parameter.name;
+    EXPECT_EQ(p.stddev, test::parameter(first, p.parameter.name).stddev) << p.parameter.name;
   }
   EXPECT_FALSE(refit(first, cell, measured(robot, 15, 21), {"gremlins"}));
 }
@@ -366,7 +364,7 @@ TEST(Calibrate, RefitsACauseThatTheModelDidNotHaveAndTheFormThatItHas) {
           .map([](const Refit& refit) { return refit.result; });
   ASSERT_TRUE(added) << added.error().message;
   EXPECT_LE(validation_rms_mm(*added, measured(robot, 300, 26)), 0.030);
-  EXPECT_NEAR(parameter(*added, "tx").value, -1e-3, 5e-5);
+  EXPECT_NEAR(test::parameter(*added, "tx").value, -1e-3, 5e-5);
   // A parameter that is held is known or was not known before: nothing new is said of it.
   for (const UnidentifiableCombination& combination : added->unidentifiable) {
     const bool before =
@@ -417,8 +415,9 @@ TEST(Calibrate, WhatIsKeptHasNoPartInARefitHoweverMuchItIs) {
   const Refit other = test::demand(refit(many, cell, batch, {"base", "tool"}));
   for (const Eigen::Index k : one.anew) {
     const IdentifiedParameter& p = one.result.parameters[static_cast<std::size_t>(k)];
-    EXPECT_NEAR(parameter(other.result, p.parameter.name).value, p.value, 1e-9) << p.parameter.name;
-    EXPECT_NEAR(parameter(other.result, p.parameter.name).stddev, p.stddev, 1e-3 * p.stddev)
+    EXPECT_NEAR(test::parameter(other.result, p.parameter.name).value, p.value, 1e-9)
+        << p.parameter.name;
+    EXPECT_NEAR(test::parameter(other.result, p.parameter.name).stddev, p.stddev, 1e-3 * p.stddev)
         << p.parameter.name;
   }
   EXPECT_EQ(other.result.rank, one.result.rank + 960);

@@ -26,7 +26,7 @@ using test::three_corners;
 using test::unknown_places;
 using test::wire_rows;
 
-const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
+const std::vector<std::string> kGaugesM3 = {"base", "geometry", "compliance"};
 constexpr double kSigma = 0.05;  // mm, of a good draw wire
 
 const IdentifiedParameter* parameter(const CalibrationResult& result, const std::string& name) {
@@ -54,15 +54,17 @@ TEST(Gauges, DrawWiresToKnownAnchorsTellTheArmAsWellAsTheyCan) {
     const std::vector<GaugeRow> rows = wire_rows(arm, 200, seed);
     ASSERT_EQ(rows.size(), 200U);
     const Result<CalibrationResult> found =
-        calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
+        calibrate(arm.cell, kGaugesM3, gauge_batch(arm, rows, kSigma, seed), {});
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_TRUE(found->converged);
     EXPECT_FALSE(has_source(*found, kInstrumentZero)) << "nothing asks for a zero";
     missed += std::pow(test::volumetric_mm(arm, *found, false, 1000 + seed), 2);
     least += std::pow(test::least_volumetric_mm(arm, rows, kSigma, true, false, 1000 + seed), 2);
     const auto positions = gauge_batch(arm, test::position_rows(arm, 200, seed), kSigma, seed);
-    by_positions += std::pow(
-        test::volumetric_mm(arm, *calibrate(arm.cell, kM3, positions, {}), false, 1000 + seed), 2);
+    by_positions +=
+        std::pow(test::volumetric_mm(arm, *calibrate(arm.cell, kGaugesM3, positions, {}), false,
+                                     1000 + seed),
+                 2);
   }
   test::tell_figure("200 distances over the bound", std::sqrt(missed / least));
   test::tell_figure("200 distances over 200 positions", std::sqrt(missed / by_positions));
@@ -76,7 +78,7 @@ TEST(Gauges, DrawWiresToAnchorsThatNobodyMeasuredTellTheArmButNotWhereItStands) 
     const GaugedArm arm = gauged_arm(seed, three_corners(), unknown_places(three_corners()));
     const std::vector<GaugeRow> rows = wire_rows(arm, 200, seed);
     const Result<CalibrationResult> found =
-        calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, seed), {});
+        calibrate(arm.cell, kGaugesM3, gauge_batch(arm, rows, kSigma, seed), {});
     ASSERT_TRUE(found) << found.error().message;
     missed += std::pow(test::volumetric_mm(arm, *found, true, 1000 + seed), 2);
     least += std::pow(test::least_volumetric_mm(arm, rows, kSigma, false, true, 1000 + seed), 2);
@@ -100,7 +102,7 @@ TEST(Gauges, OneKnownAnchorLeavesTheTurnsAboutItAndTwoThatAboutTheirLine) {
        {std::pair(one, "how the base is turned about it"), std::pair(two, "about the line")}) {
     const GaugedArm arm = gauged_arm(4, three_corners(), yaml);
     const auto found =
-        calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 150, 4), kSigma, 4), {});
+        calibrate(arm.cell, kGaugesM3, gauge_batch(arm, wire_rows(arm, 150, 4), kSigma, 4), {});
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_NE(sentences(*found).find(said), std::string::npos) << sentences(*found);
   }
@@ -109,8 +111,8 @@ TEST(Gauges, OneKnownAnchorLeavesTheTurnsAboutItAndTwoThatAboutTheirLine) {
 TEST(Gauges, TheZeroOfAnInstrumentIsFoundWhereTheDistancesAskForIt) {
   for (const double zero : {0.7, 80.0}) {
     const GaugedArm arm = gauged_arm(5, three_corners());
-    const auto found =
-        calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, zero), kSigma, 5), {});
+    const auto found = calibrate(arm.cell, kGaugesM3,
+                                 gauge_batch(arm, wire_rows(arm, 200, 5, zero), kSigma, 5), {});
     ASSERT_TRUE(found) << found.error().message;
     ASSERT_TRUE(has_source(*found, kInstrumentZero)) << zero;
     for (const char* name : {"zero[a1]", "zero[a2]", "zero[a3]"}) {
@@ -128,7 +130,7 @@ TEST(Gauges, AZeroThatTheCellFileTellsIsTakenOff) {
       "0.7}, a3: {xyz_mm: [2600, 200, 2600], zero_mm: 0.7}}";
   const GaugedArm arm = gauged_arm(5, three_corners(), yaml);
   const auto found =
-      calibrate(arm.cell, kM3, gauge_batch(arm, wire_rows(arm, 200, 5, 0.7), kSigma, 5), {});
+      calibrate(arm.cell, kGaugesM3, gauge_batch(arm, wire_rows(arm, 200, 5, 0.7), kSigma, 5), {});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_FALSE(has_source(*found, kInstrumentZero));
   EXPECT_LT(to_mm(found->rms), 1.1 * kSigma);
@@ -217,13 +219,13 @@ TEST(Gauges, PositionsDistancesTouchesAndDifferencesAreOneBatch) {
     const std::vector<GaugeRow> rows = every_kind(arm, 40, seed);
     const MeasurementBatch batch = gauge_batch(arm, rows, kSigma, seed);
     ASSERT_EQ(batch.measurements.size(), rows.size());
-    const Result<CalibrationResult> found = calibrate(arm.cell, kM3, batch, {});
+    const Result<CalibrationResult> found = calibrate(arm.cell, kGaugesM3, batch, {});
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_LT(to_mm(found->discrepancy), 0.02) << "every kind fits with its own sigma";
     const double together = test::volumetric_mm(arm, *found, false, 50);
     MeasurementBatch positions = batch;
     std::erase_if(positions.measurements, [](const Measurement& m) { return m.gauge.has_value(); });
-    const auto alone = calibrate(arm.cell, kM3, positions, {});
+    const auto alone = calibrate(arm.cell, kGaugesM3, positions, {});
     ASSERT_TRUE(alone) << alone.error().message;
     EXPECT_LT(together, 0.8 * test::volumetric_mm(arm, *alone, false, 50));
     for (const char* axis : {"ax", "ay", "az"}) {
@@ -240,7 +242,7 @@ TEST(Gauges, AWrongDistanceIsASuspectAndDoesNoHarm) {
   const GaugedArm arm = gauged_arm(9, three_corners());
   std::vector<GaugeRow> rows = wire_rows(arm, 200, 9);
   rows[20].value_mm += 5;
-  const auto found = calibrate(arm.cell, kM3, gauge_batch(arm, rows, kSigma, 9), {});
+  const auto found = calibrate(arm.cell, kGaugesM3, gauge_batch(arm, rows, kSigma, 9), {});
   ASSERT_TRUE(found) << found.error().message;
   ASSERT_FALSE(found->suspects.empty());
   EXPECT_EQ(found->suspects.front().pose_id, "p21");
@@ -297,7 +299,7 @@ TEST(Gauges, ATelescopingBallbarSaysWhatItsStrokeCannotKnow) {
   const std::map<std::string, Eigen::Vector3d> centre = {{"c", {1500, 200, 700}}};
   const GaugedArm exact = gauged_arm(11, centre, "{c: {xyz_mm: null}}");
   const std::vector<GaugeRow> rows = ballbar_rows(exact, 300, 1.2, 100);
-  const auto found = calibrate(exact.cell, kM3, gauge_batch(exact, rows, 0.001, 11), {});
+  const auto found = calibrate(exact.cell, kGaugesM3, gauge_batch(exact, rows, 0.001, 11), {});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_FALSE(has_source(*found, kInstrumentZero)) << "no stroke of a ballbar asks for its zero";
   EXPECT_NE(sentences(*found).find("do not tell where the base stands"), std::string::npos);
@@ -306,7 +308,7 @@ TEST(Gauges, ATelescopingBallbarSaysWhatItsStrokeCannotKnow) {
   EXPECT_NE(sentences(*found).find("taken as exact"), std::string::npos) << sentences(*found);
 
   const GaugedArm open = gauged_arm(11, centre, "{c: {xyz_mm: null, zero_mm: null}}");
-  const auto unsure = calibrate(open.cell, kM3, gauge_batch(open, rows, 0.001, 11), {});
+  const auto unsure = calibrate(open.cell, kGaugesM3, gauge_batch(open, rows, 0.001, 11), {});
   ASSERT_TRUE(unsure) << unsure.error().message;
   EXPECT_NE(sentences(*unsure).find(
                 "zero and the robot's size (all lengths alike) change the distances nearly alike"),
@@ -320,7 +322,7 @@ TEST(Gauges, ATelescopingBallbarSaysWhatItsStrokeCannotKnow) {
 TEST(Gauges, WhatDistancesDoNotTellIsRefusedWithWhatToDo) {
   const GaugedArm arm = gauged_arm(12, three_corners(), unknown_places(three_corners()));
   const auto refusal = [&](const GaugedArm& of, const std::vector<GaugeRow>& rows) {
-    const auto found = calibrate(of.cell, kM3, gauge_batch(of, rows, kSigma, 12), {});
+    const auto found = calibrate(of.cell, kGaugesM3, gauge_batch(of, rows, kSigma, 12), {});
     return found ? std::string("learned") : found.error().message;
   };
   EXPECT_NE(refusal(arm, wire_rows(arm, 9, 12)).find("at least 4 are needed"), std::string::npos);
@@ -341,7 +343,7 @@ TEST(Gauges, WhatDistancesDoNotTellIsRefusedWithWhatToDo) {
   MeasurementBatch two = gauge_batch(arm, wire_rows(arm, 60, 12), kSigma, 12);
   two.sessions = {"monday", "tuesday"};
   for (std::size_t i = 30; i < 60; ++i) two.measurements[i].session = 1;
-  const auto found = calibrate(arm.cell, kM3, two, {});
+  const auto found = calibrate(arm.cell, kGaugesM3, two, {});
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().message.find("set-ups of the instrument"), std::string::npos)
       << found.error().message;

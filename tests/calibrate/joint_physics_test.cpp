@@ -9,6 +9,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
+#include "tests/support/calibrated.h"
 #include "tests/support/demand.h"
 #include "tests/support/heavy_arm.h"
 
@@ -46,20 +47,13 @@ std::vector<std::string> with(const std::vector<std::string>& more) {
   return all;
 }
 
-double held_out_mm(const CalibrationResult& result, const MeasurementBatch& batch) {
-  double sum = 0;
-  for (const Measurement& m : batch.measurements)
-    sum += (m.p_W - result.model.pose_W(m.context).translation()).squaredNorm();
-  return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
-}
-
 /// Trained on one batch, held out on another: the noise with `sources`, `times` as much without.
 CalibrationResult expect_to_explain(const HeavyArm& arm, const std::vector<std::string>& sources,
                                     const MeasurementBatch& batch, const MeasurementBatch& fresh,
                                     double times) {
   const CalibrationResult found = test::demand(calibrate(arm.cell, with(sources), batch, {}));
-  EXPECT_LE(held_out_mm(found, fresh), 1.05 * kNoise_mm) << sources.front();
-  EXPECT_GE(held_out_mm(test::demand(calibrate(arm.cell, kM3, batch, {})), fresh),
+  EXPECT_LE(test::held_out_mm(found, fresh), 1.05 * kNoise_mm) << sources.front();
+  EXPECT_GE(test::held_out_mm(test::demand(calibrate(arm.cell, kM3, batch, {})), fresh),
             times * kNoise_mm)
       << sources.front();
   return found;
@@ -211,7 +205,7 @@ TEST(JointPhysics, AnAxisThatWobblesIsNoAngleError) {
         expect_to_explain(arm, {fmt::format("axis_runout:{}", joint)}, batch, fresh, 1.5);
     const CalibrationResult map =
         test::demand(calibrate(arm.cell, with({fmt::format("joint_map:{}", joint)}), batch, {}));
-    EXPECT_GE(held_out_mm(map, fresh), 1.15 * kNoise_mm) << joint;
+    EXPECT_GE(test::held_out_mm(map, fresh), 1.15 * kNoise_mm) << joint;
     EXPECT_EQ(is_identified(found, fmt::format("radial_x{}_-1", joint)), joint != 2)
         << "joint 2 turns half around";
     EXPECT_TRUE(is_identified(found, fmt::format("tilt_x{}_-1", joint)));
@@ -244,7 +238,8 @@ TEST(JointPhysics, TeethThatGiveWayUnevenlyRippleWithTheTorque) {
         expect_to_explain(arm, {"loaded_ripple:3@90.02"}, batch, fresh, 1.3);
     const CalibrationResult plain =
         test::demand(calibrate(arm.cell, with({"gear_transmission:3@90.02"}), batch, {}));
-    EXPECT_GE(held_out_mm(plain, fresh), 1.1 * kNoise_mm) << "a ripple that no torque changes";
+    EXPECT_GE(test::held_out_mm(plain, fresh), 1.1 * kNoise_mm)
+        << "a ripple that no torque changes";
     coverage.add(found, {{"loaded_sin3", give * 0.15 * std::cos(phase)},
                          {"loaded_cos3", give * 0.15 * std::sin(phase)},
                          {"order3", 90}});
@@ -328,8 +323,8 @@ TEST(JointPhysics, WhatIsMeasuredBeforeStandstillLacksAShareOfTheMove) {
         test::demand(calibrate(visiting.arm.cell, with({"early_reading"}), batch, {}));
     const CalibrationResult none = test::demand(calibrate(visiting.arm.cell, kM3, batch, {}));
     const MeasurementBatch fresh = visiting.measured(400, 100 + seed);
-    EXPECT_LE(held_out_mm(early, fresh), 1.05 * kNoise_mm);
-    EXPECT_GE(held_out_mm(none, fresh), 2 * kNoise_mm);
+    EXPECT_LE(test::held_out_mm(early, fresh), 1.05 * kNoise_mm);
+    EXPECT_GE(test::held_out_mm(none, fresh), 2 * kNoise_mm);
     for (Eigen::Index j = 0; j < hidden::kJoints; ++j)
       coverage.add(early, {{fmt::format("early{}", j + 1), left(j)}});
   }
@@ -420,7 +415,7 @@ TEST(JointPhysics, LinksThatWarmUpLateGrowLate) {
   const CalibrationResult found = expect_to_explain(arm, {"lagged_growth"}, batch, fresh, 1.5);
   const CalibrationResult at_once =
       test::demand(calibrate(arm.cell, with({"thermal_growth"}), batch, {}));
-  EXPECT_GE(held_out_mm(at_once, fresh), 1.1 * kNoise_mm);
+  EXPECT_GE(test::held_out_mm(at_once, fresh), 1.1 * kNoise_mm);
   Coverage coverage;
   coverage.add(found, {{"growth", growth}, {"heat_lag", lag_s}});
   EXPECT_EQ(coverage.within, 2);

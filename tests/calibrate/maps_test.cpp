@@ -7,6 +7,7 @@
 #include "server/calibrate/calibrate_with_maps.h"
 #include "server/calibrate/maps/map_evidence.h"
 #include "server/error_sources/joint_map.h"
+#include "tests/support/calibrated.h"
 #include "tests/support/demand.h"
 #include "tests/support/heavy_arm.h"
 #include "tests/support/virtual_robot.h"
@@ -16,7 +17,7 @@ namespace trammel {
 namespace {
 
 const CalibrateOptions kWeigh{.held = {}, .weigh_links = true};
-const double kNoise_mm = 0.013 * std::sqrt(3.0);
+const double kMapsNoise_mm = 0.013 * std::sqrt(3.0);
 
 /// rad: what a joint (0-based) is off by at that angle.
 using Shape = std::function<double(Eigen::Index joint, double angle)>;
@@ -31,13 +32,6 @@ test::HeavyArm arm_with(const Shape& shape) {
   };
   arm.world.effects = {effect};
   return arm;
-}
-
-double held_out_mm(const CalibrationResult& result, const MeasurementBatch& batch) {
-  double sum = 0;
-  for (const Measurement& m : batch.measurements)
-    sum += (m.p_W - result.model.pose_W(m.context).translation()).squaredNorm();
-  return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
 }
 
 /// % of the measured coordinates that lie within 1.96 standard deviations.
@@ -77,13 +71,13 @@ TEST(Maps, AJointThatIsOffTwentySixTimesATurnGetsThatManyHarmonicsAndTheOthersFe
   const CalibrationResult found = test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh));
   EXPECT_GE(harmonics(found, 2), 26);
   EXPECT_LE(harmonics(found, 5), 12);
-  EXPECT_LE(held_out_mm(found, fresh), 1.2 * kNoise_mm);
+  EXPECT_LE(test::held_out_mm(found, fresh), 1.2 * kMapsNoise_mm);
   EXPECT_GT(inside(found, fresh), 93);
   EXPECT_LT(inside(found, fresh), 98);
   const std::vector<std::string> told = {"base", "geometry", "compliance", "joint_map:2@48",
                                          "joint_map:5@48"};
-  EXPECT_LT(held_out_mm(found, fresh),
-            held_out_mm(test::demand(calibrate(arm.cell, told, batch, kWeigh)), fresh));
+  EXPECT_LT(test::held_out_mm(found, fresh),
+            test::held_out_mm(test::demand(calibrate(arm.cell, told, batch, kWeigh)), fresh));
 }
 
 TEST(Maps, AnArmWithoutMapsIsHardlyWorseForAskingAfterThem) {
@@ -94,9 +88,10 @@ TEST(Maps, AnArmWithoutMapsIsHardlyWorseForAskingAfterThem) {
   std::vector<std::string> open = without;
   for (const char* map : {"joint_map:2", "joint_map:3", "joint_map:4"}) open.emplace_back(map);
   const double plain =
-      held_out_mm(test::demand(calibrate(arm.cell, without, batch, kWeigh)), fresh);
-  EXPECT_LE(held_out_mm(test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh)), fresh),
-            1.02 * plain);
+      test::held_out_mm(test::demand(calibrate(arm.cell, without, batch, kWeigh)), fresh);
+  EXPECT_LE(
+      test::held_out_mm(test::demand(calibrate_with_maps(arm.cell, open, batch, kWeigh)), fresh),
+      1.02 * plain);
 }
 
 TEST(Maps, ASpectrumThatIsToldStays) {

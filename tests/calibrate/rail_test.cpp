@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
+#include "tests/support/calibrated.h"
 #include "tests/support/demand.h"
 #include "tests/support/hidden_files.h"
 #include "tests/support/hidden_world.h"
@@ -112,11 +113,6 @@ double held_out(const CalibrationResult& result, const MeasurementBatch& batch) 
   return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size()))) / kNoise_mm;
 }
 
-const IdentifiedParameter& parameter(const CalibrationResult& result, const std::string& name) {
-  return *std::find_if(result.parameters.begin(), result.parameters.end(),
-                       [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
-}
-
 TEST(Rail, ScaleRackAndStraightnessAreTakenForWhatTheyAre) {
   const ArmOnRail arm = arm_on_rail();
   const MeasurementBatch batch = measured(arm, 600, 1);
@@ -138,7 +134,7 @@ TEST(Rail, ScaleRackAndStraightnessAreTakenForWhatTheyAre) {
       {"rack_sin1", from_mm(kRack_mm * std::cos(kRackPhase))},
       {"rack_cos1", from_mm(kRack_mm * std::sin(kRackPhase))}};
   for (const auto& [name, value] : truth) {
-    const IdentifiedParameter& one = parameter(found, name);
+    const IdentifiedParameter& one = test::parameter(found, name);
     EXPECT_TRUE(one.identified) << name;
     EXPECT_NEAR(one.value, value, 2 * one.stddev) << name;
   }

@@ -4,6 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
+#include "tests/support/calibrated.h"
 #include "tests/support/demand.h"
 #include "tests/support/heavy_arm.h"
 #include "tests/support/virtual_robot.h"
@@ -16,7 +17,7 @@ using test::draw_heavy_arm;
 using test::HeavyArm;
 
 const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
-const double kNoise_mm = 0.013 * std::sqrt(3.0);
+const double kSelfWeightNoise_mm = 0.013 * std::sqrt(3.0);
 
 double held_out_mm(const CalibrationResult& result, const MeasurementBatch& batch) {
   double sum = 0;
@@ -42,8 +43,8 @@ TEST(LinkWeights, ComplianceFindsTheWeightsThatNoDataSheetTold) {
     const MeasurementBatch fresh = test::measured(arm, 500, 2);
     const CalibrationResult found = calibrated(arm, kM3, 600);
     EXPECT_TRUE(has(found, "self_weight")) << payloads << " payloads";
-    EXPECT_LE(held_out_mm(found, fresh), 1.05 * kNoise_mm) << payloads << " payloads";
-    EXPECT_GE(held_out_mm(calibrated(arm, kM3, 600, false), fresh), 2 * kNoise_mm)
+    EXPECT_LE(held_out_mm(found, fresh), 1.05 * kSelfWeightNoise_mm) << payloads << " payloads";
+    EXPECT_GE(held_out_mm(calibrated(arm, kM3, 600, false), fresh), 2 * kSelfWeightNoise_mm)
         << payloads << " payloads";
   }
 }
@@ -75,7 +76,8 @@ TEST(LinkWeights, EveryArmIsPredictedToTheNoiseWhateverItWeighs) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const HeavyArm arm = draw_heavy_arm({.seed = seed});
     const CalibrationResult found = calibrated(arm, kM3, 300);
-    EXPECT_LE(held_out_mm(found, test::measured(arm, 500, 2)), 1.09 * kNoise_mm) << "seed " << seed;
+    EXPECT_LE(held_out_mm(found, test::measured(arm, 500, 2)), 1.09 * kSelfWeightNoise_mm)
+        << "seed " << seed;
   }
 }
 
@@ -88,7 +90,7 @@ TEST(LinkWeights, WithTwoKnownPayloadsTheSagOfAThirdIsKnown) {
   arm.world.loads[1] = {160, {20, 30, 200}};
   CalibrationResult changed = found;
   changed.model.cell = cell;
-  EXPECT_LE(held_out_mm(changed, test::measured(arm, 500, 2, 1)), 1.1 * kNoise_mm);
+  EXPECT_LE(held_out_mm(changed, test::measured(arm, 500, 2, 1)), 1.1 * kSelfWeightNoise_mm);
 }
 
 TEST(LinkWeights, ABalancerAndASoftFootAreTakenForWhatTheyAre) {
@@ -96,17 +98,13 @@ TEST(LinkWeights, ABalancerAndASoftFootAreTakenForWhatTheyAre) {
   const MeasurementBatch fresh = test::measured(arm, 500, 2);
   const std::vector<std::string> all = {"base",        "geometry",   "compliance",
                                         "self_weight", "balancer:2", "base_compliance"};
-  EXPECT_LE(held_out_mm(calibrated(arm, all, 600), fresh), 1.05 * kNoise_mm);
+  EXPECT_LE(held_out_mm(calibrated(arm, all, 600), fresh), 1.05 * kSelfWeightNoise_mm);
   for (const char* without : {"balancer:2", "base_compliance"}) {
     std::vector<std::string> fewer = all;
     std::erase(fewer, without);
-    EXPECT_GE(held_out_mm(calibrated(arm, fewer, 600), fresh), 1.1 * kNoise_mm) << without;
+    EXPECT_GE(held_out_mm(calibrated(arm, fewer, 600), fresh), 1.1 * kSelfWeightNoise_mm)
+        << without;
   }
-}
-
-const IdentifiedParameter& parameter(const CalibrationResult& result, const std::string& name) {
-  return *std::find_if(result.parameters.begin(), result.parameters.end(),
-                       [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
 }
 
 TEST(LinkWeights, TradeAFactorWithTheCompliancesUntilAKnownPayloadChanges) {
@@ -115,8 +113,8 @@ TEST(LinkWeights, TradeAFactorWithTheCompliancesUntilAKnownPayloadChanges) {
   const CalibrationResult open = calibrated(bare, kM3, 600);
   const CalibrationResult told = calibrated(changing, kM3, 600);
   for (const int joint : {2, 3, 5}) {
-    const IdentifiedParameter& one = parameter(open, fmt::format("C{}", joint));
-    const IdentifiedParameter& other = parameter(told, fmt::format("C{}", joint));
+    const IdentifiedParameter& one = test::parameter(open, fmt::format("C{}", joint));
+    const IdentifiedParameter& other = test::parameter(told, fmt::format("C{}", joint));
     const double truth = from_rad_per_nmm(changing.world.arm.give(joint - 1));
     EXPECT_GT(one.stddev, 0.3 * one.value) << joint;
     EXPECT_LT(other.stddev, 0.05 * other.value) << joint;
@@ -124,7 +122,7 @@ TEST(LinkWeights, TradeAFactorWithTheCompliancesUntilAKnownPayloadChanges) {
   }
   // Together they are known: the more weight, the less compliance.
   const auto index = [&](const std::string& name) {
-    return &parameter(open, name) - open.parameters.data();
+    return &test::parameter(open, name) - open.parameters.data();
   };
   EXPECT_LT(open.correlation()(index("C2"), index("wx2")), -0.9);
 }

@@ -28,10 +28,6 @@ test::Corrected krl(const std::string& src, const std::string& dat = "",
 std::string program(const std::string& lines) {
   return "&ACCESS RVP\nDEF p( )\nINI\n" + kSet + lines + "END\n";
 }
-std::string why(const test::Corrected& made, const std::string& name) {
-  return row_of(made.program, name).message;
-}
-
 TEST(Krl, PositionsOfTheDataListAreCorrectedWhereTheyStand) {
   const std::string dat =
       "DEFDAT p PUBLIC\r\n; Bohrung gr\xFC"
@@ -91,14 +87,15 @@ TEST(Krl, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
                   "LIN_REL {X 10}\nLIN {Z 400}\nLIN $POS_ACT\nPTP XELSEWHERE\nLIN P1:{X DX,Y 0,Z "
                   "0,A 0,B 0,C 0}\n"
                   "BAS(#BASE,n)\nLIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n"));
-  EXPECT_NE(why(made, "P1").find("P1 is set at run time (p.src line"), std::string::npos)
-      << why(made, "P1");
-  EXPECT_NE(why(made, "P2").find("Z is not a constant number"), std::string::npos);
-  EXPECT_NE(why(made, "{X 10}").find("relative"), std::string::npos);
-  EXPECT_NE(why(made, "{Z 400}").find("does not say X"), std::string::npos);
-  EXPECT_NE(why(made, "$POS_ACT").find("decides it"), std::string::npos);
-  EXPECT_NE(why(made, "XELSEWHERE").find("not in the files"), std::string::npos);
-  EXPECT_NE(why(made, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("N chooses it"), std::string::npos);
+  EXPECT_NE(test::why(made, "P1").find("P1 is set at run time (p.src line"), std::string::npos)
+      << test::why(made, "P1");
+  EXPECT_NE(test::why(made, "P2").find("Z is not a constant number"), std::string::npos);
+  EXPECT_NE(test::why(made, "{X 10}").find("relative"), std::string::npos);
+  EXPECT_NE(test::why(made, "{Z 400}").find("does not say X"), std::string::npos);
+  EXPECT_NE(test::why(made, "$POS_ACT").find("decides it"), std::string::npos);
+  EXPECT_NE(test::why(made, "XELSEWHERE").find("not in the files"), std::string::npos);
+  EXPECT_NE(test::why(made, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("N chooses it"),
+            std::string::npos);
   EXPECT_EQ(made.program.moves_corrected, 0u);
 }
 
@@ -108,7 +105,7 @@ TEST(Krl, ToolAndBaseAreFollowedThroughCallsAndBranches) {
           "up( )\nIF $IN[1] THEN\n$BASE=$NULLFRAME\nENDIF\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n") +
       "DEF up( )\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
   EXPECT_TRUE(row_of(made.program, "{X 300,Y 0,Z 500,A 0,B 60,C 0}").corrected());
-  EXPECT_NE(why(made, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("branch"), std::string::npos);
+  EXPECT_NE(test::why(made, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("branch"), std::string::npos);
 }
 
 TEST(Krl, WithoutAToolOrABaseNothingIsGuessed) {
@@ -165,12 +162,12 @@ TEST(Krl, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   for (const auto& [head, end] : loops) {
     const test::Corrected frame =
         krl(program(head + "LIN " + kPoint + "\n$BASE=$NULLFRAME\n" + end));
-    EXPECT_NE(why(frame, kPoint).find("$BASE: a branch or a loop"), std::string::npos)
-        << head << why(frame, kPoint);
+    EXPECT_NE(test::why(frame, kPoint).find("$BASE: a branch or a loop"), std::string::npos)
+        << head << test::why(frame, kPoint);
     const test::Corrected tool =
         krl(program(head + "LIN " + kPoint + "\n$TOOL=$NULLFRAME\n" + end));
-    EXPECT_NE(why(tool, kPoint).find("$TOOL: a branch or a loop"), std::string::npos)
-        << head << why(tool, kPoint);
+    EXPECT_NE(test::why(tool, kPoint).find("$TOOL: a branch or a loop"), std::string::npos)
+        << head << test::why(tool, kPoint);
     const test::Corrected called = krl(program(head + "LIN " + kPoint + "\nnull( )\n" + end) +
                                        "DEF null( )\n$BASE=$NULLFRAME\nEND\n");
     EXPECT_FALSE(row_of(called.program, kPoint).corrected()) << head;
@@ -181,7 +178,7 @@ TEST(Krl, ALoopThatSetsWhatItNeedsIsCorrected) {
   const test::Corrected made =
       krl(program("LOOP\n" + kSet + "LIN " + kPoint + "\n$BASE=$NULLFRAME\nIF $IN[1] THEN\nEXIT\n" +
                   "ENDIF\nENDLOOP\n"));
-  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
+  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << test::why(made, kPoint);
 }
 
 const std::string kMore = "{X 310,Y 0,Z 500,A 0,B 60,C 0}";
@@ -196,24 +193,25 @@ TEST(Krl, WhatAnInterruptRoutineSetsHoldsAnywhereBehindItsDeclaration) {
   for (const char* set :
        {"$BASE=$NULLFRAME\n", "BAS(#BASE,0)\n", "null( )\nEND\nDEF null( )\n$BASE=$NULLFRAME\n"}) {
     const test::Corrected made = with(set);
-    EXPECT_TRUE(row_of(made.program, kMore).corrected()) << why(made, kMore);
-    EXPECT_NE(why(made, kPoint).find("$BASE: the interrupt routine STOPPED may change it"),
+    EXPECT_TRUE(row_of(made.program, kMore).corrected()) << test::why(made, kMore);
+    EXPECT_NE(test::why(made, kPoint).find("$BASE: the interrupt routine STOPPED may change it"),
               std::string::npos)
-        << set << why(made, kPoint);
+        << set << test::why(made, kPoint);
   }
   for (const char* harmless :
        {"$OUT[1]=TRUE\n", "$BASE=$NULLFRAME\n$BASE=BASE_DATA[2]\n", "BRAKE F\nRESUME\n"})
     EXPECT_TRUE(row_of(with(harmless).program, kPoint).corrected())
-        << harmless << why(with(harmless), kPoint);
+        << harmless << test::why(with(harmless), kPoint);
 }
 
 TEST(Krl, AMotionOfAnInterruptRoutineHasTheToolAndBaseOfWhatItComesInto) {
   const std::string declared = "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO away( )\nLIN " + kMore + "\n";
   const std::string away = "DEF away( )\nLIN " + kPoint + "\nEND\n";
   const test::Corrected one = krl(program(declared) + away);
-  EXPECT_TRUE(row_of(one.program, kPoint).corrected()) << why(one, kPoint);
+  EXPECT_TRUE(row_of(one.program, kPoint).corrected()) << test::why(one, kPoint);
   const test::Corrected two = krl(program(declared + "$BASE=$NULLFRAME\n") + away);
-  EXPECT_NE(why(two, kPoint).find("used in different ways"), std::string::npos) << why(two, kPoint);
+  EXPECT_NE(test::why(two, kPoint).find("used in different ways"), std::string::npos)
+      << test::why(two, kPoint);
 }
 
 TEST(Krl, ResumeEndsWhatWasInterruptedWhereverItWas) {
@@ -224,7 +222,7 @@ TEST(Krl, ResumeEndsWhatWasInterruptedWhereverItWas) {
                "0}\n$BASE=BASE_DATA[2]\nEND\n" +
                "DEF stopped( )\nBRAKE\n" + last + "END\n");
   };
-  EXPECT_TRUE(row_of(with("").program, kPoint).corrected()) << why(with(""), kPoint);
+  EXPECT_TRUE(row_of(with("").program, kPoint).corrected()) << test::why(with(""), kPoint);
   EXPECT_FALSE(row_of(with("RESUME\n").program, kPoint).corrected());
 }
 
@@ -233,8 +231,8 @@ TEST(Krl, WhatATriggerOrAnotherFileSetsIsNoConstant) {
       "DEFDAT p\nDECL GLOBAL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
   const test::Corrected trigger =
       krl(program("TRIGGER WHEN DISTANCE=0 DELAY=0 DO XP1.X=305\nLIN XP1\n"), dat);
-  EXPECT_NE(why(trigger, "XP1").find("XP1 is set at run time (p.src line"), std::string::npos)
-      << why(trigger, "XP1");
+  EXPECT_NE(test::why(trigger, "XP1").find("XP1 is set at run time (p.src line"), std::string::npos)
+      << test::why(trigger, "XP1");
   const auto beside = [&](const std::string& line) {
     return corrected_by_shift(Dialect::kKrl,
                               {{"p.src", program("LIN XP1\nBAS(#BASE,2)\nLIN " + kPoint + "\n")},
@@ -243,12 +241,12 @@ TEST(Krl, WhatATriggerOrAnotherFileSetsIsNoConstant) {
                                {"q.src", "DEF q( )\n" + line + "\nEND\n"}});
   };
   EXPECT_TRUE(row_of(beside("").program, "XP1").corrected());
-  EXPECT_NE(why(beside("XP1.Z=400"), "XP1").find("(q.src line 2)"), std::string::npos)
-      << why(beside("XP1.Z=400"), "XP1");
+  EXPECT_NE(test::why(beside("XP1.Z=400"), "XP1").find("(q.src line 2)"), std::string::npos)
+      << test::why(beside("XP1.Z=400"), "XP1");
   const test::Corrected base = beside("BASE_DATA[2]={X 1501,Y 0,Z 500,A 0,B 0,C 0}");
-  EXPECT_NE(why(base, kPoint).find("BASE_DATA[2] is set at run time (q.src line 2)"),
+  EXPECT_NE(test::why(base, kPoint).find("BASE_DATA[2] is set at run time (q.src line 2)"),
             std::string::npos)
-      << why(base, kPoint);
+      << test::why(base, kPoint);
   EXPECT_TRUE(
       row_of(beside("BASE_DATA[2]={X 1500,Y 0,Z 500,A 0,B 0,C 0}").program, kPoint).corrected());
 }
@@ -271,9 +269,10 @@ TEST(Krl, ALoadThatMotionsSetIsComparedWithTheCells) {
               "\n$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\n"
               "LIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n$LOAD.M=W\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n"
               "$LOAD=LOAD_DATA[1]\nLIN {X 303,Y 0,Z 500,A 0,B 60,C 0}\n"));
-  EXPECT_TRUE(row_of(some.program, kPoint).corrected()) << why(some, kPoint);
-  EXPECT_NE(why(some, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("60.000 kg"), std::string::npos);
-  EXPECT_NE(why(some, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("a part of $LOAD"), std::string::npos);
+  EXPECT_TRUE(row_of(some.program, kPoint).corrected()) << test::why(some, kPoint);
+  EXPECT_NE(test::why(some, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("60.000 kg"), std::string::npos);
+  EXPECT_NE(test::why(some, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("a part of $LOAD"),
+            std::string::npos);
   EXPECT_TRUE(row_of(some.program, "{X 303,Y 0,Z 500,A 0,B 60,C 0}").corrected());
 }
 
@@ -288,12 +287,12 @@ TEST(Krl, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
                   "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"),
           dat);
   EXPECT_TRUE(row_of(made.program, "XP1").corrected());
-  EXPECT_NE(why(made, "XX").find("it moves with XP1, which is corrected"), std::string::npos)
-      << why(made, "XX");
-  EXPECT_NE(why(made, "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}").find("it moves with XP1"),
+  EXPECT_NE(test::why(made, "XX").find("it moves with XP1, which is corrected"), std::string::npos)
+      << test::why(made, "XX");
+  EXPECT_NE(test::why(made, "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}").find("it moves with XP1"),
             std::string::npos);
-  EXPECT_NE(why(made, "XP2").find("its numbers are read elsewhere too"), std::string::npos)
-      << why(made, "XP2");
+  EXPECT_NE(test::why(made, "XP2").find("its numbers are read elsewhere too"), std::string::npos)
+      << test::why(made, "XP2");
   EXPECT_NE(fmt::format("{}", fmt::join(made.program.notes, "\n"))
                 .find("no motion in these files goes to Xq ("),
             std::string::npos);
@@ -304,8 +303,9 @@ TEST(Krl, AnArcIsCorrectedWithBothPointsOrWithNone) {
       "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
   const test::Corrected made = krl(program("CIRC {X 300,Y 20,Z 510},XP1\n"), dat);
   EXPECT_FALSE(row_of(made.program, "{X 300,Y 20,Z 510}").corrected());
-  EXPECT_NE(why(made, "XP1").find("the other point of its arc (p.src line"), std::string::npos)
-      << why(made, "XP1");
+  EXPECT_NE(test::why(made, "XP1").find("the other point of its arc (p.src line"),
+            std::string::npos)
+      << test::why(made, "XP1");
   EXPECT_EQ(made.program.moves_corrected, 0u);
 }
 
@@ -327,8 +327,8 @@ TEST(Krl, WhatASplineSetsAtItsHeadHoldsForEachOfItsMotions) {
                     "\nENDSPLINE\nSLIN " + far + "\n"),
             kFdat);
     ASSERT_EQ(made.refusal, "") << head;
-    EXPECT_NEAR(row_of(made.program, kPoint).p_B.x(), 1.8, 1e-9) << head << why(made, kPoint);
-    EXPECT_NEAR(row_of(made.program, kMore).p_B.x(), 1.81, 1e-9) << head << why(made, kMore);
+    EXPECT_NEAR(row_of(made.program, kPoint).p_B.x(), 1.8, 1e-9) << head << test::why(made, kPoint);
+    EXPECT_NEAR(row_of(made.program, kMore).p_B.x(), 1.81, 1e-9) << head << test::why(made, kMore);
     EXPECT_NEAR(row_of(made.program, far).p_B.x(), 1.8, 1e-9)
         << head << "behind the block, what held before it";
   }
@@ -348,8 +348,8 @@ TEST(Krl, WhatWithSetsAndNobodyCanTellLeavesTheMotion) {
            {"$IPO_MODE=MODE", "$IPO_MODE is not constant"}}) {
     const test::Corrected made =
         krl(program("SLIN " + kPoint + " WITH $VEL.CP=0.1, " + with + "\n"), kFdat);
-    EXPECT_NE(why(made, kPoint).find(reason), std::string::npos)
-        << with << ": " << why(made, kPoint) << made.refusal;
+    EXPECT_NE(test::why(made, kPoint).find(reason), std::string::npos)
+        << with << ": " << test::why(made, kPoint) << made.refusal;
   }
 }
 
@@ -362,13 +362,13 @@ TEST(Krl, AToolThatStandsIsSaidInEveryForm) {
                     "\nPTP {A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}\nSLIN " + kPoint +
                     " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
             kFdat);
-    EXPECT_NE(why(made, "XP1").find("the tool stands"), std::string::npos)
-        << with << why(made, "XP1");
-    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << with << why(made, kPoint);
+    EXPECT_NE(test::why(made, "XP1").find("the tool stands"), std::string::npos)
+        << with << test::why(made, "XP1");
+    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << with << test::why(made, kPoint);
     const test::Corrected spline =
         krl(program("SPLINE WITH " + std::string(with) + "\nSPL XP1\nENDSPLINE\n"), kFdat);
-    EXPECT_NE(why(spline, "XP1").find("the tool stands"), std::string::npos)
-        << with << why(spline, "XP1");
+    EXPECT_NE(test::why(spline, "XP1").find("the tool stands"), std::string::npos)
+        << with << test::why(spline, "XP1");
   }
 }
 
@@ -376,16 +376,17 @@ TEST(Krl, ABaseThatExternalKinematicsCarryIsLeft) {
   const test::Corrected made = krl(program("LIN " + kPoint + "\nBAS(#EX_BASE,2)\nLIN " + kMore +
                                            "\nBAS(#BASE,2)\nLIN {X 320,Y 0,Z 500,A 0,B 60,C 0}\n"));
   EXPECT_TRUE(row_of(made.program, kPoint).corrected());
-  EXPECT_NE(why(made, kMore).find("external kinematics carry the base (p.src line"),
+  EXPECT_NE(test::why(made, kMore).find("external kinematics carry the base (p.src line"),
             std::string::npos)
-      << why(made, kMore);
+      << test::why(made, kMore);
   EXPECT_TRUE(row_of(made.program, "{X 320,Y 0,Z 500,A 0,B 60,C 0}").corrected());
   for (const auto& [index, carried] :
        {std::pair("3", true), std::pair("0", false), std::pair("-1", false)}) {
     const test::Corrected unit =
         krl(program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
             "DEFDAT p\nMACH_DEF_INDEX[2]=" + std::string(index) + "\nENDDAT\n");
-    EXPECT_EQ(row_of(unit.program, kPoint).corrected(), !carried) << index << why(unit, kPoint);
+    EXPECT_EQ(row_of(unit.program, kPoint).corrected(), !carried)
+        << index << test::why(unit, kPoint);
   }
 }
 
@@ -398,7 +399,8 @@ TEST(Krl, ALoadThatNobodyToldIsTheControllersDefault) {
     const test::Corrected made = corrected_by_shift(
         Dialect::kKrl,
         {{"p.src", program("$LOAD=LOAD_DATA[1]\nLIN " + kPoint + "\n")}, {"$config.dat", config}});
-    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint) << made.refusal;
+    EXPECT_TRUE(row_of(made.program, kPoint).corrected())
+        << test::why(made, kPoint) << made.refusal;
     ASSERT_EQ(made.program.notes.size(), 2u) << load << ": the other one is of the posture";
     EXPECT_NE(made.program.notes[0].find(
                   "a load of -1 kg ($config.dat line 5): the controller takes its default load"),
@@ -422,7 +424,7 @@ TEST(Krl, TheControllersOwnBasIsKnown) {
                         {name, text}});
   };
   const test::Corrected made = with("R1/System/bas.src", bas);
-  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
+  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << test::why(made, kPoint);
   EXPECT_EQ(made.program.files[2].text, bas);
   EXPECT_FALSE(row_of(with("R1/own.src", bas).program, kPoint).corrected())
       << "a routine of the user's own";
@@ -441,11 +443,11 @@ TEST(Krl, WhatARoutineIsHandedIsNothingOfADataListAndMayBeSetByIt) {
   const std::string dat =
       "DEFDAT p PUBLIC\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
   const std::string by_value = "DEF go(XP1:IN)\nLIN XP1\nEND\n";
-  EXPECT_NE(why(krl(program("go({X 310,Y 0,Z 500,A 0,B 60,C 0})\n") + by_value, dat), "XP1")
+  EXPECT_NE(test::why(krl(program("go({X 310,Y 0,Z 500,A 0,B 60,C 0})\n") + by_value, dat), "XP1")
                 .find("is a parameter"),
             std::string::npos);
   const auto handed = [&](const std::string& call, const std::string& routine) {
-    return why(krl(program(call + "\nLIN XP1\n") + routine, dat), "XP1");
+    return test::why(krl(program(call + "\nLIN XP1\n") + routine, dat), "XP1");
   };
   const std::string sets = "DEF shift(P:OUT)\nP.Z=P.Z+10\nEND\n";
   EXPECT_NE(handed("shift(XP1)", sets).find("XP1 may be set by SHIFT (p.src line 6)"),
@@ -479,8 +481,8 @@ TEST(Krl, RoutinesThatTheFilesLackAreToldWhereTheyMightChangeToolOrBase) {
 TEST(Krl, AToolThatAnIndexMayChangeIsNotConstant) {
   const test::Corrected tool =
       krl(program("TOOL_DATA[i]={X 0,Y 0,Z 1,A 0,B 0,C 0}\nLIN " + kPoint + "\n"));
-  EXPECT_NE(why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos)
-      << why(tool, kPoint);
+  EXPECT_NE(test::why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos)
+      << test::why(tool, kPoint);
   const test::Corrected load = krl(program("LOAD_DATA[1].M=5\nLIN " + kPoint + "\n"));
   EXPECT_NE(fmt::format("{}", fmt::join(load.program.notes, "\n"))
                 .find("is set at run time (p.src line 6)"),
@@ -489,9 +491,9 @@ TEST(Krl, AToolThatAnIndexMayChangeIsNotConstant) {
 
 TEST(Krl, WhatInitmovSetsIsNotTheToolAndBaseOfBefore) {
   const test::Corrected made = krl(program("BAS(#INITMOV,0)\nLIN " + kPoint + "\n"));
-  EXPECT_NE(why(made, kPoint).find("BAS(#INITMOV) sets it to its default (p.src line 6)"),
+  EXPECT_NE(test::why(made, kPoint).find("BAS(#INITMOV) sets it to its default (p.src line 6)"),
             std::string::npos)
-      << why(made, kPoint);
+      << test::why(made, kPoint);
   EXPECT_TRUE(
       row_of(krl(program("BAS(#INITMOV,0)\n" + kSet + "LIN " + kPoint + "\n")).program, kPoint)
           .corrected());
@@ -505,8 +507,9 @@ TEST(Krl, ARowOfFramesThatContradictsTheFilesLeavesThePointWithBothValues) {
     return krl(program("LIN " + kPoint + "\n"), "", {.frames = {{row, X}}});
   };
   for (const char* row : {"TOOL_DATA[1]", "BASE_DATA[2]"}) {
-    EXPECT_TRUE(row_of(with(row, 0).program, kPoint).corrected()) << why(with(row, 0), kPoint);
-    const std::string said = why(with(row, 0.0025), kPoint);
+    EXPECT_TRUE(row_of(with(row, 0).program, kPoint).corrected())
+        << test::why(with(row, 0), kPoint);
+    const std::string said = test::why(with(row, 0.0025), kPoint);
     for (const char* part : {row, "by --frames and [", "by $config.dat line", "2.500 mm"})
       EXPECT_NE(said.find(part), std::string::npos) << said;
   }
@@ -519,8 +522,9 @@ TEST(Krl, AUnitThatIsNoneCarriesNoBase) {
                "0,PARENT[] \" \",ROOT {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},MECH_TYPE " +
                    type + ",GEOMETRY[] \" \"}\nENDDAT\n");
   };
-  EXPECT_TRUE(row_of(with("#NONE").program, kPoint).corrected()) << why(with("#NONE"), kPoint);
-  EXPECT_NE(why(with("#EASYS"), kPoint).find("external kinematics carry base 2"),
+  EXPECT_TRUE(row_of(with("#NONE").program, kPoint).corrected())
+      << test::why(with("#NONE"), kPoint);
+  EXPECT_NE(test::why(with("#EASYS"), kPoint).find("external kinematics carry base 2"),
             std::string::npos);
 }
 
@@ -529,9 +533,9 @@ TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
        {"PTP {E1 90}", "ASYPTP {E1 90}", "PTP_REL {E1 90}", "LIN_REL {X 5,Y 0,Z 0,E1 90}"}) {
     const test::Corrected made =
         krl(program("LIN " + kPoint + "\n" + motion + "\nLIN " + kMore + "\n"));
-    EXPECT_NE(why(made, kPoint).find("external axis a moves"), std::string::npos)
-        << motion << why(made, kPoint);
-    EXPECT_NE(why(made, kMore).find("external axis a moves"), std::string::npos) << motion;
+    EXPECT_NE(test::why(made, kPoint).find("external axis a moves"), std::string::npos)
+        << motion << test::why(made, kPoint);
+    EXPECT_NE(test::why(made, kMore).find("external axis a moves"), std::string::npos) << motion;
     Program read = read_program(Dialect::kKrl,
                                 {{"p.src", program("LIN " + kPoint + "\n" + motion + "\n")}}, {});
     ASSERT_TRUE(take_idle_axes(read, {"external axis a"})) << motion;
@@ -546,7 +550,8 @@ TEST(Krl, FdatThatTheProgramMakesItselfIsNotGuessed) {
        {"FDAT_ACT.BASE_NO=2", "FDAT_ACT={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}"}) {
     const test::Corrected made =
         krl(program(std::string(line) + "\nBAS(#FRAMES)\nLIN " + kPoint + "\n"));
-    EXPECT_NE(why(made, kPoint).find("FDAT_ACT is set by itself (p.src line 6)"), std::string::npos)
+    EXPECT_NE(test::why(made, kPoint).find("FDAT_ACT is set by itself (p.src line 6)"),
+              std::string::npos)
         << line;
   }
 }
@@ -557,8 +562,8 @@ TEST(Krl, ABaseThatEachBranchOfASwitchSetsAlikeIsKnown) {
                        "\nDEFAULT\n$BASE=BASE_DATA[2]\nENDSWITCH\nLIN " + kPoint + "\n"));
   };
   EXPECT_TRUE(row_of(with("$BASE=BASE_DATA[2]").program, kPoint).corrected())
-      << why(with("$BASE=BASE_DATA[2]"), kPoint);
-  EXPECT_NE(why(with("n=2"), kPoint).find("a branch"), std::string::npos);
+      << test::why(with("$BASE=BASE_DATA[2]"), kPoint);
+  EXPECT_NE(test::why(with("n=2"), kPoint).find("a branch"), std::string::npos);
 }
 
 }  // namespace

@@ -8,10 +8,6 @@ namespace {
 using test::corrected_by_shift;
 using test::row_of;
 
-std::string why(const test::Corrected& made, const std::string& name) {
-  return row_of(made.program, name).message;
-}
-
 const Pose kSpindle = test::spindle_only().tools.at("spindle");
 
 // Yaskawa
@@ -53,18 +49,18 @@ TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
       "MOVL P001 V=1.0\r\nMOVL C00000 V=1.0 UNTIL IN#(1)=ON\r\nSFTON P010\r\nMOVL C00001 "
       "V=1.0\r\nSFTOF\r\n"
       "IMOV C00002 V=1.0\r\nMOVJ C00003 VJ=1.0\r\n"));
-  EXPECT_NE(why(made, "P001").find("variable"), std::string::npos);
-  EXPECT_NE(why(made, "C00000").find("sensor"), std::string::npos);
-  EXPECT_NE(why(made, "C00001").find("SFTON"), std::string::npos);
-  EXPECT_NE(why(made, "C00002").find("relative"), std::string::npos);
-  EXPECT_NE(why(made, "C00003").find("pulses"), std::string::npos);
+  EXPECT_NE(test::why(made, "P001").find("variable"), std::string::npos);
+  EXPECT_NE(test::why(made, "C00000").find("sensor"), std::string::npos);
+  EXPECT_NE(test::why(made, "C00001").find("SFTON"), std::string::npos);
+  EXPECT_NE(test::why(made, "C00002").find("relative"), std::string::npos);
+  EXPECT_NE(test::why(made, "C00003").find("pulses"), std::string::npos);
 }
 
 TEST(Inform, ASearchEndsWhereItsSensorSays) {
   const test::Corrected made = jbi(job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n",
                                        "MOVL C00000 V=1.0 SRCH RIN#(1)=ON DIS=20.0\r\n"));
-  EXPECT_NE(why(made, "C00000").find("a sensor may end the motion (SRCH)"), std::string::npos)
-      << why(made, "C00000");
+  EXPECT_NE(test::why(made, "C00000").find("a sensor may end the motion (SRCH)"), std::string::npos)
+      << test::why(made, "C00000");
 }
 
 TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
@@ -75,12 +71,13 @@ TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
            "*A\r\nMOVL C00000 V=100.0\r\nJUMP *B IF IN#(1)=ON\r\nSFTOF\r\n*B\r\nSFTON P001\r\nJUMP "
            "*A\r\n"}) {
     const test::Corrected made = jbi(job(point, lines));
-    EXPECT_NE(why(made, "C00000").find("SFTON displaces it (drill.jbi line "), std::string::npos)
-        << lines << why(made, "C00000");
+    EXPECT_NE(test::why(made, "C00000").find("SFTON displaces it (drill.jbi line "),
+              std::string::npos)
+        << lines << test::why(made, "C00000");
   }
   const test::Corrected off = jbi(
       job(point, "*A\r\nMOVL C00000 V=100.0\r\nSFTON P001\r\nSFTOF\r\nJUMP *A IF IN#(1)=ON\r\n"));
-  EXPECT_TRUE(row_of(off.program, "C00000").corrected()) << why(off, "C00000");
+  EXPECT_TRUE(row_of(off.program, "C00000").corrected()) << test::why(off, "C00000");
 }
 
 TEST(Inform, AFrameOrToolThatAJobSetsIsNotKnown) {
@@ -94,16 +91,16 @@ TEST(Inform, AFrameOrToolThatAJobSetsIsNotKnown) {
         {.frames = {{"TOOL[1]", kSpindle},
                     {"USER[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5})}}});
   };
-  EXPECT_EQ(with("").program.left_alone(), 0u) << why(with(""), "C00001");
+  EXPECT_EQ(with("").program.left_alone(), 0u) << test::why(with(""), "C00001");
   const test::Corrected frame = with("MFRAME UF#(1) P001 P002 P003\r\n");
-  EXPECT_TRUE(row_of(frame.program, "C00000").corrected()) << why(frame, "C00000");
-  EXPECT_NE(why(frame, "C00001").find("USER[1] is set at run time (drill.jbi line"),
+  EXPECT_TRUE(row_of(frame.program, "C00000").corrected()) << test::why(frame, "C00000");
+  EXPECT_NE(test::why(frame, "C00001").find("USER[1] is set at run time (drill.jbi line"),
             std::string::npos);
   EXPECT_TRUE(row_of(with("MFRAME UF#(2) P001 P002 P003\r\n").program, "C00001").corrected());
   EXPECT_FALSE(row_of(with("MFRAME UF#(I001) P001 P002 P003\r\n").program, "C00001").corrected());
-  EXPECT_NE(why(with("SETTOOL TL#(1) P010\r\n"), "C00000").find("TOOL[1] is set at run time"),
+  EXPECT_NE(test::why(with("SETTOOL TL#(1) P010\r\n"), "C00000").find("TOOL[1] is set at run time"),
             std::string::npos)
-      << why(with("SETTOOL TL#(1) P010\r\n"), "C00000");
+      << test::why(with("SETTOOL TL#(1) P010\r\n"), "C00000");
 }
 
 TEST(Inform, PointsOfOneArcAreCorrectedTogether) {
@@ -112,7 +109,8 @@ TEST(Inform, PointsOfOneArcAreCorrectedTogether) {
                    "MOVL C00000 V=10.0\r\nMOVC C00001 V=10.0\r\nMOVC " + last + " V=10.0\r\n"));
   };
   EXPECT_TRUE(row_of(with("C00001").program, "C00001").corrected());
-  EXPECT_NE(why(with("P001"), "C00001").find("the other point of its arc"), std::string::npos);
+  EXPECT_NE(test::why(with("P001"), "C00001").find("the other point of its arc"),
+            std::string::npos);
   EXPECT_TRUE(row_of(with("P001").program, "C00000").corrected());
 }
 
@@ -129,14 +127,14 @@ test::Corrected jbi_with_axes(const std::string& first, const std::string& secon
 
 TEST(Inform, WhereABaseAxisMovesThatTheCellHasNotTargetsAreLeft) {
   EXPECT_EQ(jbi_with_axes("0", "0").program.left_alone(), 0u)
-      << why(jbi_with_axes("0", "0"), "C00000");
+      << test::why(jbi_with_axes("0", "0"), "C00000");
   for (const auto& [first, second] : {std::pair("0", "250000"), std::pair("250000", "250000")}) {
     const test::Corrected made = jbi_with_axes(first, second);
     EXPECT_EQ(made.program.left_alone(), 2u);
-    EXPECT_NE(
-        why(made, "C00000").find("base axis 1 is not at zero throughout, and the cell has none"),
-        std::string::npos)
-        << why(made, "C00000");
+    EXPECT_NE(test::why(made, "C00000")
+                  .find("base axis 1 is not at zero throughout, and the cell has none"),
+              std::string::npos)
+        << test::why(made, "C00000");
   }
 }
 
@@ -144,8 +142,8 @@ TEST(Inform, AJobOfAnotherRobotIsLeft) {
   std::string text =
       job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n", "MOVL C00000 V=100.0\r\n");
   text.replace(text.find("GROUP1 RB1"), 10, "GROUP1 RB2");
-  EXPECT_NE(why(jbi(text), "C00000").find("moves RB2, another robot"), std::string::npos)
-      << why(jbi(text), "C00000");
+  EXPECT_NE(test::why(jbi(text), "C00000").find("moves RB2, another robot"), std::string::npos)
+      << test::why(jbi(text), "C00000");
 }
 
 // Universal Robots
@@ -190,9 +188,9 @@ TEST(UrScript, ConstantTransformsAreFoldedAndWhatIsComputedIsLeft) {
                 "  # trammel: was pose_trans(hole, p[0, 0, -0.05, 0, 0, 0])\n  movel(p[1.750123,"),
             std::string::npos)
       << made.program.files[0].text;
-  EXPECT_NE(why(made, "moving").find("set at run time"), std::string::npos);
-  EXPECT_NE(why(made, "get_actual_tcp_pose()").find("function"), std::string::npos);
-  EXPECT_NE(why(made, "elsewhere").find("not in the script"), std::string::npos);
+  EXPECT_NE(test::why(made, "moving").find("set at run time"), std::string::npos);
+  EXPECT_NE(test::why(made, "get_actual_tcp_pose()").find("function"), std::string::npos);
+  EXPECT_NE(test::why(made, "elsewhere").find("not in the script"), std::string::npos);
 }
 
 TEST(UrScript, AToolThatIsNotTheCellsIsRefused) {
@@ -207,8 +205,8 @@ TEST(UrScript, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   const std::string loop = "  while i < 2:\n    movel(hole, a=1.2, v=0.05)\n";
   const test::Corrected tool =
       script("def p():\n" + kTcp + hole + loop + "    set_tcp(p[0, 0, 0, 0, 0, 0])\n  end\nend\n");
-  EXPECT_NE(why(tool, "hole").find("set_tcp: a branch or a loop"), std::string::npos)
-      << why(tool, "hole");
+  EXPECT_NE(test::why(tool, "hole").find("set_tcp: a branch or a loop"), std::string::npos)
+      << test::why(tool, "hole");
   const test::Corrected called =
       script("def null():\n  set_tcp(p[0, 0, 0, 0, 0, 0])\nend\ndef p():\n" + kTcp + hole + loop +
              "    null()\n  end\nend\n");
@@ -216,7 +214,7 @@ TEST(UrScript, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   const test::Corrected set =
       script("def p():\n" + hole + "  while i < 2:\n  " + kTcp +
              "    movel(hole, a=1.2, v=0.05)\n    set_tcp(p[0, 0, 0, 0, 0, 0])\n  end\nend\n");
-  EXPECT_TRUE(row_of(set.program, "hole").corrected()) << why(set, "hole");
+  EXPECT_TRUE(row_of(set.program, "hole").corrected()) << test::why(set, "hole");
 }
 
 TEST(UrScript, AThreadMaySetItsToolAtAnyTime) {
@@ -257,9 +255,10 @@ TEST(UrScript, WhatIsSeenFromAConveyorIsLeft) {
         script("def p():\n" + kTcp + "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n  " + track +
                "\n  movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0])\n  stop_conveyor_tracking()\n"
                "  movel(p[1.8, -0.2, 0.8, 0, 1.0472, 0])\nend\n");
-    EXPECT_NE(why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]").find("conveyor that moves (line 4)"),
-              std::string::npos)
-        << why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]");
+    EXPECT_NE(
+        test::why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]").find("conveyor that moves (line 4)"),
+        std::string::npos)
+        << test::why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]");
     EXPECT_TRUE(row_of(made.program, "p[1.8, -0.2, 0.8, 0, 1.0472, 0]").corrected());
   }
 }
@@ -278,7 +277,8 @@ TEST(UrScript, ThePayloadIsComparedWithTheCells) {
   EXPECT_EQ(same.program.left_alone(), 0u);
   const test::Corrected unknown = script(
       "def p():\n" + kTcp + moves + "  set_payload(m)\n  movel(p[1.8, 0, 0.8, 0, 1.5, 0])\nend\n");
-  EXPECT_NE(why(unknown, "p[1.8, 0, 0.8, 0, 1.5, 0]").find("is not constant"), std::string::npos);
+  EXPECT_NE(test::why(unknown, "p[1.8, 0, 0.8, 0, 1.5, 0]").find("is not constant"),
+            std::string::npos);
 }
 
 TEST(UrScript, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
@@ -288,9 +288,9 @@ TEST(UrScript, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
              "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n  movel(hole)\n  movel(pose_add(hole, off))\n"
              "  h = low[2] + 0.1\n  movel(low)\nend\n");
   EXPECT_TRUE(row_of(made.program, "hole").corrected());
-  EXPECT_NE(why(made, "pose_add(hole, off)").find("it moves with hole"), std::string::npos);
-  EXPECT_NE(why(made, "low").find("its numbers are read elsewhere too"), std::string::npos)
-      << why(made, "low");
+  EXPECT_NE(test::why(made, "pose_add(hole, off)").find("it moves with hole"), std::string::npos);
+  EXPECT_NE(test::why(made, "low").find("its numbers are read elsewhere too"), std::string::npos)
+      << test::why(made, "low");
 }
 
 // Tables
@@ -325,8 +325,9 @@ TEST(UrScript, AParameterHidesWhatIsCalledSoElsewhere) {
   const test::Corrected made = script(with_lines(
       "  q = " + kPose + "\n  def to(q):\n    movel(q)\n  end\n  to(" + kPose + ")\n  movel(q)\n"));
   EXPECT_EQ(made.program.left_alone(), 2u) << made.refusal;
-  EXPECT_NE(why(made, "q").find("q is a parameter of to (p.script line 5)"), std::string::npos)
-      << why(made, "q");
+  EXPECT_NE(test::why(made, "q").find("q is a parameter of to (p.script line 5)"),
+            std::string::npos)
+      << test::why(made, "q");
 }
 
 TEST(UrScript, WhatAnOffsetOrAForceMovesIsLeftUntilItEnds) {
@@ -338,7 +339,7 @@ TEST(UrScript, WhatAnOffsetOrAForceMovesIsLeftUntilItEnds) {
     const std::string first = "  " + std::string(begin) + "\n  movel(" + kPose + ")\n";
     const test::Corrected made =
         script(with_lines(first + "  " + end + "\n  movel(p[1.8, 0.1, 0.8, 0, 1.5707963, 0])\n"));
-    EXPECT_NE(why(made, kPose).find(clause), std::string::npos) << why(made, kPose);
+    EXPECT_NE(test::why(made, kPose).find(clause), std::string::npos) << test::why(made, kPose);
     EXPECT_EQ(made.program.left_alone(), 1u) << made.refusal;
   }
 }
@@ -348,24 +349,24 @@ TEST(UrScript, WhatMovesWhileSomebodyLeadsTheArmIsLeft) {
                                    std::pair("teach_mode()", "end_teach_mode()")}) {
     const std::string led = "  " + std::string(begin) + "\n  movel(" + kPose + ")\n  " + end + "\n";
     const test::Corrected made = script(with_lines(led + "  movej([0, -0.3, 0.3, 0, 0.5, 0])\n"));
-    EXPECT_NE(why(made, kPose).find("the arm gives way"), std::string::npos)
-        << begin << ": " << why(made, kPose);
+    EXPECT_NE(test::why(made, kPose).find("the arm gives way"), std::string::npos)
+        << begin << ": " << test::why(made, kPose);
     EXPECT_EQ(made.program.left_alone(), 1u) << made.refusal;
   }
 }
 
 TEST(UrScript, TheMotionsThatChooseTheirOwnSpeedAreMotions) {
   const test::Corrected made = script(with_lines("  optimovel(" + kPose + ", a=0.5, v=0.5)\n"));
-  EXPECT_TRUE(row_of(made.program, kPose).corrected()) << made.refusal << why(made, kPose);
+  EXPECT_TRUE(row_of(made.program, kPose).corrected()) << made.refusal << test::why(made, kPose);
 }
 
 // Yaskawa again
 
-const std::string kPoint = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
+const std::string kCamOthersPoint = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
 
 TEST(Inform, ARelativeJobThatACallGivesAnotherFrameIsLeft) {
   const std::string relative =
-      job("///USER 1\r\n///POSTYPE USER\r\n" + kPoint, "MOVL C00000 V=138.0\r\n");
+      job("///USER 1\r\n///POSTYPE USER\r\n" + kCamOthersPoint, "MOVL C00000 V=138.0\r\n");
   for (const bool given : {true, false}) {
     const std::string call = "/JOB\r\n//NAME A\r\n//INST\r\nNOP\r\nCALL JOB:DRILL" +
                              std::string(given ? " UF#(2)" : "") + "\r\nEND\r\n";
@@ -373,24 +374,26 @@ TEST(Inform, ARelativeJobThatACallGivesAnotherFrameIsLeft) {
         corrected_by_shift(Dialect::kInform, {{"a.jbi", call}, {"d.jbi", relative}},
                            {.frames = {{"TOOL[1]", kSpindle}, {"USER[1]", Pose::Identity()}}});
     EXPECT_EQ(row_of(made.program, "C00000").corrected(), !given)
-        << made.refusal << why(made, "C00000");
-    EXPECT_EQ(why(made, "C00000").find("gives the job another user frame (a.jbi line 5)") !=
+        << made.refusal << test::why(made, "C00000");
+    EXPECT_EQ(test::why(made, "C00000").find("gives the job another user frame (a.jbi line 5)") !=
                   std::string::npos,
               given);
   }
 }
 
 TEST(Inform, AnInstructionThatIsNotKnownLeavesThePositionThatItIsGiven) {
-  const test::Corrected made = jbi(job(kPoint, "SMOVL C00000 V=138.0\r\n"));
-  EXPECT_NE(why(made, "C00000").find("SMOVL is not known here: it may move the robot there"),
+  const test::Corrected made = jbi(job(kCamOthersPoint, "SMOVL C00000 V=138.0\r\n"));
+  EXPECT_NE(test::why(made, "C00000").find("SMOVL is not known here: it may move the robot there"),
             std::string::npos)
-      << made.refusal << why(made, "C00000");
+      << made.refusal << test::why(made, "C00000");
 }
 
 TEST(Inform, APositionThatStandsThereTwiceIsLeft) {
-  const test::Corrected made = jbi(job(kPoint + kPoint, "MOVL C00000 V=138.0\r\n"));
-  EXPECT_NE(why(made, "C00000").find("it stands there twice (line 9, line 10)"), std::string::npos)
-      << made.refusal << why(made, "C00000");
+  const test::Corrected made =
+      jbi(job(kCamOthersPoint + kCamOthersPoint, "MOVL C00000 V=138.0\r\n"));
+  EXPECT_NE(test::why(made, "C00000").find("it stands there twice (line 9, line 10)"),
+            std::string::npos)
+      << made.refusal << test::why(made, "C00000");
 }
 
 TEST(OtherDialects, WhatIsNoneIsLeftAsItIs) {

@@ -19,7 +19,7 @@ std::string line_at(double y, const std::string& speed = "v100") {
       "\n",
       y, speed);
 }
-std::string program(const std::string& motions) {
+std::string program_path(const std::string& motions) {
   return "MODULE M\n" + kTool + "PROC main()\n" + motions + "ENDPROC\nENDMODULE\n";
 }
 
@@ -53,7 +53,7 @@ AskCorrections growing(const std::set<std::size_t>& left = {}) {
 
 CorrectedProgram corrected(const std::string& motions, const Chain& robot,
                            const AskCorrections& ask) {
-  const Program read = read_program(Dialect::kRapid, {{"m.mod", program(motions)}}, {});
+  const Program read = read_program(Dialect::kRapid, {{"m.mod", program_path(motions)}}, {});
   return correct_program(read, robot, test::spindle_only(), ask, {}).value();
 }
 

@@ -11,7 +11,7 @@ using test::corrected_by_shift;
 using test::kShift_mm;
 using test::row_of;
 
-const std::string kTool =
+const std::string kCamRapidTool =
     "  PERS tooldata "
     "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];"
     "\n";
@@ -24,7 +24,7 @@ std::string target(const std::string& name, const std::string& position) {
   return "  CONST robtarget " + name + ":=[[" + position + "]" + kRest + ";\n";
 }
 std::string program(const std::string& data, const std::string& motions) {
-  return "MODULE M\n" + kTool + kPanel + data + "  PROC main()\n" + motions +
+  return "MODULE M\n" + kCamRapidTool + kPanel + data + "  PROC main()\n" + motions +
          "  ENDPROC\nENDMODULE\n";
 }
 std::string move_l(const std::string& point, const std::string& wobj = "\\WObj:=wPanel") {
@@ -34,10 +34,6 @@ test::Corrected rapid(const std::string& text, const ReadOptions& read = {},
                       const CorrectProgramOptions& options = {}) {
   return corrected_by_shift(Dialect::kRapid, {{"m.mod", text}}, read, options);
 }
-std::string why(const test::Corrected& made, const std::string& name) {
-  return row_of(made.program, name).message;
-}
-
 TEST(Rapid, OnlyNumbersOfTargetsChangeAndWholeLinesAreInserted) {
   const std::string text =
       "\xEF\xBB\xBF" + program(
@@ -64,8 +60,8 @@ TEST(Rapid, WhatIsSetAtRunTimeIsNamedAlsoWhereOneOfItsNumbersIs) {
   std::string data = target("p10", "0,0,400");
   data.replace(data.find("CONST"), 5, "PERS");
   const test::Corrected made = rapid(program(data, "    p10.trans.z:=reg1;\n" + move_l("p10")));
-  EXPECT_NE(why(made, "p10").find("p10 is set at run time (m.mod line"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("p10 is set at run time (m.mod line"), std::string::npos)
+      << test::why(made, "p10");
 }
 
 TEST(Rapid, AFileWhoseLinesEndInCrAloneIsRefused) {
@@ -176,18 +172,19 @@ TEST(Rapid, WhatTheProgramDecidesAtRunTimeIsLeftWithTheReason) {
                 "    FOR k FROM 1 TO 3 DO\n" + move_l("Offs(p10,0,k*10,0)") + "    ENDFOR\n" +
                 "    n:=n+1;\n    pVar.trans.z:=5;\n    PDispOn p10,tSpindle;\n" +
                 move_l("Offs(p10,1,0,0)") + "    PDispOff;\n" + move_l("Offs(p10,2,0,0)")));
-  EXPECT_NE(why(made, "Offs(p10,n,0,0)").find("n is set at run time (m.mod line"),
+  EXPECT_NE(test::why(made, "Offs(p10,n,0,0)").find("n is set at run time (m.mod line"),
             std::string::npos);
-  EXPECT_NE(why(made, "Offs(p10,nPers,0,0)").find("persistent"), std::string::npos);
-  EXPECT_NE(why(made, "pVar").find("set at run time"), std::string::npos);
-  EXPECT_NE(why(made, "Offs(pFound,0,0,1)").find("SearchL"), std::string::npos);
-  EXPECT_NE(why(made, "fWhere(2)").find("function"), std::string::npos);
-  EXPECT_NE(why(made, "pElsewhere").find("not in the files"), std::string::npos);
-  EXPECT_NE(why(made, "Offs(p10,0,k*10,0)").find("loop counts k"), std::string::npos);
-  EXPECT_NE(why(made, "Offs(p10,1,0,0)").find("PDispOn"), std::string::npos);
+  EXPECT_NE(test::why(made, "Offs(p10,nPers,0,0)").find("persistent"), std::string::npos);
+  EXPECT_NE(test::why(made, "pVar").find("set at run time"), std::string::npos);
+  EXPECT_NE(test::why(made, "Offs(pFound,0,0,1)").find("SearchL"), std::string::npos);
+  EXPECT_NE(test::why(made, "fWhere(2)").find("function"), std::string::npos);
+  EXPECT_NE(test::why(made, "pElsewhere").find("not in the files"), std::string::npos);
+  EXPECT_NE(test::why(made, "Offs(p10,0,k*10,0)").find("loop counts k"), std::string::npos);
+  EXPECT_NE(test::why(made, "Offs(p10,1,0,0)").find("PDispOn"), std::string::npos);
   EXPECT_TRUE(row_of(made.program, "Offs(p10,2,0,0)").corrected());
-  EXPECT_NE(why(made, "p10").find("a displacement is measured from it (PDispOn"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("a displacement is measured from it (PDispOn"),
+            std::string::npos)
+      << test::why(made, "p10");
 }
 
 TEST(Rapid, TheSamePointInTwoFramesIsRefusedOrSplit) {
@@ -195,9 +192,9 @@ TEST(Rapid, TheSamePointInTwoFramesIsRefusedOrSplit) {
       "  PERS wobjdata wOther:=[FALSE,TRUE,\"\",[[1800,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n" +
           target("p10", "0,125,400"),
       move_l("p10") + move_l("p10", "\\WObj:=wOther"));
-  EXPECT_NE(
-      why(rapid(text), "p10").find("used in different ways: tool tSpindle in wPanel (m.mod line"),
-      std::string::npos);
+  EXPECT_NE(test::why(rapid(text), "p10")
+                .find("used in different ways: tool tSpindle in wPanel (m.mod line"),
+            std::string::npos);
   const test::Corrected split = rapid(text, {.split = true});
   ASSERT_EQ(split.program.rows.size(), 2u);
   for (const ReceiptRow& row : split.program.rows) EXPECT_TRUE(row.corrected()) << row.message;
@@ -214,15 +211,16 @@ TEST(Rapid, ParametersAreFollowedToWhatIsHandedOver) {
       "Offs(pAt,-nBack,0,0),v10,fine,tWith\\WObj:=wPanel;\n  ENDPROC\n"
       "  PROC rOnce(robtarget pAt)\n    MoveL "
       "Offs(pAt,-20,0,0),v10,fine,tSpindle\\WObj:=wPanel;\n"));
-  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << why(made, "p10");
+  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << test::why(made, "p10");
   EXPECT_TRUE(row_of(made.program, "p20").corrected());
-  EXPECT_NE(why(made, "Offs(pAt,-nBack,0,0)").find("different values"), std::string::npos);
+  EXPECT_NE(test::why(made, "Offs(pAt,-nBack,0,0)").find("different values"), std::string::npos);
   EXPECT_TRUE(row_of(made.program, "Offs(pAt,-20,0,0)").corrected());
 }
 
 TEST(Rapid, ModulesShareTheirDataAndKeepTheirOwn) {
-  const std::string data = "MODULE D(SYSMODULE)\n" + kTool + kPanel + target("p10", "0,125,400") +
-                           "  LOCAL" + target("p20", "0,1,1").substr(1) + "ENDMODULE\n";
+  const std::string data = "MODULE D(SYSMODULE)\n" + kCamRapidTool + kPanel +
+                           target("p10", "0,125,400") + "  LOCAL" +
+                           target("p20", "0,1,1").substr(1) + "ENDMODULE\n";
   const std::string moves = "MODULE P\n  LOCAL" + target("p20", "0,200,200").substr(1) +
                             "  PROC main()\n" + move_l("p10") + move_l("p20") +
                             "  ENDPROC\nENDMODULE\n";
@@ -300,8 +298,9 @@ TEST(Rapid, ALoadThatMotionsSetIsComparedWithTheCells) {
   const test::Corrected some =
       rapid(program(points, move_l("p10") + "    GripLoad lPart;\n" + move_l("p20") +
                                 "    GripLoad load0;\n" + move_l("p30")));
-  EXPECT_TRUE(row_of(some.program, "p10").corrected()) << some.refusal << why(some, "p10");
-  EXPECT_NE(why(some, "p20").find("carrying lPart"), std::string::npos) << why(some, "p20");
+  EXPECT_TRUE(row_of(some.program, "p10").corrected()) << some.refusal << test::why(some, "p10");
+  EXPECT_NE(test::why(some, "p20").find("carrying lPart"), std::string::npos)
+      << test::why(some, "p20");
   EXPECT_TRUE(row_of(some.program, "p30").corrected());
 }
 
@@ -315,13 +314,13 @@ TEST(Rapid, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
     const test::Corrected load =
         rapid(program(points, move_l("p20") + head + move_l("p10") + "    GripLoad lPart;\n" + end +
                                   "    GripLoad load0;\n"));
-    EXPECT_NE(why(load, "p10").find("a branch, a loop or a caller"), std::string::npos)
-        << head << why(load, "p10");
+    EXPECT_NE(test::why(load, "p10").find("a branch, a loop or a caller"), std::string::npos)
+        << head << test::why(load, "p10");
     const test::Corrected shifted =
         rapid(program(points, head + move_l("p10") + "    PDispSet peX;\n    IF di2=1 PDispOff;\n" +
                                   end + "    PDispOff;\n"));
-    EXPECT_NE(why(shifted, "p10").find("PDispSet displaces it"), std::string::npos)
-        << head << why(shifted, "p10");
+    EXPECT_NE(test::why(shifted, "p10").find("PDispSet displaces it"), std::string::npos)
+        << head << test::why(shifted, "p10");
   }
 }
 
@@ -330,7 +329,7 @@ const std::string kPart = "  PERS loaddata lPart:=[40,[0,0,100],[1,0,0,0],0,0,0]
 /// p1 behind GripLoad load0, in a program with these routines beside main.
 test::Corrected beside(const std::string& routines, const std::string& rest_of_main = "",
                        const std::string& before = "") {
-  return rapid("MODULE M\n" + kTool + kPanel + kPart + target("p1", "0,0,300") +
+  return rapid("MODULE M\n" + kCamRapidTool + kPanel + kPart + target("p1", "0,0,300") +
                target("p2", "0,10,300") + "  PROC main()\n    GripLoad load0;\n" + before +
                move_l("p1") + rest_of_main + "  ENDPROC\n" + routines + "ENDMODULE\n");
 }
@@ -339,21 +338,22 @@ TEST(Rapid, WhatATrapChangesMayHoldAnywhere) {
   const auto with = [](const std::string& lines) {
     return beside("  TRAP tStop\n" + lines + "  ENDTRAP\n");
   };
-  EXPECT_NE(why(with("    GripLoad lPart;\n"), "p1").find("GripLoad: the TRAP tStop may change"),
-            std::string::npos)
-      << why(with("    GripLoad lPart;\n"), "p1");
-  EXPECT_NE(why(with("    PDispSet dNow;\n"), "p1").find("PDispSet displaces it"),
+  EXPECT_NE(
+      test::why(with("    GripLoad lPart;\n"), "p1").find("GripLoad: the TRAP tStop may change"),
+      std::string::npos)
+      << test::why(with("    GripLoad lPart;\n"), "p1");
+  EXPECT_NE(test::why(with("    PDispSet dNow;\n"), "p1").find("PDispSet displaces it"),
             std::string::npos);
   for (const std::string& harmless :
        std::vector<std::string>{"", "    StopMove;\n    SetDO do1,1;\n    StartMove;\n",
                                 "    GripLoad lPart;\n    GripLoad load0;\n"})
     EXPECT_TRUE(row_of(with(harmless).program, "p1").corrected())
-        << harmless << why(with(harmless), "p1");
+        << harmless << test::why(with(harmless), "p1");
 }
 
 TEST(Rapid, AMotionInATrapHasTheLoadOfWhatItComesInto) {
   const std::string trap = "  TRAP tAway\n" + move_l("p2") + "  ENDTRAP\n";
-  EXPECT_TRUE(row_of(beside(trap).program, "p2").corrected()) << why(beside(trap), "p2");
+  EXPECT_TRUE(row_of(beside(trap).program, "p2").corrected()) << test::why(beside(trap), "p2");
   const test::Corrected gripped = beside(trap, "    GripLoad lPart;\n" + move_l("p1"));
   EXPECT_FALSE(row_of(gripped.program, "p2").corrected());
 }
@@ -364,9 +364,9 @@ TEST(Rapid, WhatAnErrorHandlerChangesHoldsWhereItGoesBack) {
   };
   for (const std::string& back : std::vector<std::string>{"RETRY", "TRYNEXT"}) {
     const test::Corrected made = with("    GripLoad lPart;\n    " + back + ";\n");
-    EXPECT_NE(why(made, "p1").find("GripLoad: the handler 'error' of its routine may change"),
+    EXPECT_NE(test::why(made, "p1").find("GripLoad: the handler 'error' of its routine may change"),
               std::string::npos)
-        << back << why(made, "p1");
+        << back << test::why(made, "p1");
     EXPECT_TRUE(row_of(with("    SetDO do1,1;\n    " + back + ";\n").program, "p1").corrected());
   }
   const test::Corrected numbered =
@@ -386,7 +386,7 @@ TEST(Rapid, WhatHoldsWhereARoutineFailsHoldsInTheHandlerOfItsCaller) {
   };
   EXPECT_FALSE(row_of(with("    TRYNEXT;\n").program, "p1").corrected());
   EXPECT_TRUE(row_of(with("    RETURN;\n").program, "p1").corrected())
-      << why(with("    RETURN;\n"), "p1");
+      << test::why(with("    RETURN;\n"), "p1");
 }
 
 TEST(Rapid, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
@@ -395,11 +395,12 @@ TEST(Rapid, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
               move_l("pA") + "    pX:=pA;\n    pX.trans.z:=pX.trans.z+10;\n" + move_l("pX") +
                   "    n:=n+1;\n" + move_l("Offs(pA,0,0,n)") + "    TPWrite \"at\"\\Pos:=pA;\n"));
   EXPECT_TRUE(row_of(made.program, "pA").corrected());
-  EXPECT_NE(why(made, "pX").find("pX is set at run time"), std::string::npos) << why(made, "pX");
-  EXPECT_NE(why(made, "pX").find("it moves with pA, which is corrected"), std::string::npos)
-      << why(made, "pX");
-  EXPECT_NE(why(made, "Offs(pA,0,0,n)").find("it moves with pA"), std::string::npos)
-      << why(made, "Offs(pA,0,0,n)");
+  EXPECT_NE(test::why(made, "pX").find("pX is set at run time"), std::string::npos)
+      << test::why(made, "pX");
+  EXPECT_NE(test::why(made, "pX").find("it moves with pA, which is corrected"), std::string::npos)
+      << test::why(made, "pX");
+  EXPECT_NE(test::why(made, "Offs(pA,0,0,n)").find("it moves with pA"), std::string::npos)
+      << test::why(made, "Offs(pA,0,0,n)");
   EXPECT_NE(
       fmt::format("{}", fmt::join(made.program.notes, "\n")).find("reads pA, which is corrected"),
       std::string::npos);
@@ -413,12 +414,12 @@ TEST(Rapid, ATargetWhoseNumbersAreReadElsewhereStaysUnlessItIsSplit) {
         target("pA", "0,125,400") + "  VAR num h;\n",
         reading + move_l("pA") + "  ENDPROC\n  PROC height(robtarget p)\n    h:=p.trans.z;\n");
     const test::Corrected left = rapid(text);
-    EXPECT_NE(why(left, "pA").find("its numbers are read elsewhere too (m.mod line"),
+    EXPECT_NE(test::why(left, "pA").find("its numbers are read elsewhere too (m.mod line"),
               std::string::npos)
-        << reading << why(left, "pA");
+        << reading << test::why(left, "pA");
     EXPECT_EQ(left.program.files[0].text, text);
     const test::Corrected split = rapid(text, {.split = true});
-    EXPECT_TRUE(row_of(split.program, "pA").corrected()) << reading << why(split, "pA");
+    EXPECT_TRUE(row_of(split.program, "pA").corrected()) << reading << test::why(split, "pA");
     EXPECT_NE(split.program.files[0].text.find("pA:=[[0,125,400]"), std::string::npos)
         << split.program.files[0].text;
   }
@@ -429,12 +430,13 @@ TEST(Rapid, AConfigurationThatContradictsItselfIsSaid) {
   text.replace(text.find("[0,0,0,0],[9E9"), 9, "[-1,-1,0,0]");
   const test::Corrected made = rapid(text);
   ASSERT_TRUE(row_of(made.program, "p10").corrected());
-  EXPECT_NE(why(made, "p10").find("contradicts itself: branch 0 has joint 4 at"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("contradicts itself: branch 0 has joint 4 at"),
+            std::string::npos)
+      << test::why(made, "p10");
   ASSERT_EQ(made.program.notes.size(), 1u);
   text.replace(text.find("[-1,-1,0,0]"), 11, "[-1,-1,0,1]");
   const test::Corrected consistent = rapid(text);
-  EXPECT_EQ(why(consistent, "p10"), "");
+  EXPECT_EQ(test::why(consistent, "p10"), "");
   EXPECT_TRUE(consistent.program.notes.empty());
 }
 
@@ -448,7 +450,7 @@ TEST(Rapid, NamesAreSpelledAsTheProgramSpellsThemAndOptionalArgumentsAreFollowed
   EXPECT_NE(made.program.notes[0].find("no motion in these files goes to pUnUsed (m.mod line"),
             std::string::npos)
       << made.program.notes[0];
-  EXPECT_TRUE(row_of(made.program, "pA").corrected()) << why(made, "pA");
+  EXPECT_TRUE(row_of(made.program, "pA").corrected()) << test::why(made, "pA");
 }
 
 TEST(Rapid, TheToolOfAMotionThatSetsASignalStandsBehindItsZone) {
@@ -461,7 +463,7 @@ TEST(Rapid, TheToolOfAMotionThatSetsASignalStandsBehindItsZone) {
                 "  ENDPROC\nENDMODULE\n",
             {}, options);
   ASSERT_EQ(made.refusal, "");
-  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10") << why(made, "p20");
+  EXPECT_EQ(made.program.left_alone(), 0u) << test::why(made, "p10") << test::why(made, "p20");
   EXPECT_NE(made.program.notes.at(0).find("tool tHand is not in the files"), std::string::npos)
       << made.program.notes[0];
 }
@@ -474,10 +476,11 @@ TEST(Rapid, WhereExternalAxesAreDisplacedTargetsThatHaveThemAreLeft) {
     const test::Corrected made =
         rapid(program(data, move_l("p30") + "    " + displace + ";\n" + move_l("p10") +
                                 move_l("p20") + "    EOffsOff;\n"));
-    EXPECT_TRUE(row_of(made.program, "p10").corrected()) << why(made, "p10");
-    EXPECT_NE(why(made, "p20").find("displaces its external axes (m.mod line"), std::string::npos)
-        << why(made, "p20");
-    EXPECT_TRUE(row_of(made.program, "p30").corrected()) << why(made, "p30");
+    EXPECT_TRUE(row_of(made.program, "p10").corrected()) << test::why(made, "p10");
+    EXPECT_NE(test::why(made, "p20").find("displaces its external axes (m.mod line"),
+              std::string::npos)
+        << test::why(made, "p20");
+    EXPECT_TRUE(row_of(made.program, "p30").corrected()) << test::why(made, "p30");
   }
 }
 
@@ -497,7 +500,7 @@ TEST(Rapid, WithConfLOffALineStaysInThePostureOfTheJointsBeforeIt) {
   };
   const test::Corrected on = with("");
   const test::Corrected off = with("    ConfJ\\Off;\n    ConfL\\Off;\n");
-  ASSERT_EQ(off.program.left_alone(), 0u) << why(off, "p10");
+  ASSERT_EQ(off.program.left_alone(), 0u) << test::why(off, "p10");
   EXPECT_GT(joints_of(on, "p10").at(4), 0);
   EXPECT_LT(joints_of(off, "p10").at(4), 0);
   EXPECT_LT(joints_of(off, "p20").at(4), 0);
@@ -526,9 +529,9 @@ TEST(Rapid, MotionsOfAToolThatTheModelHasNotLearnedWithAreLeft) {
       program(other + target("p10", "0,125,400") + target("p20", "0,125,410"),
               move_l("p10") + "    MoveL p20,v100,fine,tGripper\\WObj:=wPanel;\n");
   const test::Corrected made = corrected_by_shift(Dialect::kRapid, {{"m.mod", text}}, {}, {}, cell);
-  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << made.refusal << why(made, "p10");
-  EXPECT_NE(why(made, "p20").find("not trained with gripper"), std::string::npos)
-      << why(made, "p20");
+  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << made.refusal << test::why(made, "p10");
+  EXPECT_NE(test::why(made, "p20").find("not trained with gripper"), std::string::npos)
+      << test::why(made, "p20");
 }
 
 /// A program as planning software posts it: what a tool and a work object are is assigned before
@@ -552,7 +555,7 @@ TEST(Rapid, ConstantsThatAreAssignedToToolsAndWorkObjectsHoldUntilTheNext) {
              "    wOlp.uframe:=[[1400,0,500],[1,0,0,0]];\n    wOlp.uframe.trans:=[1500,0,500];\n" +
              to("p10") + "    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n" + to("p20")));
   ASSERT_EQ(made.refusal, "");
-  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10");
+  EXPECT_EQ(made.program.left_alone(), 0u) << test::why(made, "p10");
   EXPECT_LT((row_of(made.program, "p10").p_B - Vector3(1.8, -.125, 1.2)).norm(), 1e-12);
   EXPECT_LT((row_of(made.program, "p20").p_B - Vector3(1.79, -.125, 1.21)).norm(), 1e-12);
 }
@@ -562,9 +565,10 @@ TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
   const test::Corrected branch = rapid(posted(
       kSetTool + frame + to("p10") +
       "    IF di1=1 THEN\n      wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n    ENDIF\n" + to("p20")));
-  EXPECT_TRUE(row_of(branch.program, "p10").corrected()) << branch.refusal << why(branch, "p10");
-  EXPECT_NE(why(branch, "p20").find("wOlp is set at run time"), std::string::npos)
-      << why(branch, "p20");
+  EXPECT_TRUE(row_of(branch.program, "p10").corrected())
+      << branch.refusal << test::why(branch, "p10");
+  EXPECT_NE(test::why(branch, "p20").find("wOlp is set at run time"), std::string::npos)
+      << test::why(branch, "p20");
   const test::Corrected number =
       rapid(posted(kSetTool + frame + "    wOlp.uframe.trans.x:=reg1;\n" + to("p10")));
   EXPECT_FALSE(row_of(number.program, "p10").corrected());
@@ -578,7 +582,7 @@ TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
   const test::Corrected before = rapid(posted(kSetTool + to("p10") + frame + to("p20")));
   EXPECT_FALSE(row_of(before.program, "p10").corrected())
       << "the end of main comes before its head, too";
-  EXPECT_TRUE(row_of(before.program, "p20").corrected()) << why(before, "p20");
+  EXPECT_TRUE(row_of(before.program, "p20").corrected()) << test::why(before, "p20");
 }
 
 TEST(Rapid, APointThatADisplacementIsMeasuredFromStaysUnlessItIsSplit) {
@@ -593,25 +597,25 @@ TEST(Rapid, APointThatADisplacementIsMeasuredFromStaysUnlessItIsSplit) {
         "    shift:=DefDFrame(pRef,pRef,pRef,pNow,pNow,pNow);\n    PDispSet shift;\n" + last}) {
     const std::string text = program(points, moves + displaced);
     const test::Corrected left = rapid(text);
-    EXPECT_NE(why(left, "pRef").find("a displacement is measured from it"), std::string::npos)
-        << why(left, "pRef");
-    EXPECT_TRUE(row_of(left.program, "pNow").corrected()) << why(left, "pNow");
+    EXPECT_NE(test::why(left, "pRef").find("a displacement is measured from it"), std::string::npos)
+        << test::why(left, "pRef");
+    EXPECT_TRUE(row_of(left.program, "pNow").corrected()) << test::why(left, "pNow");
     EXPECT_FALSE(row_of(left.program, "pNext").corrected());
     const test::Corrected split = rapid(text, {.split = true});
-    EXPECT_TRUE(row_of(split.program, "pRef").corrected()) << why(split, "pRef");
+    EXPECT_TRUE(row_of(split.program, "pRef").corrected()) << test::why(split, "pRef");
     EXPECT_NE(split.program.files[0].text.find(target("pRef", "0,125,400")), std::string::npos);
   }
   const test::Corrected array = rapid(
       program("  CONST robtarget p{2}:=[[[0,125,400]" + kRest + ",[[0,225,400]" + kRest + "];\n",
               move_l("p{1}") + move_l("p{2}") + "    PDispOn p{1},tSpindle;\n    PDispOff;\n"));
-  EXPECT_NE(why(array, "p{1}").find("a displacement is measured from it"), std::string::npos)
-      << why(array, "p{1}");
-  EXPECT_TRUE(row_of(array.program, "p{2}").corrected()) << why(array, "p{2}");
+  EXPECT_NE(test::why(array, "p{1}").find("a displacement is measured from it"), std::string::npos)
+      << test::why(array, "p{1}");
+  EXPECT_TRUE(row_of(array.program, "p{2}").corrected()) << test::why(array, "p{2}");
 }
 
 TEST(Rapid, AModuleThatIsNotWholeIsRefusedWithTheBlockThatHasNoEnd) {
   const std::string data =
-      "MODULE M\n" + kTool + kPanel + target("p10", "0,0,400") + "  PROC main()\n";
+      "MODULE M\n" + kCamRapidTool + kPanel + target("p10", "0,0,400") + "  PROC main()\n";
   const std::string move = move_l("p10");
   const std::vector<std::pair<std::string, std::string>> cases = {
       {data + move, "PROC main has no ENDPROC"},
@@ -641,9 +645,9 @@ TEST(Rapid, APointThatOnlyAnUnknownInstructionIsGivenIsLeftAndNotCalledUnused) {
   const test::Corrected made =
       rapid(program(target("p10", "0,0,400") + target("p20", "0,10,400"),
                     move_l("p10") + "    FCPressL p20,v50,100,fine,tSpindle;\n"));
-  EXPECT_NE(why(made, "p20").find("FCPressL is not known here: it may move the robot there"),
+  EXPECT_NE(test::why(made, "p20").find("FCPressL is not known here: it may move the robot there"),
             std::string::npos)
-      << why(made, "p20");
+      << test::why(made, "p20");
   EXPECT_TRUE(row_of(made.program, "p10").corrected());
   const test::Corrected read =
       rapid(program(target("p10", "0,0,400") + target("p20", "0,10,400"),
@@ -655,15 +659,15 @@ TEST(Rapid, ANameThatAFileDeclaresTwiceIsLeft) {
   const std::string first = program(target("p10", "0,0,400"), move_l("p10"));
   const test::Corrected made = rapid(first + "MODULE N\n" + target("p10", "0,50,400") +
                                      "  PROC other()\n" + move_l("p10") + "  ENDPROC\nENDMODULE\n");
-  EXPECT_NE(why(made, "p10").find("p10 is declared twice (m.mod line"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("p10 is declared twice (m.mod line"), std::string::npos)
+      << test::why(made, "p10");
 }
 
 TEST(Rapid, AMotionThatASensorCorrectsIsLeft) {
   const test::Corrected made =
       rapid(program(target("p10", "0,0,400"), move_l("p10", "\\WObj:=wPanel\\Corr")));
-  EXPECT_NE(why(made, "p10").find("a sensor corrects the path"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("a sensor corrects the path"), std::string::npos)
+      << test::why(made, "p10");
 }
 
 TEST(Rapid, WhatAnotherTaskSetsOfASharedPersistentIsSetAtRunTime) {
@@ -676,17 +680,17 @@ TEST(Rapid, WhatAnotherTaskSetsOfASharedPersistentIsSetAtRunTime) {
         Dialect::kRapid, {{"RAPID/TASK1/PROGMOD/m.mod", text},
                           {std::string("RAPID/") + task + "/PROGMOD/b.mod", background}});
     EXPECT_EQ(row_of(made.program, "p10").corrected(), !shared)
-        << task << made.refusal << why(made, "p10");
-    EXPECT_EQ(why(made, "p10").find("wPanel is set at run time") != std::string::npos, shared)
-        << why(made, "p10");
+        << task << made.refusal << test::why(made, "p10");
+    EXPECT_EQ(test::why(made, "p10").find("wPanel is set at run time") != std::string::npos, shared)
+        << test::why(made, "p10");
   }
 }
 
 TEST(Rapid, AProcedureThatIsMerelyCalledLikeAMotionIsNotTakenForOne) {
   const test::Corrected made = rapid(
       program(target("p10", "0,0,400"), "    MoveLOffset p10,v100,fine,tSpindle\\WObj:=wPanel;\n"));
-  EXPECT_NE(why(made, "p10").find("MoveLOffset is not known here"), std::string::npos)
-      << why(made, "p10");
+  EXPECT_NE(test::why(made, "p10").find("MoveLOffset is not known here"), std::string::npos)
+      << test::why(made, "p10");
 }
 
 }  // namespace

@@ -16,11 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kNotAll = 1;
+constexpr int kCorrectProgramNotAll = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kRefusedData = 3;
 
-const std::string kPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
+const std::string kCorrectProgramPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
 
 /// A model of the shipped cell that knows of no errors: what is corrected is written as it was,
 /// with its digits.
@@ -105,7 +105,7 @@ TEST_F(CorrectProgram, WhatIsLeftDecidesTheExitCode) {
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("strict.mod"), "--strict"}),
             kRefusedData);
   EXPECT_FALSE(exists("strict.mod"));
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kNotAll);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kCorrectProgramNotAll);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("allowed.mod"), "--allow-failed"}), 0);
   EXPECT_EQ(text("allowed.mod"), text("out.mod"));
 }
@@ -171,17 +171,17 @@ TEST_F(CorrectProgram, AFolderComesBackAsAFolder) {
 /// A KUKA folder as its archive has it: a position that a motion of the program goes to stands in
 /// the controller's own file.
 void write_krl_folder(const test::TemporaryFolder& folder, const std::string& under) {
-  const std::string config = read_text_file(kPrograms + "$config.dat").value();
+  const std::string config = read_text_file(kCorrectProgramPrograms + "$config.dat").value();
   for (const char* place : {"/KRC/R1/System", "/KRC/R1/Program"})
     fs::create_directories(folder.file(under + place));
   folder.write(under + "/KRC/R1/System/$config.dat",
                config.substr(0, config.rfind("ENDDAT")) +
                    "DECL E6POS XHOME={X 0.0,Y 125.0,Z 100.0,A 0.0,B 90.0,C 0.0,S 2,T 0}\nENDDAT\n");
-  const std::string drill = read_text_file(kPrograms + "drill.src").value();
+  const std::string drill = read_text_file(kCorrectProgramPrograms + "drill.src").value();
   folder.write(under + "/KRC/R1/Program/drill.src",
                drill.substr(0, drill.rfind("END")) + "PTP XHOME\nEND\n");
   folder.write(under + "/KRC/R1/Program/drill.dat",
-               read_text_file(kPrograms + "drill.dat").value());
+               read_text_file(kCorrectProgramPrograms + "drill.dat").value());
 }
 
 TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
@@ -189,7 +189,7 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
   const std::string config = "/KRC/R1/System/$config.dat", program = "/KRC/R1/Program/drill.dat";
   EXPECT_EQ(
       correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("r.csv")}),
-      kNotAll);
+      kCorrectProgramNotAll);
   EXPECT_EQ(text("out" + config), text("in" + config));
   EXPECT_FALSE(exists("out" + config + ".original"));
   EXPECT_NE(text("out" + program), text("in" + program)) << "the program itself is corrected";
@@ -203,8 +203,8 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
 
 TEST_F(CorrectProgram, SystemModulesOfAFolderStayWhereverTheyLie) {
   fs::create_directories(file("in"));
-  fs::copy(kPrograms + "drill.mod", file("in/User.sys"));
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), kNotAll);
+  fs::copy(kCorrectProgramPrograms + "drill.mod", file("in/User.sys"));
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), kCorrectProgramNotAll);
   EXPECT_EQ(text("out/User.sys"), text("in/User.sys"));
   EXPECT_EQ(correct({"--model", model(), file("in/User.sys"), "-o", file("asked.sys")}), 0);
   EXPECT_NE(text("asked.sys"), text("in/User.sys"));
@@ -212,8 +212,9 @@ TEST_F(CorrectProgram, SystemModulesOfAFolderStayWhereverTheyLie) {
 
 TEST_F(CorrectProgram, PulsesAreToldInSixNumbersAndOfYaskawaJobsAlone) {
   const auto with = [&](const char* program, const char* pulses) {
-    return correct({"--model", model(), kPrograms + program, "-o", file("out.txt"), "--frames",
-                    kPrograms + "frames.csv", "--pulses-per-deg", pulses});
+    return correct({"--model", model(), kCorrectProgramPrograms + program, "-o", file("out.txt"),
+                    "--frames", kCorrectProgramPrograms + "frames.csv", "--pulses-per-deg",
+                    pulses});
   };
   EXPECT_EQ(with("drill.jbi", "1000,1000,1000,1000,1000,1000"), 0);
   EXPECT_EQ(with("drill.jbi", "1000,1000,1000"), kWrongUsage);
@@ -227,15 +228,16 @@ TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
         std::pair("drill.mod", "log.dat")}) {
     fs::remove_all(file("in"));
     fs::create_directories(file("in"));
-    fs::copy(kPrograms + program, file(std::string("in/") + program));
+    fs::copy(kCorrectProgramPrograms + program, file(std::string("in/") + program));
     folder_.write(std::string("in/") + other, "! options of this controller\n");
     EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--frames",
-                       kPrograms + "frames.csv"}),
+                       kCorrectProgramPrograms + "frames.csv"}),
               0)
         << program;
   }
   write_krl_folder(folder_, "krl");
-  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}), kNotAll)
+  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}),
+            kCorrectProgramNotAll)
       << "its data lists are read";
   EXPECT_TRUE(exists("krl-out/KRC/R1/Program/drill.dat"));
 }
@@ -247,8 +249,8 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
   const auto with = [&](const std::string& rows, const std::string& command = "correct") {
     folder_.write("frames.csv", header + rows + "\n");
     testing::internal::CaptureStderr();
-    const int code = run(command.c_str(), {"--model", model(), kPrograms + "drill.ls", "-o",
-                                           file("out"), "--frames", file("frames.csv")});
+    const int code = run(command.c_str(), {"--model", model(), kCorrectProgramPrograms + "drill.ls",
+                                           "-o", file("out"), "--frames", file("frames.csv")});
     return fmt::format("{}: {}", code, testing::internal::GetCapturedStderr());
   };
   EXPECT_TRUE(with(tool + "\nUFRAME[1]" + frame).starts_with("0: "));
@@ -276,7 +278,9 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
 }
 
 TEST_F(CorrectProgram, FramesOfABackupServeEveryProgramOfIt) {
-  ASSERT_EQ(run("import-backup", {kPrograms + "backup", "--frames", file("frames.csv")}), 0);
+  ASSERT_EQ(
+      run("import-backup", {kCorrectProgramPrograms + "backup", "--frames", file("frames.csv")}),
+      0);
   EXPECT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--frames",
                      file("frames.csv")}),
             0);
@@ -296,18 +300,20 @@ TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
 
 TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
   const std::vector<std::vector<std::string>> examples = {
-      {kPrograms + "drill.mod"},
-      {kPrograms + "drill.src", kPrograms + "drill.dat", kPrograms + "$config.dat"},
-      {kPrograms + "drill.ls"},
-      {kPrograms + "drill.jbi"},
-      {kPrograms + "drill.script"},
-      {"--format", "camrob", kPrograms + "camrob.csv"},
-      {"--format", "robodk", kPrograms + "robodk.csv"},
+      {kCorrectProgramPrograms + "drill.mod"},
+      {kCorrectProgramPrograms + "drill.src", kCorrectProgramPrograms + "drill.dat",
+       kCorrectProgramPrograms + "$config.dat"},
+      {kCorrectProgramPrograms + "drill.ls"},
+      {kCorrectProgramPrograms + "drill.jbi"},
+      {kCorrectProgramPrograms + "drill.script"},
+      {"--format", "camrob", kCorrectProgramPrograms + "camrob.csv"},
+      {"--format", "robodk", kCorrectProgramPrograms + "robodk.csv"},
   };
   for (const std::vector<std::string>& example : examples) {
     std::vector<std::string> arguments = example;
-    arguments.insert(arguments.end(), {"--model", model(), "--frames", kPrograms + "frames.csv",
-                                       "-o", file("out/"), "--json", file("r.json")});
+    arguments.insert(arguments.end(),
+                     {"--model", model(), "--frames", kCorrectProgramPrograms + "frames.csv", "-o",
+                      file("out/"), "--json", file("r.json")});
     EXPECT_EQ(correct(arguments), 0) << example.back();
     const auto json = nlohmann::json::parse(text("r.json"));
     EXPECT_EQ(json["left_alone"], 0) << example.back();
@@ -320,7 +326,7 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   const std::string before = module("m.mod", true);
   EXPECT_EQ(
       run("predict", {"--model", model(), before, "-o", file("p.csv"), "--json", file("p.json")}),
-      kNotAll)
+      kCorrectProgramNotAll)
       << "CRobT() is decided at run time";
   const CsvTable table = CsvTable::parse(text("p.csv"), "p.csv").value();
   ASSERT_EQ(table.size(), 2u);
@@ -333,7 +339,8 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   EXPECT_EQ(table.field(1, table.find("px_mm").value()), "");
   EXPECT_EQ(nlohmann::json::parse(text("p.json"))["targets"][1]["status"], "refused");
   ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--allow-failed"}), 0);
-  EXPECT_EQ(run("predict", {"--model", model(), file("out.mod"), "-o", file("q.csv")}), kNotAll)
+  EXPECT_EQ(run("predict", {"--model", model(), file("out.mod"), "-o", file("q.csv")}),
+            kCorrectProgramNotAll)
       << "a corrected one, too";
   EXPECT_EQ(run("predict", {"--model", model(), "-o", file("q.csv")}), kWrongUsage);
   EXPECT_EQ(run("predict", {"--model", model(), before, "--joints", before, "-o", file("q.csv")}),

@@ -21,7 +21,7 @@ struct Row {
   bool slides = false;
 };
 
-struct Arm {
+struct FewJointsArm {
   std::string name;
   std::vector<Row> drawn, built;
   std::vector<std::pair<double, double>> limits;  ///< deg or mm
@@ -29,11 +29,11 @@ struct Arm {
 
 /// Two parallel arms, a quill that slides downwards, and a turning flange; the second arm is too
 /// long, the zero of joint 2 is off, the quill leans.
-Arm scara() {
-  Arm arm{"scara",
-          {{0.34, 0, 0.325, 0}, {0, 0, 0.275, kPi}, {0, 0, 0, 0, true}, {0.05, 0, 0, 0}},
-          {},
-          {}};
+FewJointsArm scara() {
+  FewJointsArm arm{"scara",
+                   {{0.34, 0, 0.325, 0}, {0, 0, 0.275, kPi}, {0, 0, 0, 0, true}, {0.05, 0, 0, 0}},
+                   {},
+                   {}};
   arm.built = arm.drawn;
   arm.built[0].a += 0.4e-3;
   arm.built[1].a -= 0.6e-3;
@@ -45,16 +45,16 @@ Arm scara() {
 }
 
 /// A palletiser's kind of arm: turntable, three parallel axes, a flange that turns.
-Arm five_axes() {
+FewJointsArm five_axes() {
   const double right = kPi / 2;
-  Arm arm{"five",
-          {{0.5, 0, 0.15, right},
-           {0, right, 0.6, 0},
-           {0, 0, 0.55, 0},
-           {0, -right, 0.08, -right},
-           {0.12, 0, 0, 0}},
-          {},
-          {}};
+  FewJointsArm arm{"five",
+                   {{0.5, 0, 0.15, right},
+                    {0, right, 0.6, 0},
+                    {0, 0, 0.55, 0},
+                    {0, -right, 0.08, -right},
+                    {0.12, 0, 0, 0}},
+                   {},
+                   {}};
   arm.built = arm.drawn;
   arm.built[1].a += 0.5e-3;
   arm.built[2].theta -= from_deg(0.05);
@@ -82,7 +82,7 @@ Pose tool(const std::vector<Row>& rows, const JointVector& q) {
   return flange(rows, q) * Pose(Eigen::Translation3d(kTool));
 }
 
-std::string robot_yaml(const Arm& arm) {
+std::string robot_yaml(const FewJointsArm& arm) {
   std::string text = fmt::format("version: 1\nname: {}\njoints:\n", arm.name);
   for (std::size_t i = 0; i < arm.drawn.size(); ++i) {
     const Row& row = arm.drawn[i];
@@ -96,7 +96,7 @@ std::string robot_yaml(const Arm& arm) {
   return text;
 }
 
-std::shared_ptr<const Cell> cell_of(const Arm& arm) {
+std::shared_ptr<const Cell> cell_of(const FewJointsArm& arm) {
   const std::string cell = fmt::format(
       "version: 1\ncell: {}\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
       "tools: {{gripper: {{xyz_mm: [{}, {}, {}], q_wxyz: [1, 0, 0, 0]}}}}\n"
@@ -109,7 +109,7 @@ std::shared_ptr<const Cell> cell_of(const Arm& arm) {
 
 class Poses {
  public:
-  Poses(const Arm& arm, std::uint64_t seed) : arm_(arm), random_(seed) {}
+  Poses(const FewJointsArm& arm, std::uint64_t seed) : arm_(arm), random_(seed) {}
   JointVector next() {
     JointVector q(static_cast<Eigen::Index>(arm_.limits.size()));
     for (std::size_t i = 0; i < arm_.limits.size(); ++i) {
@@ -123,12 +123,12 @@ class Poses {
   double noise(double sigma) { return std::normal_distribution<double>(0, sigma)(random_); }
 
  private:
-  const Arm& arm_;
+  const FewJointsArm& arm_;
   std::mt19937_64 random_;
 };
 
 /// Measurements of the arm as built, by a tracker.
-std::string measured(const Arm& arm, int count) {
+std::string measured(const FewJointsArm& arm, int count) {
   Poses poses(arm, 11);
   std::string csv;
   for (std::size_t i = 0; i < arm.drawn.size(); ++i)
@@ -152,12 +152,12 @@ std::string measured(const Arm& arm, int count) {
 }
 
 struct Trained {
-  Arm arm;
+  FewJointsArm arm;
   std::shared_ptr<const Cell> cell;
   CompensatedModel model;
 };
 
-Trained trained(const Arm& arm) {
+Trained trained(const FewJointsArm& arm) {
   const auto cell = cell_of(arm);
   TrainOptions options;
   options.bias = "none";
@@ -176,7 +176,7 @@ Correction corrected(const Trained& robot, const Target& target) {
   return robot.model.correct(target, "gripper", "");
 }
 
-class ArmOfFewJoints : public testing::TestWithParam<Arm> {};
+class ArmOfFewJoints : public testing::TestWithParam<FewJointsArm> {};
 
 TEST_P(ArmOfFewJoints, PutsThePointOfItsToolWhereItIsWanted) {
   const Trained robot = trained(GetParam());

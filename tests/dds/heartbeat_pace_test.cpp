@@ -13,8 +13,8 @@ using test::Packet;
 using test::Prefix;
 
 constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
-                 kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
-constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2,
+                 kHeartbeatPaceOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr std::uint32_t kHeartbeatPacePublications = 0x000003c2, kSubscriptions = 0x000004c2,
                         kTheirReader = 0x000003c7;
 constexpr std::uint32_t kUserReader = 0x00000104, kUserWriter = 0x00000103;
 const HeartbeatPace::Time kStart{std::chrono::hours(1)};
@@ -27,7 +27,8 @@ TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
   HeartbeatPace pace;
   int left = 0;
   for (int ms = 0; ms < 1000; ++ms) {
-    left += pace.lets_out(offer(kPublications).bytes(), kStart + milliseconds(ms)) ? 1 : 0;
+    left +=
+        pace.lets_out(offer(kHeartbeatPacePublications).bytes(), kStart + milliseconds(ms)) ? 1 : 0;
   }
   EXPECT_EQ(left, 50);
 }
@@ -35,14 +36,14 @@ TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
 TEST(HeartbeatPace, WhatTheLibraryAppendsForItsStatisticsChangesNothing) {
   HeartbeatPace pace;
   const auto message =
-      offer(kPublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
+      offer(kHeartbeatPacePublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
   EXPECT_TRUE(pace.lets_out(message, kStart));
   EXPECT_FALSE(pace.lets_out(message, kStart + milliseconds(1)));
 }
 
 TEST(HeartbeatPace, WritersAndReadersAreToldOfApart) {
   HeartbeatPace pace;
-  EXPECT_TRUE(pace.lets_out(offer(kPublications).bytes(), kStart));
+  EXPECT_TRUE(pace.lets_out(offer(kHeartbeatPacePublications).bytes(), kStart));
   EXPECT_TRUE(pace.lets_out(offer(kSubscriptions).bytes(), kStart));
   EXPECT_FALSE(pace.lets_out(offer(kSubscriptions).bytes(), kStart + milliseconds(1)));
 }
@@ -50,8 +51,10 @@ TEST(HeartbeatPace, WritersAndReadersAreToldOfApart) {
 TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
-    const auto message =
-        Packet(kSelf).to(kOther).heartbeat(kTheirReader, kPublications, 1, 9, 1).bytes();
+    const auto message = Packet(kSelf)
+                             .to(kHeartbeatPaceOther)
+                             .heartbeat(kTheirReader, kHeartbeatPacePublications, 1, 9, 1)
+                             .bytes();
     EXPECT_TRUE(pace.lets_out(message, kStart));
   }
 }
@@ -63,20 +66,24 @@ TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
   };
   int left = 0;
   for (int ms = 0; ms < 10'000; ++ms) {
-    left += pace.lets_out(question(kOther, kUserWriter), kStart + milliseconds(ms)) ? 1 : 0;
+    left += pace.lets_out(question(kHeartbeatPaceOther, kUserWriter), kStart + milliseconds(ms))
+                ? 1
+                : 0;
   }
   EXPECT_LE(left, 15);
   EXPECT_GE(left, 10);
   const auto now = kStart + milliseconds(10'000);
-  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter), now + milliseconds(1500)))
+  EXPECT_TRUE(pace.lets_out(question(kHeartbeatPaceOther, kUserWriter), now + milliseconds(1500)))
       << "it is met again";
   EXPECT_TRUE(pace.lets_out(question(kSelf, kUserWriter), now))
       << "a writer of the same name elsewhere";
-  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter + 0x100), now));
+  EXPECT_TRUE(pace.lets_out(question(kHeartbeatPaceOther, kUserWriter + 0x100), now));
   EXPECT_TRUE(pace.lets_out(
-      Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(), now));
+      Packet(kSelf).to(kHeartbeatPaceOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(),
+      now));
   EXPECT_TRUE(pace.lets_out(
-      Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
+      Packet(kSelf).to(kHeartbeatPaceOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(),
+      now));
 }
 
 /// The number of messages that leave of an offer that is made every 10 ms for so long.
@@ -84,7 +91,7 @@ int offered(HeartbeatPace& pace, HeartbeatPace::Time from, int milliseconds_long
   int left = 0;
   for (int ms = 0; ms < milliseconds_long; ms += 10) {
     const auto message =
-        Packet(kSelf).to(kOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
+        Packet(kSelf).to(kHeartbeatPaceOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
     left += pace.lets_out(message, from + milliseconds(ms)) ? 1 : 0;
   }
   return left;
@@ -107,11 +114,13 @@ TEST(HeartbeatPace, WhoAnswersIsOfferedAtOnceWhatItLacks) {
   const auto then = kStart + milliseconds(2000);
   pace.heard(Packet(kSelf).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then);
   EXPECT_LT(offered(pace, then, 300), 10) << "somebody else answers";
-  pace.heard(Packet(kOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(),
-             then + milliseconds(300));
+  pace.heard(
+      Packet(kHeartbeatPaceOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(),
+      then + milliseconds(300));
   EXPECT_EQ(offered(pace, then + milliseconds(300), 400), 40);
-  pace.heard(Packet(kOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(),
-             then + milliseconds(700));
+  pace.heard(
+      Packet(kHeartbeatPaceOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(),
+      then + milliseconds(700));
   EXPECT_EQ(offered(pace, then + milliseconds(700), 400), 40);
   pace.heard({}, then);
 }
@@ -120,13 +129,13 @@ TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
     test::DataFields data;
-    data.writer = kPublications;
-    EXPECT_TRUE(pace.lets_out(offer(kPublications).data(data).bytes(), kStart));
+    data.writer = kHeartbeatPacePublications;
+    EXPECT_TRUE(pace.lets_out(offer(kHeartbeatPacePublications).data(data).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out(Packet(kSelf).data(data).bytes(), kStart));
     EXPECT_TRUE(
         pace.lets_out(Packet(kSelf).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes(), kStart));
-    EXPECT_TRUE(
-        pace.lets_out(Packet(kSelf).acknack(kTheirReader, kPublications, 1, 0, 1).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out(
+        Packet(kSelf).acknack(kTheirReader, kHeartbeatPacePublications, 1, 0, 1).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out({}, kStart));
   }
 }

@@ -22,14 +22,14 @@ namespace trammel {
 namespace {
 
 using Corrector = test::RawClient<wire::CorrectTarget>;
-const std::vector<double> kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+const std::vector<double> kLoadJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
 
 wire::CorrectTargetRequest corrections(std::size_t targets) {
   wire::CorrectTargetRequest request;
   request.about().cell("cell-7");
   wire::Target target;
   target.kind(wire::TARGET_JOINTS);
-  target.joints_rad(kJoints);
+  target.joints_rad(kLoadJoints);
   target.approach().temperature_c(std::nan(""));
   target.approach().time_s(std::nan(""));
   request.targets(std::vector<wire::Target>(targets, target));
@@ -265,7 +265,7 @@ TEST_F(NarrowTest, ASessionThatIsToldToTryAgainLaterDoesSo) {
       std::size_t answered = 0;
       for (int i = 0; i < 10; ++i) {
         client::TargetMm target;
-        target.seed_rad = kJoints;
+        target.seed_rad = kLoadJoints;
         target.joint_target = true;
         const auto answer =
             (*session)->correct_targets(cell_7, std::vector<client::TargetMm>(200, target));

@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 using Mark = std::optional<std::uint64_t>;
 
 constexpr milliseconds kTick{250};
-constexpr milliseconds kLimit{5000};
+constexpr milliseconds kStillnessLimit{5000};
 
 /// Two parts whose marks the test says.
 struct Parts {
@@ -21,7 +21,7 @@ struct Parts {
   Stillness watched{
       {{"discovery", [this] { return discovery; }}, {"replying", [this] { return replying; }}},
       kTick,
-      kLimit};
+      kStillnessLimit};
   /// What `ticks` looks end with.
   std::string after(int ticks, milliseconds each = kTick) {
     std::string names;
@@ -39,7 +39,7 @@ TEST(Stillness, APartThatStopsIsNamedAfterItsLimit) {
 TEST(Stillness, APartIsToldBeforeItsLimitAndOneThatEndsNothingIsOnlyTold) {
   Stillness watched(
       {{"status", [] { return Mark(1); }}, {"computing", [] { return Mark(2); }, false}}, kTick,
-      kLimit);
+      kStillnessLimit);
   for (int i = 0; i < 1 + 7; ++i) EXPECT_TRUE(watched.look(kTick).empty());
   EXPECT_EQ(watched.still_for(milliseconds(1750)), 3u) << "a bit each";
   EXPECT_EQ(watched.still_for(milliseconds(2000)), 0u);

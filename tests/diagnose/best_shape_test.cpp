@@ -7,20 +7,13 @@
 #include "server/diagnose/tell/doubts.h"
 #include "server/measurement/files/batch_file.h"
 #include "tests/support/demand.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/virtual_robot.h"
 
 // A name is sure only where noise is all that is left.
 
 namespace trammel {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.next_poses = 0;
-  options.recovery = false;
-  return options;
-}
 
 TEST(BestShape, IsSaidSoAndStillCompensated) {
   const Cause coupling{"wrist_coupling"};
@@ -53,7 +46,7 @@ TEST(BestShape, OfARealRobotNothingIsSureThatLeavesMoreThanNoiseNorASmallStep) {
   batch.measurements.resize((batch.measurements.size() + 8) / 9);
   const auto cell =
       std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
-  const Diagnosis real = test::demand(diagnose(cell, batch, quick()));
+  const Diagnosis real = test::demand(diagnose(cell, batch, test::quick()));
   EXPECT_NE(real.verdict, Verdict::kNamed) << real.sentence;
   bool maps = false;
   for (const Finding& finding : real.findings) {

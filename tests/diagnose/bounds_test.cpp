@@ -6,20 +6,13 @@
 
 #include "server/diagnose/diagnose.h"
 #include "tests/support/demand.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/virtual_robot.h"
 
 // The sign of its numbers is part of a cause's name.
 
 namespace trammel::cause_search {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.recovery = false;
-  options.next_poses = 0;
-  return options;
-}
 
 /// cell-7's virtual robot, pose after pose with their times. `further`: what it does besides, as it
 /// moves from one pose to the next, each source with its numbers.
@@ -52,7 +45,7 @@ MeasurementBatch with_moves(const std::vector<std::pair<std::string, std::vector
 
 Diagnosis diagnosed(const std::vector<std::pair<std::string, std::vector<double>>>& further,
                     std::uint64_t seed) {
-  return test::demand(diagnose(test::cell_7(), with_moves(further, 140, seed), quick()));
+  return test::demand(diagnose(test::cell_7(), with_moves(further, 140, seed), test::quick()));
 }
 
 bool names(const Diagnosis& diagnosis, std::string_view cause) {

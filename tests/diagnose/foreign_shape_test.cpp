@@ -5,6 +5,7 @@
 #include "server/diagnose/tell/doubts.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/virtual_robot.h"
 
 // What has another form than all known causes is explained in part by the nearest of them. That
@@ -12,14 +13,6 @@
 
 namespace trammel {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.next_poses = 0;
-  options.recovery = false;
-  return options;
-}
 
 bool may_be_unknown(const Finding& finding) {
   return std::any_of(finding.could_also_be.begin(), finding.could_also_be.end(),
@@ -40,7 +33,7 @@ TEST_P(ForeignShape, IsNotTakenForACauseForCertain) {
   for (const std::uint64_t seed : {1, 2}) {
     const hidden::HiddenCase hidden = hidden::hide(
         {.kind = GetParam().kind, .seed = seed, .lambda = GetParam().lambda, .poses = 160});
-    const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+    const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
     const std::string shown = fmt::format("seed {}: {}", seed, test::told(diagnosis));
     EXPECT_NE(diagnosis.verdict, Verdict::kNamed) << shown;
     EXPECT_NE(diagnosis.verdict, Verdict::kNothing) << shown;

@@ -10,6 +10,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/process.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
@@ -23,14 +24,6 @@ namespace {
 using hidden::HiddenSpec;
 using test::Judgement;
 
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.next_poses = 0;
-  options.recovery = false;
-  return options;
-}
-
 /// What is said of a case; the whole verdict goes with every failure.
 struct Answer {
   Judgement judgement;
@@ -38,7 +31,7 @@ struct Answer {
   std::string shown;
 };
 
-Answer answer_to(const HiddenSpec& spec, const DiagnoseOptions& options = quick()) {
+Answer answer_to(const HiddenSpec& spec, const DiagnoseOptions& options = test::quick()) {
   const hidden::HiddenCase hidden = hidden::hide(spec);
   Answer answer;
   answer.diagnosis = test::demand(test::diagnose_files(hidden, options));
@@ -139,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(Twins, HiddenTwin,
 
 TEST(HiddenEffectInterval, IsOfTwoStandardUncertaintiesAsInATraining) {
   const hidden::HiddenCase hidden = hidden::hide({.kind = "replica_p28", .seed = 1});
-  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
   ASSERT_EQ(diagnosis.findings.size(), 1U);
   const Estimate& distance = diagnosis.findings[0].parameters.at(0);
   EXPECT_NEAR(distance.u95, 2 * 1e3 * diagnosis.noise, 1e-9 * distance.u95);
@@ -186,7 +179,7 @@ TEST(HiddenEffectExtended, PredictsPosesHeldOutAsWellAsWhoKnowsTheTruth) {
       "test",
       {.kind = "backlash", .seed = 6, .lambda = 300, .poses = 240, .validation_share = 0.4}};
   trial.compare_with_oracle = true;
-  const test::TrialResult result = run_trial(trial, quick());
+  const test::TrialResult result = run_trial(trial, test::quick());
   ASSERT_EQ(result.error, "");
   EXPECT_LT(result.held_out_after_mm, 1.05 * result.oracle_mm.value()) << result.judgement.said;
   EXPECT_LT(result.held_out_after_mm, result.held_out_before_mm);
@@ -217,9 +210,9 @@ TEST(HiddenByOneProcess, IsFoundByAnother) {
 TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnotherOrder) {
   hidden::HiddenCase hidden =
       hidden::hide({.kind = "tracker_moved", .seed = 3, .lambda = 150, .poses = 160});
-  const Diagnosis in_order = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis in_order = test::demand(test::diagnose_files(hidden, test::quick()));
   hidden.batch_csv = backwards(hidden.batch_csv);
-  const Diagnosis moved = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis moved = test::demand(test::diagnose_files(hidden, test::quick()));
   ASSERT_EQ(in_order.findings.size(), 1U);
   ASSERT_EQ(moved.findings.size(), 1U);
   EXPECT_EQ(moved.findings[0].cause, in_order.findings[0].cause);
@@ -286,7 +279,7 @@ TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) 
   const double q2 = -5e-4;
   const Diagnosis several = test::demand(diagnose(
       cell, with_wrong_geometry(cell, {{"q2", q2}, {"d4", -3e-5}, {"a2", 4e-5}, {"q3", 4e-5}}, 120),
-      quick()));
+      test::quick()));
   ASSERT_EQ(several.findings.size(), 1U) << several.sentence;
   EXPECT_EQ(several.findings[0].cause.parameter, "") << "not it alone";
   const auto& numbers = several.findings[0].parameters;
@@ -295,7 +288,7 @@ TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) 
   ASSERT_NE(of_q2, numbers.end());
   EXPECT_NEAR(of_q2->value, q2, 2 * of_q2->u95);
   const Diagnosis alone =
-      test::demand(diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}}, 120), quick()));
+      test::demand(diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}}, 120), test::quick()));
   ASSERT_EQ(alone.findings.size(), 1U) << alone.sentence;
   EXPECT_EQ(alone.findings[0].cause.parameter, "q2");
 }
@@ -303,7 +296,7 @@ TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) 
 TEST(TheOnlyCauseOfARobot, IsNamedForCertainWhereThePosesHeldOutGainByIt) {
   const hidden::HiddenCase hidden =
       hidden::hide({.kind = "base", .seed = 1001, .lambda = 120, .poses = 300});
-  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
   ASSERT_EQ(diagnosis.findings.size(), 1U) << test::told(diagnosis);
   const Finding& base = diagnosis.findings.front();
   EXPECT_EQ(base.cause.cause, "base");
@@ -320,7 +313,7 @@ TEST(Doubt, WhatOnlySomePosesRecordIsNotLookedForAndSaid) {
   for (std::size_t i = 0; i < batch.measurements.size(); i += 2)
     batch.measurements[i].context.temperature.reset();
   hidden.batch_csv = to_csv(batch);
-  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
   const auto says = [](const std::string& limit) {
     return limit.find("temperatures of 60 of 120 poses") == 0;
   };
@@ -341,7 +334,8 @@ TEST(MapsOfJoints, AreOneFindingAJointAlsoWhereFineDetailShowsOnlyBesideAllElse)
       robot.truth.values(first + k) = size * std::sin(static_cast<double>(k * k + first));
     }
   }
-  const Diagnosis diagnosis = test::demand(diagnose(cell, test::measured(robot, 300, 71), quick()));
+  const Diagnosis diagnosis =
+      test::demand(diagnose(cell, test::measured(robot, 300, 71), test::quick()));
   std::set<int> joints;
   for (const Finding& finding : diagnosis.findings) {
     if (finding.cause.cause != "joint_map") continue;
@@ -359,7 +353,7 @@ TEST(FormOfACompliance, IsChosenAgainBesideWhatIsFoundLaterSoThatNothingElseIsNa
         own ? std::vector<std::string>{"base", "compliance"} : std::vector<std::string>{"base"};
     const auto cell = std::make_shared<const Cell>(lacking);
     const Diagnosis diagnosis = test::demand(
-        diagnose(cell, test::measured(test::chapter_5_robot(shipped), 200, 5), quick()));
+        diagnose(cell, test::measured(test::chapter_5_robot(shipped), 200, 5), test::quick()));
     std::set<std::string> causes;
     for (const Finding& finding : diagnosis.findings) causes.insert(finding.cause.cause);
     EXPECT_EQ(causes, own ? std::set<std::string>{"geometry"}
@@ -383,7 +377,7 @@ TEST(NextPoses, TellApartWhatTheBatchConfoundsMoreThanRandomOnesWould) {
                              .cell_ranges = "calibration"},
                     .compare_with_oracle = false,
                     .compare_next_poses = true};
-  DiagnoseOptions options = quick();
+  DiagnoseOptions options = test::quick();
   options.next_poses = 10;
   const test::TrialResult result = run_trial(trial, options);
   ASSERT_TRUE(result.next_poses_measured) << result.judgement.said;

@@ -8,20 +8,13 @@
 
 #include "server/diagnose/diagnose.h"
 #include "tests/support/demand.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/virtual_robot.h"
 
 // Rows that somebody got wrong are found, and say how.
 
 namespace trammel {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.recovery = false;
-  options.next_poses = 0;
-  return options;
-}
 
 /// cell-7 with a second tool, 60 mm longer.
 std::shared_ptr<const Cell> cell_of_two_tools() {
@@ -60,8 +53,8 @@ TEST(RowMistakes, ExchangedRowsAreLocatedAndSaidToBeExchanged) {
   Measurement& one = batch.measurements[40];
   Measurement& other = batch.measurements[93];
   std::swap(one.p_W, other.p_W);
-  const Diagnosis found = test::demand(
-      diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+  const Diagnosis found = test::demand(diagnose(
+      test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), test::quick()));
   EXPECT_EQ(ids_of(found.suspects, "were rows exchanged"),
             (std::set<std::string>{one.pose_id, other.pose_id}))
       << found.sentence;
@@ -93,7 +86,7 @@ TEST(RowMistakes, WrongToolIdsAmongRightOnesAreLocated) {
   }
   const auto cell = cell_of_two_tools();
   const Diagnosis found =
-      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), test::quick()));
   EXPECT_EQ(ids_of(found.suspects, "is its tool_id wrong"), wrong) << found.sentence;
   EXPECT_TRUE(says(found, "not their tool_id"));
   for (const Finding& finding : found.findings)
@@ -109,7 +102,7 @@ TEST(RowMistakes, AToolIdThatIsNeverRightIsSaidToBeWrong) {
   }
   const auto cell = cell_of_two_tools();
   const Diagnosis found =
-      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick()));
+      test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), test::quick()));
   EXPECT_EQ(ids_of(found.suspects, "fits tool 'spindle'"), wrong) << found.sentence;
   EXPECT_TRUE(says(found, "tool 'probe' is found where tool 'spindle' is"));
   EXPECT_NE(found.verdict, Verdict::kNamed) << found.sentence;
@@ -144,7 +137,7 @@ TEST(RowMistakes, WrongMarksOfTheSideOfApproachAreLocatedAndThePlayIsNotSure) {
       wrong.insert(batch.measurements[i].pose_id);
     }
     const Diagnosis found = test::demand(diagnose(
-        test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+        test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), test::quick()));
     const auto play =
         std::find_if(found.findings.begin(), found.findings.end(),
                      [](const Finding& one) { return one.cause.cause == "backlash"; });
@@ -175,8 +168,8 @@ TEST(RowMistakes, TimesThatDoNotRiseAreLocated) {
   for (std::size_t i = 0; i < 60; ++i)
     batch.measurements[i].context.time = 30.0 * static_cast<double>(i);
   std::swap(batch.measurements[12].context.time, batch.measurements[45].context.time);
-  const Diagnosis found = test::demand(
-      diagnose(test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), quick()));
+  const Diagnosis found = test::demand(diagnose(
+      test::cell_7(), test::demand(check_against_cell(batch, *test::cell_7())), test::quick()));
   EXPECT_EQ(
       ids_of(found.suspects, "time_s"),
       (std::set<std::string>{batch.measurements[12].pose_id, batch.measurements[45].pose_id}));

@@ -5,20 +5,13 @@
 #include "server/diagnose/tell/doubts.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
+#include "tests/support/quick_diagnosis.h"
 #include "tests/support/virtual_robot.h"
 
 // What moves slowly in the course of a batch is no step, however many steps come near it.
 
 namespace trammel {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.next_poses = 0;
-  options.recovery = false;
-  return options;
-}
 
 bool begins(const Cause& cause) { return !cause.pose_id.empty() && cause.cause != "outlier"; }
 
@@ -29,7 +22,7 @@ TEST_P(SlowTime, IsNotNamedAStepAndNothingOfItGoesIntoTheCell) {
     for (const double lambda : {150.0, 2000.0}) {
       const hidden::HiddenCase hidden =
           hidden::hide({.kind = GetParam(), .seed = seed, .lambda = lambda, .poses = 200});
-      const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+      const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
       const std::string shown =
           fmt::format("seed {} lambda {}: {}", seed, lambda, diagnosis.sentence);
       for (const Finding& finding : diagnosis.findings)
@@ -56,7 +49,7 @@ TEST(SlowTime, AStepIsStillAStep) {
     for (const std::uint64_t seed : {21, 22, 23}) {
       const hidden::HiddenCase hidden =
           hidden::hide({.kind = kind, .seed = seed, .lambda = 150, .poses = 200});
-      const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+      const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
       EXPECT_TRUE(test::judge(diagnosis, hidden).exact)
           << kind << seed << ' ' << diagnosis.sentence;
     }
@@ -68,7 +61,8 @@ TEST(SlowTime, NoiseOfLongTailsOrThatLastsIsNoCause) {
     for (const std::uint64_t seed : {1, 2, 3}) {
       hidden::HiddenSpec spec{.kind = "null_white", .seed = seed, .poses = 150};
       spec.noise = noise;
-      const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden::hide(spec), quick()));
+      const Diagnosis diagnosis =
+          test::demand(test::diagnose_files(hidden::hide(spec), test::quick()));
       for (const Finding& finding : diagnosis.findings)
         EXPECT_TRUE(finding.cause.cause == "outlier" || !finding.could_also_be.empty())
             << diagnosis.sentence;

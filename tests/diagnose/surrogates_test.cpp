@@ -4,17 +4,10 @@
 
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
+#include "tests/support/quick_diagnosis.h"
 
 namespace trammel::cause_search {
 namespace {
-
-DiagnoseOptions quick() {
-  DiagnoseOptions options;
-  options.draws = 200;
-  options.next_poses = 0;
-  options.recovery = false;
-  return options;
-}
 
 struct Unrecorded {
   const char* kind;
@@ -29,7 +22,7 @@ TEST(Unrecorded, CauseIsNeverNamedForCertainButAmongWhatItMayBe) {
                                 {"time_lag", "time_s"}}) {
     const hidden::HiddenCase hidden = hidden::hide(
         {.kind = one.kind, .seed = 1, .lambda = 300, .poses = 160, .withheld = {one.column}});
-    const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+    const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
     for (const Finding& finding : diagnosis.findings) {
       EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
     }
@@ -47,7 +40,7 @@ TEST(Unrecorded, CauseIsNeverNamedForCertainButAmongWhatItMayBe) {
 TEST(Unrecorded, LagAlongAPathWithoutTimesIsNoStepForCertain) {
   const hidden::HiddenCase hidden = hidden::hide(
       {.kind = "time_lag", .seed = 313, .lambda = 120, .poses = 300, .withheld = {"time_s"}});
-  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
   for (const Finding& finding : diagnosis.findings) {
     EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
   }
@@ -58,7 +51,7 @@ TEST(Unrecorded, SidesDrawnAtRandomAreNoCause) {
   const hidden::HiddenCase hidden = hidden::hide(
       {.kind = "backlash", .seed = 4, .lambda = 300, .poses = 160, .withheld = {"dir"}});
   ASSERT_TRUE(hidden.truth.untraceable);
-  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, test::quick()));
   EXPECT_TRUE(diagnosis.findings.empty()) << test::told(diagnosis);
 }
 

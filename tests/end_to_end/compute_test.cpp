@@ -15,7 +15,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{120};
+constexpr std::chrono::seconds kComputeLimit{120};
 constexpr int kLargeBatch = 700;  // poses: learning from them takes longer than what is done to it
 
 class ComputeTest : public testing::Test {
@@ -25,11 +25,11 @@ class ComputeTest : public testing::Test {
     session_ = std::move(client::Session::open(daemon_.session_options()).value());
     const auto first =
         session_->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
-    ASSERT_TRUE(session_->wait_for_job(first.value(), kLimit, nullptr)->in_force);
+    ASSERT_TRUE(session_->wait_for_job(first.value(), kComputeLimit, nullptr)->in_force);
     context_.cell = "cell-7";
     // A job is told to be over a moment before its process is.
     if (const auto last = test::computing_child(daemon_.process().pid())) {
-      ASSERT_TRUE(test::Watched(*last).ends(kLimit));
+      ASSERT_TRUE(test::Watched(*last).ends(kComputeLimit));
     }
   }
   /// Until something is computed.
@@ -58,10 +58,11 @@ TEST_F(ComputeTest, ADaemonWhoseComputingIsKilledAnswersAndFinishesTheJob) {
   ASSERT_TRUE(computing);
   ::kill(*computing, SIGKILL);
   answers();
-  const auto over = session_->wait_for_job(*job, kLimit, nullptr);
+  const auto over = session_->wait_for_job(*job, kComputeLimit, nullptr);
   ASSERT_TRUE(over);
   EXPECT_EQ(over->stage, "done") << over->what;
-  EXPECT_TRUE(daemon_.process().wait_for_line("signal 9", kLimit)) << "the log says what happened";
+  EXPECT_TRUE(daemon_.process().wait_for_line("signal 9", kComputeLimit))
+      << "the log says what happened";
   answers();
   EXPECT_EQ(daemon_.stop(), 0);
 }
@@ -73,7 +74,7 @@ TEST_F(ComputeTest, ADaemonThatIsKilledTakesItsComputingWithIt) {
   ASSERT_TRUE(computing);
   const test::Watched watched(*computing);
   daemon_.kill();
-  EXPECT_TRUE(watched.ends(kLimit)) << "nobody would know of it";
+  EXPECT_TRUE(watched.ends(kComputeLimit)) << "nobody would know of it";
 }
 
 TEST_F(ComputeTest, ADaemonWhoseComputingHangsStopsWhenItIsTold) {
@@ -85,7 +86,7 @@ TEST_F(ComputeTest, ADaemonWhoseComputingHangsStopsWhenItIsTold) {
   ::kill(*computing, SIGSTOP);
   answers();
   EXPECT_EQ(daemon_.stop(), 0);
-  EXPECT_TRUE(watched.ends(kLimit));
+  EXPECT_TRUE(watched.ends(kComputeLimit));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace {
 
 using client::JobStatus;
 
-constexpr std::chrono::seconds kLimit{120};
+constexpr std::chrono::seconds kCrashLimit{120};
 const client::CallContext kContext = [] {
   client::CallContext context;
   context.cell = "cell-7";
@@ -38,7 +38,7 @@ class CrashTest : public testing::Test {
   }
   JobStatus wait_for(std::int64_t job,
                      const std::function<void(const JobStatus&)>& listener = nullptr) {
-    const auto over = session_->wait_for_job(job, kLimit, listener);
+    const auto over = session_->wait_for_job(job, kCrashLimit, listener);
     EXPECT_TRUE(over) << over.error().message;
     return over.value_or(JobStatus{});
   }

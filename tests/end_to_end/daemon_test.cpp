@@ -17,8 +17,8 @@ namespace {
 
 using client::JobStatus;
 
-constexpr std::chrono::seconds kLimit{120};
-const client::CallContext kContext = [] {
+constexpr std::chrono::seconds kDaemonLimit{120};
+const client::CallContext kDaemonContext = [] {
   client::CallContext context;
   context.cell = "cell-7";
   return context;
@@ -39,13 +39,13 @@ class DaemonTest : public testing::Test {
   }
   JobStatus wait_for(std::int64_t job,
                      const std::function<void(const JobStatus&)>& listener = nullptr) {
-    const auto over = session_->wait_for_job(job, kLimit, listener);
+    const auto over = session_->wait_for_job(job, kDaemonLimit, listener);
     EXPECT_TRUE(over) << over.error().message;
     return over.value_or(JobStatus{});
   }
   /// The model that answers for the cell now.
   client::ModelInfo model() {
-    const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
+    const auto answer = session_->predict_error(kDaemonContext, test::virtual_joints(3, 7));
     EXPECT_TRUE(answer) << answer.error().message;
     return answer ? answer->model : client::ModelInfo{};
   }
@@ -63,7 +63,7 @@ TEST_F(DaemonTest, ASubmittedBatchBecomesTheModelThatPredicts) {
   EXPECT_TRUE(done.in_force) << done.what;
   EXPECT_EQ(stages.back(), "done");
 
-  const auto answer = session_->predict_error(kContext, test::virtual_joints(20, 7));
+  const auto answer = session_->predict_error(kDaemonContext, test::virtual_joints(20, 7));
   ASSERT_TRUE(answer) << answer.error().message;
   EXPECT_EQ(answer->model.version, done.model_version);
   EXPECT_EQ(answer->model.batch_id, "lt-07");

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::seconds;
-constexpr seconds kLimit{30};
+constexpr seconds kDiscoveryServerLimit{30};
 constexpr const char* kProgram = "/usr/bin/fast-discovery-server";
 
 /// The shipped file, on another port.
@@ -38,13 +38,13 @@ class DiscoveryServer {
       : port_(static_cast<std::uint16_t>(test::own_ports() + 4 + number)),
         process_({kProgram, "-i", std::to_string(number), "-x",
                   folder_.write("discovery.xml", set_up(port_))}) {
-    EXPECT_TRUE(process_.wait_for_line("Server is running", kLimit) ||
-                process_.wait_for_line("Server GUID", kLimit))
+    EXPECT_TRUE(process_.wait_for_line("Server is running", kDiscoveryServerLimit) ||
+                process_.wait_for_line("Server GUID", kDiscoveryServerLimit))
         << process_.standard_output() << process_.standard_error();
   }
   void kill() {
     process_.signal(SIGKILL);
-    EXPECT_EQ(process_.wait(kLimit), 128 + SIGKILL);
+    EXPECT_EQ(process_.wait(kDiscoveryServerLimit), 128 + SIGKILL);
   }
   [[nodiscard]] HostPort place() const { return {"127.0.0.1", port_}; }
   [[nodiscard]] pid_t pid() const { return process_.pid(); }
@@ -99,7 +99,7 @@ class DiscoveryServerTest : public testing::Test {
   }
   static std::size_t servers_of(client::Session& session, std::size_t expected) {
     const auto there = [expected](const auto& servers) { return servers.size() >= expected; };
-    const auto servers = session.servers_when(there, kLimit);
+    const auto servers = session.servers_when(there, kDiscoveryServerLimit);
     return servers ? servers->size() : 0;
   }
 

@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{180};
+constexpr std::chrono::seconds kFailoverLimit{180};
 
 TEST(Failover, WhenTheHostOfThePrimaryIsKilledChangesGoOnAndNothingAcknowledgedIsLost) {
   test::FailingOver fleet;
@@ -22,11 +22,11 @@ TEST(Failover, WhenTheHostOfThePrimaryIsKilledChangesGoOnAndNothingAcknowledgedI
   EXPECT_NE(fleet.first->process().standard_error().find("survives the loss of one host of three"),
             std::string::npos);
   test::ChangeLoad load(fleet.session_options(), 2);
-  ASSERT_TRUE(load.wait_for_everybody(kLimit));
+  ASSERT_TRUE(load.wait_for_everybody(kFailoverLimit));
   const int killed = fleet.record.primary();
   ASSERT_GT(killed, 0);
   fleet.record.act("kill", killed);
-  EXPECT_TRUE(load.wait_for_everybody(kLimit)) << "changes are taken again";
+  EXPECT_TRUE(load.wait_for_everybody(kFailoverLimit)) << "changes are taken again";
   load.stop();
   EXPECT_NE(fleet.record.primary(), killed);
   EXPECT_EQ(fleet.lost(load), std::set<std::string>())

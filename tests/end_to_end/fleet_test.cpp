@@ -25,7 +25,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-constexpr seconds kLimit{180};  // a lease is 15 s, and a busy machine trains slowly
+constexpr seconds kFleetLimit{180};  // a lease is 15 s, and a busy machine trains slowly
 const client::CallContext kContext = [] {
   client::CallContext context;
   context.cell = "cell-7";
@@ -34,7 +34,7 @@ const client::CallContext kContext = [] {
 
 /// Asks until it holds; each time is a call to a server.
 void wait_until(const std::function<bool()>& holds, const char* what) {
-  const auto deadline = std::chrono::steady_clock::now() + kLimit;
+  const auto deadline = std::chrono::steady_clock::now() + kFleetLimit;
   while (!holds()) ASSERT_LT(std::chrono::steady_clock::now(), deadline) << what;
 }
 
@@ -67,7 +67,7 @@ class Fleet : public testing::Test {
     return job.value_or(0);
   }
   static client::JobStatus end_of(client::Session& session, std::int64_t job) {
-    const auto over = session.wait_for_job(job, kLimit, nullptr);
+    const auto over = session.wait_for_job(job, kFleetLimit, nullptr);
     EXPECT_TRUE(over) << sentence(over.error());
     return over.value_or(client::JobStatus());
   }
@@ -175,7 +175,7 @@ TEST_F(Fleet, TheJobOfATrainingHostThatIsKilledIsDoneByAnother) {
   start(second_, "serves: false\n");
   const auto session = session_with({&first_});
   const std::int64_t job = submit(*session, "b1", 1, 400);
-  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit))
+  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kFleetLimit))
       << "it works on the job";
   start(third_, "serves: false\n");
   second_.kill();
@@ -189,7 +189,7 @@ TEST_F(Fleet, AHostThatWasStoppedWhileAnotherDidItsJobStoresNothingWhenItGoesOn)
   start(second_, "serves: false\n");
   const auto session = session_with({&first_});
   const std::int64_t job = submit(*session, "b1", 1, 400);
-  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kLimit))
+  ASSERT_TRUE(second_.process().wait_for_line(fmt::format("job {}: ", job), kFleetLimit))
       << "it works on the job";
   second_.process().signal(SIGSTOP);
   start(third_, "serves: false\n");
@@ -224,7 +224,7 @@ class FleetOfDyingServers : public Fleet {
   auto told_by_another(const std::string& statement, const Ask& ask) -> decltype(ask()) {
     held_.hold(statement);
     auto asked = std::async(std::launch::async, ask);
-    const pid_t maker = held_.held(kLimit);
+    const pid_t maker = held_.held(kFleetLimit);
     EXPECT_TRUE(maker == first_.process().pid() || maker == second_.process().pid()) << maker;
     test::Daemon& dead = maker == first_.process().pid() ? first_ : second_;
     dead.kill();
@@ -450,7 +450,7 @@ TEST_F(Fleet, AJobIsCancelledOnAnyServerWhetherItWaitsOrRunsElsewhere) {
   EXPECT_EQ(end_of(*one, waits).stage, "cancelled");
   start(third_, "serves: false\n");
   const std::int64_t runs = submit(*one, "b2", 2, 400);
-  ASSERT_TRUE(third_.process().wait_for_line(fmt::format("job {}: ", runs), kLimit))
+  ASSERT_TRUE(third_.process().wait_for_line(fmt::format("job {}: ", runs), kFleetLimit))
       << "it works on the job";
   ASSERT_TRUE(other->cancel(runs));
   const auto over = end_of(*one, runs);

@@ -14,7 +14,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{60};
+constexpr std::chrono::seconds kOutputLimit{60};
 
 /// A pipe that is full: who writes to it waits, or is told so.
 class FullPipe {
@@ -67,7 +67,7 @@ void expect_serves_and_stops(const test::Daemon& daemon, test::Process& process,
   EXPECT_TRUE(answers(daemon)) << "the pipe is closed";
   EXPECT_FALSE(process.wait(std::chrono::milliseconds(0))) << "it runs";
   process.signal(SIGTERM);
-  EXPECT_EQ(process.wait(kLimit), 0);
+  EXPECT_EQ(process.wait(kOutputLimit), 0);
 }
 
 TEST(OutputTest, ADaemonWhoseErrorsNobodyReadsServesAndStopsAsEver) {
@@ -89,7 +89,7 @@ TEST(OutputTest, TheSupervisorOfSuchADaemonGoesOnToo) {
 TEST(OutputTest, AFileThatMayGrowNoFurtherRefusesChangesAndEndsNothing) {
   const test::Daemon daemon;
   test::Process process(after("ulimit -f 400;", daemon.command_line()));  // of 512 bytes
-  ASSERT_TRUE(process.wait_for_line("ready", kLimit)) << process.standard_error();
+  ASSERT_TRUE(process.wait_for_line("ready", kOutputLimit)) << process.standard_error();
   const auto session = client::Session::open(daemon.session_options());
   ASSERT_TRUE(session) << session.error().message;
   std::optional<Error> refused;
@@ -102,7 +102,7 @@ TEST(OutputTest, AFileThatMayGrowNoFurtherRefusesChangesAndEndsNothing) {
   EXPECT_TRUE(answers(daemon)) << refused->message;
   EXPECT_FALSE(process.wait(std::chrono::milliseconds(0))) << process.standard_error();
   process.signal(SIGTERM);
-  EXPECT_EQ(process.wait(kLimit), 0);
+  EXPECT_EQ(process.wait(kOutputLimit), 0);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace trammel {
 namespace {
 
 using std::chrono::seconds;
-constexpr seconds kLimit{300};
+constexpr seconds kPooledFleetLimit{300};
 constexpr int kBatches = 4, kDecisions = 16;  // of each server; a decision is judged first
 
 class PooledFleet : public testing::Test {
@@ -74,7 +74,7 @@ TEST_F(PooledFleet, ChangesAllTheTimeAndLosesNothing) {
     const auto job = session->submit_measurements("cell-7", fmt::format("b{}", seed),
                                                   test::virtual_batch_csv(60, seed));
     ASSERT_TRUE(job) << sentence(job.error());
-    ASSERT_TRUE(session->wait_for_job(*job, kLimit, nullptr));
+    ASSERT_TRUE(session->wait_for_job(*job, kPooledFleetLimit, nullptr));
   }
   std::set<std::int64_t> jobs, of_second;
   {
@@ -84,7 +84,7 @@ TEST_F(PooledFleet, ChangesAllTheTimeAndLosesNothing) {
   jobs.merge(of_second);
   EXPECT_EQ(jobs.size(), std::size_t{2 * kBatches});
   for (const std::int64_t job : jobs) {
-    const auto over = session->wait_for_job(job, kLimit, nullptr);
+    const auto over = session->wait_for_job(job, kPooledFleetLimit, nullptr);
     ASSERT_TRUE(over) << sentence(over.error());
     EXPECT_GT(over->model_version, 0) << over->what;
   }

@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::chrono::seconds kLimit{120};
+constexpr std::chrono::seconds kReplayLimit{120};
 
 class ReplayTest : public testing::Test {
  protected:
@@ -30,7 +30,7 @@ class ReplayTest : public testing::Test {
       const auto job = session_->submit_measurements("cell-7", fmt::format("b{}", seed),
                                                      test::virtual_batch_csv(60, seed));
       ASSERT_TRUE(job) << sentence(job.error());
-      ASSERT_TRUE(session_->wait_for_job(*job, kLimit, nullptr));
+      ASSERT_TRUE(session_->wait_for_job(*job, kReplayLimit, nullptr));
     }
     ASSERT_TRUE(session_->activate("cell-7", 1));
     for (const int version : {1, 2}) {
@@ -59,7 +59,7 @@ class ReplayTest : public testing::Test {
   [[nodiscard]] test::Finished replay(int version, const std::string& records) const {
     return test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model",
                       model_file(version), records, "--strict", "--json", "-"},
-                     kLimit);
+                     kReplayLimit);
   }
   [[nodiscard]] std::string only_record() const {
     std::string path;
@@ -113,7 +113,7 @@ TEST_F(ReplayTest, HalfALastLineAndAnEmptyFileAreSaid) {
   const auto replayed = [&](const std::string& name, const std::string& text) {
     return test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model", model_file(1),
                       folder_.write(name, text)},
-                     kLimit);
+                     kReplayLimit);
   };
   const std::string text = test::read_file(only_record());
   const auto half = replayed("half.jsonl", text + text.substr(0, 100));

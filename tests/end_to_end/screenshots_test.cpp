@@ -25,7 +25,7 @@ using nlohmann::json;
 constexpr std::array<int, 3> kWidths = {400, 800, 1400};  // px: a telephone, a tablet, a desk
 constexpr int kHighest = 16000;                           // px of a picture
 constexpr std::size_t kHeaviest = 1'500'000;              // bytes of a page
-constexpr std::chrono::minutes kLimit{2};
+constexpr std::chrono::minutes kScreenshotsLimit{2};
 const fs::path kPictures = TRAMMEL_BINARY_DIR "/tests/screenshots";
 
 /// Of a page: what stands out of its window, what is drawn on each canvas, where its links lead. A
@@ -159,7 +159,7 @@ class PagesOfFiles : public Screenshots {
          "TRAMMEL_DEFAULTS=", "PATH=" TRAMMEL_BINARY_DIR "/clients:/usr/bin:/bin",
          "TRUTH=" TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml",
          "PROGRAM=" TRAMMEL_SOURCE_DIR "/config/programs/drill.mod", "/bin/bash", "-c", kRun},
-        kLimit);
+        kScreenshotsLimit);
     ASSERT_EQ(made.exit_code, 0) << made.out << made.err;
   }
   test::TemporaryFolder folder_;
@@ -211,7 +211,7 @@ class PagesOfAService : public Screenshots {
     argv.insert(argv.end(), words.begin(), words.end());
     argv.insert(argv.end(), {"--port", std::to_string(daemon_.port()), "--domain",
                              std::to_string(daemon_.domain()), "--timeout", "60"});
-    const test::Finished done = test::run(argv, kLimit);
+    const test::Finished done = test::run(argv, kScreenshotsLimit);
     EXPECT_LE(done.exit_code.value_or(9), 1) << words[0] << ": " << done.out << done.err;
   }
   [[nodiscard]] std::string address(const std::string& path) const {

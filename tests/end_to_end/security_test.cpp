@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::seconds;
-constexpr seconds kLimit{30};
+constexpr seconds kSecurityLimit{30};
 constexpr std::chrono::milliseconds kInVain{
     2500};  // a participant that is refused tries again once a second
 
@@ -255,7 +255,8 @@ TEST_F(SecurityTest, TheAuditTrailAndTheLogNameTheCertificate) {
       return r.at("subject") == "batch " + batch;
     });
     ASSERT_NE(row, rows.end()) << rows.dump();
-    EXPECT_TRUE(daemon_.process().wait_for_line("\"who\":\"CN=" + name + ",O=Trammel\"", kLimit));
+    EXPECT_TRUE(
+        daemon_.process().wait_for_line("\"who\":\"CN=" + name + ",O=Trammel\"", kSecurityLimit));
     const std::string who = row->at("who");
     EXPECT_TRUE(who.starts_with("CN=" + name + ",O=Trammel client ")) << who;
   };
@@ -323,7 +324,7 @@ TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks)
   std::uint32_t writer = 0;
   for (std::size_t i = who.size(); i < octets.size(); ++i) writer = writer << 8 | octets[i];
   test::RawParticipant stranger(daemon_.port(), daemon_.domain());
-  ASSERT_TRUE(stranger.meet(kLimit)) << "it learns where samples are read";
+  ASSERT_TRUE(stranger.meet(kSecurityLimit)) << "it learns where samples are read";
   stranger.set_prefix(who);
   const test::PacketBytes no_key(20);
   std::uint32_t count = 100'000;
@@ -416,11 +417,12 @@ TEST_F(SecurityTest, TheLogNamesWhoIsRefusedAlsoWhatTheStopCutsShort) {
                     later = others.of("engineer", "came-later");
   daemon_.start();
   expect_nobody(stranger);
-  EXPECT_TRUE(
-      daemon_.process().wait_for_line("says it is CN=stranger,O=Trammel, at 127.0.0.1", kLimit));
+  EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=stranger,O=Trammel, at 127.0.0.1",
+                                              kSecurityLimit));
   expect_nobody(later);
   daemon_.process().signal(SIGTERM);
-  EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=came-later,O=Trammel", kLimit));
+  EXPECT_TRUE(
+      daemon_.process().wait_for_line("says it is CN=came-later,O=Trammel", kSecurityLimit));
 }
 
 TEST_F(SecurityTest, AServiceWithTheCertificateOfAClientIsToldWhichRoleItNeeds) {

@@ -12,7 +12,7 @@ namespace trammel {
 namespace {
 
 using std::chrono::seconds;
-constexpr seconds kLimit{30};
+constexpr seconds kSeveralServersLimit{30};
 
 class SeveralServersTest : public testing::Test {
  protected:
@@ -36,7 +36,7 @@ class SeveralServersTest : public testing::Test {
   void learn(const std::string& cell, const std::string& batch, std::uint64_t seed) {
     const auto job = session_->submit_measurements(cell, batch, test::virtual_batch_csv(60, seed));
     ASSERT_TRUE(job) << sentence(job.error());
-    const auto over = session_->wait_for_job(*job, kLimit, nullptr);
+    const auto over = session_->wait_for_job(*job, kSeveralServersLimit, nullptr);
     ASSERT_TRUE(over) << sentence(over.error());
     ASSERT_TRUE(over->in_force) << over->what;
   }
@@ -71,14 +71,14 @@ TEST_F(SeveralServersTest, OfTwoJobsWithOneNumberNoneIsTakenForTheOther) {
       session_->submit_measurements("cell-8", "of-eight", test::virtual_batch_csv(60, 2));
   ASSERT_TRUE(of_eight) << sentence(of_eight.error());
   ASSERT_EQ(*of_eight, *of_seven) << "every server counts its own jobs";
-  const auto either = session_->wait_for_job(*of_eight, kLimit, nullptr);
+  const auto either = session_->wait_for_job(*of_eight, kSeveralServersLimit, nullptr);
   ASSERT_FALSE(either) << either->what;
   EXPECT_EQ(either.error().code, ErrorCode::kRefused) << sentence(either.error());
   client::SessionOptions options = first_.session_options();
   options.server_ports = {second_.port()};
   auto alone = client::Session::open(options);
   ASSERT_TRUE(alone) << sentence(alone.error());
-  const auto over = (*alone)->wait_for_job(*of_eight, kLimit, nullptr);
+  const auto over = (*alone)->wait_for_job(*of_eight, kSeveralServersLimit, nullptr);
   ASSERT_TRUE(over) << sentence(over.error());
   EXPECT_EQ(over->cell, "cell-8");
 }

@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::seconds;
 
-constexpr seconds kLimit{30};
+constexpr seconds kSignalsLimit{30};
 
 /// The daemon with a library that started a thread before main(); the thread takes any signal.
 class ALibrarysThread : public testing::Test {
@@ -32,7 +32,7 @@ class ALibrarysThread : public testing::Test {
     const std::vector<std::string> daemon = daemon_.command_line();
     argv.insert(argv.end(), daemon.begin(), daemon.end());
     process_ = std::make_unique<test::Process>(argv);
-    ASSERT_TRUE(process_->wait_for_line("ready", kLimit)) << process_->standard_error();
+    ASSERT_TRUE(process_->wait_for_line("ready", kSignalsLimit)) << process_->standard_error();
   }
   /// The thread of the library itself gets the signal.
   void signal_its_thread(int number) const {
@@ -47,7 +47,7 @@ class ALibrarysThread : public testing::Test {
     FAIL() << "the library has no thread";
   }
   void expect_an_orderly_stop() {
-    EXPECT_EQ(process_->wait(kLimit), 0) << process_->standard_error();
+    EXPECT_EQ(process_->wait(kSignalsLimit), 0) << process_->standard_error();
     EXPECT_NE(process_->standard_error().find("info stopped"), std::string::npos)
         << process_->standard_error();
   }
@@ -58,7 +58,7 @@ class ALibrarysThread : public testing::Test {
 
 TEST_F(ALibrarysThread, HandsTheReloadOn) {
   signal_its_thread(SIGHUP);
-  EXPECT_TRUE(process_->wait_for_line("read again", kLimit)) << process_->standard_error();
+  EXPECT_TRUE(process_->wait_for_line("read again", kSignalsLimit)) << process_->standard_error();
   signal_its_thread(SIGTERM);
   expect_an_orderly_stop();
 }
@@ -75,7 +75,7 @@ TEST_F(ALibrarysThread, HandsCtrlCOn) {
 
 TEST_F(ALibrarysThread, TakesNoSignalThatTheProcessGets) {
   process_->signal(SIGHUP);
-  EXPECT_TRUE(process_->wait_for_line("read again", kLimit)) << process_->standard_error();
+  EXPECT_TRUE(process_->wait_for_line("read again", kSignalsLimit)) << process_->standard_error();
   process_->signal(SIGTERM);
   expect_an_orderly_stop();
 }
@@ -85,8 +85,8 @@ TEST_F(ALibrarysThread, ATrainingIsComputedWithItAndEndsWithTheDaemon) {
   const auto job = session->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
   ASSERT_TRUE(job);
   process_->signal(SIGHUP);
-  EXPECT_TRUE(process_->wait_for_line("read again", kLimit)) << process_->standard_error();
-  const auto over = session->wait_for_job(*job, kLimit, nullptr);
+  EXPECT_TRUE(process_->wait_for_line("read again", kSignalsLimit)) << process_->standard_error();
+  const auto over = session->wait_for_job(*job, kSignalsLimit, nullptr);
   ASSERT_TRUE(over) << over.error().message;
   EXPECT_EQ(over->stage, "done") << over->what;
   process_->signal(SIGTERM);

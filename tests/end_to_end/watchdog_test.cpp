@@ -16,11 +16,11 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{30};
+constexpr std::chrono::seconds kWatchdogLimit{30};
 
 /// Threads of this name, once there are `least` of them: a thread names itself as it begins.
 std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::size_t least = 1) {
-  const auto deadline = std::chrono::steady_clock::now() + kLimit;
+  const auto deadline = std::chrono::steady_clock::now() + kWatchdogLimit;
   std::vector<test::ThreadOf> threads;
   do {
     threads = test::threads_of(process);
@@ -32,7 +32,7 @@ std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::s
 /// True if every thread but the first has a name of its own before long: until then it has that of
 /// the process.
 bool all_are_named(pid_t process) {
-  const auto deadline = std::chrono::steady_clock::now() + kLimit;
+  const auto deadline = std::chrono::steady_clock::now() + kWatchdogLimit;
   while (named(process, "trammeld").size() > 1) {
     if (std::chrono::steady_clock::now() > deadline) return false;
   }
@@ -59,7 +59,7 @@ std::optional<int> end_without(test::Process& process, pid_t thread,
   }
   if (process.standard_error().find("ends at once") == std::string::npos) return std::nullopt;
   stopped.bury();
-  return process.wait(kLimit);
+  return process.wait(kWatchdogLimit);
 }
 
 TEST(WatchdogTest, AStatusThreadThatHangsEndsTheDaemonAndIsNamed) {
@@ -67,7 +67,7 @@ TEST(WatchdogTest, AStatusThreadThatHangsEndsTheDaemonAndIsNamed) {
   daemon.start();
   const auto status = named(daemon.process().pid(), "status");
   ASSERT_EQ(status.size(), 1u);
-  EXPECT_EQ(end_without(daemon.process(), status[0].id, kLimit), kExitHung);
+  EXPECT_EQ(end_without(daemon.process(), status[0].id, kWatchdogLimit), kExitHung);
   EXPECT_NE(daemon.process().standard_error().find("status"), std::string::npos)
       << daemon.process().standard_error();
   daemon.start();
@@ -79,7 +79,7 @@ TEST(WatchdogTest, AThreadOfRepliesThatHangsEndsTheDaemonAndIsNamed) {
   daemon.start();
   const auto replies = named(daemon.process().pid(), "replies");
   ASSERT_EQ(replies.size(), 1u);
-  EXPECT_EQ(end_without(daemon.process(), replies[0].id, kLimit), kExitHung);
+  EXPECT_EQ(end_without(daemon.process(), replies[0].id, kWatchdogLimit), kExitHung);
   EXPECT_NE(daemon.process().standard_error().find("in: replies;"), std::string::npos)
       << daemon.process().standard_error();
 }
@@ -93,7 +93,7 @@ TEST(WatchdogTest, AnyThreadOfTheLibraryThatHangsEndsTheDaemon) {
     if (i > 0) daemon.start();
     const auto threads = named(daemon.process().pid(), "dds", 3);
     ASSERT_EQ(threads.size(), count);
-    EXPECT_EQ(end_without(daemon.process(), threads[i].id, kLimit), kExitHung)
+    EXPECT_EQ(end_without(daemon.process(), threads[i].id, kWatchdogLimit), kExitHung)
         << "thread " << i << " of " << count;
   }
   daemon.start();
@@ -110,15 +110,15 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirKindIsNamed) {
     stopped.push_back(std::make_unique<test::StoppedThread>(thread.id));
     ASSERT_TRUE(stopped.back()->is_stopped());
   }
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(1)))
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kWatchdogLimit + std::chrono::seconds(1)))
       << "nobody asked for anything yet";
   test::Process client({TRAMMEL_BINARY_DIR "/clients/trammel", "models", "--service", "--cell",
                         "cell-7", "--port", std::to_string(daemon.port()), "--domain",
                         std::to_string(daemon.domain()), "--timeout", "20"});
-  ASSERT_TRUE(daemon.process().wait_for_line("reading requests; ends at once", kLimit))
+  ASSERT_TRUE(daemon.process().wait_for_line("reading requests; ends at once", kWatchdogLimit))
       << daemon.process().standard_error();
   for (const auto& thread : stopped) thread->bury();
-  EXPECT_EQ(daemon.process().wait(kLimit), kExitHung);
+  EXPECT_EQ(daemon.process().wait(kWatchdogLimit), kExitHung);
 }
 
 TEST(WatchdogTest, ADaemonThatWasStoppedAndGoesOnIsNotHung) {
@@ -126,7 +126,7 @@ TEST(WatchdogTest, ADaemonThatWasStoppedAndGoesOnIsNotHung) {
   daemon.start();
   EXPECT_TRUE(answers(daemon));
   daemon.process().signal(SIGSTOP);
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(2)))
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kWatchdogLimit + std::chrono::seconds(2)))
       << "it was stopped";
   daemon.process().signal(SIGCONT);
   EXPECT_TRUE(answers(daemon));
@@ -142,9 +142,10 @@ TEST(WatchdogTest, ASignalEndsADaemonThatHangsWhileItStops) {
   test::StoppedThread stopped(trainer[0].id);
   ASSERT_TRUE(stopped.is_stopped());
   daemon.process().signal(SIGTERM);
-  EXPECT_TRUE(daemon.process().wait_for_line("has not stopped after 10 s; ends at once", kLimit));
+  EXPECT_TRUE(
+      daemon.process().wait_for_line("has not stopped after 10 s; ends at once", kWatchdogLimit));
   stopped.bury();
-  EXPECT_EQ(daemon.process().wait(kLimit), kExitHung);
+  EXPECT_EQ(daemon.process().wait(kWatchdogLimit), kExitHung);
 }
 
 /// The number behind `what` in the newest line that has it.
@@ -160,21 +161,22 @@ TEST(SuperviseTest, ADaemonThatHangsIsStartedAgainAndAnswers) {
   std::vector<std::string> command = {kSupervise, "--first-pause", "0.2"};
   for (const std::string& word : daemon.command_line()) command.push_back(word);
   test::Process supervisor(command);
-  ASSERT_TRUE(supervisor.wait_for_line("ready", kLimit)) << supervisor.standard_error();
+  ASSERT_TRUE(supervisor.wait_for_line("ready", kWatchdogLimit)) << supervisor.standard_error();
   const pid_t first = number_after(supervisor.standard_error(), "process ");
   const auto status = named(first, "status");
   ASSERT_EQ(status.size(), 1u);
   test::StoppedThread stopped(status[0].id);
   ASSERT_TRUE(stopped.is_stopped());
-  ASSERT_TRUE(supervisor.wait_for_line("ends at once", kLimit)) << supervisor.standard_error();
+  ASSERT_TRUE(supervisor.wait_for_line("ends at once", kWatchdogLimit))
+      << supervisor.standard_error();
   stopped.bury();
-  ASSERT_TRUE(supervisor.wait_for_line("ended with code 70", kLimit))
+  ASSERT_TRUE(supervisor.wait_for_line("ended with code 70", kWatchdogLimit))
       << supervisor.standard_error();
   EXPECT_TRUE(answers(daemon)) << supervisor.standard_error();
   EXPECT_NE(number_after(supervisor.standard_error(), "process "), first);
 
   supervisor.signal(SIGTERM);
-  EXPECT_EQ(supervisor.wait(kLimit), 0) << supervisor.standard_error();
+  EXPECT_EQ(supervisor.wait(kWatchdogLimit), 0) << supervisor.standard_error();
   EXPECT_NE(supervisor.standard_error().find("stopped"), std::string::npos)
       << "the daemon was told to stop";
   EXPECT_FALSE(answers(daemon)) << "and is gone";
@@ -183,7 +185,7 @@ TEST(SuperviseTest, ADaemonThatHangsIsStartedAgainAndAnswers) {
 TEST(SuperviseTest, WhatKeepsEndingIsSaidPlainlyAndStartedWithGrowingPauses) {
   test::Process supervisor(
       {kSupervise, "--first-pause", "0.1", "--longest-pause", "0.4", "/bin/false"});
-  ASSERT_TRUE(supervisor.wait_for_line("keeps ending: 5 times", kLimit))
+  ASSERT_TRUE(supervisor.wait_for_line("keeps ending: 5 times", kWatchdogLimit))
       << supervisor.standard_error();
   const std::string said = supervisor.standard_error();
   std::size_t at = 0;
@@ -193,7 +195,7 @@ TEST(SuperviseTest, WhatKeepsEndingIsSaidPlainlyAndStartedWithGrowingPauses) {
     ++at;
   }
   supervisor.signal(SIGTERM);
-  EXPECT_TRUE(supervisor.wait(kLimit));
+  EXPECT_TRUE(supervisor.wait(kWatchdogLimit));
 }
 
 TEST(SuperviseTest, WhatEndsByItselfOrIsUsedWronglyIsNotStartedAgain) {

@@ -24,7 +24,7 @@ namespace trammel {
 namespace {
 
 using std::chrono::seconds;
-constexpr seconds kLimit{30};
+constexpr seconds kWatchingLimit{30};
 
 class WatchingTest : public testing::Test {
  protected:
@@ -119,7 +119,7 @@ TEST_F(WatchingTest, TwoHundredSlowConnectionsThatRenewThemselvesKeepNoWatcherFr
 TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
   pid_t status = 0;
   // A thread has its name some moments after the daemon is ready.
-  for (const auto until = std::chrono::steady_clock::now() + kLimit;
+  for (const auto until = std::chrono::steady_clock::now() + kWatchingLimit;
        status == 0 && std::chrono::steady_clock::now() < until;) {
     for (const test::ThreadOf& thread : test::threads_of(daemon_.process().pid()))
       if (thread.name == "status") status = thread.id;
@@ -129,7 +129,7 @@ TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
   test::StoppedThread stopped(status);
   ASSERT_TRUE(stopped.is_stopped());
   bool told = false;
-  const auto until = std::chrono::steady_clock::now() + kLimit;
+  const auto until = std::chrono::steady_clock::now() + kWatchingLimit;
   while (std::chrono::steady_clock::now() < until) {
     const auto health = get("/healthz");
     if (health.code == 0) break;  // it has ended
@@ -142,10 +142,10 @@ TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
     break;
   }
   EXPECT_TRUE(told);
-  EXPECT_TRUE(daemon_.process().wait_for_line("ends at once", kLimit))
+  EXPECT_TRUE(daemon_.process().wait_for_line("ends at once", kWatchingLimit))
       << daemon_.process().standard_error();
   stopped.bury();
-  EXPECT_EQ(daemon_.process().wait(kLimit), 70);
+  EXPECT_EQ(daemon_.process().wait(kWatchingLimit), 70);
 }
 
 TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNothing) {
@@ -153,7 +153,7 @@ TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNoth
   write_config("trainer: {queue_capacity: 3, max_poses: 4000}\n",
                "log: {level: debug, format: json}\n");
   daemon_.process().signal(SIGHUP);
-  ASSERT_TRUE(daemon_.process().wait_for_line("\"event\":\"reloaded\"", kLimit))
+  ASSERT_TRUE(daemon_.process().wait_for_line("\"event\":\"reloaded\"", kWatchingLimit))
       << daemon_.process().standard_error();
   const std::string said = daemon_.process().standard_error();
   EXPECT_NE(said.find("log: format, trainer: queue_capacity"), std::string::npos) << said;
@@ -162,8 +162,8 @@ TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNoth
 
   write_config("trainr: {}\n", "log: {level: wran, format: text}\n");
   daemon_.process().signal(SIGHUP);
-  ASSERT_TRUE(daemon_.process().wait_for_line("everything stays as it was", kLimit));
-  EXPECT_TRUE(daemon_.process().wait_for_line("did you mean warn", kLimit))
+  ASSERT_TRUE(daemon_.process().wait_for_line("everything stays as it was", kWatchingLimit));
+  EXPECT_TRUE(daemon_.process().wait_for_line("did you mean warn", kWatchingLimit))
       << daemon_.process().standard_error();
   const std::string last = daemon_.process().standard_error();
   EXPECT_EQ(last.find('{', last.rfind('\n', last.size() - 2) + 1),
@@ -203,7 +203,7 @@ class ReloadOfCellsTest : public testing::Test {
   void reload(const std::string& cells, const std::string& line) {
     name_cells(cells);
     daemon_.process().signal(SIGHUP);
-    ASSERT_TRUE(daemon_.process().wait_for_line(line, kLimit))
+    ASSERT_TRUE(daemon_.process().wait_for_line(line, kWatchingLimit))
         << daemon_.process().standard_error();
   }
   void learn(const std::string& cell, const std::string& batch) {
@@ -252,7 +252,7 @@ TEST_F(ReloadOfCellsTest, ANewCellIsServedAtOnceAndWhoAsksForTheOthersLosesNothi
 
 TEST_F(ReloadOfCellsTest, ACellThatIsLeftOutIsServedUntilTheNextStartAndComesBackWithItsModel) {
   reload("[cell-8.yaml]", "cells: cell-7 (left out) changes with the next start only");
-  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit));
+  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kWatchingLimit));
   EXPECT_EQ(version(*session_, "cell-7"), 1);
   EXPECT_EQ(daemon_.stop(), 0);
   daemon_.start();
@@ -268,7 +268,7 @@ TEST_F(ReloadOfCellsTest,
   ASSERT_TRUE(
       write_text_file(file("cell-9.yaml"), "version: 1\ncell: cell-9\nrobot: nowhere.yaml\n"));
   reload("[cell-7.yaml, cell-8.yaml, cell-9.yaml]", "everything stays as it was");
-  EXPECT_TRUE(daemon_.process().wait_for_line("nowhere.yaml", kLimit))
+  EXPECT_TRUE(daemon_.process().wait_for_line("nowhere.yaml", kWatchingLimit))
       << daemon_.process().standard_error();
   EXPECT_EQ(status().find("cell-8"), std::string::npos);
   EXPECT_EQ(version(*session_, "cell-7"), 1);
@@ -289,7 +289,7 @@ TEST_F(WatchingTest, ACellThatIsAddedWhileItServesHasItsPageItsReadinessAndItsFi
   original_.replace(original_.find("[cell-7.yaml]"), 13, "[cell-7.yaml, cell-8.yaml]");
   write_config("");
   daemon_.process().signal(SIGHUP);
-  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit))
+  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kWatchingLimit))
       << daemon_.process().standard_error();
   EXPECT_EQ(get("/cells/cell-8").code, 200);
   EXPECT_NE(get("/").body.find("cell-8"), std::string::npos);
@@ -306,7 +306,7 @@ TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
   auto session = client::Session::open(daemon_.session_options());
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_FALSE((*session)->submit_measurements("cell-9", "b1", "q1_deg\n"));
-  ASSERT_TRUE(daemon_.process().wait_for_line("request_refused", kLimit))
+  ASSERT_TRUE(daemon_.process().wait_for_line("request_refused", kWatchingLimit))
       << daemon_.process().standard_error();
   EXPECT_EQ(daemon_.stop(), 0);
   std::istringstream lines(daemon_.process().standard_error());
@@ -375,7 +375,7 @@ class ManagerSocket {
 
   /// Until it hears something with this in it.
   [[nodiscard]] bool hears(const std::string& what) {
-    const auto until = std::chrono::steady_clock::now() + kLimit;
+    const auto until = std::chrono::steady_clock::now() + kWatchingLimit;
     while (std::chrono::steady_clock::now() < until) {
       pollfd look{socket_, POLLIN, 0};
       if (::poll(&look, 1, 200) <= 0) continue;
@@ -409,7 +409,7 @@ TEST(ServiceManagerTest, ItIsToldWhatTheDaemonDoesFromItsStartToItsEnd) {
   EXPECT_TRUE(manager.hears("READY=1"));
   process.signal(SIGTERM);
   EXPECT_TRUE(manager.hears("STOPPING=1"));
-  EXPECT_EQ(process.wait(kLimit), 0) << process.standard_error();
+  EXPECT_EQ(process.wait(kWatchingLimit), 0) << process.standard_error();
 }
 
 TEST(SupervisedReloadTest, ASupervisorPassesTheRequestOnAndGoesOnSupervising) {
@@ -417,11 +417,12 @@ TEST(SupervisedReloadTest, ASupervisorPassesTheRequestOnAndGoesOnSupervising) {
   std::vector<std::string> command = {TRAMMEL_SOURCE_DIR "/deploy/supervise"};
   for (const std::string& word : daemon.command_line()) command.push_back(word);
   test::Process supervisor(command);
-  ASSERT_TRUE(supervisor.wait_for_line("ready", kLimit)) << supervisor.standard_error();
+  ASSERT_TRUE(supervisor.wait_for_line("ready", kWatchingLimit)) << supervisor.standard_error();
   supervisor.signal(SIGHUP);
-  EXPECT_TRUE(supervisor.wait_for_line("read again", kLimit)) << supervisor.standard_error();
+  EXPECT_TRUE(supervisor.wait_for_line("read again", kWatchingLimit))
+      << supervisor.standard_error();
   supervisor.signal(SIGTERM);
-  EXPECT_EQ(supervisor.wait(kLimit), 0) << supervisor.standard_error();
+  EXPECT_EQ(supervisor.wait(kWatchingLimit), 0) << supervisor.standard_error();
   EXPECT_NE(supervisor.standard_error().find("after SIGTERM; not started again"),
             std::string::npos);
 }

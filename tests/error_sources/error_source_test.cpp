@@ -19,7 +19,7 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-std::shared_ptr<const Cell> cell_7() {
+std::shared_ptr<const Cell> cell_7_source() {
   return std::make_shared<const Cell>(
       *read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml"));
 }
@@ -44,8 +44,8 @@ PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
   return context;
 }
 
-std::shared_ptr<const Cell> cell_on_a_rail() {
-  auto cell = std::make_shared<Cell>(*cell_7());
+std::shared_ptr<const Cell> cell_on_a_rail_source() {
+  auto cell = std::make_shared<Cell>(*cell_7_source());
   cell->robot =
       *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
   cell->joint_ranges.clear();
@@ -81,7 +81,7 @@ const std::vector<std::string>& every_spec() {
         "gear_transmission:3@40.5+81", "joint_map:6@5",  "joint_map:5@3+150+2+1", "link_bending:4",
         "joint_coupling:3@2",          "cable_pull:4@6", "axis_runout:4",         "axis_runout:1",
         "loaded_ripple:3@40.5+81"};
-    for (const std::string& spec : specs_of(*cell_7())) specs.push_back(spec);
+    for (const std::string& spec : specs_of(*cell_7_source())) specs.push_back(spec);
     return specs;
   }();
   return kSpecs;
@@ -90,9 +90,9 @@ const std::vector<std::string>& every_spec() {
 /// The specifications of a robot on a rail alone.
 const std::vector<std::string>& rail_specs() {
   static const std::vector<std::string> kSpecs = [] {
-    std::vector<std::string> specs = specs_of(*cell_on_a_rail());
+    std::vector<std::string> specs = specs_of(*cell_on_a_rail_source());
     std::erase_if(specs, [](const std::string& spec) {
-      return make_error_source(spec, *cell_7()).has_value();
+      return make_error_source(spec, *cell_7_source()).has_value();
     });
     return specs;
   }();
@@ -135,7 +135,7 @@ void expect_exact_derivatives(const std::shared_ptr<const Cell>& cell,
 }
 
 TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   std::vector<std::vector<std::string>> lists;
   for (const std::string& spec : every_spec()) lists.push_back({spec});
   for (const char* compliance :
@@ -150,7 +150,7 @@ TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
 }
 
 TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
-  const auto cell = cell_on_a_rail();
+  const auto cell = cell_on_a_rail_source();
   std::vector<std::string> all = {"compliance", "geometry", "base"};
   for (const std::string& spec : rail_specs()) {
     expect_exact_derivatives(cell, {spec});
@@ -163,7 +163,7 @@ TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
 
 /// Cell-7 with joint 3 counted the other way and coupled to joint 2.
 std::shared_ptr<const Cell> coupled_cell(CouplingKind kind) {
-  auto cell = std::make_shared<Cell>(*cell_7());
+  auto cell = std::make_shared<Cell>(*cell_7_source());
   std::vector<Joint> joints;
   for (int j = 0; j < cell->robot.size(); ++j) joints.push_back(cell->robot.joint(j));
   joints[2].sign = -1;
@@ -186,7 +186,7 @@ TEST(ErrorSources, JacobiansOfCoupledJointsFitCentralDifferencesAloneAndTogether
 }
 
 TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   const PoseContext context = some_pose(*cell, 7);
   const auto deflected = [&](const char* form, double stiffness_factor) {
     PhysicalModel model = *make_physical_model(cell, {form});
@@ -204,7 +204,7 @@ TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
 }
 
 TEST(ErrorSources, WithoutValuesTheModelIsNominal) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   const PhysicalModel model =
       *make_physical_model(cell, {"base", "geometry", "compliance", "tool"});
   const PoseContext context = some_pose(*cell, 8);
@@ -212,7 +212,7 @@ TEST(ErrorSources, WithoutValuesTheModelIsNominal) {
 }
 
 TEST(ErrorSources, GeometryHasTheParametersOfTheSource) {
-  const PhysicalModel model = *make_physical_model(cell_7(), {"geometry"});
+  const PhysicalModel model = *make_physical_model(cell_7_source(), {"geometry"});
   std::string names;
   for (const Parameter& parameter : model.parameters()) names += parameter.name + " ";
   EXPECT_EQ(names,
@@ -254,13 +254,14 @@ void expect_to_move_the_tool(const std::shared_ptr<const Cell>& cell, const std:
 }
 
 TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
-  for (const std::string& spec : every_spec()) expect_to_move_the_tool(cell_7(), spec);
-  for (const std::string& spec : rail_specs()) expect_to_move_the_tool(cell_on_a_rail(), spec);
+  for (const std::string& spec : every_spec()) expect_to_move_the_tool(cell_7_source(), spec);
+  for (const std::string& spec : rail_specs())
+    expect_to_move_the_tool(cell_on_a_rail_source(), spec);
 }
 
 /// What belongs to the measuring or to what nobody knows of a request.
 TEST(ErrorSources, NothingServedHasWhatBelongsToTheInstrument) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   for (const char* spec :
        {"tracker_drift", "tracker_moved@2", "instrument_scale", "early_reading"}) {
     PhysicalModel model = *make_physical_model(cell, {spec});
@@ -273,7 +274,7 @@ TEST(ErrorSources, NothingServedHasWhatBelongsToTheInstrument) {
 }
 
 TEST(ErrorSources, AnUnknownPoseBeforeHasNoEffect) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   for (const char* spec : {"hysteresis:2", "early_reading"}) {
     PhysicalModel model = *make_physical_model(cell, {spec});
     model.values = plausible_values(model, 11);
@@ -285,7 +286,7 @@ TEST(ErrorSources, AnUnknownPoseBeforeHasNoEffect) {
 }
 
 TEST(ErrorSources, AGearboxFollowsTheTemperatureWithItsOwnLag) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   PhysicalModel model = *make_physical_model(cell, {"thermal_zero:1"});
   PoseContext context = some_pose(*cell, 14);
   const auto turned = [&](double lag) {
@@ -302,7 +303,7 @@ TEST(ErrorSources, AGearboxFollowsTheTemperatureWithItsOwnLag) {
 }
 
 TEST(ErrorSources, AStepBeginsAtItsPose) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   for (const char* spec : {"tracker_moved@4", "tool_changed@4", "joint_slip:2@4"}) {
     PhysicalModel model = *make_physical_model(cell, {spec});
     model.values = plausible_values(model, 11);
@@ -317,7 +318,7 @@ TEST(ErrorSources, AStepBeginsAtItsPose) {
 }
 
 TEST(ErrorSources, AJointWithPlayHangsBackFromWhereItIsGoing) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   PhysicalModel model = *make_physical_model(cell, {"backlash:1"});
   model.values(0) = 1e-4;
   PoseContext context = some_pose(*cell, 14);
@@ -334,7 +335,7 @@ TEST(ErrorSources, AJointWithPlayHangsBackFromWhereItIsGoing) {
 TEST(ErrorSources, BendingIsTheCantileverOfTheTextbook) {
   // Link 2 level, load at its end: F l^3 / 3EI down, slope F l^2 / 2EI, plus the moment of the
   // load's lever beyond the end.
-  auto cell = std::make_shared<Cell>(*cell_7());
+  auto cell = std::make_shared<Cell>(*cell_7_source());
   PhysicalModel model = *make_physical_model(cell, {"link_bending:2"});
   model.values(0) = 1e-6;
   PoseContext context = some_pose(*cell, 13);
@@ -368,7 +369,7 @@ TEST(ErrorSources, LevelsAreListsOfSources) {
 
 TEST(ErrorSources, AStarStandsForEveryJointThatCanHaveTheSource) {
   const auto names = [](const std::string& robot, const std::string& spec) {
-    auto cell = std::make_shared<Cell>(*cell_7());
+    auto cell = std::make_shared<Cell>(*cell_7_source());
     cell->robot = *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + robot);
     std::string all;
     const auto model = make_physical_model(cell, {spec});
@@ -380,12 +381,12 @@ TEST(ErrorSources, AStarStandsForEveryJointThatCanHaveTheSource) {
             "joint_map:1@5 joint_map:2@5 joint_map:3@5 joint_map:4@5 joint_map:5@5 joint_map:6@5 ");
   EXPECT_TRUE(names("abb_irb6640-205-275-on-rail.yaml", "joint_map:*")
                   .starts_with("joint_map:2 joint_map:3 "));
-  EXPECT_FALSE(make_physical_model(cell_7(), {"geometry:*"}));
-  EXPECT_FALSE(make_physical_model(cell_7(), {"joint_map:*", "joint_map:2"}));
+  EXPECT_FALSE(make_physical_model(cell_7_source(), {"geometry:*"}));
+  EXPECT_FALSE(make_physical_model(cell_7_source(), {"joint_map:*", "joint_map:2"}));
 }
 
 TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   EXPECT_EQ(spelled_map(1, {.harmonics = 110, .amplitude = 312.54e-6, .knee = 1.84, .power = 1.02}),
             "joint_map:2@110+312.5+1.840+1.020");
   // An exponent would be read as another number.
@@ -423,12 +424,12 @@ TEST(ErrorSources, AMapIsOpenWhereNothingIsToldOfItsSpectrum) {
 }
 
 TEST(ErrorSources, FormerNamesAreReadAsThePresentOnes) {
-  EXPECT_EQ((*make_error_source("link_weights", *cell_7()))->name(), "self_weight");
-  EXPECT_EQ((*make_error_source("base_yielding", *cell_7()))->name(), "base_compliance");
+  EXPECT_EQ((*make_error_source("link_weights", *cell_7_source()))->name(), "self_weight");
+  EXPECT_EQ((*make_error_source("base_yielding", *cell_7_source()))->name(), "base_compliance");
 }
 
 TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
-  const auto cell = cell_7();
+  const auto cell = cell_7_source();
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
   EXPECT_EQ(refusal_of(unknown),

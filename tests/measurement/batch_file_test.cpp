@@ -4,7 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/files/point_list.h"
-#include "tests/support/refusal.h"
+#include "tests/support/refusal_file.h"
 
 namespace trammel {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Refusal refusal(const std::string& text) {
+Refusal refusal_file(const std::string& text) {
   const auto batch = parse_robodk_csv(text, "rdk.csv");
   return refusal_of(batch);
 }
@@ -90,7 +90,7 @@ TEST(RoboDkCsv, ReadsTheExportsByPosition) {
   EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz"))
                 .norm(),
             1e-12);
-  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200.5,300,10,-20,170,7,8,9,0,0,0\n"),
+  EXPECT_EQ(refusal_file("1,2,3,4,5,6,100,200.5,300,10,-20,170,7,8,9,0,0,0\n"),
             Refusal("rdk.csv", 1, "rx_rad").beyond(10, 6.28319));
 }
 
@@ -104,19 +104,19 @@ TEST(RoboDkCsv, MakesAToolOfEachTcp) {
 }
 
 TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
-  EXPECT_EQ(refusal(""), Refusal("rdk.csv"));
-  EXPECT_EQ(refusal("J1,X,Y,Z\n"), Refusal("rdk.csv").beyond(0, 1));
-  EXPECT_EQ(refusal("1,2,3,4\n"), Refusal("rdk.csv", 1, "J1").value(4));
-  EXPECT_EQ(refusal("J1,J3,X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2"));
-  EXPECT_EQ(refusal("J1,X,Y\n1,2,3\n"), Refusal("rdk.csv", {}, "x").beyond(2, 3));
-  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"),
+  EXPECT_EQ(refusal_file(""), Refusal("rdk.csv"));
+  EXPECT_EQ(refusal_file("J1,X,Y,Z\n"), Refusal("rdk.csv").beyond(0, 1));
+  EXPECT_EQ(refusal_file("1,2,3,4\n"), Refusal("rdk.csv", 1, "J1").value(4));
+  EXPECT_EQ(refusal_file("J1,J3,X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2"));
+  EXPECT_EQ(refusal_file("J1,X,Y\n1,2,3\n"), Refusal("rdk.csv", {}, "x").beyond(2, 3));
+  EXPECT_EQ(refusal_file("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"),
             Refusal("rdk.csv", {}, "orientation"));
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), Refusal("rdk.csv", 3, "Y").text("c"));
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2e7,3,4\n"), Refusal("rdk.csv", 2, "X").beyond(2e+07, 1e+06));
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), Refusal("rdk.csv", 2).beyond(3, 4));
-  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"),
+  EXPECT_EQ(refusal_file("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), Refusal("rdk.csv", 3, "Y").text("c"));
+  EXPECT_EQ(refusal_file("J1,X,Y,Z\n1,2e7,3,4\n"), Refusal("rdk.csv", 2, "X").beyond(2e+07, 1e+06));
+  EXPECT_EQ(refusal_file("J1,X,Y,Z\n1,2,3\n"), Refusal("rdk.csv", 2).beyond(3, 4));
+  EXPECT_EQ(refusal_file("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"),
             Refusal("rdk.csv", {}, "J2 (turns)").text("turns"));
-  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"),
+  EXPECT_EQ(refusal_file("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"),
             Refusal("rdk.csv", 3, "pose_id").text("a"));
 }
 

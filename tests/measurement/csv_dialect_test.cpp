@@ -5,7 +5,7 @@
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/files/point_list.h"
-#include "tests/support/refusal.h"
+#include "tests/support/refusal_dialect.h"
 
 namespace trammel {
 namespace {
@@ -33,7 +33,7 @@ std::string dialect(const std::string& separator, bool decimal_comma) {
   return "\xEF\xBB\xBF" + with(text, "\n", "\r\n");
 }
 
-Refusal refusal(const std::string& text) { return refusal_of(parse_batch(text, "b.csv")); }
+Refusal refusal_dialect(const std::string& text) { return refusal_of(parse_batch(text, "b.csv")); }
 
 TEST(CsvDialect, ABatchFromASpreadsheetOfAnyLanguageIsTheSameBatch) {
   const MeasurementBatch plain = parse_batch(kBatch, "b.csv").value();
@@ -72,8 +72,8 @@ TEST(CsvDialect, NamesOfSpatialAnalyzerCountByTheirLastComponent) {
 
 TEST(CsvDialect, WhatMayBeReadInTwoWaysIsRefused) {
   // Commas between values and in them.
-  EXPECT_EQ(refusal(with(kBatch, ".", ",")), Refusal("b.csv", 2).beyond(14, 8));
-  EXPECT_EQ(refusal(with(kBatch, "870.586", "\"870,586\"")),
+  EXPECT_EQ(refusal_dialect(with(kBatch, ".", ",")), Refusal("b.csv", 2).beyond(14, 8));
+  EXPECT_EQ(refusal_dialect(with(kBatch, "870.586", "\"870,586\"")),
             Refusal("b.csv", 2, "x_mm").text("870,586"));
   EXPECT_EQ(refusal_of(parse_points("p1,870,5,12,3,4,5\n", "sa.txt",
                                     {{}, {}, BehindCoordinates::kUncertainties, 1})),
@@ -84,21 +84,22 @@ TEST(CsvDialect, WhatMayBeReadInTwoWaysIsRefused) {
   // Points and commas before decimals: one of them would be thousands.
   const std::string mixed =
       with(with(with(kBatch, ",", ";"), "-1081.625", "-1081,625"), "-10.5", "-10");
-  EXPECT_EQ(refusal(mixed), Refusal("b.csv", 2, "y_mm").text("-1081,625"));
-  EXPECT_EQ(refusal(with(with(kBatch, ",", ";"), "870.586", "1.870,586")),
+  EXPECT_EQ(refusal_dialect(mixed), Refusal("b.csv", 2, "y_mm").text("-1081,625"));
+  EXPECT_EQ(refusal_dialect(with(with(kBatch, ",", ";"), "870.586", "1.870,586")),
             Refusal("b.csv", 2, "x_mm").text("1.870,586"));
   // Two separators between the names.
-  EXPECT_EQ(refusal("q1_deg;x_mm,y_mm;z_mm\n1;2;3;4\n"), Refusal("b.csv", 1));
-  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm,note;more\n1,2,3,4,5\n"), Refusal::none())
+  EXPECT_EQ(refusal_dialect("q1_deg;x_mm,y_mm;z_mm\n1;2;3;4\n"), Refusal("b.csv", 1));
+  EXPECT_EQ(refusal_dialect("q1_deg,x_mm,y_mm,z_mm,note;more\n1,2,3,4,5\n"), Refusal::none())
       << "the rows decide";
-  EXPECT_EQ(refusal("sep=;\nq1_deg;x_mm;y_mm;z_mm;a,b,c,d,e\n1;2;3;4;x,x,x,x\n"), Refusal::none());
+  EXPECT_EQ(refusal_dialect("sep=;\nq1_deg;x_mm;y_mm;z_mm;a,b,c,d,e\n1;2;3;4;x,x,x,x\n"),
+            Refusal::none());
 }
 
 TEST(CsvDialect, ASpreadsheetIsRefusedWithHowToExportIt) {
   using namespace std::string_literals;
   for (const std::string& text : {"PK\x03\x04\0\0"s, "\xD0\xCF\x11\xE0\xA1\xB1"s, "\xFF\xFEq\0"s}) {
     for (const auto& read :
-         {refusal(text), refusal_of(parse_joint_csv(text, "b.csv").map([](auto&&) {})),
+         {refusal_dialect(text), refusal_of(parse_joint_csv(text, "b.csv").map([](auto&&) {})),
           refusal_of(parse_points(text, "b.csv").map([](auto&&) {})),
           refusal_of(parse_robodk_csv(text, "b.csv").map([](auto&&) {}))}) {
       EXPECT_EQ(read, Refusal("b.csv"));

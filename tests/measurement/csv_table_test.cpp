@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "tests/support/refusal.h"
+#include "tests/support/refusal_table.h"
 
 namespace trammel {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Refusal refusal(const std::string& text) {
+Refusal refusal_table(const std::string& text) {
   const auto table = CsvTable::parse(text, "f.csv");
   return refusal_of(table);
 }
@@ -56,24 +56,24 @@ TEST(CsvTable, WrittenFieldsReadBackAsTheyWere) {
 }
 
 TEST(CsvTable, RefusesWhatIsNoTableAndSaysWhere) {
-  EXPECT_EQ(refusal(""), Refusal("f.csv").beyond(0, 1));
-  EXPECT_EQ(refusal("# only a comment\n"), Refusal("f.csv").beyond(0, 1));
-  EXPECT_EQ(refusal("a,b,a\n"), Refusal("f.csv", 1, "a"));
-  EXPECT_EQ(refusal("a,,b\n"), Refusal("f.csv", 1).value(2));
-  EXPECT_EQ(refusal("a,b\n1,2\n1\n"), Refusal("f.csv", 3).beyond(1, 2));
-  EXPECT_EQ(refusal("a,b\n1,2,\n"), Refusal("f.csv", 2).beyond(3, 2));
-  EXPECT_EQ(refusal("a,b\n1,2,"), Refusal("f.csv", 2).beyond(3, 2));
-  EXPECT_EQ(refusal("a,b\n\"1,2\n"), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal("a,b\n\"1\"x,2\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table(""), Refusal("f.csv").beyond(0, 1));
+  EXPECT_EQ(refusal_table("# only a comment\n"), Refusal("f.csv").beyond(0, 1));
+  EXPECT_EQ(refusal_table("a,b,a\n"), Refusal("f.csv", 1, "a"));
+  EXPECT_EQ(refusal_table("a,,b\n"), Refusal("f.csv", 1).value(2));
+  EXPECT_EQ(refusal_table("a,b\n1,2\n1\n"), Refusal("f.csv", 3).beyond(1, 2));
+  EXPECT_EQ(refusal_table("a,b\n1,2,\n"), Refusal("f.csv", 2).beyond(3, 2));
+  EXPECT_EQ(refusal_table("a,b\n1,2,"), Refusal("f.csv", 2).beyond(3, 2));
+  EXPECT_EQ(refusal_table("a,b\n\"1,2\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table("a,b\n\"1\"x,2\n"), Refusal("f.csv", 2));
 }
 
 TEST(CsvTable, RefusesBytesThatAreNoUtf8AndTakesThoseThatAre) {
-  EXPECT_EQ(refusal("a\n\xB0\n"), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal("a\n\xE2\x82\n"), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal("a\n\xED\xA0\x80\n"), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal("a\n\xC0\xAF\n"), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal(std::string("a\n\0\n", 4)), Refusal("f.csv", 2));
-  EXPECT_EQ(refusal("a\n\xC2\xB0 \xE2\x82\xAC \xF0\x9F\xA4\x96\n"), Refusal::none());
+  EXPECT_EQ(refusal_table("a\n\xB0\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table("a\n\xE2\x82\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table("a\n\xED\xA0\x80\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table("a\n\xC0\xAF\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table(std::string("a\n\0\n", 4)), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal_table("a\n\xC2\xB0 \xE2\x82\xAC \xF0\x9F\xA4\x96\n"), Refusal::none());
 }
 
 TEST(CsvTable, ReadsNumbersWholeOrNotAtAll) {

@@ -7,7 +7,7 @@
 #include "server/measurement/repeats.h"
 #include "tests/support/demand.h"
 #include "tests/support/hidden_files.h"
-#include "tests/support/refusal.h"
+#include "tests/support/refusal_gauges.h"
 
 namespace trammel {
 namespace {
@@ -23,7 +23,9 @@ constexpr const char* kMixed =
     "place,30,1,2,3,,,,,\n"
     "rel,40,,,,-0.75,,a1,zero,\n";
 
-Refusal refusal(const std::string& text) { return refusal_of(parse_batch_csv(text, "wires.csv")); }
+Refusal refusal_gauges(const std::string& text) {
+  return refusal_of(parse_batch_csv(text, "wires.csv"));
+}
 
 TEST(Gauges, EachRowSaysWhatItIsAndAllKindsComeTogether) {
   const MeasurementBatch batch = test::demand(parse_batch_csv(kMixed, "wires.csv"));
@@ -64,14 +66,16 @@ TEST(Gauges, AreWrittenAsTheyWereRead) {
 TEST(Gauges, ARowThatIsTwoThingsOrNothingIsRefused) {
   const std::string head =
       "pose_id,q1_deg,x_mm,y_mm,z_mm,distance_mm,touch_mm,anchor_id,minus_pose_id\n";
-  EXPECT_EQ(refusal(head + "a,1,1,2,3,5,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
-  EXPECT_EQ(refusal(head + "a,1,,,,5,6,a1,\n"), Refusal("wires.csv", 2, "touch_mm"));
-  EXPECT_EQ(refusal(head + "a,1,,,,,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
-  EXPECT_EQ(refusal(head + "a,1,,,,-5,,a1,\n"),
+  EXPECT_EQ(refusal_gauges(head + "a,1,1,2,3,5,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,6,a1,\n"), Refusal("wires.csv", 2, "touch_mm"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,-5,,a1,\n"),
             Refusal("wires.csv", 2, "distance_mm").beyond(-5, 0));
-  EXPECT_EQ(refusal(head + "a,1,,,,5,,a1,b\n"), Refusal("wires.csv", 2, "minus_pose_id").text("b"));
-  EXPECT_EQ(refusal(head + "a,1,,,,5,,a1,a\n"), Refusal("wires.csv", 2, "minus_pose_id").text("a"));
-  EXPECT_EQ(refusal(head + "a,1,1,2,3,,,,a\n"), Refusal("wires.csv", 2, "minus_pose_id"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,b\n"),
+            Refusal("wires.csv", 2, "minus_pose_id").text("b"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,a\n"),
+            Refusal("wires.csv", 2, "minus_pose_id").text("a"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,1,2,3,,,,a\n"), Refusal("wires.csv", 2, "minus_pose_id"));
   EXPECT_FALSE(parse_batch_csv(head + "a,1,1,2,,,,,\n", "wires.csv")) << "a part of a position";
 }
 

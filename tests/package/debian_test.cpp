@@ -19,10 +19,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::minutes kLimit{15};
+constexpr std::chrono::minutes kDebianLimit{15};
 
 bool is_here(const std::string& program) {
-  return test::run({"/bin/sh", "-c", "command -v " + program}, kLimit).exit_code == 0;
+  return test::run({"/bin/sh", "-c", "command -v " + program}, kDebianLimit).exit_code == 0;
 }
 
 /// Built once, from what is built; skipped with what is missing.
@@ -36,7 +36,7 @@ class Debian : public testing::Test {
     // Quick to pack: what is looked at is what is inside.
     const test::Finished made = test::run(
         {"/usr/bin/env", "TRAMMEL_XZ=0", TRAMMEL_SOURCE_DIR "/deploy/package", TRAMMEL_BINARY_DIR},
-        kLimit);
+        kDebianLimit);
     EXPECT_EQ(made.exit_code, 0) << made.out << made.err;
   }
   void SetUp() override {
@@ -58,7 +58,7 @@ class Debian : public testing::Test {
 
   static std::string about(const std::string& package_name, const std::string& option) {
     const test::Finished said =
-        test::run({"/usr/bin/dpkg-deb", option, package(package_name)}, kLimit);
+        test::run({"/usr/bin/dpkg-deb", option, package(package_name)}, kDebianLimit);
     EXPECT_EQ(said.exit_code, 0) << said.err;
     return said.out;
   }
@@ -102,7 +102,8 @@ TEST_F(Debian, EachPackageHasItsFiles) {
 TEST_F(Debian, TheDaemonsManualHasEveryOption) {
   std::string manual = test::read_file(TRAMMEL_SOURCE_DIR "/deploy/debian/trammeld.8");
   manual.erase(std::remove(manual.begin(), manual.end(), '\\'), manual.end());
-  const std::string help = test::run({TRAMMEL_BINARY_DIR "/server/trammeld", "--help"}, kLimit).out;
+  const std::string help =
+      test::run({TRAMMEL_BINARY_DIR "/server/trammeld", "--help"}, kDebianLimit).out;
   static const std::regex kOption("--[a-z-]+");
   int options = 0;
   for (auto at = std::sregex_iterator(help.begin(), help.end(), kOption);
@@ -135,7 +136,7 @@ TEST_F(Debian, LibrariesHaveTheirFiles) {
 
 TEST_F(Debian, TheVersionIsThatOfTheProgram) {
   const test::Finished version =
-      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "--version"}, kLimit);
+      test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "--version"}, kDebianLimit);
   std::smatch number;
   ASSERT_TRUE(std::regex_search(version.out, number, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")))
       << version.out;
@@ -146,10 +147,10 @@ TEST_F(Debian, TheVersionIsThatOfTheProgram) {
 
 TEST_F(Debian, WhatAHostConfiguresIsKeptOnUpgrades) {
   const test::TemporaryFolder control;
-  ASSERT_EQ(
-      test::run({"/usr/bin/dpkg-deb", "-e", package("trammeld"), control.path().string()}, kLimit)
-          .exit_code,
-      0);
+  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-e", package("trammeld"), control.path().string()},
+                      kDebianLimit)
+                .exit_code,
+            0);
   EXPECT_EQ(
       test::read_file(control.file("conffiles")),
       "/etc/logrotate.d/trammeld\n/etc/trammel/cell-7.yaml\n/etc/trammel/discovery-server.xml\n"
@@ -166,7 +167,7 @@ TEST_F(Debian, LintianFindsNoError) {
   for (const auto& entry : fs::directory_iterator(folder())) {
     if (entry.path().extension() == ".deb") command.push_back(entry.path().string());
   }
-  const test::Finished found = test::run(command, kLimit);
+  const test::Finished found = test::run(command, kDebianLimit);
   EXPECT_EQ(found.exit_code, 0) << found.out << found.err;
 }
 
@@ -179,10 +180,10 @@ void put_everywhere(std::string& text, const std::string& what, const std::strin
 TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   if (!is_here("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze here";
   const test::TemporaryFolder root;
-  ASSERT_EQ(
-      test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit)
-          .exit_code,
-      0);
+  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()},
+                      kDebianLimit)
+                .exit_code,
+            0);
   // Its programs are where the package was unpacked, not where it will be installed; one is of a
   // package that it only suggests.
   const std::string here = root.path().string();
@@ -195,13 +196,13 @@ TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
     std::string text = test::read_file(unit);
     for (const auto& [installed, present] : programs) put_everywhere(text, installed, present);
     const test::Finished verified = test::run(
-        {"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kLimit);
+        {"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kDebianLimit);
     EXPECT_EQ(verified.exit_code, 0) << name << ": " << verified.err;
     EXPECT_EQ(verified.err.find("trammel"), std::string::npos) << verified.err;
     const test::Finished exposed =
         test::run({"/usr/bin/systemd-analyze", "security", "--offline=yes", "--threshold=20",
                    "--no-pager", unit},
-                  kLimit);
+                  kDebianLimit);
     EXPECT_EQ(exposed.exit_code, 0)
         << exposed.out << exposed.err;  // 20 stands for an exposure of 2.0
   }

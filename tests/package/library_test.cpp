@@ -22,10 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::minutes kLimit{15};
+constexpr std::chrono::minutes kLibraryLimit{15};
 
 std::string output_of(const std::vector<std::string>& command) {
-  const test::Finished finished = test::run(command, kLimit);
+  const test::Finished finished = test::run(command, kLibraryLimit);
   EXPECT_EQ(finished.exit_code, 0) << command[0] << " " << command[1] << ":\n"
                                    << finished.out << finished.err;
   return finished.out;
@@ -91,7 +91,7 @@ TEST_F(Library, ItsExampleCorrectsATargetWithAModelOfTheInstalledProgram) {
 
 TEST_F(Library, ItsExampleSaysWhatIsWrongWithAModel) {
   const test::Finished refused =
-      test::run({(build_ / "offline").string(), "/nowhere.model"}, kLimit);
+      test::run({(build_ / "offline").string(), "/nowhere.model"}, kLibraryLimit);
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_NE(refused.out.find("/nowhere.model"), std::string::npos) << refused.out;
 }
@@ -169,7 +169,7 @@ TEST_F(Library, ItsFileSaysWhichProgramsCanUseIt) {
 }
 
 TEST_F(Library, EveryNameInItsHeadersIsExplained) {
-  if (test::run({"/usr/bin/env", "doxygen", "--version"}, kLimit).exit_code == 127)
+  if (test::run({"/usr/bin/env", "doxygen", "--version"}, kLibraryLimit).exit_code == 127)
     GTEST_SKIP() << "no doxygen here";
   const test::TemporaryFolder folder;
   const std::string settings = folder.write(
@@ -177,7 +177,7 @@ TEST_F(Library, EveryNameInItsHeadersIsExplained) {
       "@INCLUDE = " TRAMMEL_SOURCE_DIR "/clients/library/Doxyfile\nINPUT = " TRAMMEL_SOURCE_DIR
       "/clients/library/trammel\nGENERATE_HTML = NO\nGENERATE_XML = YES\nOUTPUT_DIRECTORY = " +
           folder.path().string() + "\n");
-  const test::Finished complaints = test::run({"/usr/bin/env", "doxygen", settings}, kLimit);
+  const test::Finished complaints = test::run({"/usr/bin/env", "doxygen", settings}, kLibraryLimit);
   EXPECT_EQ(complaints.exit_code, 0);
   EXPECT_EQ(complaints.err, "");
 }

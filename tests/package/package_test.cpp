@@ -17,10 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::minutes kLimit{15};
+constexpr std::chrono::minutes kPackageLimit{15};
 
 void run_to_its_end(const std::vector<std::string>& command) {
-  const test::Finished finished = test::run(command, kLimit);
+  const test::Finished finished = test::run(command, kPackageLimit);
   EXPECT_EQ(finished.exit_code, 0) << command[0] << " " << command[1] << ":\n"
                                    << finished.out << finished.err;
 }
@@ -66,7 +66,7 @@ void expect_to_reach_a_daemon(const Consumer& consumer) {
   daemon.start();
   const test::Finished asked = test::run(
       {consumer.program("session"), std::to_string(daemon.port()), std::to_string(daemon.domain())},
-      kLimit);
+      kPackageLimit);
   EXPECT_EQ(asked.exit_code, 0) << asked.out << asked.err;
   EXPECT_EQ(asked.out, "cell-7\n");
 }
@@ -92,7 +92,7 @@ TEST(Package, AnInstalledOfflineLibraryReadsAModelOfTheInstalledProgram) {
                   batch});
   run_to_its_end(
       {trammel, "train", "--cell", cell, "--batch", batch, "--bias", "none", "-o", model});
-  const test::Finished predicted = test::run({consumer.program("offline"), model}, kLimit);
+  const test::Finished predicted = test::run({consumer.program("offline"), model}, kPackageLimit);
   EXPECT_EQ(predicted.exit_code, 0) << predicted.out << predicted.err;
   EXPECT_TRUE(predicted.out.ends_with(" mm\n")) << predicted.out;
 }

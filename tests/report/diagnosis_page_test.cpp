@@ -8,13 +8,10 @@
 #include "server/report/diagnosis_charts.h"
 #include "tests/report/diagnosis_fixture.h"
 #include "tests/report/seen_by_browser.h"
+#include "tests/support/page_text.h"
 
 namespace trammel {
 namespace {
-
-bool has(const std::string& page, const std::string& part) {
-  return page.find(part) != std::string::npos;
-}
 
 class DiagnosisPage : public testing::Test {
  protected:
@@ -35,34 +32,34 @@ TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
         std::string("48.503"), std::string("parameter ± U (k = 2)"), std::string("0.040"),
         std::string("link geometry (d6)"), std::string("p28"),
         std::string("repeat it and its neighbours"), std::string("both approach directions")}) {
-    EXPECT_TRUE(has(page, part)) << part;
+    EXPECT_TRUE(test::has(page, part)) << part;
   }
 }
 
 TEST_F(DiagnosisPage, CallsErrorSourcesByTheirPlainNames) {
   diagnosis_.sources_after.emplace_back("gear_transmission:3@48.5");
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(has(page, "base position, link geometry, gearbox compliance"));
-  EXPECT_TRUE(has(page, "gear ripple in joint 3"));
-  EXPECT_FALSE(has(page, "gear_transmission"));
+  EXPECT_TRUE(test::has(page, "base position, link geometry, gearbox compliance"));
+  EXPECT_TRUE(test::has(page, "gear ripple in joint 3"));
+  EXPECT_FALSE(test::has(page, "gear_transmission"));
 }
 
 TEST_F(DiagnosisPage, DoesNotSayHowOftenRepetitionsNameACause) {
-  EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "repetitions"));
-  EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "naming_frequency"));
+  EXPECT_FALSE(test::has(diagnosis_page(diagnosis_, *cell_), "repetitions"));
+  EXPECT_FALSE(test::has(diagnosis_page(diagnosis_, *cell_), "naming_frequency"));
 }
 
 TEST_F(DiagnosisPage, SpeaksOfOneKindOfIntervalOnly) {
-  EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "half its 95 % interval"));
+  EXPECT_FALSE(test::has(diagnosis_page(diagnosis_, *cell_), "half its 95 % interval"));
 }
 
 TEST_F(DiagnosisPage, OpensWithoutANetworkAndKeepsNamesFromFilesText) {
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(has(page, "Chart.js v"));
-  EXPECT_FALSE(has(page, "<link"));
-  EXPECT_FALSE(has(page, " src="));
-  EXPECT_FALSE(has(page, "made-up <1>"));
-  EXPECT_TRUE(has(page, "made-up &lt;1&gt;"));
+  EXPECT_TRUE(test::has(page, "Chart.js v"));
+  EXPECT_FALSE(test::has(page, "<link"));
+  EXPECT_FALSE(test::has(page, " src="));
+  EXPECT_FALSE(test::has(page, "made-up <1>"));
+  EXPECT_TRUE(test::has(page, "made-up &lt;1&gt;"));
 }
 
 TEST_F(DiagnosisPage, FoldsAGearsOscillationWithoutAnyOtherCause) {
@@ -110,34 +107,34 @@ TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
 
 TEST_F(DiagnosisPage, AnswersOnWhatTheLeftoverDepends) {
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(has(page, "Does what is left depend on"));
-  EXPECT_TRUE(has(page, "<tr class=\"yes\"><td>yes</td><td>the residual</td><td>q4</td>"));
-  EXPECT_TRUE(has(page, "<tr class=\"no\"><td>no</td><td>its size</td><td>torque</td>"));
+  EXPECT_TRUE(test::has(page, "Does what is left depend on"));
+  EXPECT_TRUE(test::has(page, "<tr class=\"yes\"><td>yes</td><td>the residual</td><td>q4</td>"));
+  EXPECT_TRUE(test::has(page, "<tr class=\"no\"><td>no</td><td>its size</td><td>torque</td>"));
 }
 
 TEST_F(DiagnosisPage, DoesNotCallUnseenWhatWasLookedForByTheOrderOfThePoses) {
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "Would not have shown"));
+  EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_), "Would not have shown"));
   for (Measurement& m : diagnosis_.batch.measurements) m.context.direction.clear();
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_FALSE(has(page, "Would not have shown"));
-  EXPECT_TRUE(has(page, "Would not have been named for certain"));
+  EXPECT_FALSE(test::has(page, "Would not have shown"));
+  EXPECT_TRUE(test::has(page, "Would not have been named for certain"));
 }
 
 TEST_F(DiagnosisPage, SaysOneFigureOfNoiseAndWhatItIs) {
   const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(
-      has(page,
-          "<b>0.0225 mm</b><span>noise, rms: what is left of a position when all that was found"));
-  EXPECT_FALSE(has(page, "per axis")) << "one figure";
+  EXPECT_TRUE(test::has(
+      page,
+      "<b>0.0225 mm</b><span>noise, rms: what is left of a position when all that was found"));
+  EXPECT_FALSE(test::has(page, "per axis")) << "one figure";
 }
 
 TEST_F(DiagnosisPage, AChanceThatIsSmallerThanAnythingKnownIsNoEquality) {
   diagnosis_.unexplained = {true, {"q4"}, 5e-5, 1e-6, ""};
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_),
-                  "rms. It changes with the position of joint 4 (p &lt;\u00a010⁻⁶)."));
+  EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_),
+                        "rms. It changes with the position of joint 4 (p &lt;\u00a010⁻⁶)."));
   diagnosis_.unexplained.p_value = 0.02;
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_),
-                  "rms. It changes with the position of joint 4 (p = 0.02)."));
+  EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_),
+                        "rms. It changes with the position of joint 4 (p = 0.02)."));
 }
 
 TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {
@@ -171,8 +168,8 @@ TEST_F(DiagnosisPage, WithoutAnyFindingStillOpens) {
   empty.batch.id = "empty";
   empty.sources_before = empty.sources_after = {"base"};
   const std::string page = diagnosis_page(empty, *cell_);
-  EXPECT_TRUE(has(page, "Nothing beyond the noise."));
-  EXPECT_TRUE(has(page, "None: every pose fits the others."));
+  EXPECT_TRUE(test::has(page, "Nothing beyond the noise."));
+  EXPECT_TRUE(test::has(page, "None: every pose fits the others."));
   if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
   diagnosis_ = empty;
   EXPECT_EQ(seen_by_a_browser(1000)["errors"], 0);

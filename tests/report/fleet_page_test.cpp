@@ -2,14 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/page_text.h"
+
 namespace trammel {
 namespace {
 
 using nlohmann::ordered_json;
-
-bool has(const std::string& page, const std::string& part) {
-  return page.find(part) != std::string::npos;
-}
 
 TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
   const ordered_json fleet = ordered_json::parse(
@@ -24,15 +22,15 @@ TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
        {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer",
         "like its twins", "not checked yet", "no model in force", "R: 3 robots", "2025-11-24",
         "3 robots: 1 changed, 1 not checked yet."})
-    EXPECT_TRUE(has(page, part)) << part << "\n" << page;
-  EXPECT_TRUE(has(page, "the zero of joint 4 is off"));
-  EXPECT_FALSE(has(page, "the zero of joint 5 is not"));
+    EXPECT_TRUE(test::has(page, part)) << part << "\n" << page;
+  EXPECT_TRUE(test::has(page, "the zero of joint 4 is off"));
+  EXPECT_FALSE(test::has(page, "the zero of joint 5 is not"));
 }
 
 TEST(FleetPage, OfWhatItCannotReadLeavesOut) {
   for (const char* fleet :
        {"null", "[]", R"({"cells": [7, null, {"health": 3, "unlike_twins": [1]}], "types": [2]})"})
-    EXPECT_TRUE(has(fleet_page(ordered_json::parse(fleet), 0), "not checked yet")) << fleet;
+    EXPECT_TRUE(test::has(fleet_page(ordered_json::parse(fleet), 0), "not checked yet")) << fleet;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/page_text.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel {
@@ -14,23 +15,19 @@ constexpr const char* kFindings =
         "joint": 3, "effect_rms_mm": 0.05, "u95": 0.01, "could_also_be": [{"cause": "tool", "joint": null}]}],
         "smallest_seen": [{"cause": "geometry", "joint": null, "parameter": "d4", "effect_rms_mm": null}]})";
 
-bool has(const std::string& page, const std::string& part) {
-  return page.find(part) != std::string::npos;
-}
-
 TEST(HealthPage, SaysVerdictChangesAndWhenToCheckAgain) {
   const std::string page = health_sections(kFindings, "<p>links</p>");
   for (const char* part :
        {"cannot tell: too &lt;few&gt;", "2026-12-01: it drifts", "gear ripple in joint 3",
         "0.0500 mm", "tool position", "link geometry, d4</td><td>never", "<p>links</p>"})
-    EXPECT_TRUE(has(page, part)) << part << "\n" << page;
+    EXPECT_TRUE(test::has(page, part)) << part << "\n" << page;
 }
 
 TEST(HealthPage, OfWhatItCannotReadLeavesOut) {
   for (const char* findings :
        {"", "[]", "{\"changed\": 3, \"smallest_seen\": [7, null]}", "{\"verdict\": {}}"})
-    EXPECT_TRUE(has(health_sections(findings, ""), "Nothing that these poses show."));
-  EXPECT_FALSE(has(health_page("{}", {kHostile, kHostile}), "<script>"));
+    EXPECT_TRUE(test::has(health_sections(findings, ""), "Nothing that these poses show."));
+  EXPECT_FALSE(test::has(health_page("{}", {kHostile, kHostile}), "<script>"));
 }
 
 TEST(HealthPage, AsAPageOfItsOwnItIsDatedAndSaysOfWhichRobotAndModel) {
@@ -41,7 +38,7 @@ TEST(HealthPage, AsAPageOfItsOwnItIsDatedAndSaysOfWhichRobotAndModel) {
   const std::string page = health_page(kFindings, {"cell-3", "few", 1'763'942'400, &*cell});
   for (const char* part : {"Health of cell cell-3", "checked 2025-11-24", "serial number 66-40",
                            "measured with AT960", "0123abcd", "batch few"})
-    EXPECT_TRUE(has(page, part)) << part;
+    EXPECT_TRUE(test::has(page, part)) << part;
 }
 
 }  // namespace

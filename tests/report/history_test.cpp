@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/page_text.h"
+
 namespace trammel {
 namespace {
 
@@ -16,10 +18,6 @@ VersionOnRecord version(int number, ParameterOnRecord parameter) {
   return one;
 }
 
-bool has(const std::string& page, const std::string& part) {
-  return page.find(part) != std::string::npos;
-}
-
 TEST(History, AParameterThatMovedByMoreThanItsUncertaintyIsNamedWithBothVersions) {
   const CellHistory history{
       "cell-7",
@@ -30,12 +28,12 @@ TEST(History, AParameterThatMovedByMoreThanItsUncertaintyIsNamedWithBothVersions
   EXPECT_EQ(moved[0].from_version, 2);
   EXPECT_EQ(moved[0].to_version, 3);
   EXPECT_NEAR(moved[0].u95, std::hypot(0.03e-3, 0.02e-3), 1e-12);
-  EXPECT_TRUE(
-      has(history_page(history), "link geometry, q3: 0.0092 ± 0.0021 deg from version 2 to 3"))
+  EXPECT_TRUE(test::has(history_page(history),
+                        "link geometry, q3: 0.0092 ± 0.0021 deg from version 2 to 3"))
       << history_page(history);
-  EXPECT_TRUE(has(history_page(history),
-                  "Versions 1 to 3, trained from 2023-11-14 22:13 to 2023-11-14 22:13 UTC"));
-  EXPECT_FALSE(has(history_page(history), " rad ")) << "people read degrees";
+  EXPECT_TRUE(test::has(history_page(history),
+                        "Versions 1 to 3, trained from 2023-11-14 22:13 to 2023-11-14 22:13 UTC"));
+  EXPECT_FALSE(test::has(history_page(history), " rad ")) << "people read degrees";
 }
 
 TEST(History, WhereTheTrackerStoodAndWhatNoMeasurementTellsIsNeverSaidToHaveMoved) {
@@ -73,8 +71,8 @@ TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmle
   for (const char* part :
        {"0.5000", "0.0200", "in force: better beyond chance", "lost zero in joint 3", "activate",
         "&lt;b&gt;cell&lt;/b&gt;", "&lt;script&gt;", "2023-11-14 22:13"})
-    EXPECT_TRUE(has(page, part)) << part;
-  EXPECT_FALSE(has(page, "<script>"));
+    EXPECT_TRUE(test::has(page, part)) << part;
+  EXPECT_FALSE(test::has(page, "<script>"));
 }
 
 TEST(History, TheParametersAreThoseOfTheVersionInForceNotOfTheNewest) {
@@ -84,18 +82,19 @@ TEST(History, TheParametersAreThoseOfTheVersionInForceNotOfTheNewest) {
        version(3, zero_of_joint_3(3e-3, 1e-5))}};
   history.versions[1].in_force = true;
   const std::string page = history_page(history);
-  EXPECT_TRUE(has(page, "version 2 (in force)"));
-  EXPECT_TRUE(has(page, "0.1145")) << "2 mrad in deg";
-  EXPECT_FALSE(has(page, "0.1718")) << "of version 3";
+  EXPECT_TRUE(test::has(page, "version 2 (in force)"));
+  EXPECT_TRUE(test::has(page, "0.1145")) << "2 mrad in deg";
+  EXPECT_FALSE(test::has(page, "0.1718")) << "of version 3";
   history.versions[1].in_force = false;
   history.of_files = true;
-  EXPECT_TRUE(has(history_page(history), "Model files do not say which version is in force."));
-  EXPECT_TRUE(has(history_page(history), "0.1718"));
+  EXPECT_TRUE(
+      test::has(history_page(history), "Model files do not say which version is in force."));
+  EXPECT_TRUE(test::has(history_page(history), "0.1718"));
 }
 
 TEST(History, OfNothingIsAPageThatSaysSo) {
   const std::string page = history_page({"cell-7"});
-  EXPECT_TRUE(has(page, "No version in force is on record."));
+  EXPECT_TRUE(test::has(page, "No version in force is on record."));
   EXPECT_TRUE(moved_parameters({"cell-7"}).empty());
 }
 

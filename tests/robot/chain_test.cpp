@@ -11,7 +11,7 @@
 namespace trammel {
 namespace {
 
-Chain shipped(const std::string& file) {
+Chain shipped_chain(const std::string& file) {
   const Result<Chain> chain = read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + file);
   EXPECT_TRUE(chain) << (chain ? "" : chain.error().message);
   return *chain;
@@ -64,7 +64,7 @@ TEST(Chain, TheGearsOfACountingControllerTurnTheJointsAndThoseOfBarsAreCommanded
 
 TEST(Chain, PutsTheThesisRobotWhereItsDrawingDoes) {
   // Arm upright and forearm level: x = a1 + d4 + d6, z = d1 + a2 + a3.
-  const Pose X_BF = shipped("abb_irb6640-205-275.yaml").flange_pose(JointVector::Zero(6));
+  const Pose X_BF = shipped_chain("abb_irb6640-205-275.yaml").flange_pose(JointVector::Zero(6));
   EXPECT_NEAR(X_BF.translation().x(), 0.320 + 1.142 + 0.200, 1e-12);
   EXPECT_NEAR(X_BF.translation().y(), 0, 1e-12);
   EXPECT_NEAR(X_BF.translation().z(), 0.780 + 1.280 + 0.200, 1e-12);
@@ -76,7 +76,7 @@ TEST(Chain, ReachesAsFarAsTheThesisRobotsNameSays) {
   // Stretched out forward, the wrist centre stands a1 + a2 + hypot(a3, d4) from axis 1: 2.75 m.
   JointVector q = JointVector::Zero(6);
   q(1) = kPi / 2;
-  const Chain chain = shipped("abb_irb6640-205-275.yaml");
+  const Chain chain = shipped_chain("abb_irb6640-205-275.yaml");
   double reach = 0;
   for (double third = -kPi; third < kPi; third += 1e-3) {
     q(2) = third;
@@ -89,7 +89,7 @@ TEST(Chain, ReachesAsFarAsTheThesisRobotsNameSays) {
 TEST(Chain, PutsTheUr10WhereItsMakerDoes) {
   // All joints at zero: stretched out along -x, x = a2 + a3, y = -(d4 + d6), z = d1 - d5.
   const Vector3 p =
-      shipped("universal-robots_ur10.yaml").flange_pose(JointVector::Zero(6)).translation();
+      shipped_chain("universal-robots_ur10.yaml").flange_pose(JointVector::Zero(6)).translation();
   EXPECT_NEAR(p.x(), -0.612 - 0.5723, 1e-9);
   EXPECT_NEAR(p.y(), -0.163941 - 0.0922, 1e-9);
   EXPECT_NEAR(p.z(), 0.1273 - 0.1157, 1e-9);
@@ -97,8 +97,8 @@ TEST(Chain, PutsTheUr10WhereItsMakerDoes) {
 
 TEST(Chain, GeometricJacobianIsTheDerivativeOfTheFlangePose) {
   std::mt19937_64 random(1);
-  for (const Chain& chain :
-       {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
+  for (const Chain& chain : {shipped_chain("abb_irb6640-205-275.yaml"),
+                             shipped_chain("universal-robots_ur10.yaml"), odd_arm()}) {
     const JointVector q = random_joints(chain.size(), random);
     const Vector3 p_F(0.1, -0.2, 0.3);
     const Pose X_FT = make_pose(Matrix3::Identity(), p_F);
@@ -159,8 +159,8 @@ ArmState loaded_arm(const Chain& chain, std::mt19937_64& random) {
 
 TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
   std::mt19937_64 random(2);
-  for (const Chain& chain :
-       {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
+  for (const Chain& chain : {shipped_chain("abb_irb6640-205-275.yaml"),
+                             shipped_chain("universal-robots_ur10.yaml"), odd_arm()}) {
     ArmState state = loaded_arm(chain, random);
     state.first_moments = FirstMoments::Random(2, chain.size());
     state.spring_torque = JointArray::Random(chain.size());
@@ -194,7 +194,7 @@ TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
 TEST(ArmKinematics, TorqueIsTheWorkOfTheWeightPerJointMotion) {
   // Virtual work: tau_j = d(weight . p_cog)/dq_j.
   std::mt19937_64 random(3);
-  const Chain chain = shipped("abb_irb6640-205-275.yaml");
+  const Chain chain = shipped_chain("abb_irb6640-205-275.yaml");
   const ArmState state = loaded_arm(chain, random);
   const Eigen::VectorXd torque = ArmKinematics(state).gravity_torque();
   ArmState at_cog = state;
@@ -212,7 +212,7 @@ TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
   // Virtual work again, for a robot whose links weigh: tau_j = sum over bodies of weight .
   // d(cog)/dq_j.
   std::mt19937_64 random(4);
-  const Chain heavy = shipped("universal-robots_ur10.yaml");
+  const Chain heavy = shipped_chain("universal-robots_ur10.yaml");
   ArmState state = loaded_arm(heavy, random);
   state.payload.mass = 0;
   const Eigen::VectorXd torque = ArmKinematics(state).gravity_torque();
@@ -243,7 +243,7 @@ TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
 TEST(ArmKinematics, TwoFirstMomentsALinkStandForAllWeightsOfTheLinks) {
   // Told masses, and the first moments that follow from them: what a link carries as one piece.
   std::mt19937_64 random(5);
-  const Chain heavy = shipped("universal-robots_ur10.yaml");
+  const Chain heavy = shipped_chain("universal-robots_ur10.yaml");
   std::vector<Joint> weightless;
   FirstMoments moments = FirstMoments::Zero(2, 6);
   double beyond = 0;
@@ -280,7 +280,7 @@ TEST(Chain, RefusesWhatIsNoRobot) {
 }
 
 TEST(Chain, NamesTheFirstJointOutsideItsLimits) {
-  const Chain chain = shipped("abb_irb6640-205-275.yaml");
+  const Chain chain = shipped_chain("abb_irb6640-205-275.yaml");
   JointVector q = JointVector::Zero(6);
   EXPECT_FALSE(chain.joint_outside_limits(q));
   q(2) = from_deg(70.1);

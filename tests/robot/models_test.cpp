@@ -11,8 +11,9 @@
 #include "server/robot/cell.h"
 #include "server/robot/inverse_kinematics.h"
 
-// The shipped robots against their makers' drawings, told another way than by Denavit-Hartenberg
-// rows: each axis as the drawing shows it with all joints at zero, the flange there, and the reach.
+// The shipped_models robots against their makers' drawings, told another way than by
+// Denavit-Hartenberg rows: each axis as the drawing shows it with all joints at zero, the flange
+// there, and the reach.
 
 namespace trammel {
 namespace {
@@ -152,7 +153,7 @@ std::vector<Drawing> drawings() {
   return all;
 }
 
-Chain shipped(const std::string& file) {
+Chain shipped_models(const std::string& file) {
   const Result<Chain> chain = read_robot(TRAMMEL_SOURCE_DIR "/models/" + file);
   EXPECT_TRUE(chain) << (chain ? "" : chain.error().message);
   return *chain;
@@ -198,7 +199,7 @@ TEST(ShippedRobots, EachHasItsDrawing) {
 TEST(ShippedRobots, MoveAsTheAxesOfTheirDrawingsCarryThem) {
   std::mt19937_64 random(1);
   for (const Drawing& drawing : drawings()) {
-    const Chain chain = shipped(drawing.file);
+    const Chain chain = shipped_models(drawing.file);
     ASSERT_EQ(chain.size(), static_cast<int>(drawing.axes.size())) << drawing.file;
     for (int sample = 0; sample < 20; ++sample) {
       const JointVector q =
@@ -257,7 +258,7 @@ double farthest(const Chain& chain, int shoulder, int elbow) {
 TEST(ShippedRobots, ReachAsFarAsTheirMakersSay) {
   for (const Drawing& drawing : drawings()) {
     if (!drawing.wrist_reach_mm) continue;
-    const Chain chain = shipped(drawing.file);
+    const Chain chain = shipped_models(drawing.file);
     const int elbow = chain.size() == 7 ? 3 : 2;  // the seven-axis arm has its elbow at joint 4
     EXPECT_NEAR(to_mm(farthest(chain, 1, elbow)), *drawing.wrist_reach_mm, 5) << drawing.file;
   }
@@ -265,7 +266,7 @@ TEST(ShippedRobots, ReachAsFarAsTheirMakersSay) {
 
 TEST(ShippedRobots, HaveAHayatiRowExactlyWhereTheNextAxisIsParallel) {
   for (const Drawing& drawing : drawings()) {
-    const Chain chain = shipped(drawing.file);
+    const Chain chain = shipped_models(drawing.file);
     for (int j = 0; j + 1 < chain.size(); ++j) {
       const std::size_t at = static_cast<std::size_t>(j);
       const bool revolute = drawing.axes[at].type == JointType::kRevolute;
@@ -280,7 +281,7 @@ TEST(ShippedRobots, ElbowArmsComeBackFromTheirPosesByTheClosedForm) {
   std::mt19937_64 random(2);
   int arms = 0;
   for (const Drawing& drawing : drawings()) {
-    const Chain chain = shipped(drawing.file);
+    const Chain chain = shipped_models(drawing.file);
     if (!has_spherical_wrist(chain)) continue;
     ++arms;
     for (int sample = 0; sample < 20; ++sample) {

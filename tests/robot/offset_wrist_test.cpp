@@ -12,7 +12,7 @@
 namespace trammel {
 namespace {
 
-Chain shipped(const std::string& name) {
+Chain shipped_wrist(const std::string& name) {
   const Result<Chain> chain =
       read_robot(std::string(TRAMMEL_SOURCE_DIR "/models/") + name + ".yaml");
   EXPECT_TRUE(chain) << name;
@@ -22,17 +22,18 @@ Chain shipped(const std::string& name) {
 const std::vector<std::string> kOffset = {"universal-robots_ur10", "universal-robots_ur5"};
 
 TEST(OffsetWrist, OnlyArmsWithThreeParallelAxesHaveOne) {
-  for (const std::string& name : kOffset) EXPECT_TRUE(has_offset_wrist(shipped(name))) << name;
+  for (const std::string& name : kOffset)
+    EXPECT_TRUE(has_offset_wrist(shipped_wrist(name))) << name;
   for (const char* name :
        {"abb_irb6640-205-275", "kuka_lbr-iiwa-7-r800", "abb_irb6640-205-275-on-rail"})
-    EXPECT_FALSE(has_offset_wrist(shipped(name))) << name;
+    EXPECT_FALSE(has_offset_wrist(shipped_wrist(name))) << name;
 }
 
 TEST(OffsetWrist, EveryBranchBringsTheFlangeThereAndOneOfThemIsTheArms) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> angle(-3, 3);
   for (const std::string& name : kOffset) {
-    const Chain chain = shipped(name);
+    const Chain chain = shipped_wrist(name);
     for (int pose = 0; pose < 200; ++pose) {
       JointVector q(6);
       for (int j = 0; j < 6; ++j) q(j) = angle(random);
@@ -53,7 +54,7 @@ TEST(OffsetWrist, EveryBranchBringsTheFlangeThereAndOneOfThemIsTheArms) {
 
 /// An oracle that shares nothing: descents from many places end at the same eight.
 TEST(OffsetWrist, NothingThatADescentFindsIsMissing) {
-  const Chain chain = shipped("universal-robots_ur10");
+  const Chain chain = shipped_wrist("universal-robots_ur10");
   std::mt19937 random(11);
   std::uniform_real_distribution<double> angle(-3, 3);
   JointVector q(6);
@@ -74,7 +75,7 @@ TEST(OffsetWrist, NothingThatADescentFindsIsMissing) {
 }
 
 TEST(OffsetWrist, WhereAxes4And6AreParallelJoint6Stays) {
-  const Chain chain = shipped("universal-robots_ur10");
+  const Chain chain = shipped_wrist("universal-robots_ur10");
   JointVector q(6);
   q << 0.7, -1.3, 1.6, -1.9, 0, 0.4;
   int own = 0;
@@ -86,7 +87,7 @@ TEST(OffsetWrist, WhereAxes4And6AreParallelJoint6Stays) {
 }
 
 TEST(OffsetWrist, OutOfReachIsNoBranch) {
-  const Chain chain = shipped("universal-robots_ur10");
+  const Chain chain = shipped_wrist("universal-robots_ur10");
   for (const Vector3& p : {Vector3(2, 0, 0), Vector3(.01, 0, .5)}) {
     for (int branch = 0; branch < 8; ++branch)
       EXPECT_FALSE(joints_of_offset_wrist(chain, make_pose(Matrix3::Identity(), p), branch,

@@ -20,7 +20,7 @@ std::string pose_text(const Eigen::Matrix4d& frame) {
       frame(0, 3), frame(1, 3), frame(2, 3), turn.w(), turn.x(), turn.y(), turn.z());
 }
 
-std::string joined(const std::vector<std::string>& words) {
+std::string joined_files(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
@@ -72,7 +72,7 @@ std::string cell_text(const World& world, const Belief& belief, const std::strin
                          : "";
   text += fmt::format("tracker: {{sigma_mm: {:.9g}, sigma_deg: {:.9g}{}}}\n", world.sigma_mm,
                       world.sigma_rad / kDegree, told);
-  text += "model: {error_sources: [" + joined(world.sources) + "], bias: none}\n";
+  text += "model: {error_sources: [" + joined_files(world.sources) + "], bias: none}\n";
   return text + ranges_text(ranges);
 }
 

@@ -13,7 +13,7 @@ namespace trammel::test {
 
 namespace {
 
-constexpr std::chrono::seconds kLimit{900};  // a training waits where others compute
+constexpr std::chrono::seconds kLearningCellLimit{900};  // a training waits where others compute
 constexpr int kTruePoses = 400;
 
 }  // namespace
@@ -35,7 +35,7 @@ LearningCell::LearningCell(std::shared_ptr<const Cell> cell, TrainerOptions opti
 
 JobProgress LearningCell::finished(std::int64_t job) {
   std::unique_lock lock(mutex_);
-  if (!changed_.wait_for(lock, kLimit, [&] { return finished_.contains(job); })) {
+  if (!changed_.wait_for(lock, kLearningCellLimit, [&] { return finished_.contains(job); })) {
     throw std::runtime_error(fmt::format("job {} does not end", job));
   }
   return finished_.at(job);

@@ -10,7 +10,7 @@
 namespace trammel::test {
 namespace {
 
-constexpr std::chrono::seconds kPatience{60};
+constexpr std::chrono::seconds kPoolerPatience{60};
 
 }  // namespace
 
@@ -32,7 +32,7 @@ Pooler::Pooler(const Postgres& server) {
                                      "--init-groups", "--pdeathsig=KILL"});
   }
   pooler_.emplace(command);
-  if (pooler_->wait_for_line("process up", kPatience)) return;
+  if (pooler_->wait_for_line("process up", kPoolerPatience)) return;
   fmt::print(stderr, "pgbouncer for the tests: {}\n", pooler_->standard_error());
   std::abort();
 }

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kPatience{60};
+constexpr std::chrono::seconds kPostgresPatience{60};
 
 [[noreturn]] void give_up(const std::string& why) {
   fmt::print(stderr, "PostgreSQL for the tests: {}\n", why);
@@ -70,7 +70,7 @@ Postgres::Postgres(Disk disk) : disk_(disk) {
   give_to_its_user(folder_.path());
   const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A",
                                          "trust", "-E", "UTF8", "--locale=C.UTF-8", "--no-sync"}),
-                            kPatience);
+                            kPostgresPatience);
   if (made.exit_code != 0) give_up(made.err);
   folder_.write("data/pg_hba.conf",
                 "local all needs_password scram-sha-256\nlocal all all trust\n");
@@ -104,7 +104,7 @@ void Postgres::start_until(const std::string& line) {
                    {"/usr/bin/unshare", "--mount", "/bin/bash", "-c", kMounted, small_disk()});
   }
   server_.emplace(command);
-  if (!server_->wait_for_line(line, kPatience)) give_up(server_->standard_error());
+  if (!server_->wait_for_line(line, kPostgresPatience)) give_up(server_->standard_error());
 }
 
 void Postgres::become_standby() {
@@ -120,17 +120,17 @@ void Postgres::make_room() const {
 void Postgres::stop() {
   if (!server_) return;
   server_->signal(SIGQUIT);
-  static_cast<void>(server_->wait(kPatience));
+  static_cast<void>(server_->wait(kPostgresPatience));
   server_.reset();
 }
 
 void Postgres::kill() {
   const std::vector<pid_t> children = children_of(server_->pid());
   server_->signal(SIGKILL);
-  static_cast<void>(server_->wait(kPatience));
+  static_cast<void>(server_->wait(kPostgresPatience));
   server_.reset();
   for (const pid_t child : children) {
-    if (!Watched(child).ends(kPatience))
+    if (!Watched(child).ends(kPostgresPatience))
       give_up("a process of the one that was killed does not end");
   }
 }
@@ -156,7 +156,7 @@ void Postgres::take_certificates(std::uint16_t port) {
       "-CAcreateserial -copy_extensions copy -days 2 -out $1.crt; }; sign server localhost; sign "
       "keeper keeper; cp server.crt server.key ../data; cp ca.crt ../data/root.crt; chmod 600 "
       "../data/server.key";
-  const Finished made = run({"/bin/bash", "-c", kMake, certificates()}, kPatience);
+  const Finished made = run({"/bin/bash", "-c", kMake, certificates()}, kPostgresPatience);
   if (made.exit_code != 0) give_up(made.err);
   for (const char* file : {"data/server.crt", "data/server.key", "data/root.crt"})
     give_to_its_user(folder_.file(file));
@@ -176,7 +176,7 @@ std::string Postgres::certified_url(const std::string& database, const std::stri
 
 std::string Postgres::sql(const std::string& url, const std::string& statement) const {
   const Finished said =
-      run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPatience);
+      run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPostgresPatience);
   if (said.exit_code != 0) give_up(said.err);
   return said.out;
 }
@@ -190,7 +190,8 @@ void Postgres::write_down(const std::string& url) const {
 std::vector<std::string> Postgres::asked() {
   const std::string mark = fmt::format("SELECT 'mark {}'", ++marks_);
   sql(url("postgres") + "&options=-clog_statement%3Dall", mark);
-  if (!server_->wait_for_line(mark, kPatience)) give_up("does not write down what it is asked");
+  if (!server_->wait_for_line(mark, kPostgresPatience))
+    give_up("does not write down what it is asked");
   const std::string log = server_->standard_error();
   std::vector<std::string> asked;
   std::istringstream lines(log.substr(read_of_log_));

@@ -96,4 +96,9 @@ inline cam::ReceiptRow row_of(const cam::CorrectedProgram& program, const std::s
   return {};
 }
 
+/// What the receipt says of the target of that name.
+inline std::string why(const Corrected& made, const std::string& name) {
+  return row_of(made.program, name).message;
+}
+
 }  // namespace trammel::test

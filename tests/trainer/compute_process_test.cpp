@@ -30,7 +30,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{120};
+constexpr std::chrono::seconds kComputeProcessLimit{120};
 constexpr const char* kSlowBias =
     "se * periodic + matern52 * linear + rational_quadratic + se(sincos)";
 
@@ -76,7 +76,7 @@ class ComputeProcessTest : public testing::Test {
   JobProgress wait_for(const Wanted& wanted) {
     std::unique_lock lock(mutex_);
     const auto found = [&] { return std::find_if(reports_.begin(), reports_.end(), wanted); };
-    if (!changed_.wait_for(lock, kLimit, [&] { return found() != reports_.end(); })) {
+    if (!changed_.wait_for(lock, kComputeProcessLimit, [&] { return found() != reports_.end(); })) {
       ADD_FAILURE() << "the awaited report did not come";
       return {};
     }
@@ -235,7 +235,7 @@ TEST_F(ComputeProcessTest, AProcessThatStandsStillIsEndedAndTold) {
     return p.job == job && p.stage == JobStage::kQueued && !p.what.empty();
   });
   EXPECT_NE(told.what.find("hung"), std::string::npos) << told.what;
-  EXPECT_TRUE(watched.ends(kLimit));
+  EXPECT_TRUE(watched.ends(kComputeProcessLimit));
   ASSERT_TRUE(trainer_->cancel(job));
   EXPECT_EQ(finished(job).outcome.verdict, JobVerdict::kCancelled);
 }
@@ -285,7 +285,7 @@ TEST_F(ComputeProcessTest, AJobThatRunsIsCancelledAndItsProcessEnds) {
   const test::Watched watched(child());
   ASSERT_TRUE(trainer_->cancel(job));
   const JobProgress cancelled = finished(job);
-  EXPECT_TRUE(watched.ends(kLimit));
+  EXPECT_TRUE(watched.ends(kComputeProcessLimit));
   EXPECT_EQ(cancelled.outcome.verdict, JobVerdict::kCancelled);
   EXPECT_EQ(store_->job(job)->state, JobState::kFailed);
   EXPECT_EQ(trainer_->cancel(job).error().code, ErrorCode::kConflict);

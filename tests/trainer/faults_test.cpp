@@ -22,7 +22,7 @@ namespace {
 
 using test::demand;
 
-constexpr std::chrono::seconds kLimit{60};
+constexpr std::chrono::seconds kFaultsLimit{60};
 
 class TrainerFaults : public testing::Test {
  protected:
@@ -52,7 +52,7 @@ class TrainerFaults : public testing::Test {
   template <typename Ready>
   bool wait_for(const Ready& ready) {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, kLimit, ready);
+    return changed_.wait_for(lock, kFaultsLimit, ready);
   }
   bool waits_until(std::int64_t job, JobStage stage, const std::string& what = "") {
     return wait_for([&] {

@@ -16,7 +16,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kLimit{60};
+constexpr std::chrono::seconds kWaitingLimit{60};
 
 /// A place that the first who comes by while it is shut waits at.
 class Gate {
@@ -43,7 +43,7 @@ class Gate {
   }
   [[nodiscard]] bool somebody_waits() {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, kLimit, [this] { return waiting_ > 0; });
+    return changed_.wait_for(lock, kWaitingLimit, [this] { return waiting_ > 0; });
   }
   [[nodiscard]] int passed() {
     const std::lock_guard lock(mutex_);
@@ -81,7 +81,7 @@ class Waiting : public testing::Test {
   }
   JobProgress finished(std::int64_t job) {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(lock, kLimit, [&] { return finished_.contains(job); }));
+    EXPECT_TRUE(changed_.wait_for(lock, kWaitingLimit, [&] { return finished_.contains(job); }));
     return finished_[job];
   }
   std::int64_t submit(const std::string& cell, const std::string& id, std::uint64_t seed = 1) {
@@ -99,7 +99,7 @@ class Waiting : public testing::Test {
   template <typename Change>
   bool ends(const Change& change) {
     auto done = std::async(std::launch::async, [&] { return change().has_value(); });
-    const bool in_time = done.wait_for(kLimit) == std::future_status::ready;
+    const bool in_time = done.wait_for(kWaitingLimit) == std::future_status::ready;
     if (!in_time) {
       judging_.open();
       publishing_.open();

@@ -20,9 +20,9 @@ using krl::Told;
 constexpr int kMostNumbered = 128;  // tools, bases
 constexpr int kAxes = 6;
 
-class Reader {
+class KukaDataReader {
  public:
-  explicit Reader(const std::vector<SourceFile>& files) { program_.files = files; }
+  explicit KukaDataReader(const std::vector<SourceFile>& files) { program_.files = files; }
 
   KukaData read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
@@ -121,6 +121,8 @@ class Reader {
 
 }  // namespace
 
-KukaData read_kuka_data(const std::vector<SourceFile>& files) { return Reader(files).read(); }
+KukaData read_kuka_data(const std::vector<SourceFile>& files) {
+  return KukaDataReader(files).read();
+}
 
 }  // namespace trammel::cam

@@ -9,7 +9,7 @@ namespace trammel::cam::krl {
 
 namespace {
 
-constexpr int kDeepest = 8;  // brackets within brackets
+constexpr int kDeepestBrackets = 8;  // brackets within brackets
 
 constexpr Lexis kLexis = {";", "\"'", false, false};
 
@@ -22,9 +22,9 @@ double bits_of(const std::string& text) {
   return static_cast<double>(std::strtol(text.c_str() + 2, nullptr, base));
 }
 
-class Reader {
+class LineReader {
  public:
-  Reader(const Tokens& tokens, std::size_t at) : tokens_(tokens), at_(at) {}
+  LineReader(const Tokens& tokens, std::size_t at) : tokens_(tokens), at_(at) {}
 
   [[nodiscard]] Token token() const { return tokens_[at_]; }
   [[nodiscard]] bool is(std::string_view sign) const { return token().is_sign(sign); }
@@ -38,7 +38,7 @@ class Reader {
 
   Value value(int depth = 0) {
     Value made;
-    if (at_end() || depth > kDeepest) return made;
+    if (at_end() || depth > kDeepestBrackets) return made;
     made.begin = token().begin;
     const bool has_sign = (is("-") || is("+")) && tokens_[at_ + 1].is_number();
     if (has_sign || token().is_number()) {
@@ -145,7 +145,7 @@ std::vector<Line> lines_of(std::string_view text, std::string_view capitals) {
 
 std::vector<Value> operands_at(const Tokens& tokens, std::size_t at, std::size_t* next) {
   std::vector<Value> operands;
-  Reader reader(tokens, at);
+  LineReader reader(tokens, at);
   do {
     if (reader.at_end()) {
       operands.clear();

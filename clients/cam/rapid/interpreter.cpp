@@ -16,7 +16,7 @@ namespace {
 
 using Kind = Expression::Kind;
 
-constexpr int kDeepest = 60;               // names that stand for names
+constexpr int kDeepestCall = 60;           // names that stand for names
 constexpr std::size_t kMostWaysIn = 2000;  // into one routine
 
 struct BuiltIn {
@@ -256,7 +256,7 @@ Told<std::pair<const Expression*, const Scope*>> Interpreter::handed_over(
     const Expression& expression, const Scope& scope) const {
   const Expression* now = &expression;
   const Scope* where = &scope;
-  for (int depth = 0; now->kind == Kind::kName && depth < kDeepest; ++depth) {
+  for (int depth = 0; now->kind == Kind::kName && depth < kDeepestCall; ++depth) {
     const auto found = find(now->name, *where);
     if (!found || found->declaration->storage != Storage::kParameter) break;
     const Told<const Expression*> argument = bound(*found->declaration, *where);
@@ -292,7 +292,7 @@ std::optional<Interpreter::Field> Interpreter::field(const std::string& type,
 
 std::string Interpreter::type_of(const Expression& expression, const Scope& scope,
                                  int depth) const {
-  if (depth > kDeepest) return "";
+  if (depth > kDeepestCall) return "";
   switch (expression.kind) {
     case Kind::kName: {
       const auto found = find(expression.name, scope);
@@ -320,7 +320,7 @@ std::string Interpreter::type_of(const Expression& expression, const Scope& scop
 
 Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const Scope& scope,
                                              int depth) const {
-  if (depth > kDeepest) return because("it stands for itself");
+  if (depth > kDeepestCall) return because("it stands for itself");
   switch (expression.kind) {
     case Kind::kName: {
       const auto found = find(expression.name, scope);

@@ -11,7 +11,7 @@ namespace trammel {
 namespace {
 
 /// Where the flange was by the arm of before, and what was measured of one tool.
-struct ToolPoses {
+struct FlangeAndPoints {
   std::vector<Pose> X_BF, oriented_X_BF, oriented_X_WT;
   std::vector<Vector3> points;
   Pose X_FT = Pose::Identity();  ///< where the tool is believed to be
@@ -25,12 +25,12 @@ struct ToolPoses {
   }
 };
 
-std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before,
-                                               const MeasurementBatch& batch) {
-  std::map<std::string, ToolPoses> tools;
+std::map<std::string, FlangeAndPoints> poses_by_tool(const PhysicalModel& before,
+                                                     const MeasurementBatch& batch) {
+  std::map<std::string, FlangeAndPoints> tools;
   for (const Measurement& m : batch.measurements) {
     const ArmState arm = before.state(m.context);
-    ToolPoses& poses = tools[m.context.tool];
+    FlangeAndPoints& poses = tools[m.context.tool];
     poses.X_FT = arm.X_FT;
     poses.X_BF.push_back(arm.X_WB.inverse() * before.pose_W(m.context) * arm.X_FT.inverse());
     poses.points.push_back(m.p_W);
@@ -43,10 +43,10 @@ std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before,
 
 /// The base from tools that are known: by positions or, where they do not span a plane, by
 /// orientations.
-Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
+Result<Pose> base_under(const std::vector<const FlangeAndPoints*>& tools) {
   std::vector<Vector3> measured, expected;
   Matrix3 turn = Matrix3::Zero();
-  for (const ToolPoses* tool : tools) {
+  for (const FlangeAndPoints* tool : tools) {
     for (std::size_t i = 0; i < tool->points.size(); ++i) {
       measured.push_back(tool->points[i]);
       expected.push_back(tool->X_BF[i] * tool->X_FT.translation());
@@ -66,7 +66,7 @@ Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
 }
 
 /// Base and tool at once, from the poses of one unknown tool.
-Result<BaseAndTool> base_and_tool(const ToolPoses& tool) {
+Result<BaseAndTool> base_and_tool(const FlangeAndPoints& tool) {
   Result<BaseAndTool> found = tool.full()
                                   ? locate_base_and_tool(tool.oriented_X_WT, tool.oriented_X_BF)
                                   : locate_base_and_tool_point(tool.p_W(), tool.X_BF);
@@ -81,7 +81,7 @@ Result<BaseAndTool> base_and_tool(const ToolPoses& tool) {
 }
 
 /// The tool from a base that is known; without orientations its rotation stays as it was.
-Result<Pose> tool_on(const Pose& X_WB, const ToolPoses& tool) {
+Result<Pose> tool_on(const Pose& X_WB, const FlangeAndPoints& tool) {
   std::vector<Pose> X_WF;
   for (const Pose& X : tool.full() ? tool.oriented_X_BF : tool.X_BF) X_WF.push_back(X_WB * X);
   if (tool.full()) return locate_tool(tool.oriented_X_WT, X_WF);
@@ -113,11 +113,11 @@ Error with_advice(Error error) {
 Status locate_refitted_frames(const PhysicalModel& before, const MeasurementBatch& batch, bool base,
                               bool tool, PhysicalModel& model) {
   if (!base && !tool) return {};
-  std::map<std::string, ToolPoses> tools = poses_by_tool(before, batch);
+  std::map<std::string, FlangeAndPoints> tools = poses_by_tool(before, batch);
   const Cell& cell = *model.cell;
   const auto to_find = [&](const std::string& name) { return tool && !cell.tools.at(name); };
   Pose X_WB = before.state(batch.measurements.front().context).X_WB;
-  std::vector<const ToolPoses*> known;
+  std::vector<const FlangeAndPoints*> known;
   for (auto& [name, poses] : tools) {
     if (to_find(name)) continue;
     if (tool) poses.X_FT = *cell.tools.at(name);

@@ -23,12 +23,12 @@ double lower_median(std::vector<double> values) {
 
 /// Squared residuals of one kind in units of their variance, and that variance itself, session by
 /// session.
-struct Squares {
+struct SquaresBySession {
   std::vector<std::vector<double>> ratio;
   std::vector<double> variance;  // sums
   std::vector<double> poses;     // joint vectors
 
-  explicit Squares(std::size_t sessions)
+  explicit SquaresBySession(std::size_t sessions)
       : ratio(sessions), variance(sessions, 0.0), poses(sessions, 0.0) {}
   /// One of so many of its joint vector.
   void add(int session, double square, double of, int together) {
@@ -40,7 +40,7 @@ struct Squares {
 };
 
 /// The variance that each session has beyond the others.
-std::vector<double> beyond_others(const Squares& squares, double share) {
+std::vector<double> beyond_others(const SquaresBySession& squares, double share) {
   const std::size_t S = squares.ratio.size();
   std::vector<double> level(S, 0.0), beyond(S, 0.0), all;
   for (std::size_t s = 0; s < S; ++s) {
@@ -65,7 +65,7 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
 
 void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights,
                    const MeasurementBatch& batch, std::vector<SessionSetting>& sessions) {
-  Squares positions(sessions.size()), rotations(sessions.size());
+  SquaresBySession positions(sessions.size()), rotations(sessions.size());
   Eigen::Index turned = 0;
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     const Measurement& m = batch.measurements[i];

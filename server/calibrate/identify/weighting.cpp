@@ -23,7 +23,7 @@ constexpr double kLeastShare =
 
 /// Squared residuals, each of so many axes, with their variances and how often the model's own
 /// enters them.
-struct Squares {
+struct WeightedSquares {
   std::vector<double> square, variance, times;
   double axes = 0;
 
@@ -37,7 +37,7 @@ struct Squares {
 
 /// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory
 /// variance); 0 where the residuals are no larger than their sigmas.
-double surplus(const Squares& r, double freedom) {
+double surplus(const WeightedSquares& r, double freedom) {
   const auto chi2 = [&](double s) {
     double sum = 0;
     for (std::size_t i = 0; i < r.square.size(); ++i)
@@ -68,8 +68,8 @@ double sigmas_of_gauge(const Residuals& r, Eigen::Index i, const Weights& weight
 
 /// Positions and gauges: the model's own error is the same in any direction. With `weights` without
 /// what is a suspect under them.
-Squares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
-  Squares lengths;
+WeightedSquares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
+  WeightedSquares lengths;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
     if (weights && sigmas_of(r, i, *weights) > kSuspect) continue;
     lengths.add(r.position.col(i).squaredNorm(), r.sigma(i), 1, 3);
@@ -81,8 +81,8 @@ Squares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
   return lengths;
 }
 
-Squares turns_of(const Residuals& r) {
-  Squares turns;
+WeightedSquares turns_of(const Residuals& r) {
+  WeightedSquares turns;
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i)
     turns.add(r.rotation.col(i).squaredNorm(), r.sigma_rotation(i), 1, 3);
   return turns;
@@ -112,7 +112,7 @@ SeenTogether seen_together(const Residuals& r, const std::vector<Eigen::Index>& 
 double shared_by_poses(const Residuals& r, const Freedom& freedom, double discrepancy,
                        const Weights& before, bool drop_suspects) {
   if (r.together.empty()) return 0;
-  Squares means;
+  WeightedSquares means;
   double most = std::pow(discrepancy, 2);
   for (const std::vector<Eigen::Index>& columns : r.together) {
     const SeenTogether seen = seen_together(r, columns);
@@ -231,10 +231,11 @@ Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch
 
 Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before,
                           bool drop_suspects) {
-  const Squares turns = turns_of(r);
+  const WeightedSquares turns = turns_of(r);
   const double lengths =
       3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size());
-  const Squares trusted = lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
+  const WeightedSquares trusted =
+      lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
   const double discrepancy =
       surplus(trusted, trusted.axes * share_left(freedom.positions, lengths));
   return {discrepancy, surplus(turns, turns.axes * share_left(freedom.turns, turns.axes)), true,

@@ -29,7 +29,7 @@ constexpr double kNarrow =
 constexpr double kLeastSpread = 1e-9;   // rad, s or of a unit variance: less is a constant
 constexpr double kLeastTorque = 1e-12;  // Nm, against division by zero
 constexpr double kFarOut = 30;          // standard deviations, beyond which erfc() is zero
-constexpr int kHalvings = 200;          // of an interval: more than a double can hold
+constexpr int kTailHalvings = 200;      // of an interval: more than a double can hold
 
 /// Distances between rows, less the means of their rows and columns.
 MatrixXd centred_distances(const MatrixXd& rows) {
@@ -96,7 +96,7 @@ class WeightedChiSquare {
   double saddlepoint(double x) const {
     double low = 0;
     double high = 0.5 / largest_;
-    for (int k = 0; k < kHalvings; ++k) {
+    for (int k = 0; k < kTailHalvings; ++k) {
       const double middle = 0.5 * (low + high);
       (slope(middle) < x ? low : high) = middle;
     }

@@ -54,13 +54,6 @@ Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& mo
   return source;
 }
 
-VectorXd scales_of(const std::vector<Parameter>& parameters) {
-  VectorXd scales(static_cast<Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k)
-    scales(static_cast<Index>(k)) = parameters[k].prior_scale;
-  return scales;
-}
-
 /// Place of `source`'s first parameter among all of the model's.
 Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
   Index first = 0;
@@ -107,6 +100,13 @@ LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nu
 }
 
 }  // namespace
+
+VectorXd scales_of(const std::vector<Parameter>& parameters) {
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    scales(static_cast<Index>(k)) = parameters[k].prior_scale;
+  return scales;
+}
 
 /// The model with every wanted source in it, each at zero: then none changes what another does.
 struct LinearProblem::Extended {

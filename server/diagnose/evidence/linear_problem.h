@@ -107,4 +107,7 @@ class LinearProblem {
   Spread position_, rotation_;
 };
 
+/// The prior scale of each parameter, in its own unit.
+[[nodiscard]] Eigen::VectorXd scales_of(const std::vector<Parameter>& parameters);
+
 }  // namespace trammel::cause_search

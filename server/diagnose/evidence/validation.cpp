@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kFarthest =
     400;  // of chi-square: beyond it no chance is left that a double tells from 0
-constexpr int kHalvings = 60;  // of an interval: all that a double can hold
+constexpr int kChanceHalvings = 60;  // of an interval: all that a double can hold
 
 /// The value that chi-square of three degrees of freedom exceeds with that chance.
 double chi_square_3(double chance) {
@@ -26,7 +26,7 @@ double chi_square_3(double chance) {
   };
   double low = 0;
   double high = kFarthest;
-  for (int k = 0; k < kHalvings; ++k) {
+  for (int k = 0; k < kChanceHalvings; ++k) {
     const double middle = 0.5 * (low + high);
     (beyond(middle) > chance ? low : high) = middle;
   }
@@ -38,13 +38,6 @@ struct Judged {
   Eigen::Matrix3Xd error_B;  ///< m
   VectorXd distance;  ///< squared error over the expected one: chi-square of three if the row fits
 };
-
-VectorXd scales_of(const std::vector<Parameter>& parameters) {
-  VectorXd scales(static_cast<Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k)
-    scales(static_cast<Index>(k)) = parameters[k].prior_scale;
-  return scales;
-}
 
 Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
   const PhysicalModel& model = fitted.model();

@@ -227,10 +227,6 @@ bool Doubt::is_as_good(std::size_t f, double made) const {
          (made > thresholds::kWholeShare * whole_ || gap(f) < thresholds::kMoreNumbers);
 }
 
-void add(std::vector<Cause>& causes, const Cause& cause) {
-  if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
-}
-
 }  // namespace
 
 Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,

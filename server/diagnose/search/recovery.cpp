@@ -11,10 +11,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kRepetitions = 25;  // of each size: a share is known to a tenth
+constexpr Index kRepetitionsOfASize = 25;  // of each size: a share is known to a tenth
 constexpr double kStrengths[] = {5, 15, 30, 45, 60, 90, 150};  // hidden, from never named to always
 
-/// A family's effect at every size, in noise: R x (sizes * kRepetitions).
+/// A family's effect at every size, in noise: R x (sizes * kRepetitionsOfASize).
 struct Hidden {
   Recovery recovery;  ///< sizes, nothing named yet
   MatrixXd data;
@@ -30,11 +30,12 @@ std::optional<Hidden> hidden_in(const MatrixXd& noise, const LinearProblem& prob
   if (strength < 1) return std::nullopt;
   const auto sizes = static_cast<Index>(std::size(kStrengths));
   Hidden hidden{{family.cause(typical), VectorXd(sizes), VectorXd::Zero(sizes)},
-                MatrixXd(problem.rows(), sizes * kRepetitions)};
+                MatrixXd(problem.rows(), sizes * kRepetitionsOfASize)};
   for (Index k = 0; k < sizes; ++k) {
     const double size = std::sqrt(kStrengths[k] / strength);
     hidden.recovery.effect_rms(k) = size * problem.position_rms(effect);
-    hidden.data.middleCols(k * kRepetitions, kRepetitions) = noise.colwise() + size * effect;
+    hidden.data.middleCols(k * kRepetitionsOfASize, kRepetitionsOfASize) =
+        noise.colwise() + size * effect;
   }
   return hidden;
 }
@@ -47,8 +48,8 @@ void count_named(const Winners& won, const std::vector<FamilyPtr>& families, dou
     const Family& winner = *families[static_cast<std::size_t>(won.family[d])];
     const Cause cause = winner.cause(winner.typical());
     if (cause.cause == recovery.cause.cause && cause.joint == recovery.cause.joint)
-      recovery.named(static_cast<Index>(d) / kRepetitions) +=
-          1.0 / static_cast<double>(kRepetitions);
+      recovery.named(static_cast<Index>(d) / kRepetitionsOfASize) +=
+          1.0 / static_cast<double>(kRepetitionsOfASize);
   }
 }
 
@@ -58,7 +59,7 @@ std::vector<Recovery> recovery_of(const LinearProblem& problem,
                                   const std::vector<FamilyPtr>& families,
                                   const Background& background, const Chance& chance,
                                   const std::vector<std::size_t>& places, std::uint64_t seed) {
-  const MatrixXd noise = draw_null(background, kRepetitions, seed);
+  const MatrixXd noise = draw_null(background, kRepetitionsOfASize, seed);
   std::vector<Recovery> all;
   for (const std::size_t place : places) {
     std::optional<Hidden> hidden = hidden_in(noise, problem, *families[place], background);

@@ -49,10 +49,6 @@ bool begins_a_session(const MeasurementBatch& rows, const std::string& pose_id) 
   return false;
 }
 
-void add(std::vector<Cause>& causes, const Cause& cause) {
-  if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
-}
-
 /// Whether the finding may have begun with a session.
 bool may_begin_with_session(const Finding& finding, const MeasurementBatch& rows) {
   return begins_a_session(rows, finding.cause.pose_id) ||

@@ -18,10 +18,6 @@ bool contains(const std::vector<Cause>& causes, const Cause& cause) {
   return std::find(causes.begin(), causes.end(), cause) != causes.end();
 }
 
-void add(std::vector<Cause>& causes, const Cause& cause) {
-  if (!contains(causes, cause)) causes.push_back(cause);
-}
-
 bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }

@@ -17,12 +17,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPositionLimit = 1e3;  // m
-constexpr double kTurnsLimit = 10;      // of a joint
+constexpr double kFarthest = 1e3;   // m
+constexpr double kTurnsLimit = 10;  // of a joint
 constexpr std::size_t kMostJoints = 12;
 constexpr std::size_t kPositionalJoints = 6;
 constexpr std::size_t kFewestColumns = 9;  // of a layout by position
-constexpr double kInch = 0.0254;           // m
+constexpr double kMetresPerInch = 0.0254;  // m
 
 enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kQuaternion };
 
@@ -72,7 +72,7 @@ Result<ScaledColumn> scaled(const CsvTable& table, std::size_t column, std::stri
   if (unit == "deg") return ScaledColumn{column, from_deg(1), true};
   if (unit == "rad") return ScaledColumn{column, 1, true};
   if (unit == "m") return ScaledColumn{column, 1, false};
-  if (unit == "in") return ScaledColumn{column, kInch, false};
+  if (unit == "in") return ScaledColumn{column, kMetresPerInch, false};
   return ScaledColumn{column, from_mm(1), false};
 }
 
@@ -226,7 +226,7 @@ std::vector<std::string> positional_names(std::size_t count) {
 
 /// Refuses numbers without any decimal point between commas: of half as many numbers with decimal
 /// commas they cannot be told.
-Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& where) {
+Status check_commas_of_columns(const std::vector<CsvTable::Row>& rows, const std::string& where) {
   for (const CsvTable::Row& row : rows) {
     const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
     if (row.fields.size() <= kFewestColumns ||
@@ -276,7 +276,7 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
           .at_row(header.line);
     }
     if (separator == ',' && !has_header) {
-      TRY(check_commas(rows, where));
+      TRY(check_commas_of_columns(rows, where));
     }
   }
   return CsvTable::from_rows(where, header, rows, separator).map([&](CsvTable table) {
@@ -293,7 +293,7 @@ Result<RoboDkColumns> find_columns(const RoboDkTable& parts) {
 
 Result<double> read_scaled(const CsvTable& table, std::size_t row, const ScaledColumn& column,
                            double angle_limit) {
-  const double limit = column.angle ? angle_limit : kPositionLimit;
+  const double limit = column.angle ? angle_limit : kFarthest;
   return table.number(row, column.column, limit / column.scale).map([&](double value) {
     return value * column.scale;
   });

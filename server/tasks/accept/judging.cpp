@@ -81,7 +81,7 @@ std::vector<Indices> drawn_poses(const MeasurementBatch& batch, double share, st
 }
 
 /// Measurements to recognise.
-class Rows {
+class JudgeRows {
  public:
   void add(const MeasurementBatch& batch) {
     for (const Measurement& m : batch.measurements) rows_.emplace(m.p_W.x(), m);
@@ -174,7 +174,7 @@ JudgingSession judging_session(const CheckedBatch& batch) {
 }
 
 void judge_once(std::vector<JudgingSession>& sessions) {
-  Rows older;
+  JudgeRows older;
   for (JudgingSession& session : sessions) {
     const MeasurementBatch drawn = session.judges;
     std::erase_if(session.judges.measurements, [&](const Measurement& m) { return older.has(m); });
@@ -185,7 +185,7 @@ void judge_once(std::vector<JudgingSession>& sessions) {
 
 CheckedBatch without_older_judges(const CheckedBatch& batch,
                                   const std::vector<JudgingSession>& sessions) {
-  Rows judges;
+  JudgeRows judges;
   for (const JudgingSession& session : sessions) {
     if (session.batch_id == batch.id()) break;
     judges.add(session.judges);

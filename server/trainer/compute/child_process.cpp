@@ -24,7 +24,7 @@ namespace trammel {
 
 namespace {
 
-constexpr int kGone = 1000;  // ms that a killed process is waited for
+constexpr int kKilledIsGone = 1000;  // ms that a killed process is waited for
 
 Failure failed(const char* what, int error) {
   return failure(ErrorCode::kInternal, "the process to compute in cannot be started: {}: {}", what,
@@ -177,7 +177,7 @@ void ChildProcess::kill() {
   static_cast<void>(usage());
   ::kill(pid_, SIGKILL);
   pollfd gone{pidfd_.get(), POLLIN, 0};
-  while (::poll(&gone, 1, kGone) < 0 && errno == EINTR) continue;
+  while (::poll(&gone, 1, kKilledIsGone) < 0 && errno == EINTR) continue;
   reap();
 }
 

@@ -29,7 +29,7 @@ constexpr int kNiceness =
 constexpr rlim_t kTimeBeyond =
     60;  // s after the limit of processor time: the service ends it before that
 constexpr std::chrono::milliseconds kReportInterval{50};
-constexpr int kGone = 1;  // exit code where the other end is
+constexpr int kParentIsGone = 1;  // exit code where the other end is
 
 void write_to(const char* path, std::string_view text) {
   const int file = ::open(path, O_WRONLY | O_CLOEXEC);
@@ -147,7 +147,7 @@ class Answers {
     for (std::size_t sent = 0; sent < bytes.size();) {
       const ssize_t n = ::send(channel_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) ::_exit(kGone);
+      if (n <= 0) ::_exit(kParentIsGone);
       sent += static_cast<std::size_t>(n);
     }
   }
@@ -156,7 +156,7 @@ class Answers {
     std::array<char, 65536> buffer;
     while (true) {
       auto frame = reader_.next();
-      if (!frame) ::_exit(kGone);
+      if (!frame) ::_exit(kParentIsGone);
       if (*frame) return std::move(**frame);
       const ssize_t n = ::recv(channel_, buffer.data(), buffer.size(), 0);
       if (n < 0 && errno == EINTR) continue;
@@ -183,7 +183,7 @@ int compute_main(const std::vector<std::string>& arguments) {
              processor_s = number(arguments[2]);
   if (!parent || !memory_mb || !processor_s) return kUsage;
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != *parent) return kGone;  // it was gone before that was set
+  if (::getppid() != *parent) return kParentIsGone;  // it was gone before that was set
   step_back();
   limit_resources(static_cast<rlim_t>(*memory_mb) << 20, static_cast<rlim_t>(*processor_s));
   Answers(ChildProcess::kChannel).give();
