@@ -7,6 +7,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
+#include "server/tasks/train/told_by_training.h"
 
 /// What the values of the library are made of.
 namespace trammel::api {
@@ -22,6 +23,7 @@ struct Batch::Inside {
 
 struct Model::Inside {
   CompensatedModel model;
+  ToldByTraining told = {};  ///< of one that was trained here; a file keeps the model's own notes
 };
 
 }  // namespace trammel::api

@@ -29,6 +29,7 @@
 #include "server/simulate/simulate.h"
 #include "server/tasks/train/extend.h"
 #include "server/tasks/train/first_batch.h"
+#include "server/tasks/train/told_by_training.h"
 #include "server/tasks/train/train.h"
 
 namespace trammel::api {
@@ -346,7 +347,9 @@ std::string Model::budget_json() const {
   return budget ? trammel::budget_json(*budget).dump() : "null";
 }
 
-std::vector<Note> Model::notes() const { return library::to_api(notes_of(inside_->model)); }
+std::vector<Note> Model::notes() const {
+  return library::to_api(inside_->told.beside(notes_of(inside_->model)));
+}
 
 Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg,
                                                const Context& context) const {
@@ -413,7 +416,13 @@ Result<Model> train(const Cell& cell, std::span<const Batch> batches, const Trai
     const auto first = check_first_batch(cell.inside().cell, *batch, options.level);
     if (!first) return passed_on(first);
   }
+  std::vector<FleetMember> twins;
+  for (const Model& twin : options.fleet)
+    twins.push_back({twin.inside().model.cell().name, twin.inside().model});
+  auto fleet = prior_of_twins(*cell.inside().cell, twins);
+  if (!fleet) return passed_on(fleet);
   trammel::TrainOptions how;
+  how.fleet = std::move(*fleet);
   how.looked_at = options.as_read;
   how.level = options.level;
   how.bias = options.bias;
@@ -424,7 +433,9 @@ Result<Model> train(const Cell& cell, std::span<const Batch> batches, const Trai
   };
   auto model = trammel::train(cell.inside().cell, *batch, how);
   if (!model) return passed_on(model);
-  return Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(*model)}));
+  ToldByTraining told = told_by_training(*model, *batch, how);
+  return Model(
+      std::make_shared<const Model::Inside>(Model::Inside{std::move(*model), std::move(told)}));
 }
 
 Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches,

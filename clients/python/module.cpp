@@ -455,15 +455,16 @@ void add_work(py::module_& m) {
       "train",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches,
          std::optional<std::string> level, std::optional<std::string> bias, std::uint64_t seed,
-         double validation_share, const py::object& progress, bool as_read) {
+         double validation_share, const py::object& progress, bool as_read,
+         const std::vector<api::Model>& fleet) {
         return told_of(progress, [&](api::Progress told) {
           return api::train(cell, batches,
                             {std::move(level), std::move(bias), seed, validation_share,
-                             std::move(told), as_read});
+                             std::move(told), as_read, fleet});
         });
       },
       "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a,
-      "as_read"_a);
+      "as_read"_a, "fleet"_a);
   m.def(
       "diagnose",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::uint64_t seed,

@@ -691,9 +691,9 @@ class Guards(unittest.TestCase):
         done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
-    def at_the_command_line(self, path):
-        return self.run_program(BUILD / "clients/trammel", "train", "--cell", self.path, "--batch", path, "-o",
-                                self.folder / "m.model", "--json", self.folder / "m.json")
+    def at_the_command_line(self, path, *options, cell=None):
+        return self.run_program(BUILD / "clients/trammel", "train", "--cell", cell or self.path, "--batch", path, "-o",
+                                self.folder / "m.model", "--json", self.folder / "m.json", *options)
 
     def applied_at_the_command_line(self, path):
         return self.run_program(BUILD / "clients/trammel", "diagnose", "--cell", self.path, "--batch", path, "--apply", "--cell-out",
@@ -747,6 +747,43 @@ class Guards(unittest.TestCase):
                     self.assertEqual(code, 3, said)
                     self.assertIn(words, said)
                 self.assertIn(words, self.words_of_the_service(batch))
+
+    def test_what_changed_in_a_batch_that_somebody_has_looked_at_is_told_with_the_model_at_every_door(self):
+        path, batch = self.bad_batches()["zero-2"]
+        code, said = self.at_the_command_line(path, "--as-read")
+        self.assertEqual(code, 0, said)
+        notes = json.loads((self.folder / "m.json").read_text())["notes"]
+        changed = [note for note in notes if note["code"] == "changed_within_batch"]
+        self.assertEqual([note["severity"] for note in changed], ["warning"], notes)
+        self.assertIn("lost zero in joint 2", changed[0]["text"])
+        self.assertIn(changed[0]["text"], said)
+        self.assertEqual(trammel.train(self.cell, batch, as_read=True).notes, notes)
+
+    def test_a_cell_that_counts_on_its_twins_gets_them_at_every_door_or_is_refused(self):
+        batch = trammel.Batch.parse(self.batch("twin", lambda i, row: {})[0].read_text(), "twin")
+        twins = [trammel.train(self.cell, trammel.simulate(self.cell, TRUTH, trammel.plan(self.cell, 60, seed=seed), seed=seed))
+                 for seed in (11, 12, 13)]
+        among = self.folder / "among-twins.yaml"
+        among.write_text(self.path.read_text() + "prior: fleet\n")
+        cell = trammel.Cell.load(among)
+        with self.assertRaises(trammel.Usage) as raised:
+            trammel.train(cell, batch)
+        self.assertIn("no robot of its type is named", raised.exception.message)
+        code, said = self.at_the_command_line(self.folder / "twin.csv", cell=among)
+        self.assertEqual(code, 2, said)
+        self.assertIn(raised.exception.message, said)
+        named = []
+        for k, twin in enumerate(twins):
+            twin.save(self.folder / f"twin-{k}.model")
+            named += ["--fleet", self.folder / f"twin-{k}.model"]
+        code, said = self.at_the_command_line(self.folder / "twin.csv", *named, cell=among)
+        self.assertEqual(code, 0, said)
+        drawn, alone = trammel.train(cell, batch, fleet=twins), trammel.train(self.cell, batch)
+        told = json.loads((self.folder / "m.json").read_text())
+        self.assertEqual(drawn.notes, told["notes"])
+        values = [parameter["value"] for parameter in drawn.parameters]
+        np.testing.assert_allclose(values, [parameter["value"] for parameter in told["parameters"]], rtol=1e-9, atol=1e-12)
+        self.assertNotEqual(values, [parameter["value"] for parameter in alone.parameters])
 
     def test_what_a_diagnosis_tells_is_the_same_at_every_door(self):
         path, batch = self.bad_batches()["zero-2"]

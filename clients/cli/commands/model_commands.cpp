@@ -13,7 +13,6 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
-#include "server/calibrate/jump.h"
 #include "server/compensate/budget/error_budget.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
@@ -28,9 +27,9 @@
 #include "server/report/model_page.h"
 #include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
-#include "server/robot/cell_rules.h"
 #include "server/tasks/train/first_batch.h"
 #include "server/tasks/train/refitted.h"
+#include "server/tasks/train/told_by_training.h"
 #include "server/tasks/train/train.h"
 
 namespace trammel::cli {
@@ -79,32 +78,13 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
                         causes_in_words(refit)));
 }
 
-/// The parameters that robots of the cell's type share, by the models of `paths`; empty where no
-/// paths are given.
-Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths,
-                                              const Cell& cell) {
-  const CellRules rules = TRY(rules_of(cell));
-  if (!rules.fleet_prior && paths.empty()) return std::optional<FleetPrior>();
-  if (paths.empty()) {
-    return failure(ErrorCode::kUsage,
-                   "cell {} says prior: fleet, and no robot of its type is named", cell.name)
-        .of("--fleet")
-        .next("name their models, --fleet once for each");
-  }
-  std::vector<FleetMember> members;
+Result<std::vector<FleetMember>> twins_of(const std::vector<std::string>& paths) {
+  std::vector<FleetMember> twins;
   for (const std::string& path : paths) {
     CompensatedModel model = TRY(load_model(path));
-    members.push_back({path, std::move(model)});
+    twins.push_back({path, std::move(model)});
   }
-  return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) {
-    return std::optional(std::move(prior));
-  });
-}
-
-std::string unlike_text(const std::vector<Unlike>& unlike) {
-  std::string text;
-  for (const Unlike& one : unlike) text += "unlike its twins: " + to_string(one) + "\n";
-  return text;
+  return twins;
 }
 
 nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
@@ -118,23 +98,6 @@ nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
                     {"z", one.z}});
   }
   return json;
-}
-
-/// A change that began in the middle of the batch, beside all that the model has.
-std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatch& batch) {
-  auto cell = std::make_shared<Cell>(*model.parts().physics.cell);
-  cell->model.error_sources.clear();
-  for (const ErrorSourcePtr& source : model.parts().physics.sources)
-    cell->model.error_sources.push_back(source->name());
-  return jump_within(cell, batch.in_order_of_time(cell->robot).rows());
-}
-
-std::string jump_text(const std::optional<Jump>& jump) {
-  if (!jump) return "";
-  return fmt::format(
-      "note: something changed in the middle of the batch, {}; no single arm fits the poses before "
-      "and after\n",
-      in_words(*jump));
 }
 
 nlohmann::ordered_json jump_json(const Jump& jump) {
@@ -162,7 +125,8 @@ Status train_model(const TrainArguments& arguments) {
   options.seed = arguments.seed;
   options.trained_at = unix_now();
   options.looked_at = arguments.as_read;
-  std::optional<FleetPrior> fleet = TRY(fleet_prior(arguments.fleet, cell));
+  const std::vector<FleetMember> twins = TRY(twins_of(arguments.fleet));
+  std::optional<FleetPrior> fleet = TRY(prior_of_twins(cell, twins));
   options.fleet = std::move(fleet);
   if (!arguments.from.empty()) {
     CompensatedModel from = TRY(load_model(arguments.from));
@@ -185,11 +149,8 @@ Status train_model(const TrainArguments& arguments) {
   }());
   TRY(write_output(arguments.output, serialize(model)));
   const auto& parts = model.parts();
-  const std::vector<Unlike> unlike =
-      options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
-  const std::optional<Jump> jump =
-      arguments.as_read && !options.from ? jump_beside(model, batch) : std::nullopt;
-  tell(model_text(model) + unlike_text(unlike) + jump_text(jump) +
+  const ToldByTraining told = told_by_training(model, batch, options);
+  tell(model_text(model) + notes_text(told.notes()) +
            (parts.validation
                 ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
                       evaluation_table(*parts.validation)
@@ -199,8 +160,9 @@ Status train_model(const TrainArguments& arguments) {
                       evaluation_table(parts.training)),
        {arguments.output, arguments.json});
   nlohmann::ordered_json json = model_json(model);
-  if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
-  if (jump) json["jump"] = jump_json(*jump);
+  json["notes"] = notes_json(told.beside(notes_of(model)));
+  if (options.fleet) json["unlike_twins"] = unlike_json(told.unlike);
+  if (told.jump) json["jump"] = jump_json(*told.jump);
   return write_json(arguments.json, json);
 }
 

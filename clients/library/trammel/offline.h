@@ -185,6 +185,7 @@ class TRAMMEL_API Model {
   struct Inside;
   /// For the library itself.
   explicit Model(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+  [[nodiscard]] const Inside& inside() const { return *inside_; }
 
  private:
   std::shared_ptr<const Inside> inside_;
@@ -199,10 +200,14 @@ struct TrainOptions {
   double validation_share = 0;      ///< of the rows, held out where the batch has no column `set`
   Progress progress;                ///< may be empty
   bool as_read = false;  ///< somebody has looked at the batches: learn from them as they are
+  std::vector<Model> fleet = {};  ///< of robots of the same type, at least three: what they have in
+                                  ///< common is expected of this one. A cell with `prior: fleet`
+                                  ///< needs them
 };
 /// A model of the cell, from batches of measurements. Several batches are sessions of one arm.
 /// Refuses what the service keeps out: a batch that was read wrongly, or in the middle of which
-/// something changed.
+/// something changed. With `as_read` the model's notes tell that instead, and with `fleet` in what
+/// the robot is unlike its twins.
 [[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
                                               const TrainOptions& options = {});
 

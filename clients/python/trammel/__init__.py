@@ -449,12 +449,15 @@ class Model:
 
 
 def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optional[str] = None, seed: int = 1,
-          validation_share: float = 0.0, progress: Optional[Progress] = None, as_read: bool = False) -> Model:
+          validation_share: float = 0.0, progress: Optional[Progress] = None, as_read: bool = False,
+          fleet: Sequence[Model] = ()) -> Model:
     """A model of `cell`. `level` (`M0` to `M3`, `M2,gear_transmission:3`) and `bias` (`none`, `auto`, a kernel) instead
     of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`. A
-    batch that was read wrongly or in the middle of which something changed is refused, unless `as_read`."""
+    batch that was read wrongly or in the middle of which something changed is refused, unless `as_read`: then the
+    model's notes tell it. `fleet`: models of robots of the same type, at least three; what they have in common is
+    expected of this one. A cell with `prior: fleet` needs them."""
     return Model(_trammel.train(_inside_cell(cell), _inside_of(batches), level, bias, whole(seed, "seed"), validation_share,
-                                progress, as_read))
+                                progress, as_read, [twin._inside for twin in fleet]))
 
 
 def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Dict[str, Any]:

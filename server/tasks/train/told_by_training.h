@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "server/base/note.h"
+#include "server/calibrate/jump.h"
+#include "server/compensate/compensated_model.h"
+#include "server/measurement/checked_batch.h"
+#include "server/tasks/train/train.h"
+
+namespace trammel {
+
+/// What a training tells beside the notes of its model. The command line, the library and Python
+/// tell it in the same words.
+struct ToldByTraining {
+  std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from all the same
+  std::vector<Unlike> unlike;  ///< in what the robot is unlike its twins; empty without twins
+
+  /// `changed_within_batch` and `unlike_twins`, warnings.
+  [[nodiscard]] std::vector<Note> notes() const;
+  /// Together with those of the model, the gravest first.
+  [[nodiscard]] std::vector<Note> beside(std::vector<Note> of_model) const;
+};
+
+/// Of a model that train() made of `batch` with `options`. A model to start from has judged the
+/// batch: no jump is looked for then.
+[[nodiscard]] ToldByTraining told_by_training(const CompensatedModel& model,
+                                              const CheckedBatch& batch,
+                                              const TrainOptions& options);
+
+/// What robots of the cell's type have in common, where the cell file says `prior: fleet` or
+/// somebody names twins; empty where neither is so. Refuses a cell that asks for twins where nobody
+/// names one.
+[[nodiscard]] Result<std::optional<FleetPrior>> prior_of_twins(
+    const Cell& cell, const std::vector<FleetMember>& twins);
+
+}  // namespace trammel
