@@ -6,7 +6,7 @@
 namespace trammel::client {
 namespace {
 
-wire::PoseMm to_wire(const PoseMm& pose) {
+wire::PoseMm wire_pose(const PoseMm& pose) {
   wire::PoseMm result;
   result.x_mm(pose.x_mm);
   result.y_mm(pose.y_mm);
@@ -18,7 +18,7 @@ wire::PoseMm to_wire(const PoseMm& pose) {
   return result;
 }
 
-PoseMm from_wire(const wire::PoseMm& pose) {
+PoseMm pose_of(const wire::PoseMm& pose) {
   return {pose.x_mm(), pose.y_mm(), pose.z_mm(), pose.qw(), pose.qx(), pose.qy(), pose.qz()};
 }
 
@@ -123,7 +123,7 @@ std::optional<std::int64_t> if_known(std::int64_t unix_s) {
   return unix_s < 0 ? std::nullopt : std::optional(unix_s);
 }
 
-wire::Approach to_wire(const Approach& approach) {
+wire::Approach wire_approach(const Approach& approach) {
   wire::Approach result;
   result.directions().assign(approach.directions.begin(), approach.directions.end());
   result.temperature_c(approach.temperature_c.value_or(kUnknown));
@@ -131,7 +131,7 @@ wire::Approach to_wire(const Approach& approach) {
   return result;
 }
 
-ErrorCode from_wire(wire::ResultCode code) {
+ErrorCode code_of(wire::ResultCode code) {
   switch (code) {
     case wire::RESULT_UNSUPPORTED:
     case wire::RESULT_INVALID_ARGUMENT:
@@ -175,7 +175,7 @@ wire::Context to_wire(const CallContext& context) {
 wire::CommandedJoints to_wire(const CommandedJoints& pose) {
   wire::CommandedJoints result;
   result.joints_rad(pose.q_rad);
-  result.approach(to_wire(pose.approach));
+  result.approach(wire_approach(pose.approach));
   return result;
 }
 
@@ -186,14 +186,14 @@ wire::Target to_wire(const TargetMm& target) {
   } else {
     result.kind(target.conf ? wire::TARGET_POSE_ON_BRANCH : wire::TARGET_POSE_NEAR_JOINTS);
   }
-  result.pose(to_wire(target.pose));
+  result.pose(wire_pose(target.pose));
   result.joints_rad(target.seed_rad);
   result.conf(target.conf.value_or(0));
-  result.approach(to_wire(target.approach));
+  result.approach(wire_approach(target.approach));
   return result;
 }
 
-Note from_wire(const wire::Note& note) {
+Note note_of(const wire::Note& note) {
   constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning,
                                             Note::Severity::kStop};
   return {note.code().to_string(), kSeverities[note.severity()], note.text()};
@@ -215,15 +215,15 @@ ModelInfo from_wire(const wire::ModelInfo& info) {
   result.training_poses = info.training_poses();
   result.validation_rms_mm = if_known(info.validation_rms_mm());
   result.in_force = info.in_force();
-  for (const wire::Note& note : info.notes()) result.notes.push_back(from_wire(note));
+  for (const wire::Note& note : info.notes()) result.notes.push_back(note_of(note));
   for (const std::string& line : info.budget()) result.budget.push_back(line);
   return result;
 }
 
 PredictedError from_wire(const wire::PredictedError& prediction) {
   PredictedError result;
-  result.nominal = from_wire(prediction.nominal());
-  result.predicted = from_wire(prediction.predicted());
+  result.nominal = pose_of(prediction.nominal());
+  result.predicted = pose_of(prediction.predicted());
   result.dx_mm = prediction.dx_mm();
   result.dy_mm = prediction.dy_mm();
   result.dz_mm = prediction.dz_mm();
@@ -250,7 +250,7 @@ PredictedError from_wire(const wire::PredictedError& prediction) {
 CorrectedTarget from_wire(const wire::CorrectedTarget& correction) {
   CorrectedTarget result;
   result.status = text(correction.status());
-  result.commanded = from_wire(correction.commanded());
+  result.commanded = pose_of(correction.commanded());
   result.q_rad = correction.joints_rad();
   result.error_before_mm = correction.error_before_mm();
   result.error_after_mm = correction.error_after_mm();
@@ -320,7 +320,7 @@ namespace {
 
 Error error_of(const wire::Problem& problem) {
   Error error;
-  error.code = from_wire(problem.code());
+  error.code = code_of(problem.code());
   error.message = problem.what();
   error.file = problem.file();
   if (problem.row() > 0) error.row = static_cast<long>(problem.row());
@@ -337,8 +337,8 @@ Error error_of(const wire::Problem& problem) {
 Error error_of(const wire::ReplyHeader& header) {
   std::vector<Error> problems;
   for (const wire::Problem& problem : header.problems()) problems.push_back(error_of(problem));
-  if (problems.empty()) return failure(from_wire(header.result()), "{}", header.message()).value();
-  problems.front().code = from_wire(header.result());
+  if (problems.empty()) return failure(code_of(header.result()), "{}", header.message()).value();
+  problems.front().code = code_of(header.result());
   return together(std::move(problems));
 }
 

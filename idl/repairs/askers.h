@@ -15,8 +15,8 @@ namespace trammel::wire {
 /// True if the message asks for numbers of what discovery tells of our endpoints.
 [[nodiscard]] inline bool asks_for_endpoints(Bytes message) {
   constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;
-  if (message.size() < kHeader) return false;
-  Bytes rest = message.subspan(kHeader);
+  if (message.size() < kHeaderBytes) return false;
+  Bytes rest = message.subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id != kAckNack) continue;
     Reader body(submessage->body, submessage->little_endian());

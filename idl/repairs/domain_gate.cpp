@@ -120,8 +120,8 @@ Place place_of(Bytes announcement) {
 /// True if `found` is true for any DATA in the message.
 template <typename Found>
 bool any_data(Bytes message, const Found& found) {
-  if (message.size() < kHeader) return false;
-  Bytes rest = message.subspan(kHeader);
+  if (message.size() < kHeaderBytes) return false;
+  Bytes rest = message.subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id != kData) continue;
     const auto data = data_of(submessage->body, submessage->flags);
@@ -141,7 +141,7 @@ class Gate final : public rtps::ChainingTransport {
   bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size,
             LocatorsIterator* first, LocatorsIterator* last,
             const std::chrono::steady_clock::time_point& limit) override {
-    if (size >= kHeader && !knows_itself_) {
+    if (size >= kHeaderBytes && !knows_itself_) {
       const MutexLock lock(mutex_);
       if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
       knows_itself_ = true;
@@ -205,12 +205,12 @@ class Gate final : public rtps::ChainingTransport {
   }
 
   [[nodiscard]] bool is_own(Bytes message) const {
-    if (!knows_itself_ || message.size() < kHeader) return false;
+    if (!knows_itself_ || message.size() < kHeaderBytes) return false;
     return std::equal(own_prefix_.begin(), own_prefix_.end(), message.begin() + kPrefixAt);
   }
 
   bool is_let_in(Bytes message) {
-    if (message.size() < kHeader) return true;
+    if (message.size() < kHeaderBytes) return true;
     const LostLeases::Time now = LostLeases::now();
     leases_.awake(now);
     LostLeases::Prefix prefix;

@@ -17,9 +17,9 @@ struct Lone {
   Bytes to{};  // prefix; empty: everybody
 };
 std::optional<Lone> lone_submessage(Bytes message) {
-  if (message.size() < kHeader) return std::nullopt;
+  if (message.size() < kHeaderBytes) return std::nullopt;
   std::optional<Lone> lone;
-  Bytes to, rest = message.subspan(kHeader);
+  Bytes to, rest = message.subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
     if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix)
@@ -93,8 +93,8 @@ bool HeartbeatPace::lets_offer_out(Bytes to, std::uint32_t writer, Time now) {
 }
 
 void HeartbeatPace::heard(Bytes message, Time now) {
-  if (message.size() < kHeader) return;
-  Bytes rest = message.subspan(kHeader);
+  if (message.size() < kHeaderBytes) return;
+  Bytes rest = message.subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id != kAckNack && submessage->id != kNackFrag) continue;
     const MutexLock lock(mutex_);

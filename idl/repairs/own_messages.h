@@ -37,10 +37,10 @@ class OwnMessages {
 
   /// Not where all of it is for other participants.
   static bool may_come_back(Bytes message) {
-    if (message.size() < kHeader) return false;
+    if (message.size() < kHeaderBytes) return false;
     const Bytes self = message.subspan(kPrefixAt, kPrefix);
     bool for_others = false;
-    Bytes rest = message.subspan(kHeader);
+    Bytes rest = message.subspan(kHeaderBytes);
     while (const auto submessage = next_submessage(rest)) {
       if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
       if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix)
@@ -62,7 +62,7 @@ class OwnMessages {
   /// Without the statistics at the end: the transport below writes them anew for each destination.
   [[nodiscard]] std::uint64_t hash_of(Bytes message) const {
     std::size_t size = message.size();
-    Bytes rest = message.subspan(std::min(size, kHeader));
+    Bytes rest = message.subspan(std::min(size, kHeaderBytes));
     while (!rest.empty()) {
       const std::size_t before = message.size() - rest.size();
       const auto submessage = next_submessage(rest);

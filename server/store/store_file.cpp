@@ -12,7 +12,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kHeader =
+constexpr std::size_t kSqliteHeader =
     100;  // bytes that an SQLite file begins with: sizes, counters, whose it is
 
 bool is_same_file(const struct stat& a, const struct stat& b) {
@@ -60,8 +60,9 @@ Status StoreFile::hold() {
 }
 
 StoreFile::Left StoreFile::now(const struct stat& about) const {
-  Left left{about, std::string(kHeader, '\0'), 0};
-  const ssize_t read = descriptor_ >= 0 ? ::pread(descriptor_, left.header.data(), kHeader, 0) : 0;
+  Left left{about, std::string(kSqliteHeader, '\0'), 0};
+  const ssize_t read =
+      descriptor_ >= 0 ? ::pread(descriptor_, left.header.data(), kSqliteHeader, 0) : 0;
   left.header.resize(read > 0 ? static_cast<std::size_t>(read) : 0);
   struct stat journal {};
   if (::stat((path_ + "-wal").c_str(), &journal) == 0) left.journal = journal.st_ino;

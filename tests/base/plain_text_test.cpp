@@ -11,7 +11,7 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Refusal refusal(const std::string& name) {
+Refusal refusal_of_part(const std::string& name) {
   const Status fine = check_name(name, "pose_id");
   return refusal_of(fine);
 }
@@ -20,7 +20,7 @@ TEST(PlainText, NamesOfAnyLanguagePass) {
   for (const char* name :
        {"", "p1", "lt-07 (2)", "Fräser", "工具", "Ω", "🤖", "a\\b'\"`", "\xc2\xa0x"}) {
     EXPECT_TRUE(is_plain(name)) << name;
-    EXPECT_EQ(refusal(name), Refusal::none()) << name;
+    EXPECT_EQ(refusal_of_part(name), Refusal::none()) << name;
     EXPECT_EQ(shown(name), name);
   }
 }
@@ -53,15 +53,15 @@ TEST(PlainText, ANameThatControlsATerminalOrIsNoTextIsRefusedAndShownHarmless) {
   };
   for (const auto& [name, harmless] : wrong) {
     EXPECT_FALSE(is_plain(name)) << harmless;
-    EXPECT_EQ(refusal(name), Refusal("", {}, "pose_id").text(harmless));
+    EXPECT_EQ(refusal_of_part(name), Refusal("", {}, "pose_id").text(harmless));
     EXPECT_EQ(shown(name), harmless);
     EXPECT_EQ(shown(shown(name)), harmless);
   }
 }
 
 TEST(PlainText, ANameHasALimit) {
-  EXPECT_EQ(refusal(std::string(256, 'x')), Refusal::none());
-  EXPECT_EQ(refusal(std::string(257, 'x')),
+  EXPECT_EQ(refusal_of_part(std::string(256, 'x')), Refusal::none());
+  EXPECT_EQ(refusal_of_part(std::string(257, 'x')),
             Refusal("", {}, "pose_id").of(ErrorCode::kTooLarge).beyond(257, 256));
 }
 

@@ -25,7 +25,7 @@ void tell_times(const std::string& what, std::vector<double> times) {
 
 int measure(const test::KillPlan& plan, const std::string& history) {
   const auto begin = std::chrono::steady_clock::now();
-  const test::KillOutcome outcome = test::kill_a_fleet(plan, history);
+  const test::KilledFleetOutcome outcome = test::kill_a_fleet(plan, history);
   test::tell_figure(
       "kills: the whole run, s",
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());

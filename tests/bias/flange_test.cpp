@@ -27,7 +27,7 @@ BiasModel fit_flange(const BiasProblem& problem, const std::string& kernel) {
   BiasOptions options;
   options.kernel = kernel;
   options.starts = 4;
-  auto model = BiasModel::fit_flange(problem, options);
+  auto model = BiasModel::fit(problem, options);
   if (!model) throw std::runtime_error(model.error().message);
   return *std::move(model);
 }
@@ -381,7 +381,7 @@ TEST(Flange, MorePosesThanItsMatrixHoldsAreRefusedInWords) {
   const BiasProblem problem = seen_problem(random_joints(700, 71), {kA, kB, kC}, 71);
   BiasOptions options;
   options.kernel = "se + flange";
-  const auto model = BiasModel::fit_flange(problem, options);
+  const auto model = BiasModel::fit(problem, options);
   ASSERT_FALSE(model.has_value());
   EXPECT_EQ(refusal_of(model), Refusal("", {}, "bias").beyond(700 * 6, kMostFlangeNumbers));
 }

@@ -36,10 +36,6 @@ test::Corrected ls(const std::string& text, ReadOptions read = {}) {
   read.frames.emplace("UTOOL[2]", test::spindle_only().tools.at("spindle"));
   return corrected_by_shift(Dialect::kFanuc, {{"p1.ls", text}}, read);
 }
-std::string why(const test::Corrected& made, const std::string& name) {
-  return row_of(made.program, name).message;
-}
-
 TEST(Fanuc, OnlyNumbersOfPositionsChange) {
   const std::string text =
       program("   2:J P[1] 100% FINE ;\n   3:L P[2:\"hole; 2\"] 250mm/sec CNT50 ;\n",

@@ -30,7 +30,7 @@ Eigen::Isometry3d oracle_flange(const Joints& q) {
   }
   return X;
 }
-const Eigen::Isometry3d kTcp(Eigen::Translation3d(0, 0, .1));
+const Eigen::Isometry3d kPostureTcp(Eigen::Translation3d(0, 0, .1));
 
 Joints off(const Joints& q, const Eigen::Isometry3d& wanted) {
   const Eigen::Isometry3d X = oracle_flange(q);
@@ -81,7 +81,7 @@ std::string joints_text(const Joints& q) {
                      q(4), q(5));
 }
 std::string pose_of_joints(const Joints& q) {
-  const Eigen::Isometry3d X = oracle_flange(q) * kTcp;
+  const Eigen::Isometry3d X = oracle_flange(q) * kPostureTcp;
   const Eigen::AngleAxisd turn(X.linear());
   const Eigen::Vector3d p = X.translation(), w = turn.angle() * turn.axis();
   return fmt::format("p[{:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}]", p(0), p(1), p(2),
@@ -94,7 +94,7 @@ NominalTargets ur(const std::string& lines) {
   const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n" + lines + "end\n";
   const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, {});
   EXPECT_TRUE(program.left.empty()) << program.left[0].why;
-  return nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "")
+  return nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kPostureTcp)}}, {}}, "", "")
       .value();
 }
 /// Of the last target in the text.
@@ -215,7 +215,8 @@ TEST(Posture, JointsThatAreLeftAsTheyStandSayWhereTheArmIsAllTheSame) {
   options.keep_joints = true;
   const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, options);
   const auto made =
-      nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
+      nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kPostureTcp)}}, {}}, "", "")
+          .value();
   ASSERT_EQ(made.targets.size(), 1u);
   EXPECT_TRUE(made.targets[0].q) << made.targets[0].why_not;
 }

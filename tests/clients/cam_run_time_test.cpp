@@ -12,9 +12,6 @@ namespace {
 using test::corrected_by_shift;
 using test::row_of;
 
-std::string why(const test::Corrected& made, const std::string& name) {
-  return row_of(made.program, name).message;
-}
 std::string notes(const test::Corrected& made) {
   return fmt::format("{}", fmt::join(made.program.notes, "\n"));
 }

@@ -16,11 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kCorrectProgramNotAll = 1;
-constexpr int kWrongUsage = 2;
-constexpr int kRefusedData = 3;
+constexpr int kProgramNotAll = 1;
+constexpr int kProgramWrongUsage = 2;
+constexpr int kProgramRefusedData = 3;
 
-const std::string kCorrectProgramPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
+const std::string kProgramsFolder = TRAMMEL_SOURCE_DIR "/config/programs/";
 
 /// A model of the shipped cell that knows of no errors: what is corrected is written as it was,
 /// with its digits.
@@ -74,26 +74,27 @@ TEST_F(CorrectProgram, WhatItWasBeforeIsKeptBesideItAndRestoredByteForByte) {
   const CsvTable receipt = CsvTable::parse(text("r.csv"), "r.csv").value();
   EXPECT_EQ(receipt.field(0, receipt.find("name").value()), "p10");
   EXPECT_EQ(receipt.field(0, receipt.find("status").value()), "ok");
-  const auto json = nlohmann::json::parse(text("r.json"));
-  EXPECT_EQ(json["moves_corrected"], 1);
-  EXPECT_EQ(json["inserted_lines"].size(), 1u);
+  const auto told_json = nlohmann::json::parse(text("r.json"));
+  EXPECT_EQ(told_json["moves_corrected"], 1);
+  EXPECT_EQ(told_json["inserted_lines"].size(), 1u);
 }
 
 TEST_F(CorrectProgram, WithoutItsOriginalOrWithAnotherOneNothingIsUndone) {
   const std::string before = module("m.mod");
   ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), 0);
-  EXPECT_EQ(correct({"--undo", before, "-o", file("back.mod")}), kRefusedData)
+  EXPECT_EQ(correct({"--undo", before, "-o", file("back.mod")}), kProgramRefusedData)
       << "it is not marked";
   folder_.write("out.mod.original", "MODULE Other\nENDMODULE\n");
-  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kRefusedData);
+  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kProgramRefusedData);
   fs::remove(file("out.mod.original"));
-  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kRefusedData);
+  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kProgramRefusedData);
   EXPECT_FALSE(exists("back.mod"));
 }
 
 TEST_F(CorrectProgram, ACorrectedProgramIsCorrectedAgainOnlyFromItsOriginal) {
   ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod")}), 0);
-  EXPECT_EQ(correct({"--model", model(), file("out.mod"), "-o", file("twice.mod")}), kRefusedData);
+  EXPECT_EQ(correct({"--model", model(), file("out.mod"), "-o", file("twice.mod")}),
+            kProgramRefusedData);
   EXPECT_FALSE(exists("twice.mod"));
   ASSERT_EQ(correct({"--again", "--model", model(), file("out.mod"), "-o", file("twice.mod")}), 0);
   EXPECT_EQ(text("twice.mod"), text("out.mod"));
@@ -103,9 +104,9 @@ TEST_F(CorrectProgram, ACorrectedProgramIsCorrectedAgainOnlyFromItsOriginal) {
 TEST_F(CorrectProgram, WhatIsLeftDecidesTheExitCode) {
   const std::string before = module("m.mod", true);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("strict.mod"), "--strict"}),
-            kRefusedData);
+            kProgramRefusedData);
   EXPECT_FALSE(exists("strict.mod"));
-  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kCorrectProgramNotAll);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kProgramNotAll);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("allowed.mod"), "--allow-failed"}), 0);
   EXPECT_EQ(text("allowed.mod"), text("out.mod"));
 }
@@ -123,7 +124,7 @@ TEST_F(CorrectProgram, AStrictToleranceWritesNothingWhereATargetIsOutOfDomain) {
                                "--receipt", file(out + ".csv"), "--json", file(out + ".json")});
     return correct(std::move(more));
   };
-  EXPECT_EQ(corrected("elsewhere.model", "strict.mod", {"--strict"}), kRefusedData);
+  EXPECT_EQ(corrected("elsewhere.model", "strict.mod", {"--strict"}), kProgramRefusedData);
   for (const char* name :
        {"strict.mod", "strict.mod.original", "strict.mod.csv", "strict.mod.json"})
     EXPECT_FALSE(exists(name)) << name;
@@ -136,14 +137,15 @@ TEST_F(CorrectProgram, AStrictToleranceWritesNothingWhereATargetIsOutOfDomain) {
 TEST_F(CorrectProgram, WrongUsageChangesNothing) {
   const std::string before = module("m.mod");
   const std::string was = text("m.mod");
-  EXPECT_EQ(correct({before, "-o", file("out.mod")}), kWrongUsage) << "no model";
-  EXPECT_EQ(correct({"--model", model(), before, "-o", before}), kWrongUsage) << "over its input";
+  EXPECT_EQ(correct({before, "-o", file("out.mod")}), kProgramWrongUsage) << "no model";
+  EXPECT_EQ(correct({"--model", model(), before, "-o", before}), kProgramWrongUsage)
+      << "over its input";
   EXPECT_EQ(correct({"--model", model(), "--format", "fortran", before, "-o", file("out.mod")}),
-            kWrongUsage);
+            kProgramWrongUsage);
   EXPECT_EQ(correct({"--model", model(), "--tool", "gripper", before, "-o", file("out.mod")}),
-            kWrongUsage);
+            kProgramWrongUsage);
   EXPECT_EQ(correct({"--model", model(), folder_.write("x.txt", "x"), "-o", file("out.mod")}),
-            kWrongUsage);
+            kProgramWrongUsage);
   EXPECT_EQ(text("m.mod"), was);
   EXPECT_FALSE(exists("out.mod"));
 }
@@ -152,7 +154,7 @@ TEST_F(CorrectProgram, AToolOfAnotherCellIsRefusedAndNothingIsWritten) {
   std::string other = read_text_file(module("m.mod")).value();
   other.replace(other.find("[100,0,150]"), 11, "[100.2,0,150]");
   EXPECT_EQ(correct({"--model", model(), folder_.write("o.mod", other), "-o", file("out.mod")}),
-            kRefusedData);
+            kProgramRefusedData);
   EXPECT_FALSE(exists("out.mod"));
 }
 
@@ -171,17 +173,17 @@ TEST_F(CorrectProgram, AFolderComesBackAsAFolder) {
 /// A KUKA folder as its archive has it: a position that a motion of the program goes to stands in
 /// the controller's own file.
 void write_krl_folder(const test::TemporaryFolder& folder, const std::string& under) {
-  const std::string config = read_text_file(kCorrectProgramPrograms + "$config.dat").value();
+  const std::string config = read_text_file(kProgramsFolder + "$config.dat").value();
   for (const char* place : {"/KRC/R1/System", "/KRC/R1/Program"})
     fs::create_directories(folder.file(under + place));
   folder.write(under + "/KRC/R1/System/$config.dat",
                config.substr(0, config.rfind("ENDDAT")) +
                    "DECL E6POS XHOME={X 0.0,Y 125.0,Z 100.0,A 0.0,B 90.0,C 0.0,S 2,T 0}\nENDDAT\n");
-  const std::string drill = read_text_file(kCorrectProgramPrograms + "drill.src").value();
+  const std::string drill = read_text_file(kProgramsFolder + "drill.src").value();
   folder.write(under + "/KRC/R1/Program/drill.src",
                drill.substr(0, drill.rfind("END")) + "PTP XHOME\nEND\n");
   folder.write(under + "/KRC/R1/Program/drill.dat",
-               read_text_file(kCorrectProgramPrograms + "drill.dat").value());
+               read_text_file(kProgramsFolder + "drill.dat").value());
 }
 
 TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
@@ -189,7 +191,7 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
   const std::string config = "/KRC/R1/System/$config.dat", program = "/KRC/R1/Program/drill.dat";
   EXPECT_EQ(
       correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("r.csv")}),
-      kCorrectProgramNotAll);
+      kProgramNotAll);
   EXPECT_EQ(text("out" + config), text("in" + config));
   EXPECT_FALSE(exists("out" + config + ".original"));
   EXPECT_NE(text("out" + program), text("in" + program)) << "the program itself is corrected";
@@ -203,8 +205,8 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
 
 TEST_F(CorrectProgram, SystemModulesOfAFolderStayWhereverTheyLie) {
   fs::create_directories(file("in"));
-  fs::copy(kCorrectProgramPrograms + "drill.mod", file("in/User.sys"));
-  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), kCorrectProgramNotAll);
+  fs::copy(kProgramsFolder + "drill.mod", file("in/User.sys"));
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), kProgramNotAll);
   EXPECT_EQ(text("out/User.sys"), text("in/User.sys"));
   EXPECT_EQ(correct({"--model", model(), file("in/User.sys"), "-o", file("asked.sys")}), 0);
   EXPECT_NE(text("asked.sys"), text("in/User.sys"));
@@ -212,14 +214,13 @@ TEST_F(CorrectProgram, SystemModulesOfAFolderStayWhereverTheyLie) {
 
 TEST_F(CorrectProgram, PulsesAreToldInSixNumbersAndOfYaskawaJobsAlone) {
   const auto with = [&](const char* program, const char* pulses) {
-    return correct({"--model", model(), kCorrectProgramPrograms + program, "-o", file("out.txt"),
-                    "--frames", kCorrectProgramPrograms + "frames.csv", "--pulses-per-deg",
-                    pulses});
+    return correct({"--model", model(), kProgramsFolder + program, "-o", file("out.txt"),
+                    "--frames", kProgramsFolder + "frames.csv", "--pulses-per-deg", pulses});
   };
   EXPECT_EQ(with("drill.jbi", "1000,1000,1000,1000,1000,1000"), 0);
-  EXPECT_EQ(with("drill.jbi", "1000,1000,1000"), kWrongUsage);
-  EXPECT_EQ(with("drill.jbi", "1000,1000,0,1000,1000,1000"), kWrongUsage);
-  EXPECT_EQ(with("drill.mod", "1000,1000,1000,1000,1000,1000"), kWrongUsage);
+  EXPECT_EQ(with("drill.jbi", "1000,1000,1000"), kProgramWrongUsage);
+  EXPECT_EQ(with("drill.jbi", "1000,1000,0,1000,1000,1000"), kProgramWrongUsage);
+  EXPECT_EQ(with("drill.mod", "1000,1000,1000,1000,1000,1000"), kProgramWrongUsage);
 }
 
 TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
@@ -228,16 +229,15 @@ TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
         std::pair("drill.mod", "log.dat")}) {
     fs::remove_all(file("in"));
     fs::create_directories(file("in"));
-    fs::copy(kCorrectProgramPrograms + program, file(std::string("in/") + program));
+    fs::copy(kProgramsFolder + program, file(std::string("in/") + program));
     folder_.write(std::string("in/") + other, "! options of this controller\n");
     EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--frames",
-                       kCorrectProgramPrograms + "frames.csv"}),
+                       kProgramsFolder + "frames.csv"}),
               0)
         << program;
   }
   write_krl_folder(folder_, "krl");
-  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}),
-            kCorrectProgramNotAll)
+  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}), kProgramNotAll)
       << "its data lists are read";
   EXPECT_TRUE(exists("krl-out/KRC/R1/Program/drill.dat"));
 }
@@ -249,8 +249,8 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
   const auto with = [&](const std::string& rows, const std::string& command = "correct") {
     folder_.write("frames.csv", header + rows + "\n");
     testing::internal::CaptureStderr();
-    const int code = run(command.c_str(), {"--model", model(), kCorrectProgramPrograms + "drill.ls",
-                                           "-o", file("out"), "--frames", file("frames.csv")});
+    const int code = run(command.c_str(), {"--model", model(), kProgramsFolder + "drill.ls", "-o",
+                                           file("out"), "--frames", file("frames.csv")});
     return fmt::format("{}: {}", code, testing::internal::GetCapturedStderr());
   };
   EXPECT_TRUE(with(tool + "\nUFRAME[1]" + frame).starts_with("0: "));
@@ -278,9 +278,7 @@ TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre
 }
 
 TEST_F(CorrectProgram, FramesOfABackupServeEveryProgramOfIt) {
-  ASSERT_EQ(
-      run("import-backup", {kCorrectProgramPrograms + "backup", "--frames", file("frames.csv")}),
-      0);
+  ASSERT_EQ(run("import-backup", {kProgramsFolder + "backup", "--frames", file("frames.csv")}), 0);
   EXPECT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--frames",
                      file("frames.csv")}),
             0);
@@ -300,25 +298,25 @@ TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
 
 TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
   const std::vector<std::vector<std::string>> examples = {
-      {kCorrectProgramPrograms + "drill.mod"},
-      {kCorrectProgramPrograms + "drill.src", kCorrectProgramPrograms + "drill.dat",
-       kCorrectProgramPrograms + "$config.dat"},
-      {kCorrectProgramPrograms + "drill.ls"},
-      {kCorrectProgramPrograms + "drill.jbi"},
-      {kCorrectProgramPrograms + "drill.script"},
-      {"--format", "camrob", kCorrectProgramPrograms + "camrob.csv"},
-      {"--format", "robodk", kCorrectProgramPrograms + "robodk.csv"},
+      {kProgramsFolder + "drill.mod"},
+      {kProgramsFolder + "drill.src", kProgramsFolder + "drill.dat",
+       kProgramsFolder + "$config.dat"},
+      {kProgramsFolder + "drill.ls"},
+      {kProgramsFolder + "drill.jbi"},
+      {kProgramsFolder + "drill.script"},
+      {"--format", "camrob", kProgramsFolder + "camrob.csv"},
+      {"--format", "robodk", kProgramsFolder + "robodk.csv"},
   };
   for (const std::vector<std::string>& example : examples) {
     std::vector<std::string> arguments = example;
     arguments.insert(arguments.end(),
-                     {"--model", model(), "--frames", kCorrectProgramPrograms + "frames.csv", "-o",
+                     {"--model", model(), "--frames", kProgramsFolder + "frames.csv", "-o",
                       file("out/"), "--json", file("r.json")});
     EXPECT_EQ(correct(arguments), 0) << example.back();
-    const auto json = nlohmann::json::parse(text("r.json"));
-    EXPECT_EQ(json["left_alone"], 0) << example.back();
-    EXPECT_EQ(json["moves"], json["moves_corrected"]) << example.back();
-    EXPECT_GE(json["moves"].get<int>(), 2) << example.back();
+    const auto told_json = nlohmann::json::parse(text("r.json"));
+    EXPECT_EQ(told_json["left_alone"], 0) << example.back();
+    EXPECT_EQ(told_json["moves"], told_json["moves_corrected"]) << example.back();
+    EXPECT_GE(told_json["moves"].get<int>(), 2) << example.back();
   }
 }
 
@@ -326,7 +324,7 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   const std::string before = module("m.mod", true);
   EXPECT_EQ(
       run("predict", {"--model", model(), before, "-o", file("p.csv"), "--json", file("p.json")}),
-      kCorrectProgramNotAll)
+      kProgramNotAll)
       << "CRobT() is decided at run time";
   const CsvTable table = CsvTable::parse(text("p.csv"), "p.csv").value();
   ASSERT_EQ(table.size(), 2u);
@@ -340,13 +338,13 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   EXPECT_EQ(nlohmann::json::parse(text("p.json"))["targets"][1]["status"], "refused");
   ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--allow-failed"}), 0);
   EXPECT_EQ(run("predict", {"--model", model(), file("out.mod"), "-o", file("q.csv")}),
-            kCorrectProgramNotAll)
+            kProgramNotAll)
       << "a corrected one, too";
-  EXPECT_EQ(run("predict", {"--model", model(), "-o", file("q.csv")}), kWrongUsage);
+  EXPECT_EQ(run("predict", {"--model", model(), "-o", file("q.csv")}), kProgramWrongUsage);
   EXPECT_EQ(run("predict", {"--model", model(), before, "--joints", before, "-o", file("q.csv")}),
-            kWrongUsage);
+            kProgramWrongUsage);
   EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}),
-            kWrongUsage);
+            kProgramWrongUsage);
 }
 
 TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodNothingIsWritten) {
@@ -354,12 +352,12 @@ TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodNothingIsWritten) {
                            "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n"}) {
     for (const char* name : {"m.mod", "m.src", "m.ls", "m.jbi", "m.script"}) {
       const std::string path = folder_.write(name, text);
-      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out")}), kRefusedData)
+      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out")}), kProgramRefusedData)
           << name << ": " << text;
       EXPECT_EQ(correct({"--model", model(), path, "-o", file("out"), "--allow-failed"}),
-                kRefusedData)
+                kProgramRefusedData)
           << name;
-      EXPECT_EQ(run("predict", {"--model", model(), path, "-o", file("out")}), kRefusedData)
+      EXPECT_EQ(run("predict", {"--model", model(), path, "-o", file("out")}), kProgramRefusedData)
           << name;
       EXPECT_FALSE(exists("out"));
     }
@@ -383,24 +381,24 @@ TEST_F(CorrectProgram, AReceiptThatCannotBeWrittenLeavesNoCorrectedProgram) {
   const std::string before = module("m.mod");
   EXPECT_EQ(
       correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("no/r.csv")}),
-      kRefusedData);
+      kProgramRefusedData);
   EXPECT_EQ(
       correct({"--model", model(), before, "-o", file("out.mod"), "--report", file("no/r.html")}),
-      kRefusedData);
+      kProgramRefusedData);
   EXPECT_EQ(
       correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod")}),
-      kWrongUsage);
+      kProgramWrongUsage);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt",
                      file("out.mod.original")}),
-            kWrongUsage);
+            kProgramWrongUsage);
   fs::create_directory(file("in"));
   const std::string inside = module("in/a.mod");
   const std::string was = read_text_file(inside).value();
   EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", inside}),
-            kWrongUsage);
+            kProgramWrongUsage);
   EXPECT_EQ(
       correct({"--model", model(), file("in"), "-o", file("out"), "--json", file("out/a.mod")}),
-      kWrongUsage);
+      kProgramWrongUsage);
   EXPECT_EQ(read_text_file(inside).value(), was);
   EXPECT_FALSE(exists("out.mod"));
   EXPECT_FALSE(exists("out"));

@@ -28,7 +28,7 @@ PoseContext posed(const JointVector& q) {
   return context;
 }
 
-JointVector inside() {
+JointVector joints_inside() {
   JointVector q(6);
   q << 0.1, -0.1, 0.2, 0.2, 0.8, -0.1;
   return q;
@@ -190,9 +190,10 @@ TEST_F(CoupledBias, ManyPosesSayWhatOneSays) {
 }
 
 TEST_F(CoupledBias, TheCovarianceOfAPredictionIsTheBiasOwnAndTheNoise) {
-  const ErrorPrediction at = model_->predict(inside(), "spindle", "spindle");
+  const ErrorPrediction at = model_->predict(joints_inside(), "spindle", "spindle");
   ASSERT_TRUE(at.in_domain);
-  const BiasPrediction bias = model_->bias()->predict(inside(), model_->features(posed(inside())));
+  const BiasPrediction bias =
+      model_->bias()->predict(joints_inside(), model_->features(posed(joints_inside())));
   const double sigma = model_->cell().tracker.sigma;
   Matrix3 expected = bias.covariance_B;
   expected.diagonal() +=
@@ -213,7 +214,7 @@ TEST(BiasPhysics, AToolThatChangedIsNotTheToolThatNobodyKnows) {
   const PhysicalModel changed =
       test::demand(make_physical_model(cell, {"base", "geometry", "tool_changed@10"}));
   const auto columns = [](const PhysicalModel& physics) {
-    return BiasPhysics(physics).at(posed(inside())).by_parameter.cols();
+    return BiasPhysics(physics).at(posed(joints_inside())).by_parameter.cols();
   };
   EXPECT_EQ(columns(changed), columns(without) + changed.values.size() - without.values.size());
 }
@@ -229,7 +230,7 @@ TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
   CompensatedModel::Parts parts = model_->parts();
   parts.q_max(0) = parts.q_min(0) + 0.1;  // as if joint 1 had hardly moved
   const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
-  const JointVector far = inside();
+  const JointVector far = joints_inside();
   const ErrorPrediction at = model.predict(far, "spindle", "spindle");
   EXPECT_EQ(at.bias_weight, 0);
   EXPECT_FALSE(at.in_domain);
@@ -304,15 +305,15 @@ TEST_F(CoupledBias, WhatFirstOrderLeavesOutGrowsWithTheSquare) {
   const BiasPhysics physics(model_->parts().physics);
   const Eigen::VectorXd found = model_->bias()->parameter_weights();
   ASSERT_EQ(found.size(), 36);
-  const Vector3 once = physics.beyond_first_order(posed(inside()), 0.01 * found);
-  const Vector3 twice = physics.beyond_first_order(posed(inside()), 0.02 * found);
+  const Vector3 once = physics.beyond_first_order(posed(joints_inside()), 0.01 * found);
+  const Vector3 twice = physics.beyond_first_order(posed(joints_inside()), 0.02 * found);
   EXPECT_GT(once.norm(), 1e-11);
   EXPECT_LT((twice - 4 * once).norm(), 0.05 * twice.norm());
 }
 
 TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   const PhysicalModel& physics = model_->parts().physics;
-  const BiasFeatures features = model_->features(posed(inside()));
+  const BiasFeatures features = model_->features(posed(joints_inside()));
   ASSERT_EQ(features.by_joint.cols(), 6);
   ASSERT_EQ(features.by_parameter.cols(), 36)
       << "base, geometry, and compliance, which the model lacks";
@@ -321,7 +322,7 @@ TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   };
   const double h = 1e-5;
   for (Eigen::Index j = 0; j < 6; ++j) {
-    JointVector up = inside(), down = inside();
+    JointVector up = joints_inside(), down = joints_inside();
     up(j) += h;
     down(j) -= h;
     const Vector6 moved = pose_difference(pose_B(up), pose_B(down)) / (2 * h);
@@ -338,7 +339,8 @@ TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   PhysicalModel softer = soft;
   softer.values(32) = 1e-3 * with.parameters()[32].prior_scale;
   const Vector6 moved =
-      pose_difference(softer.pose_W(posed(inside())), soft.pose_W(posed(inside()))) / 1e-3;
+      pose_difference(softer.pose_W(posed(joints_inside())), soft.pose_W(posed(joints_inside()))) /
+      1e-3;
   EXPECT_GT(moved.head(3).norm(), 1e-4);
   EXPECT_LT((features.by_parameter.col(32) - moved).norm(), 1e-3 * moved.norm());
 }

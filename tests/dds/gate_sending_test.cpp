@@ -30,11 +30,11 @@ using eprosima::fastrtps::rtps::Locator_t;
 using eprosima::fastrtps::rtps::LocatorsIterator;
 using eprosima::fastrtps::rtps::SenderResource;
 
-constexpr Prefix kGateSendingSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
-                 kGateSendingResident = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9},
-                 kGateSendingNewcomer = {1, 15, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
-constexpr std::uint32_t kGateSendingPublications = 0x000003c2, kTheirReader = 0x000003c7;
-constexpr std::uint16_t kGateSendingOfResident = 2001, kOfNewcomer = 2002;  // UDP ports
+constexpr Prefix kGateSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
+                 kGateResident = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9},
+                 kGateNewcomer = {1, 15, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
+constexpr std::uint32_t kGatePublications = 0x000003c2, kGateTheirReader = 0x000003c7;
+constexpr std::uint16_t kGateOfResident = 2001, kGateOfNewcomer = 2002;  // UDP ports
 
 /// Counts the datagrams instead of sending them.
 class CountedSends final : public SenderResource {
@@ -82,8 +82,8 @@ class GateSending : public testing::Test {
       : gate_(dynamic_cast<rtps::ChainingTransport*>(
             with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)
                 ->create_transport())) {
-    hear(announcement(kGateSendingResident, kGateSendingOfResident));
-    hear(announcement(kGateSendingNewcomer, kOfNewcomer));
+    hear(announcement(kGateResident, kGateOfResident));
+    hear(announcement(kGateNewcomer, kGateOfNewcomer));
   }
   void hear(const PacketBytes& message) {
     gate_->receive(&heard_, message.data(), static_cast<std::uint32_t>(message.size()),
@@ -92,16 +92,14 @@ class GateSending : public testing::Test {
   /// To both of them.
   void send(const PacketBytes& message) {
     rtps::LocatorList to;
-    for (const std::uint16_t port : {kGateSendingOfResident, kOfNewcomer})
+    for (const std::uint16_t port : {kGateOfResident, kGateOfNewcomer})
       to.push_back(locator("127.0.0.1", port));
     rtps::Locators first(to.begin()), last(to.end());
     gate_->send(&sends_, message.data(), static_cast<std::uint32_t>(message.size()), &first, &last,
                 {});
   }
   static PacketBytes offer(std::uint32_t count) {
-    return Packet(kGateSendingSelf)
-        .heartbeat(kTheirReader, kGateSendingPublications, 1, 900, count)
-        .bytes();
+    return Packet(kGateSelf).heartbeat(kGateTheirReader, kGatePublications, 1, 900, count).bytes();
   }
 
   std::unique_ptr<rtps::ChainingTransport> gate_;
@@ -112,27 +110,27 @@ class GateSending : public testing::Test {
 TEST_F(GateSending, ANewcomerHearsEveryHeartbeatOfDiscoveryOfWhichTheOthersAreSparedMost) {
   constexpr int kOffers = 200;
   for (std::uint32_t i = 1; i <= kOffers; ++i) {
-    hear(Packet(kGateSendingNewcomer)
-             .to(kGateSendingSelf)
-             .acknack(kTheirReader, kGateSendingPublications, i, 1, i)
+    hear(Packet(kGateNewcomer)
+             .to(kGateSelf)
+             .acknack(kGateTheirReader, kGatePublications, i, 1, i)
              .bytes());
     send(offer(i));
   }
-  EXPECT_EQ(sends_.to(kOfNewcomer), kOffers) << "it asks for the next numbers at each";
-  EXPECT_LT(sends_.to(kGateSendingOfResident), kOffers);
+  EXPECT_EQ(sends_.to(kGateOfNewcomer), kOffers) << "it asks for the next numbers at each";
+  EXPECT_LT(sends_.to(kGateOfResident), kOffers);
 }
 
 TEST_F(GateSending, WhoHasConfirmedEverythingIsNoNewcomer) {
   constexpr int kOffers = 200;
   for (std::uint32_t i = 1; i <= kOffers; ++i) {
-    hear(Packet(kGateSendingNewcomer)
-             .to(kGateSendingSelf)
-             .acknack(kTheirReader, kGateSendingPublications, 901, 0, i)
+    hear(Packet(kGateNewcomer)
+             .to(kGateSelf)
+             .acknack(kGateTheirReader, kGatePublications, 901, 0, i)
              .bytes());
     send(offer(i));
   }
-  EXPECT_LT(sends_.to(kOfNewcomer), kOffers);
-  EXPECT_EQ(sends_.to(kGateSendingOfResident), sends_.to(kOfNewcomer));
+  EXPECT_LT(sends_.to(kGateOfNewcomer), kOffers);
+  EXPECT_EQ(sends_.to(kGateOfResident), sends_.to(kGateOfNewcomer));
 }
 
 class GuardedGate : public GateSending {
@@ -153,8 +151,8 @@ class GuardedGate : public GateSending {
 
 TEST_F(GuardedGate, WhatComesInOurOwnNameIsHeardOnlyWhereWeHaveSentIt) {
   const auto with_statistics = [](unsigned char told) {
-    return Packet(kGateSendingSelf)
-        .heartbeat(kTheirReader, kGateSendingPublications, 1, 900, 7)
+    return Packet(kGateSelf)
+        .heartbeat(kGateTheirReader, kGatePublications, 1, 900, 7)
         .submessage(kStatistics, 1, PacketBytes(56, told))
         .bytes();
   };
@@ -162,23 +160,22 @@ TEST_F(GuardedGate, WhatComesInOurOwnNameIsHeardOnlyWhereWeHaveSentIt) {
   EXPECT_EQ(heard(with_statistics(2)), 1) << "the transport below writes the statistics anew";
   EXPECT_EQ(heard(offer(7)), 1);
   EXPECT_EQ(heard(offer(8)), 0) << "a count that we have not said";
-  EXPECT_EQ(heard(Packet(kGateSendingSelf)
-                      .heartbeat(kTheirReader, kGateSendingPublications, 900, 900, 7)
-                      .bytes()),
-            0);
-  send(Packet(kGateSendingSelf)
-           .to(kGateSendingResident)
-           .heartbeat(kTheirReader, kGateSendingPublications, 1, 900, 9)
+  EXPECT_EQ(
+      heard(Packet(kGateSelf).heartbeat(kGateTheirReader, kGatePublications, 900, 900, 7).bytes()),
+      0);
+  send(Packet(kGateSelf)
+           .to(kGateResident)
+           .heartbeat(kGateTheirReader, kGatePublications, 1, 900, 9)
            .bytes());
-  EXPECT_EQ(heard(Packet(kGateSendingSelf)
-                      .to(kGateSendingResident)
-                      .heartbeat(kTheirReader, kGateSendingPublications, 1, 900, 9)
+  EXPECT_EQ(heard(Packet(kGateSelf)
+                      .to(kGateResident)
+                      .heartbeat(kGateTheirReader, kGatePublications, 1, 900, 9)
                       .bytes()),
             0)
       << "it was for somebody else";
-  EXPECT_EQ(heard(Packet(kGateSendingResident)
-                      .to(kGateSendingSelf)
-                      .heartbeat(kTheirReader, kGateSendingPublications, 1, 900, 9)
+  EXPECT_EQ(heard(Packet(kGateResident)
+                      .to(kGateSelf)
+                      .heartbeat(kGateTheirReader, kGatePublications, 1, 900, 9)
                       .bytes()),
             1);
 }
@@ -191,7 +188,7 @@ TEST(Hearing, WhatComesBeforeTheLibraryHearsWaits) {
       with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)
           ->create_transport()));
   HeardMessages heard;
-  const PacketBytes message = announcement(kGateSendingResident, kGateSendingOfResident);
+  const PacketBytes message = announcement(kGateResident, kGateOfResident);
   auto received = std::async(std::launch::async, [&] {
     gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()),
                   locator("127.0.0.1", 2000), locator("127.0.0.1", 3000));

@@ -125,7 +125,7 @@ TEST(Guard, WhatIsNoRtpsMessageIsDropped) {
 
 TEST(Guard, SubmessagesThatDoNotFitAreDropped) {
   const PacketBytes data = from().data({0, kUserWriter, 1, {}, kSample}).bytes();
-  for (std::size_t size = kHeader + 1; size < data.size(); ++size) {
+  for (std::size_t size = kHeaderBytes + 1; size < data.size(); ++size) {
     EXPECT_EQ(fate(PacketBytes(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size))),
               Dropped::kLength)
         << size << " of " << data.size() << " bytes";
@@ -136,11 +136,11 @@ TEST(Guard, SubmessagesThatDoNotFitAreDropped) {
   EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {}, {}}).bytes()), Dropped::kLength)
       << "neither data nor state";
   PacketBytes both = data;
-  both[kHeader + 1] |= kKey;
+  both[kHeaderBytes + 1] |= kKey;
   EXPECT_EQ(fate(both), Dropped::kLength) << "data and key at once";
   PacketBytes jump = data;
-  jump[kHeader + 6] = 0xf0;  // octets to inline QoS
-  jump[kHeader + 7] = 0xff;
+  jump[kHeaderBytes + 6] = 0xf0;  // octets to inline QoS
+  jump[kHeaderBytes + 7] = 0xff;
   EXPECT_EQ(fate(jump), Dropped::kLength);
 }
 
@@ -393,13 +393,13 @@ PacketBytes goodbye_by_key(const Prefix& who, std::uint32_t by = kAnnouncer) {
   const PacketBytes status = ParameterList().add(0x0071, {0, 0, 0, 3}).bytes();
   const PacketBytes key = ParameterList().guid(id, who, 0x000001c1).payload();
   PacketBytes message = from().data({0, by, 2, status, key}).bytes();
-  message[kHeader + 1] = kLittleEndian | kInlineQos | kKey;
+  message[kHeaderBytes + 1] = kLittleEndian | kInlineQos | kKey;
   return message;
 }
 /// The ids of the submessages.
 std::vector<int> kinds(const PacketBytes& message) {
   std::vector<int> ids;
-  Bytes rest = Bytes(message).subspan(kHeader);
+  Bytes rest = Bytes(message).subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) ids.push_back(submessage->id);
   return ids;
 }
@@ -416,11 +416,12 @@ TEST(Guard, AGoodbyeReachesNoReaderOfTheLibraryAndTheLeaseDecides) {
     Guard guard(kMaxTextSample);
     const PacketBytes passed = let_in(guard, message);
     ASSERT_EQ(kinds(passed), std::vector<int>{kData});
-    EXPECT_EQ(Reader(Bytes(passed).subspan(kHeader + 8), true).entity(), 0xffffffffu);
+    EXPECT_EQ(Reader(Bytes(passed).subspan(kHeaderBytes + 8), true).entity(), 0xffffffffu);
   }
   Guard guard(kMaxTextSample);
   EXPECT_EQ(let_in(guard, announcement(participant())).size(), announcement(participant()).size());
-  EXPECT_EQ(Reader(Bytes(announcement(participant())).subspan(kHeader + 8), true).entity(), 0u);
+  EXPECT_EQ(Reader(Bytes(announcement(participant())).subspan(kHeaderBytes + 8), true).entity(),
+            0u);
 }
 
 // The library reads who has gone from the inline QoS, and from nowhere else.
@@ -432,9 +433,9 @@ TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
     const PacketBytes hash =
         ParameterList().add(0x0071, {0, 0, 0, 3}).guid(0x0070, kSource, 0x000001c1).bytes();
     const auto at = std::search(passed.begin(), passed.end(), hash.begin(), hash.end());
-    EXPECT_EQ(at - passed.begin(), static_cast<std::ptrdiff_t>(kHeader + 4 + 20))
+    EXPECT_EQ(at - passed.begin(), static_cast<std::ptrdiff_t>(kHeaderBytes + 4 + 20))
         << "behind the head of its sample";
-    EXPECT_EQ(passed[kHeader + 1], kLittleEndian | kInlineQos);
+    EXPECT_EQ(passed[kHeaderBytes + 1], kLittleEndian | kInlineQos);
   }
   EXPECT_EQ(fate(goodbye_by_key(kOther)), Dropped::kSource);
   Guard secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
@@ -492,7 +493,7 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreNobodySaysSomethingElseOfThem) {
 PacketBytes signed_message(const PacketBytes& inner, const PacketBytes& behind_prefix = {}) {
   PacketBytes message = from().submessage(kSecureRtpsPrefix, 1, PacketBytes(20)).bytes();
   test::put_bytes(message, behind_prefix);
-  test::put_bytes(message, PacketBytes(inner.begin() + kHeader, inner.end()));
+  test::put_bytes(message, PacketBytes(inner.begin() + kHeaderBytes, inner.end()));
   test::put_bytes(message, {kSecureRtpsPostfix, 1, 20, 0});
   test::put_bytes(message, PacketBytes(20));
   return message;
@@ -662,7 +663,7 @@ TEST(Guard, OfASampleThatIsTooLargeTheBeginningPassesAsASampleThatSaysSo) {
       from().fragments({0, kUserWriter, 7, 1, 1, 60000, 40u << 20, beginning}).bytes();
   const auto passed = guard.check(first, kSocket);
   ASSERT_TRUE(passed);
-  Bytes rest = passed->subspan(kHeader);
+  Bytes rest = passed->subspan(kHeaderBytes);
   const auto data = next_submessage(rest);
   ASSERT_TRUE(data);
   EXPECT_EQ(data->id, kData);
@@ -725,7 +726,7 @@ TEST(Guard, FinishedSamplesMakeRoom) {
 }
 
 std::int64_t first_of(Bytes message) {
-  Bytes rest = message.subspan(kHeader);
+  Bytes rest = message.subspan(kHeaderBytes);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id != kHeartbeat) continue;
     Reader reader(submessage->body.subspan(8), submessage->little_endian());
@@ -779,7 +780,7 @@ TEST(Guard, AGapIsTakenInSteps) {
     const PacketBytes gap = from().gap(0, kUserWriter, 1, kEnd).bytes();
     const auto passed = guard.check(gap, kSocket, now);
     if (!passed) continue;
-    Reader reader(passed->subspan(kHeader + 4 + 8), true);
+    Reader reader(passed->subspan(kHeaderBytes + 4 + 8), true);
     const std::int64_t start = reader.sequence_number().value_or(0),
                        end = reader.sequence_number().value_or(0);
     ASSERT_EQ(start, reached) << "nothing is left out";
@@ -875,7 +876,7 @@ TEST(Guard, WhatWasSentIsNotAskedForAgainWithoutEnd) {
 int asked_for(Guard& guard, const PacketBytes& acknack, Guard::Time now) {
   const auto passed = guard.check(acknack, kSocket, now);
   if (!passed) return 0;
-  Reader reader(passed->subspan(kHeader + 16 + 4 + 16), true);
+  Reader reader(passed->subspan(kHeaderBytes + 16 + 4 + 16), true);
   const std::uint32_t bits = reader.u32().value_or(0);
   int count = 0;
   for (std::uint32_t at = 0; at < bits; at += 32) {
@@ -1201,7 +1202,7 @@ TEST(Guard, WhatADiscoveryServerMayNotPassOnIsSaidNotToExist) {
   const auto whole = guard.check(hostile, kRelaySocket);
   ASSERT_TRUE(whole) << "all that follows would wait for it";
   const PacketBytes gap = Packet(kRelay).gap(0x000100c7, kAnnouncer, 7, 8).bytes();
-  const std::size_t length = kHeader + 2;  // the rest of the announcement stays behind it
+  const std::size_t length = kHeaderBytes + 2;  // the rest of the announcement stays behind it
   ASSERT_EQ(whole->size(), hostile.size());
   EXPECT_TRUE(std::equal(gap.begin(), gap.begin() + length, whole->begin()));
   EXPECT_TRUE(std::equal(gap.begin() + length + 2, gap.end(), whole->begin() + length + 2));
@@ -1239,7 +1240,7 @@ TEST(Guard, AMillionMutatedPacketsAreReadWithinTheirBytes) {
     if (!whole) continue;
     ++passed;
     ASSERT_LE(whole->size(), message.size());
-    Bytes rest = whole->subspan(kHeader);
+    Bytes rest = whole->subspan(kHeaderBytes);
     while (!rest.empty()) ASSERT_TRUE(next_submessage(rest)) << "run " << run;
   }
   EXPECT_GT(passed, 100'000);

@@ -13,10 +13,10 @@ using test::Packet;
 using test::Prefix;
 
 constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11},
-                 kHeartbeatPaceOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
-constexpr std::uint32_t kHeartbeatPacePublications = 0x000003c2, kSubscriptions = 0x000004c2,
+                 kPacedOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr std::uint32_t kPacedPublications = 0x000003c2, kPacedSubscriptions = 0x000004c2,
                         kTheirReader = 0x000003c7;
-constexpr std::uint32_t kUserReader = 0x00000104, kUserWriter = 0x00000103;
+constexpr std::uint32_t kPacedUserReader = 0x00000104, kPacedUserWriter = 0x00000103;
 const HeartbeatPace::Time kStart{std::chrono::hours(1)};
 
 Packet offer(std::uint32_t writer) {
@@ -27,8 +27,7 @@ TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
   HeartbeatPace pace;
   int left = 0;
   for (int ms = 0; ms < 1000; ++ms) {
-    left +=
-        pace.lets_out(offer(kHeartbeatPacePublications).bytes(), kStart + milliseconds(ms)) ? 1 : 0;
+    left += pace.lets_out(offer(kPacedPublications).bytes(), kStart + milliseconds(ms)) ? 1 : 0;
   }
   EXPECT_EQ(left, 50);
 }
@@ -36,25 +35,23 @@ TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
 TEST(HeartbeatPace, WhatTheLibraryAppendsForItsStatisticsChangesNothing) {
   HeartbeatPace pace;
   const auto message =
-      offer(kHeartbeatPacePublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
+      offer(kPacedPublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
   EXPECT_TRUE(pace.lets_out(message, kStart));
   EXPECT_FALSE(pace.lets_out(message, kStart + milliseconds(1)));
 }
 
 TEST(HeartbeatPace, WritersAndReadersAreToldOfApart) {
   HeartbeatPace pace;
-  EXPECT_TRUE(pace.lets_out(offer(kHeartbeatPacePublications).bytes(), kStart));
-  EXPECT_TRUE(pace.lets_out(offer(kSubscriptions).bytes(), kStart));
-  EXPECT_FALSE(pace.lets_out(offer(kSubscriptions).bytes(), kStart + milliseconds(1)));
+  EXPECT_TRUE(pace.lets_out(offer(kPacedPublications).bytes(), kStart));
+  EXPECT_TRUE(pace.lets_out(offer(kPacedSubscriptions).bytes(), kStart));
+  EXPECT_FALSE(pace.lets_out(offer(kPacedSubscriptions).bytes(), kStart + milliseconds(1)));
 }
 
 TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
-    const auto message = Packet(kSelf)
-                             .to(kHeartbeatPaceOther)
-                             .heartbeat(kTheirReader, kHeartbeatPacePublications, 1, 9, 1)
-                             .bytes();
+    const auto message =
+        Packet(kSelf).to(kPacedOther).heartbeat(kTheirReader, kPacedPublications, 1, 9, 1).bytes();
     EXPECT_TRUE(pace.lets_out(message, kStart));
   }
 }
@@ -62,27 +59,26 @@ TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
 TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
   HeartbeatPace pace;
   const auto question = [](const Prefix& of, std::uint32_t writer) {
-    return Packet(kSelf).to(of).acknack(kUserReader, writer, 0, 0, 1).bytes();
+    return Packet(kSelf).to(of).acknack(kPacedUserReader, writer, 0, 0, 1).bytes();
   };
   int left = 0;
   for (int ms = 0; ms < 10'000; ++ms) {
-    left += pace.lets_out(question(kHeartbeatPaceOther, kUserWriter), kStart + milliseconds(ms))
-                ? 1
-                : 0;
+    left +=
+        pace.lets_out(question(kPacedOther, kPacedUserWriter), kStart + milliseconds(ms)) ? 1 : 0;
   }
   EXPECT_LE(left, 15);
   EXPECT_GE(left, 10);
   const auto now = kStart + milliseconds(10'000);
-  EXPECT_TRUE(pace.lets_out(question(kHeartbeatPaceOther, kUserWriter), now + milliseconds(1500)))
+  EXPECT_TRUE(pace.lets_out(question(kPacedOther, kPacedUserWriter), now + milliseconds(1500)))
       << "it is met again";
-  EXPECT_TRUE(pace.lets_out(question(kSelf, kUserWriter), now))
+  EXPECT_TRUE(pace.lets_out(question(kSelf, kPacedUserWriter), now))
       << "a writer of the same name elsewhere";
-  EXPECT_TRUE(pace.lets_out(question(kHeartbeatPaceOther, kUserWriter + 0x100), now));
+  EXPECT_TRUE(pace.lets_out(question(kPacedOther, kPacedUserWriter + 0x100), now));
   EXPECT_TRUE(pace.lets_out(
-      Packet(kSelf).to(kHeartbeatPaceOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(),
+      Packet(kSelf).to(kPacedOther).acknack(kPacedUserReader, kPacedUserWriter, 1, 0, 1).bytes(),
       now));
   EXPECT_TRUE(pace.lets_out(
-      Packet(kSelf).to(kHeartbeatPaceOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(),
+      Packet(kSelf).to(kPacedOther).acknack(kPacedUserReader, kPacedUserWriter, 0, 8, 1).bytes(),
       now));
 }
 
@@ -90,8 +86,10 @@ TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
 int offered(HeartbeatPace& pace, HeartbeatPace::Time from, int milliseconds_long) {
   int left = 0;
   for (int ms = 0; ms < milliseconds_long; ms += 10) {
-    const auto message =
-        Packet(kSelf).to(kHeartbeatPaceOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
+    const auto message = Packet(kSelf)
+                             .to(kPacedOther)
+                             .heartbeat(kPacedUserReader, kPacedUserWriter, 1, 9, 1)
+                             .bytes();
     left += pace.lets_out(message, from + milliseconds(ms)) ? 1 : 0;
   }
   return left;
@@ -112,14 +110,15 @@ TEST(HeartbeatPace, WhoAnswersIsOfferedAtOnceWhatItLacks) {
   HeartbeatPace pace;
   static_cast<void>(offered(pace, kStart, 2000));
   const auto then = kStart + milliseconds(2000);
-  pace.heard(Packet(kSelf).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then);
+  pace.heard(Packet(kSelf).to(kSelf).acknack(kPacedUserReader, kPacedUserWriter, 1, 8, 1).bytes(),
+             then);
   EXPECT_LT(offered(pace, then, 300), 10) << "somebody else answers";
   pace.heard(
-      Packet(kHeartbeatPaceOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(),
+      Packet(kPacedOther).to(kSelf).acknack(kPacedUserReader, kPacedUserWriter, 1, 8, 1).bytes(),
       then + milliseconds(300));
   EXPECT_EQ(offered(pace, then + milliseconds(300), 400), 40);
   pace.heard(
-      Packet(kHeartbeatPaceOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(),
+      Packet(kPacedOther).to(kSelf).nack_frag(kPacedUserReader, kPacedUserWriter, 1, 1, 1).bytes(),
       then + milliseconds(700));
   EXPECT_EQ(offered(pace, then + milliseconds(700), 400), 40);
   pace.heard({}, then);
@@ -129,13 +128,13 @@ TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
     test::DataFields data;
-    data.writer = kHeartbeatPacePublications;
-    EXPECT_TRUE(pace.lets_out(offer(kHeartbeatPacePublications).data(data).bytes(), kStart));
+    data.writer = kPacedPublications;
+    EXPECT_TRUE(pace.lets_out(offer(kPacedPublications).data(data).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out(Packet(kSelf).data(data).bytes(), kStart));
-    EXPECT_TRUE(
-        pace.lets_out(Packet(kSelf).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out(
-        Packet(kSelf).acknack(kTheirReader, kHeartbeatPacePublications, 1, 0, 1).bytes(), kStart));
+        Packet(kSelf).heartbeat(kPacedUserReader, kPacedUserWriter, 1, 9, 1).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out(
+        Packet(kSelf).acknack(kTheirReader, kPacedPublications, 1, 0, 1).bytes(), kStart));
     EXPECT_TRUE(pace.lets_out({}, kStart));
   }
 }

@@ -109,13 +109,13 @@ TEST_F(DaemonTest, TheHistoryOfACellIsAPageWithItsVersionsTrainingsAndEvents) {
                  std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain()), "-o",
                  folder.file("history.html"), "--json", "-"});
   ASSERT_EQ(told.exit_code, 0) << told.err;
-  const auto json = nlohmann::json::parse(told.out);
-  ASSERT_EQ(json["versions"].size(), 1u);
-  EXPECT_TRUE(json["versions"][0]["in_force"].get<bool>());
-  EXPECT_GT(json["versions"][0]["parameters"].size(), 20u);
-  ASSERT_EQ(json["trainings"].size(), 1u);
-  EXPECT_EQ(json["trainings"][0]["batches"], "lt-07");
-  EXPECT_GT(json["events"].size(), 1u);
+  const auto history = nlohmann::json::parse(told.out);
+  ASSERT_EQ(history["versions"].size(), 1u);
+  EXPECT_TRUE(history["versions"][0]["in_force"].get<bool>());
+  EXPECT_GT(history["versions"][0]["parameters"].size(), 20u);
+  ASSERT_EQ(history["trainings"].size(), 1u);
+  EXPECT_EQ(history["trainings"][0]["batches"], "lt-07");
+  EXPECT_GT(history["events"].size(), 1u);
   EXPECT_NE(test::read_file(folder.file("history.html")).find("Version 1 is in force"),
             std::string::npos);
 }

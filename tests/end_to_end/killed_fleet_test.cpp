@@ -17,7 +17,7 @@ TEST(KilledFleet, LosesNothingMakesNothingTwiceAndGoesOn) {
   plan.batches = 6;
   const test::TemporaryFolder folder;
   const std::string history = folder.file("history.jsonl");
-  const test::KillOutcome outcome = test::kill_a_fleet(plan, history);
+  const test::KilledFleetOutcome outcome = test::kill_a_fleet(plan, history);
   const test::Finished checked = test::check_history(history);
   EXPECT_EQ(checked.exit_code, 0) << checked.out << checked.err;
   EXPECT_GT(outcome.predictions, 0);

@@ -110,7 +110,7 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirKindIsNamed) {
     stopped.push_back(std::make_unique<test::StoppedThread>(thread.id));
     ASSERT_TRUE(stopped.back()->is_stopped());
   }
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kWatchdogLimit + std::chrono::seconds(1)))
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(1)))
       << "nobody asked for anything yet";
   test::Process client({TRAMMEL_BINARY_DIR "/clients/trammel", "models", "--service", "--cell",
                         "cell-7", "--port", std::to_string(daemon.port()), "--domain",
@@ -126,7 +126,7 @@ TEST(WatchdogTest, ADaemonThatWasStoppedAndGoesOnIsNotHung) {
   daemon.start();
   EXPECT_TRUE(answers(daemon));
   daemon.process().signal(SIGSTOP);
-  EXPECT_FALSE(daemon.process().wait(Watchdog::kWatchdogLimit + std::chrono::seconds(2)))
+  EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(2)))
       << "it was stopped";
   daemon.process().signal(SIGCONT);
   EXPECT_TRUE(answers(daemon));

@@ -299,7 +299,7 @@ std::string guard_packet(std::string_view bytes) {
       return wire::name_of(reason);
   }
   TRAMMEL_CHECK(passed.has_value());
-  wire::Bytes rest = passed->subspan(wire::kHeader);
+  wire::Bytes rest = passed->subspan(wire::kHeaderBytes);
   while (!rest.empty()) TRAMMEL_CHECK(wire::next_submessage(rest).has_value());
   return passed->size() == packet.size() ? "passes" : "passes in part";
 }

@@ -84,7 +84,7 @@ TEST_F(HealthTest, AJointThatLostItsZeroBy50umIsSeenAndNamedWithItsSize) {
 }
 
 TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
-  constexpr std::int64_t kDay = 86400;
+  constexpr std::int64_t kDay_s = 86400;
   constexpr std::int64_t kMeasured = 1'700'000'000;
   CompensatedModel::Parts parts = robot_->model.parts();
   parts.provenance.measured_at = kMeasured;
@@ -95,7 +95,7 @@ TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
   std::vector<std::string> due;
   for (std::int64_t month = 1; month <= 4; ++month) {
     MeasurementBatch batch = measured_check(dated, {}, static_cast<std::uint64_t>(month));
-    batch.measured_at = kMeasured + 30 * month * kDay;
+    batch.measured_at = kMeasured + 30 * month * kDay_s;
     check = test::demand(check_health(
         dated.model, test::demand(check_against_cell(batch, dated.model.cell(), drawn(0, 1))),
         options));
@@ -113,7 +113,7 @@ TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
       << check.due_because;
   options.earlier.clear();
   MeasurementBatch batch = measured_check(dated, {}, 1);
-  batch.measured_at = kMeasured + 30 * kDay;
+  batch.measured_at = kMeasured + 30 * kDay_s;
   const HealthCheck alone = test::demand(check_health(
       dated.model, test::demand(check_against_cell(batch, dated.model.cell(), drawn(0, 1))),
       options));

@@ -4,7 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/files/point_list.h"
-#include "tests/support/refusal_file.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {

@@ -5,7 +5,7 @@
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/files/point_list.h"
-#include "tests/support/refusal_dialect.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {

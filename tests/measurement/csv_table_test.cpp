@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "tests/support/refusal_table.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {

@@ -7,7 +7,7 @@
 #include "server/measurement/repeats.h"
 #include "tests/support/demand.h"
 #include "tests/support/hidden_files.h"
-#include "tests/support/refusal_gauges.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {

@@ -11,7 +11,7 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-Refusal refusal(const std::string& text, const PointFileOptions& options = {}) {
+Refusal refusal_of_list(const std::string& text, const PointFileOptions& options = {}) {
   const auto points = parse_points(text, "sa.txt", options);
   return refusal_of(points);
 }
@@ -45,18 +45,20 @@ TEST(PointList, ReadsTargetsWithAndWithoutGroupAndCollectionBySeparatorsOfAnyKin
 
 TEST(PointList, TakesNumbersAsNamesButNoCoordinates) {
   EXPECT_EQ(demand("7 1000 2000 300\n").points[0].name, "7");
-  EXPECT_EQ(refusal("p1 100.0 200.0 300.0 0.5\n"), Refusal("sa.txt", 1, "name").text("100.0"));
+  EXPECT_EQ(refusal_of_list("p1 100.0 200.0 300.0 0.5\n"),
+            Refusal("sa.txt", 1, "name").text("100.0"));
 }
 
 TEST(PointList, ReadsTheUnitFromACommentAndRefusesAnotherOne) {
   EXPECT_NEAR(demand("// Units: Inches\np 1 0 0\n").points[0].p_W.x(), 0.0254, 1e-15);
   EXPECT_NEAR(demand("// Length units = m\np 1 0 0\n").points[0].p_W.x(), 1, 1e-15);
   EXPECT_NEAR(demand("// units in millimeters\np 1 0 0\n").points[0].p_W.x(), 1e-3, 1e-15);
-  EXPECT_EQ(refusal("// a\n// Units: feet\np 1 0 0\n"), Refusal("sa.txt", 2, "unit").text("feet"));
+  EXPECT_EQ(refusal_of_list("// a\n// Units: feet\np 1 0 0\n"),
+            Refusal("sa.txt", 2, "unit").text("feet"));
   PointFileOptions metres;
   metres.unit = LengthUnit::kMetre;
   EXPECT_NEAR(demand("p 1 0 0\n", metres).points[0].p_W.x(), 1, 1e-15);
-  EXPECT_EQ(refusal("// Units: mm\np 1 0 0\n", metres), Refusal("sa.txt", {}, "unit"));
+  EXPECT_EQ(refusal_of_list("// Units: mm\np 1 0 0\n", metres), Refusal("sa.txt", {}, "unit"));
 }
 
 TEST(PointList, TurnsCylindricalAndSphericalCoordinatesIntoCartesianOnes) {
@@ -85,7 +87,7 @@ TEST(PointList, TurnsCylindricalAndSphericalCoordinatesIntoCartesianOnes) {
              p)
                 .norm(),
             1e-12);
-  EXPECT_EQ(refusal("// cylindrical\np -5 0 0\n"), Refusal("sa.txt", 2, "r").beyond(-5, 0));
+  EXPECT_EQ(refusal_of_list("// cylindrical\np -5 0 0\n"), Refusal("sa.txt", 2, "r").beyond(-5, 0));
 }
 
 TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
@@ -109,15 +111,16 @@ TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
             1e-12);
   EXPECT_LT((rotation(demand("// ZYX Euler Angles\nf,1.0,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_LT((rotation(demand("Frame Name,X,Y,Z,Rz,Ry,Rx\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
-  EXPECT_EQ(refusal("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"), Refusal("sa.txt", 1, "angles"));
+  EXPECT_EQ(refusal_of_list("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"),
+            Refusal("sa.txt", 1, "angles"));
 }
 
 TEST(PointList, DoesNotGuessWhatThreeMoreValuesAre) {
-  EXPECT_EQ(refusal("p 1 2 3 0.01 0.01 0.01\n"),
+  EXPECT_EQ(refusal_of_list("p 1 2 3 0.01 0.01 0.01\n"),
             Refusal("sa.txt", 1, "columns behind the coordinates"));
-  EXPECT_EQ(
-      refusal("// fixed XYZ\np 1 2 3 0.01 0.01 0.01\n", behind(BehindCoordinates::kUncertainties)),
-      Refusal("sa.txt", {}, "columns behind the coordinates"));
+  EXPECT_EQ(refusal_of_list("// fixed XYZ\np 1 2 3 0.01 0.01 0.01\n",
+                            behind(BehindCoordinates::kUncertainties)),
+            Refusal("sa.txt", {}, "columns behind the coordinates"));
 }
 
 TEST(PointList, MakesOneSigmaOfUncertainties) {
@@ -130,7 +133,7 @@ TEST(PointList, MakesOneSigmaOfUncertainties) {
   const PointList far =
       demand(fmt::format("// uncertainties, cylindrical\np 2000 30 0 0 {:.15g} 0\n", to_deg(1e-3)));
   EXPECT_NEAR(far.points[0].sigma.value_or(0), 2e-3 / std::sqrt(3.0), 1e-12);
-  EXPECT_EQ(refusal("p 1 2 3 0.02 -0.04 0.04\n", two_sigma),
+  EXPECT_EQ(refusal_of_list("p 1 2 3 0.02 -0.04 0.04\n", two_sigma),
             Refusal("sa.txt", 1, "uy").text("-0.04"));
 }
 
@@ -143,18 +146,18 @@ TEST(PointList, FindsColumnsByTheNamesOfAHeaderOrOfAComment) {
   const PointList other =
       demand("// Group, Point Name, Z (in), Y (in), X (in), Offset\nG, p, 3, 2, 1, 0.5\n");
   EXPECT_LT((other.points[0].p_W - 0.0254 * Vector3(1, 2, 3)).norm(), 1e-15);
-  EXPECT_EQ(refusal("name,x_mm,y_m,z_mm\nR1,1,2,3\n"), Refusal("sa.txt", {}, "unit"));
+  EXPECT_EQ(refusal_of_list("name,x_mm,y_m,z_mm\nR1,1,2,3\n"), Refusal("sa.txt", {}, "unit"));
 }
 
 TEST(PointList, RefusalsNameFileRowColumnValueAndLimit) {
-  EXPECT_EQ(refusal(""), Refusal("sa.txt").beyond(0, 1));
-  EXPECT_EQ(refusal("name,x,y,z\n"), Refusal("sa.txt").beyond(0, 1));
-  EXPECT_EQ(refusal("p 1 2\n"), Refusal("sa.txt", 1).beyond(3, 4));
-  EXPECT_EQ(refusal("p 1 2 3\n\nq 1 2 3 4\n"), Refusal("sa.txt", 3).beyond(5, 4));
-  EXPECT_EQ(refusal("p 1 2 3\nq 1 b 3\n"), Refusal("sa.txt", 2, "y").text("b"));
-  EXPECT_EQ(refusal("p 1 2 3e6\n"), Refusal("sa.txt", 1, "z").beyond(3e+06, 1e+06));
-  EXPECT_EQ(refusal("p 1 2 3\np 1 2 3\n"), Refusal("sa.txt", 2, "name").text("p"));
-  EXPECT_EQ(refusal("p\xff 1 2 3\n"), Refusal("sa.txt", 1));
+  EXPECT_EQ(refusal_of_list(""), Refusal("sa.txt").beyond(0, 1));
+  EXPECT_EQ(refusal_of_list("name,x,y,z\n"), Refusal("sa.txt").beyond(0, 1));
+  EXPECT_EQ(refusal_of_list("p 1 2\n"), Refusal("sa.txt", 1).beyond(3, 4));
+  EXPECT_EQ(refusal_of_list("p 1 2 3\n\nq 1 2 3 4\n"), Refusal("sa.txt", 3).beyond(5, 4));
+  EXPECT_EQ(refusal_of_list("p 1 2 3\nq 1 b 3\n"), Refusal("sa.txt", 2, "y").text("b"));
+  EXPECT_EQ(refusal_of_list("p 1 2 3e6\n"), Refusal("sa.txt", 1, "z").beyond(3e+06, 1e+06));
+  EXPECT_EQ(refusal_of_list("p 1 2 3\np 1 2 3\n"), Refusal("sa.txt", 2, "name").text("p"));
+  EXPECT_EQ(refusal_of_list("p\xff 1 2 3\n"), Refusal("sa.txt", 1));
 }
 
 JointList plan(const std::string& text) {

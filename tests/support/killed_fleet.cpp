@@ -292,7 +292,7 @@ std::vector<std::int64_t> acknowledged(const std::string& history) {
 
 /// Adds the time from a loss until a change was acknowledged that was made afterwards.
 void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& history,
-                KillOutcome& outcome) {
+                KilledFleetOutcome& outcome) {
   const auto times = acknowledged(history);
   for (const Fleet::Loss& loss : losses) {
     ++outcome.kills[loss.what];
@@ -456,7 +456,7 @@ void train_first(const Fleet& fleet, History& history) {
 }
 
 /// Adds the time that jobs of a cell waited since then (Unix time, s) though nobody worked for it.
-void add_idle_times(const Fleet& fleet, std::int64_t since, KillOutcome& outcome) {
+void add_idle_times(const Fleet& fleet, std::int64_t since, KilledFleetOutcome& outcome) {
   const auto rows = fleet.rows(fmt::format(
       "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) "
       "OVER (PARTITION BY cell ORDER BY started_at, id ROWS BETWEEN UNBOUNDED PRECEDING AND 1 "
@@ -469,7 +469,7 @@ void add_idle_times(const Fleet& fleet, std::int64_t since, KillOutcome& outcome
   }
 }
 
-void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KillOutcome& outcome) {
+void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KilledFleetOutcome& outcome) {
   const std::int64_t since = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   const std::int64_t begin = monotonic_us();
   const auto open_jobs = [&] {
@@ -484,7 +484,8 @@ void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KillOutcome& outcom
   add_idle_times(fleet, since, outcome);
 }
 
-void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillOutcome& outcome) {
+void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history,
+         KilledFleetOutcome& outcome) {
   wait_for_jobs(fleet, plan, outcome);
   for (const AskedCell& cell : fleet.cells()) {
     for (const std::size_t client : {std::size_t{1}, std::size_t{2}})
@@ -501,8 +502,8 @@ void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillO
 
 }  // namespace
 
-KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
-  KillOutcome outcome;
+KilledFleetOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
+  KilledFleetOutcome outcome;
   Fleet fleet(plan.seed);
   {
     History history(path);

@@ -28,7 +28,7 @@ struct KillPlan {
   std::chrono::seconds until_jobs_end{300};  ///< after the last kill
 };
 
-struct KillOutcome {
+struct KilledFleetOutcome {
   std::map<std::string, int> kills;  ///< by what was killed or stopped
   int predictions = 0, failed = 0;   ///< while there were kills
   double p99_quiet_ms = 0, p99_load_ms = 0, p99_kills_ms = 0;
@@ -48,7 +48,7 @@ struct KillOutcome {
 };
 
 /// Runs the plan, writes the history to that file, and says what it is like besides.
-[[nodiscard]] KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& history);
+[[nodiscard]] KilledFleetOutcome kill_a_fleet(const KillPlan& plan, const std::string& history);
 
 /// What history_check.py prints of it, and its exit code.
 [[nodiscard]] Finished check_history(const std::string& history);

@@ -47,7 +47,7 @@ std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now)
 }
 
 bool Guard::is_of_relay(Bytes message, std::uint64_t socket) const {
-  if (message.size() < kHeader) return false;
+  if (message.size() < kHeaderBytes) return false;
   const Bytes prefix = message.subspan(kPrefixAt, kPrefix);
   return std::any_of(relays_.begin(), relays_.end(), [&](const Relay& relay) {
     return relay.address == static_cast<std::uint32_t>(socket) &&
@@ -63,12 +63,12 @@ bool Guard::lets_out(std::uint64_t socket, Time now) {
 }
 
 void Guard::sent(Bytes message) {
-  if (message.size() < kHeader) return;
+  if (message.size() < kHeaderBytes) return;
   if (!knows_own_.exchange(true)) {
     const MutexLock lock(memory_.mutex);
     std::copy_n(message.begin() + kPrefixAt, kPrefix, memory_.own.begin());
   }
-  Bytes rest = message.subspan(kHeader), to{};
+  Bytes rest = message.subspan(kHeaderBytes), to{};
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {
       to = submessage->body.first(kPrefix);

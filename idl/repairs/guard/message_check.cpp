@@ -48,7 +48,7 @@ std::optional<Dropped> MessageCheck::run() {
   if (const Fault fault = check_header()) return fault;
   source_ = message_.subspan(kPrefixAt, kPrefix);
   named_ = received_.relayed ? Bytes() : source_;
-  Bytes rest = message_.subspan(kHeader);
+  Bytes rest = message_.subspan(kHeaderBytes);
   while (!rest.empty()) {
     const auto submessage = next_submessage(rest);
     if (!submessage) return Dropped::kLength;
@@ -60,7 +60,8 @@ std::optional<Dropped> MessageCheck::run() {
 
 std::optional<Dropped> MessageCheck::check_header() {
   constexpr std::array<unsigned char, 5> kBegin = {'R', 'T', 'P', 'S', 2};
-  if (message_.size() < kHeader || message_.size() > EditedMessage::kMost) return Dropped::kHeader;
+  if (message_.size() < kHeaderBytes || message_.size() > EditedMessage::kMost)
+    return Dropped::kHeader;
   if (!std::equal(kBegin.begin(), kBegin.end(), message_.begin())) return Dropped::kHeader;
   const Bytes prefix = message_.subspan(kPrefixAt, kPrefix);
   if (std::all_of(prefix.begin(), prefix.end(), [](unsigned char b) { return b == 0; }))

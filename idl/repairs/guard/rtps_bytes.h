@@ -10,7 +10,7 @@ namespace trammel::wire {
 
 using Bytes = std::span<const unsigned char>;
 
-inline constexpr std::size_t kHeader = 20;  ///< "RTPS", version, vendor, prefix
+inline constexpr std::size_t kHeaderBytes = 20;  ///< "RTPS", version, vendor, prefix
 inline constexpr std::size_t kPrefixAt = 8, kPrefix = 12;
 
 enum SubmessageId : unsigned char {

@@ -52,15 +52,16 @@ bool is_flexible(const Cause& cause, const Evidence& evidence) {
          evidence.numbers > thresholds::kManyNumbers;
 }
 
-bool begins(const Cause& cause) {
+bool begins_at_a_pose(const Cause& cause) {
   return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose;
 }
 
 /// Whether the cause begins at more than one pose.
 bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
-  return begins(cause) && std::count_if(found.begin(), found.end(), [&](const Cause& other) {
-                            return other.cause == cause.cause && other.joint == cause.joint;
-                          }) > 1;
+  return begins_at_a_pose(cause) &&
+         std::count_if(found.begin(), found.end(), [&](const Cause& other) {
+           return other.cause == cause.cause && other.joint == cause.joint;
+         }) > 1;
 }
 
 bool goes_with_time(const Unexplained& unexplained) {
@@ -153,7 +154,7 @@ struct Doubts {
         dwarfed(is_dwarfed(evidence.effect_rms, beside.unexplained)),
         again(begins_again(cause, beside.found)),
         unlikely(evidence.unlikely),
-        slow(begins(cause) && goes_with_time(beside.unexplained)),
+        slow(begins_at_a_pose(cause) && goes_with_time(beside.unexplained)),
         by_scale(may_be_scale(cause, beside)),
         not_held_out(!evidence.helps_held_out),
         by_half(beside.more_than_noise && !evidence.in_both_halves),
