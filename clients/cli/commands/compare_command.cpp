@@ -87,7 +87,8 @@ Status judge(const CompensatedModel& before, const CompensatedModel& now, const 
 
 Result<Compared> compared(const CompensatedModel& before, const CompensatedModel& now,
                           const CompareArguments& asked) {
-  TRY(check_fits_cell(before, now.cell(), "model " + before.provenance().id));
+  TRY(asked.batch.empty() ? check_comparable(before, now)
+                          : check_fits_cell(before, now.cell(), "model " + before.provenance().id));
   Compared all;
   std::optional<CheckedBatch> batch;
   if (asked.batch.empty()) {

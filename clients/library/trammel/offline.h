@@ -185,6 +185,7 @@ class TRAMMEL_API Model {
   struct Inside;
   /// For the library itself.
   explicit Model(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+  /// For the library itself.
   [[nodiscard]] const Inside& inside() const { return *inside_; }
 
  private:

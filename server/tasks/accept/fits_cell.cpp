@@ -25,9 +25,12 @@ bool same_robot(const Chain& a, const Chain& b) {
   return true;
 }
 
+enum class Payloads { kTheSame, kAny };
+
 /// The tools and payloads that the model was trained with and that are no longer what the cell says
 /// they are.
-std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& cell) {
+std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& cell,
+                                     Payloads payloads) {
   const auto same_pose = [](const std::optional<Pose>& a, const std::optional<Pose>& b) {
     return a.has_value() == b.has_value() && (!a || a->matrix() == b->matrix());
   };
@@ -42,20 +45,20 @@ std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& 
     const auto now = cell.tools.find(tool);
     if (now == cell.tools.end() || !same_pose(now->second, model.cell().tools.at(tool)))
       others.push_back(fmt::format("tool {}", tool));
-    if (!same_payload(model.cell().payloads, cell.payloads, payload))
+    if (payloads == Payloads::kTheSame &&
+        !same_payload(model.cell().payloads, cell.payloads, payload))
       others.push_back(fmt::format("payload {}", payload));
   }
   return others;
 }
 
-}  // namespace
-
-Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
+Status check(const CompensatedModel& model, const Cell& cell, const std::string& which,
+             Payloads payloads) {
   if (!same_robot(model.cell().robot, cell.robot)) {
     return refused("{} was trained for another robot than cell {} has", which, cell.name)
         .of("robot");
   }
-  if (const std::vector<std::string> others = other_tools(model, cell); !others.empty()) {
+  if (const std::vector<std::string> others = other_tools(model, cell, payloads); !others.empty()) {
     return refused(
                "{} was trained with other tools or payloads than cell {} has under these names: {}",
                which, cell.name, fmt::join(others, ", "))
@@ -63,6 +66,16 @@ Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const st
         .with_text(others.front());
   }
   return {};
+}
+
+}  // namespace
+
+Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
+  return check(model, cell, which, Payloads::kTheSame);
+}
+
+Status check_comparable(const CompensatedModel& before, const CompensatedModel& now) {
+  return check(before, now.cell(), "model " + before.provenance().id, Payloads::kAny);
 }
 
 }  // namespace trammel

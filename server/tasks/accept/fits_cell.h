@@ -11,5 +11,8 @@ namespace trammel {
 /// are. `which` names it.
 [[nodiscard]] Status check_fits_cell(const CompensatedModel& model, const Cell& cell,
                                      const std::string& which);
+/// Refuses two models that are not of one robot with the same tools. Their payloads may differ:
+/// each predicts with its own.
+[[nodiscard]] Status check_comparable(const CompensatedModel& before, const CompensatedModel& now);
 
 }  // namespace trammel
