@@ -14,7 +14,7 @@ namespace trammel {
 /// What a training tells beside the notes of its model. The command line, the library and Python
 /// tell it in the same words.
 struct ToldByTraining {
-  std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from all the same
+  std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from anyhow
   std::vector<Unlike> unlike;  ///< in what the robot is unlike its twins; empty without twins
 
   /// `changed_within_batch` and `unlike_twins`, warnings.
