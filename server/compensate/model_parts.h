@@ -111,7 +111,7 @@ struct ModelParts {
   ModelProvenance provenance;            ///< id and hash are filled in by make()
   Evaluation training;                   ///< on its training poses
   std::optional<Evaluation> validation;  ///< on poses held out from training
-  std::optional<ErrorBudget> budget;     ///< at the training poses; empty where none has a position
+  std::optional<ErrorBudget> budget;     ///< at the training poses; empty where they tell none
 };
 
 }  // namespace trammel

@@ -287,7 +287,7 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch
     sources.push_back(geometry);
   const Result<CalibrationResult> found =
       calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
-  if (found) diagnosis.budget = error_budget(*found, batch);
+  if (found && tells_a_budget(batch)) diagnosis.budget = error_budget(*found, batch);
 }
 
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,

@@ -17,8 +17,8 @@ nlohmann::ordered_json figures_json(const ErrorFigures& figures) {
           {"axis", axes}};
 }
 
-ordered_json length_json(const std::optional<double>& length) {
-  return length ? ordered_json(to_mm(*length)) : ordered_json(nullptr);
+nlohmann::ordered_json length_json(const std::optional<double>& length) {
+  return length ? nlohmann::ordered_json(to_mm(*length)) : nlohmann::ordered_json(nullptr);
 }
 
 }  // namespace trammel

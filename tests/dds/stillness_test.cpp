@@ -1,5 +1,6 @@
 #include "server/dds/stillness.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <memory>

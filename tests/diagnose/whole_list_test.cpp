@@ -116,6 +116,7 @@ TEST(WholeList, AboutOnePointBaseToolAndZerosAreNotToldApartAndOtherPosesAreGive
   EXPECT_TRUE(std::any_of(told.limits.begin(), told.limits.end(), [](const std::string& limit) {
     return limit.find("measured at one point") != std::string::npos;
   }));
+  EXPECT_FALSE(told.budget) << "a line of it would advise what these poses cannot tell";
 }
 
 TEST(WholeList, AboutOnePointAToolThatIsOffIsTheToolWhereNobodySaidWhereTheRobotStands) {

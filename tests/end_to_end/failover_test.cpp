@@ -23,6 +23,7 @@ TEST(Failover, WhenTheHostOfThePrimaryIsKilledChangesGoOnAndNothingAcknowledgedI
             std::string::npos);
   test::ChangeLoad load(fleet.session_options(), 2);
   ASSERT_TRUE(load.wait_for_everybody(kFailoverLimit));
+  ASSERT_TRUE(fleet.record.wait_until_whole()) << "no host may take over before it has everything";
   const int killed = fleet.record.primary();
   ASSERT_GT(killed, 0);
   fleet.record.act("kill", killed);

@@ -16,6 +16,7 @@
 #include "server/compensate/budget/usual.h"
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/gauges.h"
+#include "server/measurement/one_place.h"
 
 namespace trammel {
 
@@ -362,6 +363,10 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left,
 }
 
 }  // namespace
+
+bool tells_a_budget(const MeasurementBatch& measured) {
+  return has_positions(measured) && !is_each_tool_at_one_place(measured);
+}
 
 ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& measured) {
   const MeasurementBatch positions = positions_of(measured);

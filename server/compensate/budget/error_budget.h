@@ -7,6 +7,10 @@
 
 namespace trammel {
 
+/// Whether a budget can be told from such rows: some have a position, and not all of a tool stand
+/// at one place, where base, tool and zeros of the last joints do the same.
+[[nodiscard]] bool tells_a_budget(const MeasurementBatch& measured);
+
 /// `measured`: rows with positions in the world of the model (in_world_of()), checked against its
 /// cell; others are left out. Without rows that have a position the budget has no line.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostPoses = 10;  // of a self test: each costs a prediction
 constexpr double kMostJoint = 1e6;      // rad, m
-constexpr double kMostMetres = 1e6;
+constexpr double kFarthestPoint = 1e6;
 
 struct TestPose {
   JointVector q;
@@ -105,7 +105,7 @@ Difference worst_of(const ErrorPrediction& now, const Json& stated) {
 bool possible(const ErrorPrediction& prediction) {
   const double most = prediction.X_BT_predicted.matrix().norm() + prediction.error_B.norm() +
                       prediction.stddev_B.norm();
-  return std::isfinite(most) && most < kMostMetres;
+  return std::isfinite(most) && most < kFarthestPoint;
 }
 
 Status impossible() { return refused("model: predicts what is no length").of("self_test"); }

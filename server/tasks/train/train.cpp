@@ -117,7 +117,7 @@ Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSpl
     if (!bare) return bare;
   }
   parts.budget.reset();
-  if (has_positions(split.train)) parts.budget = error_budget(*bare, split.train);
+  if (tells_a_budget(split.train)) parts.budget = error_budget(*bare, split.train);
   parts.validation.reset();
   if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
   return CompensatedModel::make(std::move(parts));
