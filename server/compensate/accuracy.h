@@ -19,7 +19,7 @@
 /// the tracker hides (hidden()).
 namespace trammel {
 
-/// What a pose that was not trained on says, m² per axis.
+/// The square error of a pose that was not trained on, m² per axis.
 struct JudgingCoordinate {
   double squared_error = 0;     ///< measured - predicted
   double stated_variance = 0;   ///< of the true error

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// The same with rotations above positions: the features for a bias of the orientation.
+/// The features with rotations above positions: the features for a bias of the orientation.
 [[nodiscard]] BiasFeatures turned(const BiasFeatures& features);
 
 /// Base and tool of an arm in service, with all identified errors.

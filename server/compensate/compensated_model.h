@@ -23,9 +23,9 @@ struct ErrorPrediction {
   Pose X_BT_predicted;                 ///< where it will be
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
-  /// Of the true error, m: the same without the tracker's own noise.
+  /// The standard deviation of the true error, m: as above without the tracker's own noise.
   Vector3 true_stddev_B = Vector3::Zero();
-  /// Of one measurement, m²; stddev_B is the root of its diagonal.
+  /// The covariance of one measurement, m²; stddev_B is the root of its diagonal.
   Matrix3 covariance_B = Matrix3::Zero();
   /// Of one measured orientation, rad, about the axes of B; only where the model learned
   /// orientations.
@@ -56,7 +56,7 @@ class CompensatedModel {
   /// resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
                                         const std::string& payload) const;
-  /// The same at many poses, faster for a bias with blocks.
+  /// predict() at many poses, faster for a bias with blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(
       const std::vector<PoseContext>& poses) const;
   /// The physics with which the bias was learned.
@@ -116,7 +116,7 @@ class CompensatedModel {
                                              Inside* inside);
   /// Whether the bias holds for this tool and payload.
   [[nodiscard]] bool learned_with(const std::string& tool, const std::string& payload) const;
-  /// What the biases say at a pose.
+  /// The biases' prediction at a pose.
   struct Learned {
     BiasPrediction position;
     std::optional<BiasPrediction> rotation;
@@ -150,7 +150,7 @@ class CompensatedModel {
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
   /// Turned from B of the training into B of today.
   [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
-  /// What the biases move the tool by, in B.
+  /// The way by which the biases move the tool, in B.
   struct LearnedMotion {
     Vector3 shift = Vector3::Zero();
     Matrix3 turn = Matrix3::Identity();

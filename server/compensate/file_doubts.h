@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// Of a robot file that cannot be this robot's: no corrected pose can be promised.
+/// The note on a robot file that cannot be this robot's: no corrected pose can be promised.
 constexpr const char* kOffDrawing = "robot_off_drawing";
 
 /// Of rows that were measured beside `others` and do not fit them: which, and by how much. More

@@ -15,7 +15,7 @@ constexpr const char* kNotConfirmed = "robot_not_confirmed";
 /// other.
 constexpr const char* kOneSide = "approached_from_one_side";
 
-/// What a user of the model should know, the gravest first. Every door asks here: command line,
+/// The notes for a user of the model, the gravest first. Every door asks here: command line,
 /// service, pages, library.
 ///
 /// `kStop`: a number of the robot file is farther off than a robot is off its drawing (3 mm, 3
@@ -26,7 +26,7 @@ constexpr const char* kOneSide = "approached_from_one_side";
 /// effect, a bias that was learned with a tool that has moved since, what changed between sessions.
 [[nodiscard]] std::vector<Note> notes_of(const CompensatedModel& model);
 
-/// What a user of any result should know that rests on the cell's files and on no model yet.
+/// The notes for a user of any result that rests on the cell's files and on no model yet.
 [[nodiscard]] std::vector<Note> notes_of(const Cell& cell);
 
 /// The first note that keeps the model from being put in force by itself.

@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// What changed on the arm between two sessions that a model was made from.
+/// The change of the arm between two sessions that a model was made from.
 struct SessionChange {
   /// A number of it, in the unit that people read: an angle in mrad, a length in mm.
   struct Size {
@@ -32,7 +32,7 @@ struct SessionChange {
   std::vector<std::string> could_also_be;  ///< sources that explain it nearly as well
   bool rests_on_order = false;             ///< of the sessions, which no clock told
 };
-/// What was identified from several sessions.
+/// The parameters that were identified from several sessions.
 struct IdentifiedTogether {
   const PhysicalModel& physics;
   const std::vector<IdentifiedParameter>& parameters;

@@ -9,7 +9,7 @@
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
-/// What a model's training poses were, as far as what it promises is about them.
+/// The training poses of a model, as far as its promise rests on them.
 namespace trammel {
 
 struct WhatWasMeasured {

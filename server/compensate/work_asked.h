@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What a model promises at poses that a cell was asked for.
+/// The promise of a model at poses that a cell was asked for.
 struct PromisedAtWork {
   int out_of_domain = 0;  ///< of the poses
   double rms = 0;         ///< m, of the stated standard deviations of the true position, Euclidean

@@ -15,7 +15,7 @@ struct DiagnoseOptions {
   int next_poses = 10;  ///< to suggest where causes cannot be told apart; 0: none
   bool recovery =
       true;  ///< measure how large effects must be to be named (the recovery curves of the page)
-  /// What is being done, and the share done of all in [0, 1]; return false to give up.
+  /// Is told the present step, and the share done of all in [0, 1]; return false to give up.
   std::function<bool(const std::string& stage, double share)> progress;
 };
 

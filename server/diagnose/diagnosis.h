@@ -35,13 +35,13 @@ struct Cause {
 /// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41
 /// on`. No order. A cause that only another version of the program knows comes as it is spelled.
 [[nodiscard]] std::string in_words(const Cause& cause);
-/// The same without its joint and pose, where a table has columns for them.
+/// The cause in words without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
-/// What a finding is called, all of it or without joint and pose. A pose that is out and may show
+/// The name of a finding, all of it or without joint and pose. A pose that is out and may show
 /// what the simulation lacks is no bad one.
 [[nodiscard]] std::string called(const Cause& cause, bool is_in_doubt);
 [[nodiscard]] std::string kind_called(const Cause& cause, bool is_in_doubt);
-/// What is known of it, wherever on the arm it is.
+/// The record of the cause, wherever on the arm it is.
 [[nodiscard]] const CauseRecord& record_of(const Cause& cause);
 /// The cause of that record, of `joint` (0-based; -1: of no single one).
 [[nodiscard]] Cause cause_at(const CauseRecord& record, int joint = -1);
@@ -94,7 +94,7 @@ struct Finding {
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };
 [[nodiscard]] std::string_view to_string(Verdict verdict);
 
-/// What is left and is more than noise.
+/// The rest that is more than noise.
 struct Unexplained {
   bool present = false;
   std::vector<std::string> depends_on;  ///< `q4`, `time`, `torque`
@@ -103,7 +103,7 @@ struct Unexplained {
   std::string hint = {};  ///< for people: what it may be, or what would show more; may be empty
 };
 
-/// What is left after all that was found, beside what is stated for one measurement.
+/// The rest after all that was found, beside the stated sigma of one measurement.
 struct LeftOver {
   double left = 0, stated = 0;  ///< standard deviation per axis, m or rad
   double freedom = 0;           ///< degrees of freedom; 0 where nothing was measured

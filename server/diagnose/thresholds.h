@@ -131,11 +131,11 @@ inline constexpr double kOthersSpeak = 5;
 inline constexpr std::ptrdiff_t kMostOrders = 2;
 /// Times its prior beyond which an off-centre encoder (1 mrad) is larger than robots have it.
 inline constexpr double kUnlikelyEccentricity = 2;
-/// The same of the centre of gravity of a payload (100 mm).
+/// Times its prior (100 mm) beyond which the centre of gravity of a payload is unlikely.
 inline constexpr double kUnlikelyPayload = 5;
 /// Standard deviations below zero at which the play of a joint has the wrong sign: 95 %, one side.
 inline constexpr double kWrongSign = 1.645;
-/// The same of the play at one pose, of which there are many: 98 %, one side.
+/// The same number for the play at one pose, of which there are many: 98 %, one side.
 inline constexpr double kWrongSignOfPose = 2;
 /// Share of the poses that may have play of the wrong sign. A quarter is more than the side of a
 /// pose is mistaken.

@@ -17,7 +17,7 @@ enum class TriageVerdict {
 /// `clean`, `explained`, `poisoned`.
 [[nodiscard]] std::string_view to_string(TriageVerdict verdict);
 
-/// What a new batch says against a model, before anything is learned from it.
+/// The verdict of a new batch on a model, before anything is learned from it.
 struct Triage {
   TriageVerdict verdict = TriageVerdict::kClean;
   bool learn = true;  ///< false: keep the batch apart until somebody who knows has looked at it

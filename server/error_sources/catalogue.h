@@ -18,7 +18,7 @@ namespace trammel {
 /// (`joint_slip:2@40`). Null if it is unknown.
 [[nodiscard]] const CauseRecord* find_cause(std::string_view spelling);
 
-/// The same for a spelling that must be known: an unknown one is a bug.
+/// The record of a spelling that must be known: an unknown one is a bug.
 [[nodiscard]] const CauseRecord& cause_spelled(std::string_view spelling);
 
 /// The first cause of that search family. It is a bug if there is none.
@@ -30,7 +30,7 @@ namespace trammel {
 /// The cause whose parameters correct that part of the nominal cell. It is a bug if there is none.
 [[nodiscard]] const CauseRecord& cause_correcting(causes::Part part);
 
-/// What is missing in a record, in words for its author; empty if it is complete. Its rivals must
+/// The gaps in a record, in words for its author; empty if it is complete. Its rivals must
 /// be known causes.
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);
 

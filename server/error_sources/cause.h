@@ -16,7 +16,7 @@ namespace trammel {
 class ErrorSource;
 struct Cell;
 
-/// What must have been recorded with each pose for a cause to show.
+/// The columns that each pose needs for a cause to show.
 struct ContextNeeds {
   bool time = false;
   bool temperature = false;
@@ -42,7 +42,7 @@ using SourceMaker = Result<std::shared_ptr<const ErrorSource>> (*)(const SourceS
 /// The members of a record.
 namespace causes {
 
-/// What the cause belongs to.
+/// The part of the cell that the cause belongs to.
 enum class Scope {
   kArm,      ///< of the whole arm
   kJoint,    ///< of one joint, or of the link that follows it: its spelling ends in `:joint`
@@ -73,7 +73,7 @@ enum class SearchFamily {
   kPose,      ///< every pose by itself
 };
 
-/// What a record stands for.
+/// The kind of thing that a record stands for.
 enum class StandsFor {
   kACause,           ///< one physical cause
   kNoKnownCause,     ///< an effect that no known cause explains
@@ -135,7 +135,7 @@ struct Figure {
   std::string_view meaning;
 };
 
-/// What is reported if a step happened before the first pose of a new batch.
+/// The report if a step happened before the first pose of a new batch.
 struct WholeBatch {
   std::string_view sentence;  ///< for people; `{}` for the joint
   bool harmful = false;  ///< a model must not learn from such a batch: it would learn an error that

@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// What the weight of an arm may be beyond what its robot file tells.
+/// The possible weight of an arm beyond the masses in its robot file.
 struct ExpectedWeights {
   FirstMoments moment;  ///< 2 x n, kg m
   JointArray spread;    ///< n, kg m: standard deviation of either number of a link

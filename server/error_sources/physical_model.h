@@ -21,7 +21,7 @@ struct PhysicalModel {
   Eigen::VectorXd values;  ///< SI, the parameters of all sources one after the other
 
   [[nodiscard]] int parameter_count() const;
-  /// Of all sources in order.
+  /// The parameters of all sources in order.
   [[nodiscard]] std::vector<Parameter> parameters() const;
   [[nodiscard]] Eigen::VectorXd prior_values() const;
 

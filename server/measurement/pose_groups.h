@@ -22,8 +22,8 @@ using PoseGroup = std::vector<Eigen::Index>;
 [[nodiscard]] bool are_seen_together(const Measurement& a, const Measurement& b);
 /// The rows of `batch` by joint vector, those that are not seen together apart.
 [[nodiscard]] std::vector<PoseGroup> groups_seen_together(const MeasurementBatch& batch);
-/// Of each row how many are seen together with it, itself counted; empty where all are alone.
-/// Gauges see the arm from different sides, and are alone.
+/// The number of rows that are seen together with each row, itself counted; empty where all are
+/// alone. Gauges see the arm from different sides, and are alone.
 [[nodiscard]] std::vector<int> counted_together(const MeasurementBatch& batch);
 
 }  // namespace trammel

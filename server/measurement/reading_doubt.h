@@ -23,7 +23,7 @@
 /// are in another unit of length than the others.
 namespace trammel {
 
-/// What was seen of a batch.
+/// The doubts about how a batch was read.
 struct ReadingLook {
   /// What speaks against the positions: how far they are off (`value`, mm), the reading that would
   /// fit (`text`, `with q2_deg and q3_deg exchanged`), its columns and the first row that it is

@@ -25,8 +25,8 @@ struct Tracker {
 /// Written in a list of error sources, or in its place: training chooses by the measurements.
 inline constexpr std::string_view kAutoSources = "auto";
 
-/// What to identify and what to learn. Sources as spelled on the command line: `geometry`,
-/// `gear_transmission:3`.
+/// The parameters to identify and the bias to learn. Sources as spelled on the command line:
+/// `geometry`, `gear_transmission:3`.
 struct ModelSpec {
   std::vector<std::string> error_sources = {"base", "geometry", "compliance"};
   /// Set where the cell file says `auto`: what it names beside it. A training keeps these, adds
@@ -84,7 +84,8 @@ struct Cell {
 /// The tool of a request: `requested`, or the only tool if that is empty. Refuses an unknown name.
 /// Refuses an empty name if the cell has several tools.
 [[nodiscard]] Result<std::string> resolve_tool(const Cell& cell, const std::string& requested);
-/// The same for payloads; a cell without payloads has the one called "" (nothing carried).
+/// The payload of a request, chosen as a tool is. A cell without payloads has one called ""
+/// (nothing carried).
 [[nodiscard]] Result<std::string> resolve_payload(const Cell& cell, const std::string& requested);
 
 }  // namespace trammel

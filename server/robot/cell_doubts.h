@@ -19,7 +19,7 @@ struct CellDoubt {
 /// is not told from d of the other.
 [[nodiscard]] std::vector<int> rows_without_hayati(const Chain& robot);
 
-/// What is doubtful in the files, before any measurement: gravity that points up over an upright
+/// The doubts about the files before any measurement: gravity that points up over an upright
 /// base; a quaternion that would put the base upright in the order x, y, z, w; a tool, a payload's
 /// centre or a base that is less than 2 mm away, as numbers in metres are; two consecutive parallel
 /// axes without `hayati: true`, whose d nobody can tell apart (Hayati, 1983).

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What a certificate of a cell names, as its file has it; empty where it says nothing.
+/// The fields of a cell's certificate, as its file has them; empty where it says nothing.
 struct CellPapers {
   std::string serial_number;  ///< of the robot
   std::string instrument;     ///< that its batches are measured with

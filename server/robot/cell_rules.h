@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// What the owner of a cell demands of it, beside its description.
+/// The demands of a cell's owner, beside its description.
 struct CellRules {
   std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
   bool fleet_prior =

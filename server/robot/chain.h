@@ -102,7 +102,7 @@ class Chain {
   /// commanded joint, eq. (3.7).
   [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q,
                                          const Vector3& p_F = Vector3::Zero()) const;
-  /// The same per gear angle.
+  /// The Jacobian per gear angle.
   [[nodiscard]] Eigen::MatrixXd gear_jacobian(const JointVector& q,
                                               const Vector3& p_F = Vector3::Zero()) const;
   /// Whether any link's weight is known.

@@ -13,7 +13,7 @@
 /// ranges, which measure a distance; dial gauges and probes, which touch a surface.
 namespace trammel {
 
-/// What an instrument measures to, as the cell file has it under `anchors`.
+/// The point that an instrument measures to, as the cell file has it under `anchors`.
 struct Anchor {
   enum class Shape { kPoint, kSphere, kPlane, kRing };
   Shape shape = Shape::kPoint;

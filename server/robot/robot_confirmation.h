@@ -18,7 +18,8 @@ struct RobotConfirmation {
   std::string day;             ///< 2026-11-26
 };
 
-/// What the cell file says; nothing where it says nothing, or where the robot file changed since.
+/// The confirmation in the cell file; empty where it says nothing, or where the robot file changed
+/// since.
 [[nodiscard]] std::optional<RobotConfirmation> confirmation_of(const Cell& cell);
 
 /// The text of a cell file with the line `robot_confirmed` as it is now, or without one. Refuses a

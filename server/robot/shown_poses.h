@@ -13,7 +13,7 @@
 /// lands off by the difference, however well the model fits.
 namespace trammel {
 
-/// What a controller shows at some poses.
+/// The poses that a controller shows for some joints.
 struct ShownPoses {
   /// One way in which the three angles may be meant. Makers differ: A B C, W P R, a rotation
   /// vector.
@@ -27,7 +27,7 @@ struct ShownPoses {
       orientations;  ///< the ways in which they may be meant; empty: none is shown
 };
 
-/// What comparing came to.
+/// The result of the comparison.
 struct RobotComparison {
   enum class Verdict { kConfirmed, kDiffers, kCannotTell };
   Verdict verdict = Verdict::kCannotTell;

@@ -9,7 +9,7 @@
 /// Whether a repair helped: the model of the measurements after it, held against the one before.
 namespace trammel {
 
-/// What became of a line that was to be put right.
+/// The outcome of a line that was to be put right.
 struct LineOutcome {
   enum class Helped {
     kPutRight,    ///< no longer beyond its U, or beyond what is usual

@@ -6,7 +6,7 @@
 #include "server/compensate/budget/budget.h"
 #include "server/compensate/compensated_model.h"
 
-/// What is between two models of one robot.
+/// The difference between two models of one robot.
 namespace trammel {
 
 /// A parameter of either model; one that a model does not have is 0 there, on the drawing.

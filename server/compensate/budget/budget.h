@@ -10,7 +10,7 @@
 /// arithmetic.
 namespace trammel {
 
-/// What a line of the budget is.
+/// The kind of a line of the budget.
 enum class LineKind {
   kBase,
   kJointZero,
@@ -68,8 +68,8 @@ struct BudgetView {
   std::vector<BudgetLine> lines;
 };
 
-/// What is left when this and all before it is put right, with base and tool frames touched again
-/// each time.
+/// The error that is left when this and all before it is put right, with base and tool frames
+/// touched again each time.
 struct PutRight {
   std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `loads`, `trammel`
   std::string name;     ///< for people
@@ -80,8 +80,8 @@ struct PutRight {
 struct ErrorBudget {
   int poses = 0;
   BudgetView as_it_stands;
-  /// The same of what touching base and tool frames would leave: the best fit of both to the error
-  /// is taken out of it and of every line. Lines of frames do not stand here.
+  /// The view of the error that touching base and tool frames would leave: the best fit of both to
+  /// the error is taken out of it and of every line. Lines of frames do not stand here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
   /// Of several sessions: what changed on the arm between them, each line at the poses where it

@@ -24,8 +24,8 @@ namespace trammel {
 /// without lines.
 [[nodiscard]] std::vector<std::string> in_words(const ErrorBudget& budget, int most = 6);
 
-/// What is between two models in its `most` first lines, beyond what touching frames would take
-/// away.
+/// The difference between two models in its `most` first lines, beyond what touching frames would
+/// take away.
 [[nodiscard]] std::vector<std::string> difference_in_words(const ModelDifference& difference,
                                                            int most = 6);
 

@@ -24,7 +24,7 @@ struct Datum {
   std::vector<OnDrawing> on_drawing;
 };
 
-/// What was identified of an arm.
+/// The identified parameters of an arm.
 struct Identified {
   const PhysicalModel& physics;
   const std::vector<IdentifiedParameter>& parameters;

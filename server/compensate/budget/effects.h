@@ -25,7 +25,8 @@ struct LeftAt {
                                  const std::vector<BudgetItem>& items,
                                  const MeasurementBatch& positions);
 
-/// What `items` do together: the model minus the model in which all of them are on their drawing.
+/// The effect of all `items` together: the model minus the model in which all of them are on their
+/// drawing.
 [[nodiscard]] Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model,
                                              const std::vector<const BudgetItem*>& items,
                                              const MeasurementBatch& positions);

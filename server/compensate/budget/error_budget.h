@@ -15,23 +15,23 @@ namespace trammel {
 /// cell; others are left out. Without rows that have a position the budget has no line.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const MeasurementBatch& measured);
-/// The same at targets, where the error is the predicted one: nothing is left beyond the model.
+/// The budget at targets, where the error is the predicted one: nothing is left beyond the model.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const std::vector<PoseContext>& targets);
-/// The same of a calibration, at the poses that it was made from: nothing is learned beside it.
+/// The budget of a calibration, at the poses that it was made from: nothing is learned beside it.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& calibration,
                                        const MeasurementBatch& measured);
 
-/// What two models predict differently, 3 x N, m, in W; `learned` of it is by what they learned
-/// beyond the physics.
+/// The difference of two models' predictions, 3 x N, m, in W; `learned` of it is by what they
+/// learned beyond the physics.
 struct PredictedDifference {
   std::vector<PoseContext> poses;
   Eigen::Matrix3Xd all, learned;
-  /// Of it, because what the arm carries differs (`load_change`); no column: it carries the same.
+  /// The part that another load makes (`load_change`); no column: both carry the same load.
   Eigen::Matrix3Xd load;
   std::optional<BudgetNumber> load_change;  ///< of the mass, kg
 };
-/// Of the difference between two models, whose parameters differ by those of `between`.
+/// The budget of the difference between two models, whose parameters differ by those of `between`.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& between,
                                        const PredictedDifference& predicted);
 

@@ -16,7 +16,7 @@ struct ZeroRemedy {
   double add = 0, u95 = 0;
   std::string unit;  ///< `deg` or `mm`
 };
-/// Of every joint whose zero is off by more than its U.
+/// The steps for every joint whose zero is off by more than its U.
 [[nodiscard]] std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget);
 
 /// Whether a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`,
@@ -38,12 +38,12 @@ struct RemedyValue {
 struct MakersWords {
   std::string maker, zeros, lengths, load;
   std::vector<std::string> axes = {};  ///< the names of the first ones; empty: `joint 4`
-  /// What the maker calls a joint (0-based): `A4`, `J4`, `axis 4`, `R`; else `joint 4`.
+  /// The maker's name of a joint (0-based): `A4`, `J4`, `axis 4`, `R`; else `joint 4`.
   [[nodiscard]] std::string axis(int joint) const;
 };
 [[nodiscard]] MakersWords makers_words(const Chain& robot);
 
-/// What a shop can put right, step by step, for people.
+/// The repairs that a shop can make, step by step, for people.
 [[nodiscard]] std::vector<std::string> remedies_in_words(const ErrorBudget& budget,
                                                          const Chain& robot);
 

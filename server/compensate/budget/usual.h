@@ -2,10 +2,10 @@
 
 #include "server/compensate/budget/items.h"
 
-/// What arms of their kind show, by which a value is judged.
+/// The usual sizes by which a value is judged.
 namespace trammel {
 
-/// What a healthy arm of this size does not exceed in about one of twenty cases, SI. Estimates of
+/// The size that a healthy arm does not exceed in about one of twenty cases, SI. Estimates of
 /// this project: no published table stands behind them.
 struct UsualSizes {
   double zero = 0, twist = 0;  ///< rad
@@ -27,7 +27,7 @@ struct UsualSizes {
 /// From so many times what is usual on, a line stands out.
 inline constexpr double kStandsOut = 3;
 
-/// What a person should do about a line that stands out.
+/// The advice for a line that stands out.
 [[nodiscard]] std::string action_for(const BudgetLine& line, const PhysicalModel& model);
 
 }  // namespace trammel

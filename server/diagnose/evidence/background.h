@@ -7,7 +7,7 @@ namespace trammel::cause_search {
 /// L⁻¹ of an information matrix L Lᵀ.
 [[nodiscard]] Eigen::MatrixXd inverse_factor_of(const Eigen::MatrixXd& information);
 
-/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and
+/// The expectation for whitened rows when no candidate acts: white noise of unit variance, and
 /// `columns` Z times unknown numbers of unit variance. The columns are the model's own parameters,
 /// in units of their priors, and the anonymous functions found before. The covariance of the rows
 /// is S = 1 + Z Zᵀ. By the matrix inversion lemma S⁻¹ = 1
@@ -15,7 +15,7 @@ namespace trammel::cause_search {
 class Background {
  public:
   explicit Background(Eigen::MatrixXd columns);
-  /// The same with 1 + ZᵀZ known.
+  /// The background with 1 + ZᵀZ known.
   Background(Eigen::MatrixXd columns, const Eigen::MatrixXd& information);
 
   /// S⁻¹ y of every column.

@@ -38,7 +38,7 @@ struct Shares {
 /// Those of the columns g that several families have, by what they are called.
 using KnownShares = std::map<std::string, Shares>;
 
-/// What one scan sees of the rows, with one set of data.
+/// The rows as one scan sees them, with one set of data.
 struct View {
   const Background& background;  ///< with zeros in the rows that are left out
   const Eigen::VectorXd* keep =
@@ -110,7 +110,7 @@ using FamilyPtr = std::unique_ptr<Family>;
 [[nodiscard]] FamilyPtr make_anonymous_family(const LinearProblem& problem,
                                               const std::vector<int>& joints);
 
-/// What an error that follows the attitude of the tool depends on.
+/// The circumstances of an error that follows the attitude of the tool.
 inline constexpr const char* kAttitude = "attitude of the tool to gravity";
 /// A displacement of the tool that follows how it stands to gravity, as where it sags in its clamp.
 /// No cause of the list does so, and causes of many numbers fit a part of it.

@@ -11,7 +11,8 @@
 
 namespace trammel::cause_search {
 
-/// What chance alone brings at these poses, from a parametric bootstrap of the background.
+/// The scores that chance alone brings at these poses, from a parametric bootstrap of the
+/// background.
 struct Chance {
   std::map<std::string, double>
       penalty;  ///< nat, by a family's label: the median of what it reaches by chance (it may

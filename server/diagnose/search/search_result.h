@@ -31,7 +31,7 @@ struct Reformed {
   std::string from, to;
 };
 
-/// What forward and backward selection ended with.
+/// The result of forward and backward selection.
 struct SearchResult {
   PriorModel before;       ///< calibrated, as the cell has it
   PriorModel after;        ///< with all that was accepted

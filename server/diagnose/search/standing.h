@@ -7,7 +7,7 @@
 
 namespace trammel::cause_search {
 
-/// What the model found so far leaves over, and all that may explain it. `found` outlives it.
+/// The residual of the model found so far, and all that may explain it. `found` outlives it.
 struct Standing {
   explicit Standing(const SearchResult& found);
   Standing(const Standing&) = delete;  // the families look at the problem

@@ -10,7 +10,7 @@
 #include "server/diagnose/tell/findings.h"
 #include "server/measurement/repeats.h"
 
-/// What a search found, told: each function fills its part of a diagnosis.
+/// The result of a search, in words: each function fills its part of a diagnosis.
 namespace trammel::cause_search {
 
 /// A batch made ready to be searched.
@@ -56,20 +56,21 @@ void tell_largest_first(Diagnosis& diagnosis);
 /// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects
 /// among them.
 void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
-/// What these poses could not have told apart or shown.
+/// The causes that these poses could not have told apart or shown.
 void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families,
                     const Cell& cell, const Surrogates& surrogates,
                     const MeasurementBatch& recorded, Diagnosis& diagnosis);
 void tell_periodograms(const Explained& explained, Diagnosis& diagnosis);
-/// What to measure next, or why nothing would help.
+/// The next poses to measure, or the reason why none would help.
 void tell_next_poses(const Explained& explained, const DiagnoseOptions& options,
                      Diagnosis& diagnosis);
-/// What is left after all that was found, and what it still depends on.
+/// The rest after all that was found, and the circumstances that it still depends on.
 void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis);
-/// What hiding effects of the causes found, and of some common ones, in these poses brings back.
+/// The share of hidden effects that is found again in these poses, for the causes found and some
+/// common ones.
 void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families,
                    std::uint64_t seed, Diagnosis& diagnosis);
-/// What was missing, or wrong, in the batch. `recorded`: all of its rows, without surrogates.
+/// The columns that the batch lacked or had wrong. `recorded`: all of its rows, without surrogates.
 void tell_limits(const Explained& explained, const PreparedBatch& prepared,
                  const MeasurementBatch& recorded, Diagnosis& diagnosis);
 

@@ -15,7 +15,7 @@ namespace trammel::cause_search {
 [[nodiscard]] std::vector<SessionSetting> with_noise_as_repeated(
     std::vector<SessionSetting> sessions, const MeasurementBatch& rows, const Tracker& tracker);
 
-/// What one session leaves.
+/// The residual of one session.
 struct LeftBySession {
   std::string id;
   LeftOver left;  ///< of positions

@@ -8,7 +8,7 @@
 
 namespace trammel::cause_search {
 
-/// What a finding is judged beside.
+/// The other findings and facts that a finding is judged by.
 struct Beside {
   const std::vector<Cause>& found;   ///< all causes found, the one that is judged among them
   const Unexplained& unexplained;    ///< what depends on something and has no name
@@ -19,7 +19,7 @@ struct Beside {
   bool larger = false;               ///< what is left is larger than stated, and not by chance
 };
 
-/// What speaks for a finding.
+/// The evidence for a finding.
 struct Evidence {
   double effect_rms = 0;       ///< m
   bool in_both_halves = true;  ///< either half of the poses shows it by itself

@@ -5,7 +5,7 @@
 
 #include "server/diagnose/diagnosis.h"
 
-/// What a diagnosis says of the robot file.
+/// The words of a diagnosis about the robot file.
 namespace trammel::cause_search {
 
 /// Without a Hayati row between parallel axes no number of the model is their tilt: what always

@@ -5,7 +5,7 @@
 
 namespace trammel::cause_search {
 
-/// What is left beside all that was found and has a name.
+/// The rest beside all that was found and has a name.
 struct Remainder {
   bool more_than_noise = false;
   double rms = 0;       ///< m

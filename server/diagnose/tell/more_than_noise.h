@@ -33,7 +33,7 @@ enum class NoiseVerdict {
 [[nodiscard]] bool leaves_more_than_noise(const Explained& explained,
                                           const PreparedBatch& prepared);
 
-/// What is left beside all that has a name. It is more than noise where
+/// The rest beside all that has a name. It is more than noise where
 /// - something was found that has no name;
 /// - the extended model leaves more than the measurement;
 /// - the extended model is worse on the poses held out, if there are enough of them (`diagnosis`

@@ -6,7 +6,7 @@
 
 namespace trammel::cause_search {
 
-/// What a batch could not have shown, and what it cannot tell apart.
+/// The causes that a batch could not have shown, and those that it cannot tell apart.
 struct Blindness {
   std::vector<Unseen> unseen;
   std::vector<Inseparable> inseparable;

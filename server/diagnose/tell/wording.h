@@ -7,15 +7,16 @@
 
 namespace trammel {
 
-/// What people on the shop floor do about a cause that may also be `others`.
+/// The action that people on the shop floor take against a cause that may also be `others`.
 [[nodiscard]] std::string action_for(const Cause& cause, const std::vector<Cause>& others);
-/// What a batch would need to show a cause that this one cannot show.
+/// The columns and poses that a batch would need to show a cause that this one cannot show.
 [[nodiscard]] std::string what_it_needs(const Cause& cause);
 /// Whether a cause that could not have been seen was looked for all the same, by the order of the
 /// poses: it would have been found, but never named for certain. `recorded`: the batch without
 /// surrogates.
 [[nodiscard]] bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded);
-/// What would tell a slow change from a sudden one. Asks for no column that the batch has.
+/// The measurement that would tell a slow change from a sudden one. Asks for no column that the
+/// batch has.
 [[nodiscard]] std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded);
 /// Of what changes with the circumstances `q2`, `q3`, `time`: `the positions of joints 2 and 3, and
 /// time`.

@@ -64,7 +64,7 @@ class Comparison {
     return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3;
   }
   [[nodiscard]] double all_rows() const;
-  /// What a pose may cost before it is a bad one.
+  /// The cost above which a pose is a bad one.
   [[nodiscard]] double limit(Eigen::Index rows) const {
     return static_cast<double>(rows) * std::log(all_rows()) + 2 * std::log(poses());
   }

@@ -31,7 +31,7 @@ struct CsvStart {
 /// `Q1_DEG`, `Rx [deg]`, `qw`.
 [[nodiscard]] bool holds_quantities(std::string_view column);
 
-/// What stands before the decimals of a number: `,`, `.`, or nothing where it has none or is no
+/// The sign before the decimals of a number: `,`, `.`, or nothing where it has none or is no
 /// number.
 [[nodiscard]] std::optional<char> decimal_sign(std::string_view field);
 

@@ -19,7 +19,7 @@ inline const std::string kTimeStamp = "timestamp";
 inline const std::array<std::string, 3> kWeather = {"air_temperature [c]", "air_pressure [hpa]",
                                                     "air_humidity [%]"};
 
-/// What the file and the caller state about the layout.
+/// The statements of the file and of the caller about the layout.
 struct Statements {
   std::optional<LengthUnit> unit;
   std::optional<Coordinates> coordinates;

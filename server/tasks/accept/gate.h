@@ -24,7 +24,7 @@
 /// many small losses cannot add up.
 namespace trammel {
 
-/// What a new model must be to be put in force.
+/// The conditions for a new model to be put in force.
 enum class Bar {
   kBetter,  ///< better on the judges: beyond chance, or as the models' own uncertainties say, too
   kBetterBeyondChance  ///< PairedGain::beyond_chance() alone

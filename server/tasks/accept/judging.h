@@ -11,7 +11,7 @@
 /// By which rows the models of a cell are judged, and what a model leaves of them.
 namespace trammel {
 
-/// Of the poses of a batch, where nobody says another share.
+/// The share of a batch's poses that judge, where nobody says another one.
 inline constexpr double kUsualJudgingShare = 0.2;
 
 /// The rows (Measurement::row) of `batch` that judge models: `share` of its poses and, of 100 poses

@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// What the store says of a version that is marked in force and cannot be loaded.
+/// The record of a version that is marked in force and cannot be loaded.
 struct RecordInForce {
   int version = 0;
   double validation_rms =
@@ -22,7 +22,7 @@ struct ModelText {
   std::string text;
 };
 
-/// What a candidate is held against.
+/// The model and poses that a candidate is held against.
 struct Opponents {
   std::optional<ModelText>
       in_force;  ///< none: it is the first model of its cell, or that one cannot be loaded

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What is asked of a check beside its poses.
+/// The questions to a check beside its poses.
 struct CheckAsked {
   std::optional<double> tolerance = {};  ///< m; empty: the cell's
   bool new_tool = false;                 ///< HealthOptions::new_tool

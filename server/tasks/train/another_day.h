@@ -11,7 +11,7 @@
 #include "server/measurement/checked_batch.h"
 #include "server/robot/cell.h"
 
-/// What causes are worth on a day that nobody measured yet.
+/// The gain of causes on a day that nobody measured yet.
 namespace trammel {
 
 /// The error on another day, without and with some causes, and what share of it they take off.

@@ -24,7 +24,7 @@ inline constexpr double kDiagnosisShare = 0.6;
 /// not. The batch is not named: each door has a name of its own for it.
 [[nodiscard]] Status check_can_extend(const Diagnosis& diagnosis);
 
-/// What the diagnosis adds to the list `own`.
+/// The sources that the diagnosis adds to the list `own`.
 [[nodiscard]] std::vector<std::string> added_sources(const std::vector<std::string>& own,
                                                      const Diagnosis& diagnosis);
 
@@ -81,7 +81,7 @@ struct Extension {
                                        const CheckedBatch& batch, const Diagnosis& diagnosis,
                                        const TrainOptions& options);
 
-/// What became of what a diagnosis found.
+/// The outcome of a diagnosis' findings.
 struct Applied {
   std::optional<Extension> extension;  ///< empty: there was nothing to extend by
   std::string

@@ -6,7 +6,7 @@
 
 namespace trammel {
 
-/// What `physics` leaves over of the measured positions, in B: what a bias is learned from.
+/// The residual of `physics` at the measured positions, in B. A bias is learned from it.
 [[nodiscard]] BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch);
 
 }  // namespace trammel

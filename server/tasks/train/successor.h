@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// What a batch makes of the model in force.
+/// The successor of the model in force, by one more batch.
 struct Successor {
   CompensatedModel model;
   std::string note;  ///< for people; empty where the whole model was trained anew

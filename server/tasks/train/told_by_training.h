@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// What a training tells beside the notes of its model. The command line, the library and Python
+/// The notes of a training beside those of its model. The command line, the library and Python
 /// tell it in the same words.
 struct ToldByTraining {
   std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from anyhow
@@ -23,8 +23,8 @@ struct ToldByTraining {
   [[nodiscard]] std::vector<Note> beside(std::vector<Note> of_model) const;
 };
 
-/// Of a model that train() made of `batch` with `options`. A model to start from has judged the
-/// batch: no jump is looked for then.
+/// The notes on a model that train() made of `batch` with `options`. A model to start from has
+/// judged the batch: no jump is looked for then.
 [[nodiscard]] ToldByTraining told_by_training(const CompensatedModel& model,
                                               const CheckedBatch& batch,
                                               const TrainOptions& options);

@@ -27,7 +27,7 @@ struct TrainOptions {
   std::int64_t trained_at = 0;  ///< Unix time, s, as recorded
   /// Somebody who knows the batch has looked at it: positions are learned from as they are read.
   bool looked_at = false;
-  /// What is being done and the share done of all in [0, 1]; return false to give up.
+  /// Is told the present step and the share done of all in [0, 1]; return false to give up.
   std::function<bool(const std::string& stage, double share)> progress;
 };
 
