@@ -14,7 +14,7 @@ enum class Dialect { kRapid, kKrl, kFanuc, kInform, kUrScript, kCamRob, kRoboDk 
 /// As --format spells it: `rapid krl fanuc inform urscript camrob robodk`.
 [[nodiscard]] std::optional<Dialect> dialect_called(const std::string& name);
 [[nodiscard]] const char* name_of(Dialect dialect);
-/// What a reader of this dialect looks for, for messages: `movej, movel, movep or movec`.
+/// The words that a reader of this dialect looks for, for messages: `movej, movel, movep or movec`.
 [[nodiscard]] const char* motions_of(Dialect dialect);
 /// By the ending of a file's name, whatever its case; empty: none, or one that several kinds share.
 [[nodiscard]] std::optional<Dialect> dialect_of_file(const std::string& path);

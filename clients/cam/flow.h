@@ -14,7 +14,7 @@
 /// followed here, for all of them alike.
 namespace trammel::cam {
 
-/// What a statement does to the order.
+/// The effect of a statement on the order.
 struct Step {
   enum class Kind {
     kPlain,
@@ -67,7 +67,7 @@ struct Flow {
 /// `in_any_order`: routines that nothing calls are entered again and again, behind one another.
 [[nodiscard]] Flow flow_of(const std::vector<Step>& steps, bool in_any_order = false);
 
-/// What holds before each statement; see states_before().
+/// The state before each statement; see states_before().
 template <typename State, typename Apply, typename Join>
 class StatesBefore {
  public:

@@ -5,7 +5,7 @@
 
 namespace trammel::cam {
 
-/// What corrections do along the straight motions of a program, from each target to the next.
+/// The effect of corrections along the straight motions of a program, from each target to the next.
 /// - Axis speeds, where the robot file tells limits: fills ReceiptRow::path_limit_before_mm_s and
 /// `..._after_mm_s`, the
 ///   speed of the tool at which the first axis reaches its limit on the way from the target before,

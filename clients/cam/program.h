@@ -50,7 +50,7 @@ struct Rewrite {
   std::vector<Slot> slots;
 };
 
-/// What a program says of the arm's configuration at a target. Candidates are the closed-form
+/// The arm's configuration at a target, as a program states it. Candidates are the closed-form
 /// solutions of a spherical wrist; a dialect scores them.
 struct Configuration {
   std::optional<int> conf;  ///< 0..7 as inverse_kinematics.h numbers it
@@ -168,7 +168,7 @@ struct ProgramTarget {
   bool linear = false;         ///< the tool's path to it is a line or an arc
 };
 
-/// What is left as it was.
+/// A target that is left as it was.
 struct LeftAlone {
   std::string name;
   std::size_t file = 0;
@@ -221,7 +221,7 @@ struct StatedUp {
   int line = 0;
 };
 
-/// What shows that a file is not whole.
+/// The sign that a file is not whole.
 struct Cut {
   std::size_t file = 0;
   int line = 0;
@@ -236,7 +236,7 @@ struct MarkPlace {
   bool a_line_each = false;  ///< for each word of the mark
 };
 
-/// What the controller's own files say of the robot.
+/// The robot, as the controller's own files state it.
 struct StatedRobot {
   std::vector<StatedBase> bases;  ///< the first holds
   std::vector<StatedNumber> numbers;

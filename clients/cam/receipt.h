@@ -8,12 +8,12 @@
 #include "clients/cam/program.h"
 #include "clients/session/session_types.h"
 
-/// What became of a program and of each of its targets.
+/// The outcome of a correction: for a program and for each of its targets.
 namespace trammel::cam {
 
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
-/// What became of one target.
+/// The outcome of one target.
 struct ReceiptRow {
   std::string name, file, motion, tool, frame;
   int line = 0;

@@ -28,7 +28,7 @@ struct Token {
   }
 };
 
-/// What a dialect's bytes mean.
+/// The meaning of a dialect's bytes.
 struct Lexis {
   std::string_view comment;  ///< begins one that ends with its line; empty: there are none
   std::string_view

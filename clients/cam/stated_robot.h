@@ -6,7 +6,7 @@
 #include "clients/cam/cell_tools.h"
 #include "clients/cam/program.h"
 
-/// What the files of a controller say of the robot itself: where it stands, and which one it is.
+/// The robot as the files of a controller state it: where it stands, and which one it is.
 namespace trammel::cam {
 
 /// Adds what further files say.

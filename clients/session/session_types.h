@@ -10,7 +10,7 @@
 /// The arguments and results of a session. Units as on the wire: mm, rad; a prismatic joint in mm.
 namespace trammel::client {
 
-/// What a call is about; must fit what the model was trained on.
+/// The subject of a call; must fit what the model was trained on.
 struct CallContext {
   std::string cell;
   std::string tool;     ///< empty: the cell's only one
@@ -38,7 +38,7 @@ struct ModelInfo {
   int training_poses = 0;
   std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
   bool in_force = false;
-  /// What a user of the model should know, the gravest first. In a list of versions only the one in
+  /// The notes for a user of the model, the gravest first. In a list of versions only the one in
   /// force has them.
   std::vector<Note> notes = {};
   /// Where the millimetres come from, for people, of the one in force; empty in other answers.
@@ -116,7 +116,7 @@ struct JobStatus {
   std::string held_back = {};
 };
 
-/// What a change takes for granted.
+/// The assumptions of a change.
 struct ChangeOptions {
   std::optional<int> expected_version =
       {};  ///< in force, 0: none; with another one nothing changes (kConflict)
@@ -142,7 +142,7 @@ struct DatedJob {
   std::optional<std::int64_t> started_unix_s, finished_unix_s;
 };
 
-/// What a diagnosis found.
+/// The result of a diagnosis.
 struct DiagnosisAnswer {
   std::string findings_json;  ///< as `trammel diagnose --json` prints them
   std::string page_html;      ///< self-contained; empty if not asked for, or no longer kept

@@ -9,9 +9,9 @@
 
 namespace trammel {
 
-/// What a JSON text from outside may hold. A parser may need twenty times the memory of the text,
-/// and it copies and frees its tree by recursion. So the text is scanned first, without allocating
-/// and without recursion.
+/// The size and depth that a JSON text from outside may have. A parser may need twenty times the
+/// memory of the text, and it copies and frees its tree by recursion. So the text is scanned first,
+/// without allocating and without recursion.
 struct JsonLimits {
   std::size_t bytes = std::size_t{256} << 20;
   std::size_t depth = 16;                         ///< of arrays and objects inside one another

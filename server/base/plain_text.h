@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-/// What names, ids and messages may hold. Whoever reads a name from outside checks it here; whoever
-/// shows a foreign text to people shows it by shown().
+/// The characters that names, ids and messages may hold. Whoever reads a name from outside checks
+/// it here; whoever shows a foreign text to people shows it by shown().
 namespace trammel {
 
 /// Whether the bytes are UTF-8 (RFC 3629) without NUL.

@@ -118,7 +118,8 @@ template <typename... Args>
   return Failure(std::move(error));
 }
 
-/// What `TRY` hands out: a copy of the value of a named result, the moved value of a temporary one.
+/// The value that `TRY` hands out: a copy of the value of a named result, the moved value of a
+/// temporary one.
 template <typename R>
 auto value_of(R&& result) {
   if constexpr (!std::is_void_v<typename std::remove_cvref_t<R>::value_type>)

@@ -8,7 +8,7 @@
 #include "server/base/result.h"
 #include "server/bias/bias_data.h"
 
-/// What the physics leaves over, learned: joints in, residual of the tool position with its
+/// The learned residual of the physics: joints in, residual of the tool position with its
 /// uncertainty out.
 namespace trammel {
 

@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// What a bias is worth: the errors of observations that were left out.
+/// The worth of a bias: the errors of observations that were left out.
 struct BiasCandidate {
   std::string kernel;  ///< as spelled; `none` first
   double leave_one_out_rms =

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What speaks against learning from `batch` (checked against `cell`), of positions and
+/// The reasons against learning from `batch` (checked against `cell`), of positions and
 /// orientations: a mistake of reading (look_at_readings(), orientation_doubt()) or another tool,
 /// with the figure of what would fit; and against its distances and touches (gauge_doubt()).
 /// Whoever looks at a batch before anything is learned asks this.

@@ -9,7 +9,7 @@
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
-/// What a calibration is asked, and what it found.
+/// The question to a calibration, and its result.
 namespace trammel {
 
 /// If the joints belong to the positions, identification leaves less than the larger of these: m

@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 
-/// What robots of one type have in common, learned from the models of those that were trained.
+/// The common parameters of robots of one type, learned from the models of those that were trained.
 namespace trammel {
 
 /// A robot of the fleet: its name for people, and its model.
@@ -60,10 +60,10 @@ struct Unlike {
          fleet_stddev = 0;  ///< in that unit; value: by its own poses alone
   double z = 0;             ///< standard deviations apart
 };
-/// What is unusual about a robot, the most unusual first: parameters that its own poses put beyond
-/// the prediction interval of the fleet's next robot, so wide that of the fleets whose robots are
-/// all of one law at most kFalseFleets have one that is called unlike (Student's t, Bonferroni over
-/// parameters and robots). `fleet` should be learned without it.
+/// The unusual parameters of a robot, the most unusual first: parameters that its own poses put
+/// beyond the prediction interval of the fleet's next robot, so wide that of the fleets whose
+/// robots are all of one law at most kFalseFleets have one that is called unlike (Student's t,
+/// Bonferroni over parameters and robots). `fleet` should be learned without it.
 [[nodiscard]] std::vector<Unlike> unlike_twins(const ModelParts& parts, const FleetPrior& fleet);
 [[nodiscard]] std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& parameters,
                                                const Eigen::MatrixXd& covariance,

@@ -9,7 +9,7 @@
 #include "server/health/drift.h"
 #include "server/plan/check_design.h"
 
-/// What a check of a robot was asked and what it found.
+/// The question to a check of a robot, and its result.
 namespace trammel {
 
 enum class HealthVerdict {

@@ -2,7 +2,8 @@
 
 #include <cstddef>
 
-/// What a build offers: the inner loops of learning and of diagnosis, on raw column-major arrays.
+/// The functions of one build: the inner loops of learning and of diagnosis, on raw column-major
+/// arrays.
 ///
 /// Each instruction set has a build of its own, one source file in `builds/` that includes the
 /// loops behind a target pragma. No build may use Eigen or a standard template. Their inline

@@ -27,7 +27,7 @@ struct CauseSignal {
 [[nodiscard]] Vector6 signal_at(const CauseSignal& signal, const CauseEffects& effects,
                                 const PoseEffects& at, const JointVector& q);
 
-/// What the causes do over the poses that a robot works at.
+/// The effect of the causes over the poses that a robot works at.
 class WorkingPoses {
  public:
   /// `new_tool`: the tool is refitted as well.

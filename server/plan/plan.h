@@ -61,7 +61,7 @@ struct PlanOptions {
 /// one side at least. Refuses what plan_poses() refuses of the cell.
 [[nodiscard]] Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q);
 
-/// What became of the candidates drawn; each counts for the first reason against it.
+/// The fate of the candidates drawn; each counts for the first reason against it.
 struct DrawCount {
   int drawn = 0;
   int outside = 0;  ///< the pose, or that of its approach, is outside the workspace

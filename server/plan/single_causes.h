@@ -7,7 +7,7 @@
 
 #include "server/error_sources/physical_model.h"
 
-/// What each single cause that may have changed would do to the tool.
+/// The effect on the tool of each single cause that may have changed.
 namespace trammel {
 
 /// A cause of the arm, its load or its tool that may be another than it was.

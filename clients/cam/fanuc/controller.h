@@ -27,7 +27,7 @@ struct Setting {
   std::string changed = {};  ///< why its value is not constant
 };
 
-/// What the programs set UFRAME[n] or UTOOL[n] to, or why that is not known.
+/// The values that programs give UFRAME[n] or UTOOL[n], or the reason why they are not known.
 struct Told {
   std::optional<Pose> X;
   std::string why;

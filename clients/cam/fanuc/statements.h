@@ -81,7 +81,7 @@ struct Motion {
 [[nodiscard]] bool is_group(const Token& token);
 /// `PR[5]`, also of `PR[GP1:5]`; `PR[*]` where an index chooses it.
 [[nodiscard]] std::string indexed(const Tokens& tokens, std::size_t at);
-/// What a statement does to the order. Calls are not in it.
+/// The effect of a statement on the order. Calls are not in it.
 [[nodiscard]] Step step_of(const Statement& statement);
 
 }  // namespace trammel::cam::fanuc

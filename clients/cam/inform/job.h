@@ -11,7 +11,7 @@
 #include "clients/cam/program.h"
 #include "clients/cam/scan.h"
 
-/// What a JBI file says: the head of a job with its positions, and its statements.
+/// The parts of a JBI file: the head of a job with its positions, and its statements.
 namespace trammel::cam::inform {
 
 struct Position {
@@ -40,7 +40,7 @@ struct Statement {
   [[nodiscard]] std::string sets() const;
   /// `CALL JOB:DRILL UF#(2)`
   [[nodiscard]] bool gives_frame() const { return !job.empty() && tokens.has("UF"); }
-  /// What it does to the order. A condition behind a call makes a block of it.
+  /// The effect of the statement on the order. A condition behind a call makes a block of it.
   [[nodiscard]] std::vector<Step> steps() const;
 };
 

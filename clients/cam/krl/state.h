@@ -8,12 +8,12 @@
 #include "clients/cam/krl/tools.h"
 #include "clients/cam/krl/variables.h"
 
-/// What lines of a KRL program set for the motions behind them.
+/// The settings that lines of a KRL program make for the motions behind them.
 namespace trammel::cam::krl {
 
 constexpr double kSpeedUnknown = -1;
 
-/// What the controller has set when a motion comes.
+/// The settings of the controller when a motion comes.
 struct State {
   std::size_t tool = 0, frame = 0;
   std::size_t load = 0;          ///< 0: the tool's own
@@ -31,7 +31,7 @@ class Settings {
            Program& program)
       : lines_(lines), names_(names), tools_(tools), program_(program) {}
 
-  /// What a line sets by itself.
+  /// The settings that a line makes by itself.
   void set(std::size_t f, std::size_t k, State& state);
   /// Where ways come together, what they set differently is not known.
   void join(State& state, const State& other, const std::string& by);

@@ -8,7 +8,7 @@
 #include "clients/cam/flow.h"
 #include "clients/cam/krl/lines.h"
 
-/// What the statements of KRL say, by the names of their parts.
+/// The statements of KRL, by the names of their parts.
 namespace trammel::cam::krl {
 
 [[nodiscard]] bool is_motion(std::string_view word);
@@ -64,7 +64,7 @@ struct Setting {
 [[nodiscard]] std::size_t done_later(const Tokens& tokens);
 /// Words that stand before `(`, in their order.
 [[nodiscard]] std::vector<std::string_view> called_in(const Tokens& tokens);
-/// What a line does to the order. Calls are not in it.
+/// The effect of a line on the order. Calls are not in it.
 [[nodiscard]] Step step_of(const Tokens& tokens);
 
 }  // namespace trammel::cam::krl

@@ -12,7 +12,7 @@
 /// Tools, bases and loads of a KRL program, as its lines name them.
 namespace trammel::cam::krl {
 
-/// What `$LOAD` was set to.
+/// The value that `$LOAD` was set to.
 struct Load {
   std::string name;
   std::optional<StatedLoad> load;

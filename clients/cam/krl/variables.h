@@ -13,7 +13,7 @@
 #include "clients/cam/program.h"
 #include "server/base/letters.h"
 
-/// What the names of a KRL program stand for.
+/// The values of the names of a KRL program.
 namespace trammel::cam::krl {
 
 /// A value, or one clause that says why the program decides it at run time.
@@ -64,7 +64,7 @@ class Variables {
   [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;
   [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f,
                                     int depth = 0) const;
-  /// What `$ROBROOT` stands for: the robot's base, seen from `$WORLD`.
+  /// The value of `$ROBROOT`: the robot's base, seen from `$WORLD`.
   void set_robroot(const Pose& X_WB) { X_WB_ = X_WB; }
   [[nodiscard]] const Pose& robroot() const { return X_WB_; }
   [[nodiscard]] static Told<std::vector<double>> numbers_of(

@@ -12,7 +12,7 @@
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/syntax.h"
 
-/// What the expressions of a RAPID program mean, as far as they are constant.
+/// The values of the expressions of a RAPID program, as far as they are constant.
 namespace trammel::cam::rapid {
 
 /// A value, or one clause that says why the program decides it at run time.
@@ -102,7 +102,7 @@ class Interpreter {
   /// What holds for the expressions that are asked for next.
   void assume(const Settings& settings) { now_ = &settings; }
 
-  /// What an expression stands for: its literal. Several where an index is not constant.
+  /// The value of an expression: its literal. Several where an index is not constant.
   [[nodiscard]] Told<std::vector<Data>> data_of(const Expression& expression, const Scope& scope,
                                                 int depth = 0) const;
   [[nodiscard]] Told<double> number_of(const Expression& expression, const Scope& scope,

@@ -10,7 +10,7 @@
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/interpreter.h"
 
-/// What reads the targets of a RAPID program beside the motions that go to them.
+/// The statements that read targets of a RAPID program beside the motions that go to them.
 namespace trammel::cam::rapid {
 
 class Readings {

@@ -10,13 +10,13 @@
 #include "clients/cam/rapid/order.h"
 #include "clients/cam/rapid/tools.h"
 
-/// What instructions and assignments of RAPID set for the motions behind them.
+/// The settings that instructions and assignments of RAPID make for the motions behind them.
 namespace trammel::cam::rapid {
 
 /// Whether the controller goes to the configuration of a target, or stays as near as it can.
 enum class Confs { kOn, kOff, kUndecided };
 
-/// What holds where a motion begins.
+/// The settings where a motion begins.
 struct State {
   std::size_t load = 0;                ///< as Tools numbers them; 0: the tool's own
   std::size_t displaced = 0;           ///< as Setting has the reason; 0: none

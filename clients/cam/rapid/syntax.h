@@ -90,7 +90,7 @@ struct Assignment {
   std::size_t turns = 0;           ///< of the module, that stand above it
 };
 
-/// What an IF, WHILE, TEST or FOR looks at.
+/// The condition of an IF, WHILE, TEST or FOR.
 struct Condition {
   std::size_t begin = 0, end = 0;
   int routine = -1;

@@ -12,7 +12,7 @@
 
 namespace trammel::cam::urscript {
 
-/// What `set_payload` said.
+/// The payload that `set_payload` stated.
 struct Load {
   std::string name;
   std::optional<StatedLoad> load;

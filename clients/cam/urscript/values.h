@@ -10,7 +10,7 @@
 #include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 
-/// What the expressions of a script mean, as far as they are constant.
+/// The values of the expressions of a script, as far as they are constant.
 namespace trammel::cam::urscript {
 
 template <typename T>

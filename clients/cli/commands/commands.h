@@ -18,7 +18,7 @@ namespace trammel::cli {
 /// How much of its task a command did. For kPart it has printed what is missing on standard error.
 enum class Extent { kAll, kPart };
 
-/// What the command line names to do. Commands that do all or nothing answer a Status.
+/// The commands of the command line. Commands that do all or nothing answer a Status.
 class Action {
  public:
   Action() = default;

@@ -29,7 +29,7 @@ struct ServiceOptions {
   std::vector<std::uint16_t> ports = {17500};
   double timeout_s = 5;
 };
-/// Of commands that work on files or ask a service.
+/// The options of commands that work on files or ask a service.
 void add_service_options(CLI::App& command, ServiceOptions& options);
 /// Of commands that only a service can carry out: `--service` may be said and changes nothing.
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);

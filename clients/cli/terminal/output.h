@@ -29,7 +29,7 @@ void tell_refusal(const Error& error, const std::string& json_path);
 /// when a result for programs goes there (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
 
-/// What one command reads or writes, and the option that names it.
+/// A file that a command reads or writes, and the option that names it.
 struct NamedFile {
   std::string option, path;
 };

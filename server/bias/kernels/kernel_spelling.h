@@ -15,7 +15,7 @@ namespace trammel {
 /// naming the known ones; what is no such sum; more than 32 words or 1000 bytes.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
 
-/// What a bias is made of.
+/// The parts of a bias.
 struct SpelledBias {
   KernelPtr kernel;                    ///< of each coordinate by itself
   std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share

@@ -23,7 +23,7 @@ inline const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
 /// to compute with.
 inline constexpr double kMostLogParameter = 40.0;
 
-/// What a process learns from. All outputs share the joint vectors.
+/// The data that a process learns from. All outputs share the joint vectors.
 struct GpData {
   Eigen::MatrixXd q;            ///< N x n, rad
   Eigen::MatrixXd y;            ///< N x outputs, m, mean removed

@@ -5,7 +5,7 @@
 
 #include "server/calibrate/calibration.h"
 
-/// What a model leaves over, and the sigmas that measurements are therefore weighed with.
+/// The residuals of a model, and the sigmas that measurements are therefore weighed with.
 namespace trammel {
 
 /// Standard deviations of the model's own error, added to the measurement's in quadrature.

@@ -23,7 +23,7 @@ struct Similarity {
   [[nodiscard]] Similarity operator*(const Similarity& first) const;
 };
 
-/// What belongs to one session.
+/// The parameters that belong to one session.
 struct SessionSetting {
   std::string id;
   int first = 0;           ///< index of its first pose in the batch (PoseContext::index)

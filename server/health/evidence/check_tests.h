@@ -10,7 +10,7 @@
 
 namespace trammel::health {
 
-/// What a check is tested for: causes first, then single bad poses.
+/// The hypotheses of a check: causes first, then single bad poses.
 struct Questions {
   std::vector<Hypothesis> hypotheses;
   std::size_t causes = 0;  ///< how many of them are causes

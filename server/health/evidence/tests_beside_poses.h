@@ -19,7 +19,7 @@ namespace trammel::health {
 /// as h and Z, whatever the number of rows; a check of 60 poses looks at thousands of sets.
 class TestsBesidePoses {
  public:
-  /// Of one check's residuals.
+  /// The residuals of one check as the tests see them.
   struct Seen {
     double square = 0;      ///< |l|²
     Eigen::VectorXd along;  ///< D' l of all hypotheses, one after the other
@@ -30,7 +30,7 @@ class TestsBesidePoses {
     /// Numbers that the test of a hypothesis still looks at, and of all together.
     [[nodiscard]] int freedom(std::size_t hypothesis) const { return parts_[hypothesis].freedom; }
     [[nodiscard]] int whole_freedom() const { return whole_freedom_; }
-    /// What the bad poses leave of the residuals.
+    /// The residuals beside the bad poses.
     [[nodiscard]] Seen left(const Seen& seen) const;
     /// What a hypothesis explains of what is left().
     [[nodiscard]] double explained(std::size_t hypothesis, const Seen& left) const;

@@ -4,7 +4,7 @@
 
 #include "server/health/health_verdict.h"
 
-/// What stands beside a change that was seen.
+/// The figures beside a change that was seen.
 namespace trammel::health {
 
 /// Of one joint, or of several.

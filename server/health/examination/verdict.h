@@ -5,13 +5,13 @@
 #include "server/health/foreign_poses.h"
 #include "server/health/health_verdict.h"
 
-/// What a check comes to, and the sentence that says why.
+/// The verdict of a check, and the sentence that gives its reason.
 namespace trammel::health {
 
 /// m rms, base refitted: no small change, and effects are no longer linear.
 inline constexpr double kFarOff = kNeverOff;
 
-/// What keeps a check from naming a change, or from being sure of it.
+/// The reasons that keep a check from naming a change, or from being sure of it.
 struct Doubt {
   bool is_too_far = false;  ///< the poses are off by more than a small change makes
   double scatter = 0;  ///< times a healthy robot's residuals, where nothing explains them better
