@@ -10,6 +10,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
+#include "server/measurement/reading_units.h"
 #include "server/measurement/sessions.h"
 #include "server/robot/rigid_fit.h"
 
@@ -56,6 +57,7 @@ struct Reading {
   Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
   bool by_order =
       true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
+  std::string remedy;  ///< what to write in the file; empty: nothing that holds for certain
 };
 
 double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
@@ -258,6 +260,67 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
   }
 }
 
+/// How three numbers tell an orientation, and what to call that.
+struct Told {
+  const char* name;
+  Quaternion (*from)(const Vector3&);  ///< from rad
+  Vector3 (*numbers)(const Matrix3&);  ///< the reverse; those of the shortest turns
+};
+
+Quaternion turns(double x, double y, double z, bool z_first) {
+  const Eigen::AngleAxisd about_x(x, Vector3::UnitX()), about_y(y, Vector3::UnitY()),
+      about_z(z, Vector3::UnitZ());
+  return z_first ? about_z * about_y * about_x : about_x * about_y * about_z;
+}
+
+const std::array<Told, 4> kTold = {
+    {{"as A B C", [](const Vector3& n) { return turns(n.z(), n.y(), n.x(), true); },
+      [](const Matrix3& R) {
+        return Vector3(std::atan2(R(1, 0), R(0, 0)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
+                       std::atan2(R(2, 1), R(2, 2)));
+      }},
+     {"as W P R", [](const Vector3& n) { return turns(n.x(), n.y(), n.z(), true); },
+      [](const Matrix3& R) {
+        return Vector3(std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
+                       std::atan2(R(1, 0), R(0, 0)));
+      }},
+     {"as Rx Ry Rz", [](const Vector3& n) { return turns(n.x(), n.y(), n.z(), false); },
+      [](const Matrix3& R) {
+        return Vector3(std::atan2(-R(1, 2), R(2, 2)), std::asin(std::clamp(R(0, 2), -1.0, 1.0)),
+                       std::atan2(-R(0, 1), R(0, 0)));
+      }},
+     {"as a rotation vector", [](const Vector3& n) { return Quaternion(rotation_exp(n)); },
+      [](const Matrix3& R) { return rotation_log(R); }}}};
+
+/// Adds the same three numbers as radians, in another order of turns, or as a rotation vector. The
+/// file may have told them in each way; of the wrong way the numbers fit nothing.
+void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
+  const std::size_t vector = kTold.size() - 1;
+  for (std::size_t was = 0; was < kTold.size(); ++was) {
+    const bool small = std::all_of(group.rows.begin(), group.rows.end(), [&](const Measurement* m) {
+      return kTold[was].numbers(*m->R_WT).cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
+    });
+    for (std::size_t meant = 0; meant < kTold.size(); ++meant) {
+      if (was == meant && (!small || was == vector)) continue;
+      const bool reversed = was + meant == 1;  // A B C are W P R from behind
+      if (reversed && was > meant) continue;
+      std::string name = was == meant ? "as angles"
+                         : reversed   ? "with the three angles from behind (A B C, W P R)"
+                                      : kTold[meant].name;
+      if (small) name += " in radians";
+      all.push_back(reading(std::move(name), group, q_WB, [&](const Quaternion& q) {
+        return kTold[meant].from((small ? to_deg(1) : 1) * kTold[was].numbers(q.matrix()));
+      }));
+      all.back().by_order = false;
+      const char* unit = small ? "rad" : "deg";
+      all.back().remedy =
+          meant == vector ? fmt::format("name its columns rvx_{0}, rvy_{0}, rvz_{0}", unit)
+          : small         ? "write the unit into the names of their columns: A_rad, Rx (rad)"
+                          : "name the columns as they are meant";
+    }
+  }
+}
+
 /// As given first, then all others.
 std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, const Chain& robot) {
   const auto inverse = [](const Quaternion& q) { return q.conjugate(); };
@@ -297,6 +360,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
                 as_it_is));
   }
   add_last_joint(group, q_WB, robot, all);
+  add_three_numbers(group, q_WB, all);
   return all;
 }
 
@@ -357,7 +421,8 @@ class Question {
                                otherwise()),
                    given_.fit)
         .with_text(reads_better() ? all_[best_].name : "")
-        .next("xyzw order? another tool frame?")
+        .next(reads_better() && !all_[best_].remedy.empty() ? all_[best_].remedy
+                                                            : "xyzw order? another tool frame?")
         .value();
   }
 

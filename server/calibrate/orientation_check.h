@@ -14,7 +14,8 @@
 /// every pose of a tool: its R_FT. The scatter of the poses about it tells whether the orientations
 /// follow the joints. Its distance from the cell's R_FT tells whether they are of another tool
 /// frame. The same is asked of other ways in which the numbers may have been meant: xyzw order, the
-/// inverse, the robot's base instead of the tracker, a joint reversed, rows shifted by one.
+/// inverse, the robot's base instead of the tracker, a joint reversed, rows shifted by one, the
+/// three angles of the file in radians, in another order or as a rotation vector.
 ///
 /// With one constant orientation and an unknown tool all readings fit equally well, and none does
 /// harm. Where the positions do not tell the base and do not fit that of the cell, base and tool

@@ -103,6 +103,52 @@ TEST(RoboDkCsv, MakesAToolOfEachTcp) {
   EXPECT_EQ(batch->measurements[2].context.tool, "tcp-1");
 }
 
+TEST(RoboDkCsv, ReadsARotationVectorByItsOwnNames) {
+  const Vector3 vector(1.9, 0.5, -2.2);
+  for (const char* text :
+       {"Axis 1,X,Y,Z,rvx_rad,rvy_rad,rvz_rad\n5,1,2,3,1.9,0.5,-2.2\n",
+        "J1;X;Y;Z;Rvx;Rvy;Rvz\n5;1;2;3;1,9;0,5;-2,2\n",
+        "q1_deg,x_mm,y_mm,z_mm,rvx_rad,rvy_rad,rvz_rad\n5,1,2,3,1.9,0.5,-2.2\n"}) {
+    const auto batch = parse_batch(text, "ur.csv");
+    ASSERT_TRUE(batch) << text << sentence(batch.error());
+    const Measurement& m = batch->measurements.front();
+    EXPECT_NEAR(m.context.q(0), from_deg(5), 1e-15) << text;
+    EXPECT_LT((m.R_WT.value_or(Matrix3::Zero()) - rotation_exp(vector)).norm(), 1e-12) << text;
+  }
+  const auto table = parse_batch_table(
+      "5 1 2 3 1.9 0.5 -2.2\n", {"q1_deg", "x_mm", "y_mm", "z_mm", "rvx_rad", "rvy_rad", "rvz_rad"},
+      "ur.txt");
+  ASSERT_TRUE(table) << sentence(table.error());
+  EXPECT_LT((*table->measurements.front().R_WT - rotation_exp(vector)).norm(), 1e-12);
+  EXPECT_EQ(refusal_of(parse_batch("q1_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz,rvx_rad,rvy_rad,rvz_rad\n"
+                                   "5,1,2,3,1,0,0,0,0,0,0\n",
+                                   "ur.csv")),
+            Refusal("ur.csv", {}, "rvx_rad"));
+}
+
+TEST(RoboDkCsv, WhatWasTakenByItsPlaceIsToldAndATcpOfEachRowIsNone) {
+  const auto next_of = [](const std::string& text) {
+    const auto batch = parse_robodk_csv(text, "own.csv");
+    return batch ? "read" : batch.error().next;
+  };
+  // Six axes, a position and three angles, under names that nobody else has.
+  std::string angles = "r1,r2,r3,r4,r5,r6,east,north,up,yaw,pitch,roll\n";
+  for (int row = 0; row < 8; ++row)
+    angles += fmt::format("1,2,3,4,5,{},100.5,200,300,{}.5,-20,1{}\n", row, row, row);
+  EXPECT_EQ(refusal_file(angles), Refusal("rdk.csv", {}, "tcp_x_mm").beyond(8, 2));
+  EXPECT_NE(next_of(angles).find("taken by their places"), std::string::npos) << next_of(angles);
+  EXPECT_NE(next_of(angles).find("J1 ... J6, X, Y, Z"), std::string::npos) << next_of(angles);
+  const std::string pose_first =
+      "east,north,up,yaw,pitch,roll,r1,r2,r3,r4,r5,r6\n4522.31,200,300,1,2,3,4,5,6,7,8,9.5\n";
+  EXPECT_NE(next_of(pose_first).find("no column is named J1"), std::string::npos)
+      << next_of(pose_first);
+  const std::string axes =
+      "Axis1,Axis_2,AXIS 3,PosX,PosY,PosZ,RotA,RotB,RotC,a,b,c\n1,2,3,4,5,6,7,8,9,1,2,3\n";
+  EXPECT_EQ(recognise_batch(axes), BatchKind::kRoboDk);
+  EXPECT_EQ(refusal_file(axes), Refusal("rdk.csv", {}, "X"));
+  EXPECT_NE(next_of(axes).find("J1 ... J6, X, Y, Z"), std::string::npos) << next_of(axes);
+}
+
 TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
   EXPECT_EQ(refusal_file(""), Refusal("rdk.csv"));
   EXPECT_EQ(refusal_file("J1,X,Y,Z\n"), Refusal("rdk.csv").beyond(0, 1));

@@ -71,6 +71,10 @@ TEST(Gauges, ARowThatIsTwoThingsOrNothingIsRefused) {
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,-5,,a1,\n"),
             Refusal("wires.csv", 2, "distance_mm").beyond(-5, 0));
+  const auto spike = parse_batch_csv(head + "a,1,,,,0,,a1,\n", "wires.csv");
+  ASSERT_FALSE(spike);
+  EXPECT_NE(spike.error().next.find("write x_mm, y_mm and z_mm, all 0"), std::string::npos)
+      << "a tip on a fixed point: " << spike.error().next;
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,b\n"),
             Refusal("wires.csv", 2, "minus_pose_id").text("b"));
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,a\n"),

@@ -188,6 +188,24 @@ std::vector<Misreading> all_misreadings() {
     turn_all(b, [](const Quaternion& q) { return Quaternion(q.w(), q.x(), -q.y(), q.z()); });
     return std::string("with the other sign of qy");
   });
+  add("angles in radians", true, [](MeasurementBatch& b, const Cell&, Random&) {
+    turn_all(b, [](const Quaternion& q) {
+      const Vector3 zyx = from_deg(1) * q.toRotationMatrix().eulerAngles(2, 1, 0);
+      return Quaternion(Eigen::AngleAxisd(zyx.x(), Vector3::UnitZ()) *
+                        Eigen::AngleAxisd(zyx.y(), Vector3::UnitY()) *
+                        Eigen::AngleAxisd(zyx.z(), Vector3::UnitX()));
+    });
+    return std::string("as angles in radians");
+  });
+  add("rotation vector in columns of angles", true, [](MeasurementBatch& b, const Cell&, Random&) {
+    turn_all(b, [](const Quaternion& q) {
+      const Vector3 vector = from_deg(1) * rotation_log(q.toRotationMatrix());
+      return Quaternion(Eigen::AngleAxisd(vector.x(), Vector3::UnitX()) *
+                        Eigen::AngleAxisd(vector.y(), Vector3::UnitY()) *
+                        Eigen::AngleAxisd(vector.z(), Vector3::UnitZ()));
+    });
+    return std::string("as a rotation vector in radians");
+  });
   add("left-handed tracker frame", true, [](MeasurementBatch& b, const Cell&, Random&) {
     for (Measurement& m : b.measurements) m.p_W.y() *= -1;
     turn_all(b, [](const Quaternion& q) { return Quaternion(q.w(), -q.x(), q.y(), -q.z()); });

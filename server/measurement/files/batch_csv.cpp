@@ -25,11 +25,12 @@ constexpr std::size_t kMostMeasurements =
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
 const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
+const std::vector<std::string> kVectorColumns = {"rvx_rad", "rvy_rad", "rvz_rad"};
 
 /// The columns of one batch file.
 struct BatchColumns {
   PoseColumns pose;
-  std::vector<std::size_t> position, quaternion, extra;
+  std::vector<std::size_t> position, quaternion, vector, extra;  // the orientation by one of two
   std::optional<std::size_t> sigma, set, session;
   std::optional<std::size_t> distance, touch, anchor, minus_pose;
 
@@ -57,6 +58,7 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
                        {},
                        {},
                        {},
+                       {},
                        table.find("sigma_mm"),
                        table.find("set"),
                        table.find("session_id"),
@@ -67,11 +69,18 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   TRY(find_position(table, columns));
   std::vector<std::size_t> quaternion = TRY(table.all_or_none(kQuaternionColumns));
   columns.quaternion = std::move(quaternion);
+  std::vector<std::size_t> vector = TRY(table.all_or_none(kVectorColumns));
+  columns.vector = std::move(vector);
+  if (!columns.quaternion.empty() && !columns.vector.empty())
+    return refused("two orientations, a quaternion and a rotation vector")
+        .in(table.where())
+        .of(kVectorColumns.front());
 
   std::vector<bool> used(table.columns().size(), false);
   for (const std::size_t column : columns.pose.used()) used[column] = true;
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
+  for (const std::size_t column : columns.vector) used[column] = true;
   for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance,
                              columns.touch, columns.anchor, columns.minus_pose}) {
     if (column) used[*column] = true;
@@ -98,9 +107,17 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
     const double value = TRY(table.number(row, columns.position[k], kPositionLimitMm));
     measurement.p_W(static_cast<Eigen::Index>(k)) = from_mm(value);
   }
-  if (!says(table, row, columns.quaternion)) return {};
-  const Matrix3 R_WT = TRY(table.rotation(row, columns.quaternion));
-  measurement.R_WT = R_WT;
+  if (says(table, row, columns.quaternion)) {
+    const Matrix3 R_WT = TRY(table.rotation(row, columns.quaternion));
+    measurement.R_WT = R_WT;
+  }
+  if (!says(table, row, columns.vector)) return {};
+  Vector3 vector;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double value = TRY(table.number(row, columns.vector[k], 2 * kPi));
+    vector(static_cast<Eigen::Index>(k)) = value;
+  }
+  measurement.R_WT = rotation_exp(vector);
   return {};
 }
 
@@ -112,7 +129,8 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
     return table.refuse(row, "distance_mm and touch_mm in one row")
         .of("touch_mm")
         .next("write a row for each");
-  if (says(table, row, columns.position) || says(table, row, columns.quaternion))
+  if (says(table, row, columns.position) || says(table, row, columns.quaternion) ||
+      says(table, row, columns.vector))
     return table.refuse(row, "{} beside a position", name).of(name).next("write a row for each");
   Gauge gauge;
   gauge.kind = distance ? Gauge::Kind::kDistance : Gauge::Kind::kTouch;
@@ -128,7 +146,11 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
   if (distance && gauge.minus_pose.empty() && gauge.value <= 0)
     return table.refuse(row, "distance_mm is {:g}, must be above 0", value)
         .of(name)
-        .beyond(value, 0);
+        .beyond(value, 0)
+        .next(
+            "a tip that was brought to one fixed point tells x, y and z, and no distance: write "
+            "x_mm, y_mm and z_mm, all 0, in its place, and in the cell file base: null and null "
+            "for the tool");
   return gauge;
 }
 
@@ -277,6 +299,8 @@ struct ToldColumn {
 /// `q1_rad` is `q1_deg` in another unit, and `x_m` `x_mm`.
 ToldColumn told_column(const std::string& name) {
   if (name == "skip" || name == "-" || name.empty()) return {};
+  if (std::find(kVectorColumns.begin(), kVectorColumns.end(), name) != kVectorColumns.end())
+    return {name, 1};
   const auto in = [&](std::string_view unit) {
     return name.size() > unit.size() && name.ends_with(unit)
                ? name.substr(0, name.size() - unit.size())

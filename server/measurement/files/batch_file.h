@@ -14,14 +14,15 @@ namespace trammel {
 /// decimal point are refused: they may stand in numbers, too. `#` and `//` start comments. Two
 /// layouts:
 ///
-/// Named, where the first line names `J1` ... `Jn` (or `Joint 1` ..., `A1` ..., `q1` ...; n to 12),
-/// in any order, without regard to case, blanks and underscores, units in brackets or behind an
-/// underscore:
+/// Named, where the first line names `J1` ... `Jn` (or `Joint 1` ..., `Axis 1` ..., `A1` ..., `q1`
+/// ...; n to 12), in any order, without regard to case, blanks and underscores, units in brackets
+/// or behind an underscore:
 ///
 ///     joints (deg; rad or mm where it says so), X Y Z (mm; m or in where it says so), at most one
 ///     of A B C       Rz(A) Ry(B) Rx(C), deg or rad W P R       Rz(R) Ry(P) Rx(W), deg or rad Rx Ry
-///     Rz    Rx(rx) Ry(ry) Rz(rz), deg or rad qw qx qy qz Hamilton, unit and pose_id (id, name,
-///     point, target). Other columns are kept as they are.
+///     Rz    Rx(rx) Ry(ry) Rz(rz), deg or rad rvx rvy rvz a rotation vector, rad, as Universal
+///     Robots' Rx Ry Rz are qw qx qy qz Hamilton, unit and pose_id (id, name, point, target). Other
+///     columns are kept as they are.
 ///
 /// By position, with or without a first line of other names, as the exports have them that RoboDK's
 /// validation macros read (joints, what was measured, the tool centre point in F):
@@ -35,8 +36,9 @@ namespace trammel {
 /// of its own: `tcp-1`, `tcp-2`, ... in the order of their first rows, to be named so in the cell
 /// file.
 ///
-/// Refuses, naming `where`, row, column, value and limit, what parse_batch_csv() refuses, and
-/// angles of more than a whole turn in a column of radians: they must be degrees.
+/// Refuses, naming `where`, row, column, value and limit, what parse_batch_csv() refuses, angles of
+/// more than a whole turn in a column of radians (they must be degrees), and a TCP that is another
+/// one in most rows. Of columns that were taken by position the refusal says so.
 [[nodiscard]] Result<MeasurementBatch> parse_robodk_csv(const std::string& text,
                                                         const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_robodk_csv(const std::string& path);

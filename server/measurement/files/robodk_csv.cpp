@@ -21,10 +21,15 @@ constexpr double kFarthest = 1e3;   // m
 constexpr double kTurnsLimit = 10;  // of a joint
 constexpr std::size_t kMostJoints = 12;
 constexpr std::size_t kPositionalJoints = 6;
-constexpr std::size_t kFewestColumns = 9;  // of a layout by position
-constexpr double kMetresPerInch = 0.0254;  // m
+constexpr std::size_t kFewestColumns = 9;    // of a layout by position
+constexpr std::size_t kColumnsOfPoses = 18;  // of the one with orientations
+constexpr double kMetresPerInch = 0.0254;    // m
+constexpr std::size_t kMostTcps = 2;         // more, another one in most rows, are none
+constexpr const char* kNameTheColumns =
+    "name the columns in the first line: J1 ... J6, X, Y, Z, and the angles A B C, W P R, Rx Ry Rz "
+    "(deg) or rvx_rad rvy_rad rvz_rad";
 
-enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kQuaternion };
+enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kVector, kQuaternion };
 
 /// A column and the factor from its unit to ours: rad if `angle`, else m.
 struct ScaledColumn {
@@ -41,9 +46,9 @@ struct RoboDkColumns {
   Orientation orientation = Orientation::kNone;
 };
 
-/// `j3`, `joint3`, `a3`, `q3` -> 3; 0 for any other name.
+/// `j3`, `joint3`, `axis3`, `a3`, `q3` -> 3; 0 for any other name.
 std::size_t joint_number(std::string_view name) {
-  for (const std::string_view prefix : {"joint", "j", "a", "q"}) {
+  for (const std::string_view prefix : {"joint", "axis", "j", "a", "q"}) {
     if (!name.starts_with(prefix)) continue;
     const std::string_view digits = name.substr(prefix.size());
     std::size_t number = 0;
@@ -86,7 +91,7 @@ class NamedColumns {
   [[nodiscard]] Result<RoboDkColumns> find() {
     TRY(find_joints());
     TRY(find_three({"x", "y", "z"}, "mm", found_.position));
-    if (found_.position.empty()) return tl::make_unexpected(table_.require("X").error());
+    if (found_.position.empty()) return no_position();
     TRY(find_orientation());
     for (const char* name : {"poseid", "id", "name", "point", "target"}) {
       if (!found_.pose_id) found_.pose_id = find_name(name);
@@ -105,6 +110,12 @@ class NamedColumns {
     const auto at = std::find(names_.begin(), names_.end(), name);
     if (at == names_.end()) return std::nullopt;
     return static_cast<std::size_t>(at - names_.begin());
+  }
+
+  [[nodiscard]] Failure no_position() const {
+    Error missing = table_.require("X").error();
+    missing.next += fmt::format("; {}", kNameTheColumns);
+    return Failure(std::move(missing));
   }
 
   [[nodiscard]] Status find_joints() {
@@ -144,7 +155,7 @@ class NamedColumns {
       const auto column = find_name(name);
       if (!column) continue;
       const ScaledColumn one = TRY(scaled(table_, *column, unit));
-      if (one.angle != (unit == "deg")) {
+      if (one.angle == (unit == "mm")) {
         return refused("column {} is a length, expected deg or rad", table_.columns()[*column])
             .in(table_.where())
             .of(table_.columns()[*column]);
@@ -164,13 +175,14 @@ class NamedColumns {
   }
 
   [[nodiscard]] Status find_orientation() {
-    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 3> kinds = {
+    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 4> kinds = {
         {{Orientation::kAbc, {"a", "b", "c"}},
          {Orientation::kWpr, {"w", "p", "r"}},
-         {Orientation::kRxRyRz, {"rx", "ry", "rz"}}}};
+         {Orientation::kRxRyRz, {"rx", "ry", "rz"}},
+         {Orientation::kVector, {"rvx", "rvy", "rvz"}}}};
     for (const auto& [kind, names] : kinds) {
       std::vector<ScaledColumn> angles;
-      TRY(find_three(names, "deg", angles));
+      TRY(find_three(names, kind == Orientation::kVector ? "rad" : "deg", angles));
       if (angles.empty()) continue;
       TRY(set_orientation(kind));
       found_.angles = std::move(angles);
@@ -195,7 +207,7 @@ class NamedColumns {
       return refused("two orientations")
           .in(table_.where())
           .of("orientation")
-          .next("expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz");
+          .next("expected one of A B C, W P R, Rx Ry Rz, rvx_rad rvy_rad rvz_rad, qw qx qy qz");
     }
     found_.orientation = kind;
     return {};
@@ -211,7 +223,7 @@ class NamedColumns {
 std::vector<std::string> positional_names(std::size_t count) {
   std::vector<std::string> names;
   for (std::size_t j = 1; j <= kPositionalJoints; ++j) names.push_back(fmt::format("J{}", j));
-  const bool full_pose = count == 18;
+  const bool full_pose = count == kColumnsOfPoses;
   const auto append = [&](const std::string& prefix) {
     for (const char* axis : {"x", "y", "z"})
       names.push_back(fmt::format("{}{}{}", prefix, axis, "_mm"));
@@ -321,6 +333,7 @@ Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t 
   }
   return read_three(table, row, columns.angles)
       .map([&](const Vector3& angles) -> std::optional<Matrix3> {
+        if (columns.orientation == Orientation::kVector) return rotation_exp(angles);
         if (columns.orientation == Orientation::kAbc)
           return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
         if (columns.orientation == Orientation::kWpr)
@@ -350,7 +363,7 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
   return measurement;
 }
 
-/// Names a tool for each TCP if there are several.
+/// Names a tool for each TCP if there are several. Refuses what is none: another one in most rows.
 Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp,
                   MeasurementBatch& batch) {
   std::map<std::vector<double>, std::size_t> tools;
@@ -363,15 +376,20 @@ Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp,
     const std::size_t number = tools.emplace(std::move(tool), tools.size() + 1).first->second;
     batch.measurements[row].context.tool = fmt::format("tcp-{}", number);
   }
+  if (tools.size() > kMostTcps && 2 * tools.size() > table.size()) {
+    return refused("column {} and the next ones would be the TCP: {} different ones in {} rows",
+                   tcp.front() + 1, tools.size(), table.size())
+        .in(table.where())
+        .of(table.columns()[tcp.front()])
+        .beyond(tools.size(), kMostTcps);
+  }
   if (tools.size() > 1) return {};
   for (Measurement& m : batch.measurements) m.context.tool.clear();
   return {};
 }
 
-}  // namespace
-
-Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where) {
-  const RoboDkTable parts = TRY(take_apart(text, where));
+Result<MeasurementBatch> batch_of(const RoboDkTable& parts, const std::string& text,
+                                  const std::string& where) {
   const RoboDkColumns columns = TRY(find_columns(parts));
   MeasurementBatch batch;
   batch.id = std::filesystem::path(where).stem().string();
@@ -396,6 +414,19 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
   }
   TRY(name_tools(parts.table, columns.tcp, batch));
   return batch;
+}
+
+}  // namespace
+
+Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where) {
+  const RoboDkTable parts = TRY(take_apart(text, where));
+  Result<MeasurementBatch> batch = batch_of(parts, text, where);
+  if (batch || !parts.positional) return batch;
+  return Failure(batch.error())
+      .next(fmt::format("no column is named J1, so they were taken by their places, as RoboDK "
+                        "writes them (six joints, X Y Z{}, the TCP's): {}",
+                        parts.table.columns().size() == kColumnsOfPoses ? " Rx Ry Rz" : "",
+                        kNameTheColumns));
 }
 
 Result<MeasurementBatch> read_robodk_csv(const std::string& path) {
