@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "server/measurement/files/batch_file.h"
 #include "tests/support/refusal.h"
 
 namespace trammel {
@@ -41,6 +42,29 @@ TEST(PointList, ReadsTargetsWithAndWithoutGroupAndCollectionBySeparatorsOfAnyKin
     EXPECT_FALSE(list.points[0].R_W) << text;
     EXPECT_FALSE(list.points[0].sigma) << text;
   }
+}
+
+TEST(PointList, CommasInNumbersBetweenBlanksAreDecimalCommas) {
+  const PointList list = demand("p1 3233,9547 -2853,6702 1899,0424\np2 832 4,6682 3226,0384\n");
+  ASSERT_EQ(list.points.size(), 2u);
+  EXPECT_EQ(list.points[0].name, "p1");
+  EXPECT_LT((list.points[0].p_W - Vector3(3.2339547, -2.8536702, 1.8990424)).norm(), 1e-12);
+  EXPECT_LT((list.points[1].p_W - Vector3(0.832, 4.6682e-3, 3.2260384)).norm(), 1e-12);
+  EXPECT_NEAR(demand("p1 , 1.5 , 2 , 3\n").points[0].p_W.x(), 1.5e-3, 1e-15);
+  EXPECT_NEAR(demand("point 7,1.5,2,3\n").points[0].p_W.x(), 1.5e-3, 1e-15);
+}
+
+TEST(PointList, OfPointsWithoutNamesItSaysHowTheyMeetTheirJoints) {
+  const auto points = parse_points("1.5 2.5 3.5\n", "points.txt");
+  EXPECT_EQ(refusal_of(points), Refusal("points.txt", 1).beyond(3, 4));
+  for (const char* part : {"paste JOINTS POINTS", "--table", "--columns"})
+    EXPECT_NE(points.error().next.find(part), std::string::npos) << points.error().next;
+  // As `paste` puts them: a tab between two lists that blanks separate.
+  const auto batch = parse_batch_table("10.5 -20.25\t1.5 2.5 3.5\n",
+                                       {"q1_deg", "q2_deg", "x_mm", "y_mm", "z_mm"}, "table.txt");
+  ASSERT_TRUE(batch) << sentence(batch.error());
+  EXPECT_NEAR(batch->measurements[0].context.q(1), from_deg(-20.25), 1e-15);
+  EXPECT_NEAR(batch->measurements[0].p_W.z(), 3.5e-3, 1e-15);
 }
 
 TEST(PointList, TakesNumbersAsNamesButNoCoordinates) {

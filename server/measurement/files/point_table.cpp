@@ -234,6 +234,17 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row,
                                                     const Statements& statements,
                                                     const std::string& where) {
   const std::size_t count = row.fields.size();
+  if (count + 1 == kLeastFields) {
+    return refused("{} values, and no point has a name", count)
+        .in(where)
+        .at_row(row.line)
+        .beyond(count, kLeastFields)
+        .next(
+            "put names of poses before them; or, where the rows of a list of joints belong to them "
+            "in their order, put the lists side by side (paste JOINTS POINTS > TABLE) and name the "
+            "columns: trammel convert --table TABLE --columns q1_deg,q2_deg,...,x_mm,y_mm,z_mm -o "
+            "BATCH");
+  }
   if (count < kLeastFields || count > kMostFields) {
     return refused(
                "{} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 "

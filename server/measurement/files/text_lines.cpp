@@ -58,6 +58,32 @@ class LineReader {
   int number_ = 0;
 };
 
+/// `3233,9547` or `3233.9547`; not `5,`, which ends a value.
+bool is_number_with_decimals(const std::string& field) {
+  const std::size_t comma = field.find(',');
+  const bool within =
+      comma == std::string::npos || (comma > 0 && is_digit(field[comma - 1]) &&
+                                     comma + 1 < field.size() && is_digit(field[comma + 1]));
+  return within && is_number(with_decimal_point(field));
+}
+
+/// Whether blanks separate the values of a line that has commas or tabs as well: each comma stands
+/// in a number (`p1 3233,95 -2853,67 1899,04`), or two lists of numbers stand side by side and the
+/// tab is between them.
+bool do_blanks_separate(std::string_view line) {
+  const bool tabs = line.find('\t') != std::string_view::npos;
+  const std::vector<std::string> fields = split_fields(line, ' ');
+  const auto has_comma = [](const std::string& field) {
+    return field.find(',') != std::string::npos;
+  };
+  const bool named = !tabs && !has_comma(fields.front());
+  const bool numbers =
+      std::all_of(fields.begin() + (named ? 1 : 0), fields.end(), is_number_with_decimals);
+  if (!numbers || fields.size() < 2) return false;
+  return tabs ? split_fields(line, '\t').size() < fields.size()
+              : std::any_of(fields.begin(), fields.end(), has_comma);
+}
+
 }  // namespace
 
 Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where,
@@ -94,6 +120,7 @@ std::vector<TextLine> first_lines(std::string_view text, std::size_t count) {
 }
 
 char separator_of(std::string_view line) {
+  if (line.find(';') == std::string_view::npos && do_blanks_separate(line)) return ' ';
   for (const char separator : {';', '\t', ','}) {
     if (line.find(separator) != std::string_view::npos) return separator;
   }

@@ -28,7 +28,8 @@ struct TextLine {
 [[nodiscard]] std::vector<TextLine> first_lines(std::string_view text, std::size_t count);
 
 /// `;`, tab or `,`, whichever of them comes first in this list and is in the line; ' ' where none
-/// is.
+/// is, where all commas stand in numbers between blanks, and where a tab stands between two lists
+/// of numbers that blanks separate.
 [[nodiscard]] char separator_of(std::string_view line);
 
 /// The fields of a line, without blanks around them; `' '` separates by any run of blanks. A field
