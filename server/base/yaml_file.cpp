@@ -82,6 +82,15 @@ Status check_yaml_limits(const std::string& text, const std::string& where) {
         .beyond(text.size(), kMostBytes);
   }
   if (!is_utf8(text)) return refused("not UTF-8 text").in(where);
+  if (text.find_first_not_of(" \t\r\n") != std::string::npos &&
+      text[text.find_first_not_of(" \t\r\n")] == '<') {
+    const bool is_urdf = text.find("<robot") != std::string::npos;
+    return refused("not YAML but {}", is_urdf ? "a URDF" : "XML")
+        .in(where)
+        .next(is_urdf ? "write the arm as a YAML file with a DH row for each joint "
+                        "(models/README.md); the shipped robots stand in models"
+                      : "name the YAML file");
+  }
   std::istringstream stream(text);
   Counter counter(where);
   try {

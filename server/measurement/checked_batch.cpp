@@ -147,6 +147,19 @@ void append(MeasurementBatch& all, const MeasurementBatch& next) {
   all.source_text += next.source_text;
 }
 
+/// What the file leaves out of passive joints, in all poses that it tells of.
+void complete_passive_joints(const Chain& robot, MeasurementBatch& batch) {
+  std::vector<PoseContext*> poses;
+  for (Measurement& m : batch.measurements) {
+    poses.push_back(&m.context);
+    if (!m.gauge || !m.gauge->minus) continue;
+    const auto minus = std::make_shared<PoseContext>(*m.gauge->minus);
+    poses.push_back(minus.get());
+    m.gauge->minus = minus;
+  }
+  put_in_passive_joints(robot, batch.joint_types, poses);
+}
+
 }  // namespace
 
 HoldOut drawn(double share, std::uint64_t seed) {
@@ -206,6 +219,7 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   if (batch.source_text.empty()) batch.source_text = to_csv(batch);
   std::string hash = batch_hash(batch);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
+  complete_passive_joints(cell.robot, batch);
   TRY(check_joint_columns(batch.joint_types, cell.robot, where));
   divide_into_sessions(batch);
   rebase_times(batch.measurements);

@@ -1,6 +1,9 @@
 #include "server/measurement/pose_check.h"
 
+#include <utility>
+
 #include "server/measurement/pose_columns.h"
+#include "server/robot/passive_joint.h"
 
 namespace trammel {
 
@@ -28,6 +31,24 @@ Status check_joint_columns(const std::vector<JointType>& columns, const Chain& r
         .of(joint_column(j, type));
   }
   return {};
+}
+
+void put_in_passive_joints(const Chain& robot, std::vector<JointType>& columns,
+                           const std::vector<PoseContext*>& poses) {
+  std::vector<int> passive;
+  for (int j = 0; j < robot.size(); ++j)
+    if (is_passive(robot.joint(j))) passive.push_back(j);
+  if (passive.empty() || std::ssize(columns) + std::ssize(passive) != robot.size()) return;
+  for (const int j : passive) {
+    columns.insert(columns.begin() + j, robot.joint(j).type);
+    for (PoseContext* pose : poses) {
+      JointVector q = JointVector::Zero(pose->q.size() + 1);
+      q.head(j) = pose->q.head(j);
+      q.tail(q.size() - j - 1) = pose->q.tail(q.size() - j - 1);
+      pose->q = std::move(q);
+      if (!pose->direction.empty()) pose->direction.insert(pose->direction.begin() + j, 0);
+    }
+  }
 }
 
 Status check_pose(PoseContext& context, const Cell& cell) {

@@ -13,6 +13,11 @@ namespace trammel {
 [[nodiscard]] Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
                                          const std::string& where);
 
+/// Where a file has columns of the driven joints alone, in their order: puts 0 for each passive
+/// joint (passive_joint.h) into the columns and the poses.
+void put_in_passive_joints(const Chain& robot, std::vector<JointType>& columns,
+                           const std::vector<PoseContext*>& poses);
+
 /// Checks the joint limits and resolves tool and payload. The caller adds file and row to the
 /// error.
 [[nodiscard]] Status check_pose(PoseContext& context, const Cell& cell);

@@ -6,6 +6,7 @@
 
 #include "server/base/check.h"
 #include "server/base/units.h"
+#include "server/robot/passive_joint.h"
 
 namespace trammel {
 
@@ -27,7 +28,7 @@ JointVector start_of(const Chain& robot, const JointVector& q, const Sides& side
   for (int j = 0; j < robot.size(); ++j) {
     const int side = sides[static_cast<std::size_t>(j)];
     TRAMMEL_CHECK(side == 1 || side == -1);
-    way(j) = side * longest_way(robot.joint(j));
+    way(j) = is_passive(robot.joint(j)) ? 0 : side * longest_way(robot.joint(j));
   }
   JointVector start = q - robot.commanded(way);
   for (int j = 0; j < robot.size(); ++j)
@@ -36,9 +37,10 @@ JointVector start_of(const Chain& robot, const JointVector& q, const Sides& side
 }
 
 /// True where the gear of the joint turns far enough from `start` to `q` to take up its play on
-/// this side.
+/// this side. A passive joint has none, and takes up nothing.
 bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint,
              int side) {
+  if (is_passive(robot.joint(joint))) return true;
   return side * robot.gear_angles(q - start)(joint) >= kLeastBump * longest_way(robot.joint(joint));
 }
 
@@ -86,7 +88,7 @@ JointVector on_program_grid(const Chain& robot, JointVector q) {
     double steps = std::round(q(j) / step);
     if (steps * step > joint.upper) steps = std::floor(joint.upper / step);
     if (steps * step < joint.lower) steps = std::ceil(joint.lower / step);
-    q(j) = steps * step;
+    q(j) = is_passive(joint) ? 0 : steps * step;
   }
   return q;
 }

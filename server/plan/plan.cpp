@@ -9,6 +9,7 @@
 #include "server/plan/approach.h"
 #include "server/plan/optimal_design.h"
 #include "server/plan/visibility.h"
+#include "server/robot/passive_joint.h"
 
 namespace trammel {
 
@@ -20,7 +21,9 @@ Result<JointRanges> planning_ranges(const Cell& cell) {
     if (!std::isfinite(joint.lower) || !std::isfinite(joint.upper)) {
       return refused("cell {}: joint {} has no limits", cell.name, i + 1)
           .of("joint_ranges_deg")
-          .next("give joint_ranges_deg");
+          .next(
+              "give joint_ranges_deg; or, where bars hold the joint and nobody commands it, write "
+              "passive: true in its row of the robot file");
     }
     ranges.emplace_back(joint.lower, joint.upper);
   }
@@ -232,6 +235,8 @@ std::vector<PlannedPose> planned(const Planning& planning, std::vector<PoseConte
       const Chain& robot = planning.cell->robot;
       pose.bump =
           on_program_grid(robot, bump_pose(robot, pose.context.q, pose.context.direction).value());
+      for (int j = 0; j < robot.size(); ++j)
+        if (is_passive(robot.joint(j))) pose.context.direction[static_cast<std::size_t>(j)] = 0;
       poses.push_back(std::move(pose));
     }
   }

@@ -60,18 +60,22 @@ void read_motion(const YamlMap& map, Joint& joint) {
     if (!(range[0] < range[1])) {
       map.refuse(limits, refused("lower limit {:g} {} is not below upper limit {:g} {}", range[0],
                                  unit, range[1], unit)
-                             .beyond(range[0], range[1]));
+                             .beyond(range[0], range[1])
+                             .next("where nobody commands the joint, write passive: true"));
     }
     joint.lower = si(range[0]);
     joint.upper = si(range[1]);
   }
   if (map.has(speed)) joint.max_speed = si(map.number(speed));
+  if (!map.boolean("passive", false)) return;
+  if (map.has(limits)) map.refuse(limits, "a passive joint is never commanded and has no limits");
+  joint.lower = joint.upper = 0;
 }
 
 Joint read_joint(const YamlMap& map) {
   map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
             "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
-            "max_speed_deg_s", "max_speed_mm_s"});
+            "max_speed_deg_s", "max_speed_mm_s", "passive"});
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");

@@ -29,7 +29,8 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints,
   Eigen::VectorXd signs(n);
   for (int i = 0; i < n; ++i) {
     const Joint& joint = joints[static_cast<std::size_t>(i)];
-    if (!(joint.lower < joint.upper)) {
+    const bool passive = joint.lower == 0 && joint.upper == 0;
+    if (!passive && !(joint.lower < joint.upper)) {
       return refused("robot {} joint {}: lower limit {} is not below upper limit {}", name, i + 1,
                      joint.lower, joint.upper)
           .of(fmt::format("joints {}: limits", i + 1))

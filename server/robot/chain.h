@@ -69,8 +69,8 @@ struct Coupling {
 class Chain {
  public:
   Chain() = default;
-  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit, a coupling of a joint
-  /// that does not exist or with itself.
+  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit (but 0 to 0: a passive
+  /// joint, passive_joint.h), a coupling of a joint that does not exist or with itself.
   [[nodiscard]] static Result<Chain> make(std::string name, std::vector<Joint> joints,
                                           std::vector<Coupling> couplings = {});
 

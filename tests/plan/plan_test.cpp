@@ -5,6 +5,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "server/base/units.h"
+#include "server/measurement/checked_batch.h"
+#include "server/measurement/files/joint_list.h"
+#include "tests/support/demand.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -45,6 +50,54 @@ TEST(Plan, KeepsToTheWorkspace) {
   cell.workspace = Workspace{{50, 50, 50}, {51, 51, 51}};
   EXPECT_FALSE(plan_poses(cell, {40, 1}));
   EXPECT_FALSE(plan_poses(cell, {0, 1}));
+}
+
+/// A palletiser: bars keep the wrist level.
+Cell palletiser() {
+  const test::TemporaryFolder folder;
+  folder.write("pal.yaml",
+               "version: 1\nname: palletiser\njoints:\n"
+               "  - {d_mm: 740, a_mm: 260, alpha_deg: -90, limits_deg: [-170, 170]}\n"
+               "  - {theta_deg: -90, a_mm: 950, hayati: true, limits_deg: [-40, 80]}\n"
+               "  - {theta_deg: 90, a_mm: 1000, hayati: true, limits_deg: [-20, 100]}\n"
+               "  - {a_mm: 200, alpha_deg: 90, passive: true}\n"
+               "  - {d_mm: -250, limits_deg: [-300, 300]}\n"
+               "coupling:\n  - {joint: 3, follows: 2, ratio: -1, kind: parallelogram}\n"
+               "  - {joint: 4, follows: 3, ratio: -1, kind: parallelogram}\n");
+  return test::demand(
+      read_cell(folder.write("cell.yaml",
+                             "version: 1\ncell: pal\nrobot: pal.yaml\nbase: null\n"
+                             "tools: {t1: null}\ntracker: {sigma_mm: 0.03}\n"
+                             "model: {error_sources: [base, tool, geometry], bias: none}\n")));
+}
+
+TEST(Plan, APassiveJointIsNeverPlannedAndItsColumnMayBeLeftOut) {
+  const auto cell = std::make_shared<const Cell>(palletiser());
+  PlanOptions options;
+  options.count = 20;
+  for (const bool both : {false, true}) {
+    options.bidirectional = both;
+    const Plan plan = test::demand(make_plan(cell, options));
+    for (const PlannedPose& pose : plan.poses) {
+      EXPECT_EQ(pose.context.q(3), 0);
+      EXPECT_EQ(pose.bump(3), 0);
+      EXPECT_EQ(pose.context.direction[3], 0);
+    }
+  }
+  const JointList driven = test::demand(check_against_cell(
+      test::demand(parse_joint_csv("q1_deg,q2_deg,q3_deg,q4_deg,dir1,dir2,dir3,dir4\n"
+                                   "10,20,30,200,1,-1,1,-1\n",
+                                   "j.csv")),
+      *cell));
+  EXPECT_NEAR(driven.poses[0].context.q(4), from_deg(200), 1e-12);
+  EXPECT_EQ(driven.poses[0].context.q(3), 0);
+  EXPECT_EQ(driven.poses[0].context.direction, (std::vector<int>{1, -1, 1, 0, -1}));
+  const CheckedBatch batch = test::demand(
+      check_against_cell(test::demand(parse_batch_csv("q1_deg,q2_deg,q3_deg,q4_deg,x_mm,y_mm,z_mm\n"
+                                                      "10,20,30,200,1500,10,900\n",
+                                                      "b.csv")),
+                         *cell));
+  EXPECT_NEAR(batch.rows().measurements[0].context.q(4), from_deg(200), 1e-12);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "server/robot/cell.h"
 #include "server/robot/cell_papers.h"
 #include "server/robot/cell_rules.h"
+#include "server/robot/passive_joint.h"
 #include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
@@ -137,6 +138,37 @@ TEST(CellFile, ACouplingIsTheControllersOrOneOfBars) {
             Refusal("cell.yaml (robot)", 13, "coupling 1: kind").text("belt"));
   EXPECT_EQ(read_robot(shipped("models/fanuc_m-20ia.yaml"))->couplings().front().kind,
             CouplingKind::kController);
+}
+
+TEST(CellFile, AUrdfIsNamedAsOne) {
+  const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
+  const auto urdf =
+      parse_cell(cell, "<?xml version=\"1.0\"?>\n<robot name=\"arm\"><link name=\"l\"/></robot>\n",
+                 "cell.yaml");
+  ASSERT_FALSE(urdf);
+  EXPECT_NE(sentence(urdf.error()).find("a URDF"), std::string::npos) << sentence(urdf.error());
+  EXPECT_NE(urdf.error().next.find("models/README.md"), std::string::npos) << urdf.error().next;
+}
+
+TEST(CellFile, APassiveJointIsNeverCommandedAndHasNoLimits) {
+  const auto with_wrist = [](const std::string& keys) {
+    return parse_cell(
+        "version: 1\ncell: pal\nrobot: pal.yaml\nbase: null\ntools: {t1: null}\n"
+        "model: {error_sources: [base, tool], bias: none}\n",
+        "version: 1\nname: level\njoints:\n  - {d_mm: 740, limits_deg: [-180, 180]}\n"
+        "  - {a_mm: 200, " +
+            keys + "}\ncoupling: [{joint: 2, follows: 1, ratio: -1, kind: parallelogram}]\n",
+        "cell.yaml");
+  };
+  const auto level = with_wrist("passive: true");
+  ASSERT_TRUE(level) << sentence(level.error());
+  EXPECT_FALSE(is_passive(level->robot.joint(0)));
+  EXPECT_TRUE(is_passive(level->robot.joint(1)));
+  EXPECT_FALSE(level->robot.joint_outside_limits(JointVector::Zero(2)));
+  EXPECT_FALSE(with_wrist("passive: true, limits_deg: [-1, 1]"));
+  const auto empty = with_wrist("limits_deg: [0, 0]");
+  ASSERT_FALSE(empty);
+  EXPECT_NE(empty.error().next.find("passive: true"), std::string::npos) << empty.error().next;
 }
 
 TEST(CellFile, ARobotFileThatIsAPipeIsRefusedAndNotWaitedFor) {

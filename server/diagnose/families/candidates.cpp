@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "server/diagnose/thresholds.h"
+#include "server/robot/passive_joint.h"
 
 namespace trammel::cause_search {
 
@@ -97,6 +98,7 @@ void for_each_cause(const Chain& robot, const Take& take) {
     const auto last = std::find_if_not(first, all.end(), is_of_joint);
     for (int joint = 0; joint < robot.size(); ++joint) {
       for (auto one = first; one != last; ++one) {
+        if (is_passive(robot.joint(joint))) continue;  // it has no gear
         if (!(*one)->of_turning_joint || robot.joint(joint).type == JointType::kRevolute)
           take(**one, joint);
       }

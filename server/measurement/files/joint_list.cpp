@@ -96,6 +96,9 @@ Status check_degrees(const JointList& list, const Chain& robot) {
 }  // namespace
 
 Result<JointList> check_against_cell(JointList list, const Cell& cell) {
+  std::vector<PoseContext*> contexts;
+  for (CommandedPose& pose : list.poses) contexts.push_back(&pose.context);
+  put_in_passive_joints(cell.robot, list.joint_types, contexts);
   TRY(check_joint_columns(list.joint_types, cell.robot, list.where));
   for (CommandedPose& pose : list.poses) {
     const Status checked = check_pose(pose.context, cell);
