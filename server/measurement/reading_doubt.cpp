@@ -132,6 +132,13 @@ class Look {
   [[nodiscard]] std::optional<Error> of_tool() const;
   [[nodiscard]] Error of_tool_at(const std::string& tool, const Vector3& p_FT) const;
 
+  /// The cell with the robot as the reading has it.
+  [[nodiscard]] Cell cell_of(const Reading& reading) const {
+    Cell cell = cell_;
+    if (reading.robot) cell.robot = *reading.robot;
+    return cell;
+  }
+
   const Cell& cell_;
   const NumberTable table_;
   std::optional<ArmFit> given_;
@@ -145,11 +152,13 @@ void Look::search() {
   readings_ = position_readings(table_);
   for (auto& one : joint_readings(table_, cell_.robot)) readings_.push_back(std::move(one));
   for (auto& one : row_readings(table_, cell_)) readings_.push_back(std::move(one));
+  for (auto& one : robot_readings(cell_.robot)) readings_.push_back(std::move(one));
   std::vector<std::pair<double, Tried>> near;
   for (const Reading& one : readings_) {
     Tried tried{&one, one.of_rows ? thinned(one.apply(table_), kRowsFitted) : one.apply(some), {}};
     if (tried.table.size() < kFewestPoses) continue;
-    tried.fit = located(one.of_rows ? thinned(tried.table, kRowsLocated) : one.apply(few), cell_);
+    tried.fit =
+        located(one.of_rows ? thinned(tried.table, kRowsLocated) : one.apply(few), cell_of(one));
     const double quality = tried.fit.quality;
     near.emplace_back(quality, std::move(tried));
   }
@@ -158,7 +167,7 @@ void Look::search() {
   if (near.size() > kMostFitted) near.resize(kMostFitted);
   std::vector<Tried> tried;
   for (auto& [quality, one] : near) {
-    one.fit = fitted(one.table, cell_, one.fit);
+    one.fit = fitted(one.table, cell_of(*one.reading), one.fit);
     const bool worth = !one.reading->of_rows || given_->quality > kOfRows;
     if (worth && is_much_better(one)) tried.push_back(std::move(one));
   }
@@ -190,8 +199,11 @@ void Look::keep_best(std::vector<Tried> tried) {
   };
   const auto quality = [](const Tried& one) { return one.fit.quality; };
   keep(quality, kAsGood, 0.2 * kWorthAsking, std::numeric_limits<double>::infinity());
-  keep([this](const Tried& one) { return turned(one.table, cell_, one.fit).value_or(0); }, kAsGood,
-       kOtherTurn, kPi);
+  keep(
+      [this](const Tried& one) {
+        return turned(one.table, cell_of(*one.reading), one.fit).value_or(0);
+      },
+      kAsGood, kOtherTurn, kPi);
   std::stable_sort(tried.begin(), tried.end(),
                    [](const Tried& a, const Tried& b) { return a.reading < b.reading; });
   if (cell_.X_WB) {
@@ -227,7 +239,8 @@ Error Look::of_reading() const {
       .of(best.reading->columns)
       .beyond(to_mm(given), to_mm(std::max(kWorthAsking, kMuchBetter * given_->quality)))
       .with_text(best.reading->name)
-      .next("correct the file if it was meant so")
+      .next(best.reading->robot ? "is it such a table? models/README.md says how to write it here"
+                                : "correct the file if it was meant so")
       .value();
 }
 

@@ -14,7 +14,7 @@
 /// good batch fits it to a millimetre, however badly the robot was mastered. Numbers that were read
 /// wrongly do not, and fit in the one way in which they were meant: rows shifted against joints,
 /// two columns exchanged, another sign, unit or zero in one of them, mirrored axes, another point
-/// of the tool.
+/// of the tool, a robot file in another convention.
 ///
 /// What cannot be told: of positions alone from a tracker that may stand anywhere, which of three
 /// axes is mirrored, and that two of them were exchanged instead; a turned joint 1, which is a

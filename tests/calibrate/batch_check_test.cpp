@@ -135,6 +135,32 @@ TEST(BatchCheck, PositionsThatAreInUmAreStillNamed) {
   EXPECT_EQ(said->text, "with all positions in um") << sentence(*said);
 }
 
+TEST(BatchCheck, ARobotFileInCraigsConventionIsTold) {
+  for (const char* name : {"kuka_lbr-iiwa-7-r800", "universal-robots_ur5", "staubli_tx2-90l"}) {
+    FirstBatch first;
+    first.robot = name;
+    first.orientation = false;
+    first.tool_known = false;
+    const auto cell = test::new_cell(first);
+    std::vector<Joint> joints;
+    for (int j = 0; j < cell->robot.size(); ++j) {
+      Joint joint = cell->robot.joint(j);
+      const LinkGeometry before = j > 0 ? cell->robot.joint(j - 1).link : LinkGeometry();
+      joint.link.a = before.a;
+      joint.link.alpha = before.alpha;
+      joint.hayati = false;
+      joints.push_back(joint);
+    }
+    Cell pasted = *cell;
+    pasted.robot = test::demand(Chain::make("pasted", joints, cell->robot.couplings()));
+    const auto said = test::said_of(test::measured_first(first, *cell), pasted);
+    ASSERT_TRUE(said) << name;
+    EXPECT_TRUE(test::names(*said, "with a and alpha of the robot file one row up"))
+        << name << ": " << sentence(*said);
+    EXPECT_EQ(said->field, "a_mm,alpha_deg");
+  }
+}
+
 TEST(BatchCheck, ARowInAnotherUnitThanTheOthersIsNamedWithIt) {
   for (const auto& [unit, factor] : {std::pair("metres", 1e-3), std::pair("inches", 1 / 25.4)}) {
     for (const bool known : {true, false}) {

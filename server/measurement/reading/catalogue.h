@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct Reading {
   std::string columns;   ///< that it is about: `q2_deg,q3_deg`
   bool of_rows = false;  ///< other rows belong together: it needs the whole table
   std::function<NumberTable(NumberTable)> apply;
+  std::optional<Chain> robot = {};  ///< the robot file is read in another way, the numbers are not
 };
 
 /// Everything that may be wrong in joint columns: two exchanged, the other sign, another unit,
@@ -23,6 +25,9 @@ struct Reading {
 [[nodiscard]] std::vector<Reading> joint_readings(const NumberTable& table, const Chain& robot);
 /// Likewise of the measured positions; of a batch with orientations also a left-handed frame.
 [[nodiscard]] std::vector<Reading> position_readings(const NumberTable& table);
+/// The table of the robot file in another convention: Craig's, which tells a and alpha one row
+/// later.
+[[nodiscard]] std::vector<Reading> robot_readings(const Chain& robot);
 /// Rows whose joints stand in other rows: those next to it, or whatever the distances from pose to
 /// pose suggest.
 [[nodiscard]] std::vector<Reading> row_readings(const NumberTable& table, const Cell& cell);

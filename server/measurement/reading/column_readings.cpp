@@ -135,7 +135,30 @@ Reading left_handed(int axis) {
           }};
 }
 
+/// The robot whose table tells in each row the a and alpha of the link before; the last row's are
+/// lost, and lie in the tool.
+Result<Chain> with_links_one_row_up(const Chain& robot) {
+  std::vector<Joint> joints;
+  for (int j = 0; j < robot.size(); ++j) {
+    Joint joint = robot.joint(j);
+    const LinkGeometry next = j + 1 < robot.size() ? robot.joint(j + 1).link : LinkGeometry();
+    joint.link.a = next.a;
+    joint.link.alpha = next.alpha;
+    joint.link.beta = 0;
+    joint.hayati = false;
+    joints.push_back(std::move(joint));
+  }
+  return Chain::make(robot.name(), std::move(joints), robot.couplings());
+}
+
 }  // namespace
+
+std::vector<Reading> robot_readings(const Chain& robot) {
+  Result<Chain> turned = with_links_one_row_up(robot);
+  if (!turned) return {};
+  return {{"with a and alpha of the robot file one row up (Craig's convention of DH)",
+           "a_mm,alpha_deg", false, [](NumberTable table) { return table; }, std::move(*turned)}};
+}
 
 std::vector<Reading> joint_readings(const NumberTable& table, const Chain& robot) {
   return JointReadings(table, robot).all();
