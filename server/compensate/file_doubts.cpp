@@ -92,18 +92,30 @@ std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspect
 }
 
 std::optional<Note> robot_off_drawing(const PhysicalModel& model,
-                                      const std::vector<IdentifiedParameter>& parameters) {
+                                      const std::vector<IdentifiedParameter>& parameters,
+                                      double discrepancy) {
+  constexpr double kMuchLeft = 3;  // times the stated sigma
   const std::string off = off_drawing(model, parameters);
   if (off.empty()) return std::nullopt;
+  const double stated = model.cell->tracker.sigma;
+  const double times = std::hypot(discrepancy, stated) / stated;
+  const std::string lacking =
+      times < kMuchLeft
+          ? ""
+          : fmt::format(
+                "{:.0f} times the stated sigma is left as well: is it something that the "
+                "error sources lack, and the number makes up for (trammel diagnose)? Else ",
+                times);
   // A model of the wrong robot file fits positions and is of no use for corrected poses.
   return Note{
       kOffDrawing, Severity::kStop,
       fmt::format(
-          "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the "
+          "no robot is so far off its drawing: {}; {}is it this robot's file, and is the tool in "
+          "the "
           "cell file the one that was measured (null in its place finds it)? Where the file is not "
           "the controller's, corrected poses land off by the difference, since the controller "
           "solves them with its own arm: compare them (trammel confirm-robot)",
-          off)};
+          off, lacking)};
 }
 
 }  // namespace trammel

@@ -18,8 +18,11 @@ constexpr const char* kOffDrawing = "robot_off_drawing";
 
 /// Of a robot file with a number that is farther off than a robot is off its drawing (3 mm, 3 mrad,
 /// 1 degree of a zero), by what was identified: `parameters` of `model`. It stops a model. Whoever
-/// looks at a calibration asks here: a training, and a diagnosis.
+/// looks at a calibration asks here: a training, and a diagnosis. `discrepancy`: m per axis, what
+/// the model leaves beyond the measurement's sigma. Beside much of it the number may make up for
+/// what the error sources lack.
 [[nodiscard]] std::optional<Note> robot_off_drawing(
-    const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters);
+    const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters,
+    double discrepancy);
 
 }  // namespace trammel

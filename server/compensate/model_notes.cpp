@@ -337,7 +337,8 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
     notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
-  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters))
+  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters,
+                                   model.parts().discrepancy))
     notes.push_back(*std::move(off));
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);

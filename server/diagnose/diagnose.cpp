@@ -278,10 +278,25 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
   diagnosis.seed = seed;
 }
 
-/// Where the error of the drawing comes from: by what the cell lists, and the geometry in any case.
-void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                 Diagnosis& diagnosis) {
-  std::vector<std::string> sources = with_unknown_frames(*cell);
+/// `sources`, and all that was found beside them, its name sure or not: what a link would have to
+/// make up for without it is no number of the link.
+std::vector<std::string> with_all_found(std::vector<std::string> sources,
+                                        const SearchResult& found) {
+  for (const Accepted& one : found.accepted) {
+    const auto is_form = [&](const std::string& own) {
+      return are_forms_of_one(own, one.in_model);
+    };
+    if (!one.is_outlier() && std::none_of(sources.begin(), sources.end(), is_form))
+      sources.push_back(one.in_model);
+  }
+  return sources;
+}
+
+/// Where the error of the drawing comes from: by what the cell lists, what was found, and the
+/// geometry in any case.
+void tell_budget(const std::shared_ptr<const Cell>& cell, const SearchResult& searched,
+                 const MeasurementBatch& batch, Diagnosis& diagnosis) {
+  std::vector<std::string> sources = with_all_found(with_unknown_frames(*cell), searched);
   const std::string geometry(cause_correcting(causes::Part::kLinks).spelling);
   if (std::find(sources.begin(), sources.end(), geometry) == sources.end())
     sources.push_back(geometry);
@@ -335,8 +350,9 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                      tell_left_over(explained, options.seed, diagnosis);
                      tell_limits(explained, prepared, as_recorded(prepared.surrogates, found.all),
                                  diagnosis);
-                     tell_budget(cell, prepared.train, diagnosis);
-                     tell_file_doubts(cell, prepared.train, diagnosis);
+                     tell_budget(cell, found, prepared.train, diagnosis);
+                     tell_file_doubts(cell, with_all_found(diagnosis.sources_after, found),
+                                      prepared.train, diagnosis);
                    }});
   TRY(run(steps, options));
   tell_sessions(together, diagnosis);

@@ -65,6 +65,26 @@ TEST(FileDoubts, ALinkThatIsWrongInTheFileLeadsThoughTheListOfCausesExplainsIt) 
   EXPECT_EQ(right.sentence.find("drawing"), std::string::npos) << right.sentence;
 }
 
+TEST(FileDoubts, BesideMuchThatIsLeftTheNumberMayMakeUpForSomethingElse) {
+  const PhysicalModel model = test::demand(make_physical_model(test::cell_7(), {"geometry"}));
+  std::vector<IdentifiedParameter> parameters;
+  for (const Parameter& one : model.parameters()) {
+    parameters.emplace_back();
+    parameters.back().parameter = one;
+    parameters.back().value = one.name == "alpha4" ? 5e-3 : 0;
+    parameters.back().stddev = 1e-5;
+  }
+  const double sigma = model.cell->tracker.sigma;
+  const auto told = [&](double left) {
+    const auto off = robot_off_drawing(model, parameters, left);
+    return off ? off->text : "";
+  };
+  EXPECT_NE(told(0).find("alpha4 by 5 mrad (limit 3); is it this robot's file"), std::string::npos)
+      << told(0);
+  EXPECT_NE(told(10 * sigma).find("10 times the stated sigma is left as well"), std::string::npos)
+      << told(10 * sigma);
+}
+
 TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
   const auto cell = cell_with(", hayati: true", "");
   for (const double tilt : {4e-4, 1.5e-3}) {

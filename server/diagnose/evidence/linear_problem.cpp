@@ -118,14 +118,14 @@ struct LinearProblem::Extended {
 
 LinearProblem::LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
                              const std::vector<Parameter>& priors,
-                             const std::vector<std::string>& further)
+                             const std::vector<std::string>& further, Weighed weighed)
     : model_(model), batch_(&batch), priors_(priors) {
   TRAMMEL_CHECK(static_cast<int>(priors.size()) == model.parameter_count());
   first_row_ = {0};
   for (const Measurement& m : batch_->measurements)
     first_row_.push_back(first_row_.back() + (m.R_WT ? 6 : 3));
   differentiate(extended_by(further));
-  whiten();
+  whiten(weighed);
 }
 
 LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string>& further) {
@@ -206,7 +206,7 @@ VectorXd LinearProblem::residual_of(const PhysicalModel& model) const {
 
 /// From what was measured to rows of unit variance: adds to every standard deviation what is left
 /// beyond it, and divides by it.
-void LinearProblem::whiten() {
+void LinearProblem::whiten(Weighed weighed) {
   std::vector<Index> position, rotation;
   for (Index i = 0; i < poses(); ++i) {
     for (Index k = 0; k < row_count(i); ++k)
@@ -216,13 +216,15 @@ void LinearProblem::whiten() {
   // The noise is what no parameter explains, whether the model stands at its best fit already or
   // not.
   const Leftover left = leftover_of(residual_, nuisance_, scales, sigma_);
-  const double surplus = robust_surplus(left.residual(position), sigma_(position), left.share);
-  const double surplus_rotation =
-      robust_surplus(left.residual(rotation), sigma_(rotation), left.share);
+  const auto surplus_of = [&](const std::vector<Index>& rows) {
+    return weighed == Weighed::kAsStated
+               ? 0
+               : robust_surplus(left.residual(rows), sigma_(rows), left.share);
+  };
   weight_.resize(sigma_.size());
-  position_ = weigh(position, surplus, left.share);
-  weigh_together(left);
-  rotation_ = weigh(rotation, surplus_rotation, left.share);
+  position_ = weigh(position, surplus_of(position), left.share);
+  if (weighed == Weighed::kByWhatIsLeft) weigh_together(left);
+  rotation_ = weigh(rotation, surplus_of(rotation), left.share);
 
   residual_ = residual_.cwiseProduct(weight_).eval();
   nuisance_ = (weight_.asDiagonal() * nuisance_ * scales.asDiagonal()).eval();

@@ -15,6 +15,12 @@ struct Effect {
   Eigen::MatrixXd columns;            ///< R x m, whitened
 };
 
+/// By what a row's residual is weighed.
+enum class Weighed {
+  kByWhatIsLeft,  ///< the noise that is stated, and what is left beyond it
+  kAsStated
+};
+
 /// A batch seen from a calibrated model, to first order. A pose has 3 rows, or 6 with its
 /// orientation; every row is divided by the standard deviation of its noise, so that white noise
 /// has unit variance.
@@ -25,7 +31,8 @@ class LinearProblem {
   /// `further` names sources whose effect is wanted too; those that the cell or the model cannot
   /// have are left out. `batch` outlives the problem.
   LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
-                const std::vector<Parameter>& priors, const std::vector<std::string>& further);
+                const std::vector<Parameter>& priors, const std::vector<std::string>& further,
+                Weighed weighed = Weighed::kByWhatIsLeft);
 
   [[nodiscard]] Eigen::Index poses() const {
     return static_cast<Eigen::Index>(batch_->measurements.size());
@@ -91,7 +98,7 @@ class LinearProblem {
   [[nodiscard]] Extended extended_by(const std::vector<std::string>& further);
   void differentiate(const Extended& extended);
   void measure(Eigen::Index pose, const Pose& X_WT);
-  void whiten();
+  void whiten(Weighed weighed);
   Spread weigh(const std::vector<Eigen::Index>& rows, double surplus, double share);
   void weigh_together(const Leftover& left);
 

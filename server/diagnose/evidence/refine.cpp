@@ -154,10 +154,10 @@ void remove_from(PriorModel& prior_model, const std::string& source) {
 }
 
 void refine(PriorModel& prior_model, const MeasurementBatch& batch,
-            const std::vector<Unnamed>& unnamed) {
+            const std::vector<Unnamed>& unnamed, Weighed weighed) {
   const Index P = prior_model.model.values.size();
   for (int k = 0; k < kMostSteps; ++k) {
-    const LinearProblem problem(prior_model.model, batch, prior_model.priors, {});
+    const LinearProblem problem(prior_model.model, batch, prior_model.priors, {}, weighed);
     const MatrixXd columns = background_columns(problem, unnamed);
     NormalEquation equation = normal_equation(columns);
     VectorXd functions = VectorXd::Zero(columns.cols() - P);

@@ -33,8 +33,10 @@ struct PriorModel {
 void remove_from(PriorModel& prior_model, const std::string& source);
 
 /// Identifies all parameters anew, from where they stand, beside the anonymous functions:
-/// Gauss-Newton on the whitened rows, maximum a posteriori.
+/// Gauss-Newton on the whitened rows, maximum a posteriori. Weighed by what is left, an effect that
+/// is much larger than its prior can stay where it was: it is noise itself, beside which its prior
+/// weighs more. Weighed as stated, it comes to where the data want it.
 void refine(PriorModel& prior_model, const MeasurementBatch& batch,
-            const std::vector<Unnamed>& unnamed);
+            const std::vector<Unnamed>& unnamed, Weighed weighed = Weighed::kByWhatIsLeft);
 
 }  // namespace trammel::cause_search

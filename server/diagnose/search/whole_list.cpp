@@ -50,6 +50,7 @@ std::vector<Trial> trials_of(const SearchResult& result, const std::vector<Cause
     Trial trial{cause, result.after, 0};
     if (tried || has_cause(trial.model.model, cause) || !add_to(trial.model, to_string(cause)))
       continue;
+    refine(trial.model, result.batch, {}, Weighed::kAsStated);
     refine(trial.model, result.batch, {});
     trial.square = held_out_square(trial.model, result.batch, {}, weight);
     trials.push_back(std::move(trial));

@@ -43,11 +43,13 @@ void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis) {
   }
 }
 
-void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
+                      const std::vector<std::string>& sources, const MeasurementBatch& batch,
                       Diagnosis& diagnosis) {
   const Result<CalibrationResult> found =
-      calibrate(cell, diagnosis.sources_after, batch, {.held = {}, .weigh_links = true});
-  auto off = found ? robot_off_drawing(found->model, found->parameters) : std::nullopt;
+      calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
+  auto off =
+      found ? robot_off_drawing(found->model, found->parameters, found->discrepancy) : std::nullopt;
   if (off) diagnosis.notes.push_back(*std::move(off));
   for (const CellDoubt& doubt : doubts_of(*cell))
     if (doubt.of_robot_file)

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/diagnose/diagnosis.h"
 
@@ -13,8 +14,9 @@ namespace trammel::cause_search {
 void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis);
 
 /// Adds to the notes what is doubtful of the robot file: by itself, and by what is identified on
-/// `batch` with all sources that the diagnosis ends with.
-void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+/// `batch` with `sources`.
+void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
+                      const std::vector<std::string>& sources, const MeasurementBatch& batch,
                       Diagnosis& diagnosis);
 
 /// The notes, a sentence each, with a blank behind; empty where there are none.
