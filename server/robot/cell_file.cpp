@@ -253,12 +253,33 @@ Anchors read_anchors(const YamlMap& map) {
   return all;
 }
 
+bool says_auto(const YamlMap& model) {
+  try {
+    return model.text("error_sources") == kAutoSources;
+  } catch (const YamlRefusal&) {
+    return false;
+  }
+}
+
+/// A list, or `auto`, alone or in the list. Beside it the bias is chosen, too, unless it is said.
+void read_error_sources(const YamlMap& model, ModelSpec& spec) {
+  std::vector<std::string> names =
+      says_auto(model) ? std::vector<std::string>{} : model.texts("error_sources");
+  if (!says_auto(model) && std::erase(names, kAutoSources) == 0) {
+    spec.error_sources = std::move(names);
+    return;
+  }
+  if (!names.empty()) spec.error_sources = names;
+  spec.beside_auto = std::move(names);
+  spec.bias = kAutoSources;
+}
+
 void read_model(const YamlMap& map, Cell& cell) {
   if (!map.has("model")) return;
   const YamlMap model = map.map("model");
   model.only({"error_sources", "bias"});
   model.attempt([&] {
-    if (model.has("error_sources")) cell.model.error_sources = model.texts("error_sources");
+    if (model.has("error_sources")) read_error_sources(model, cell.model);
   });
   model.attempt([&] { cell.model.bias = model.text("bias", cell.model.bias); });
 }

@@ -41,6 +41,7 @@ Status check_spellings(const Cell& cell, const std::string& level, const std::st
     const auto specs = TRY(parse_level(level));
     TRY(check_most("level", specs.size(), kMaxSources, "error sources"));
     for (const std::string& spec : spelled_out(specs, cell)) {
+      if (spec == kAutoSources) continue;
       TRY(make_error_source(spec, cell));
     }
   }

@@ -166,5 +166,27 @@ TEST(ModelText, TellsWhatWasAskedBeforeABiasWasLeftOut) {
   EXPECT_NEAR(json["candidates"][1]["gain_mm2"], 1e-6, 1e-15);
 }
 
+TEST(ModelText, TellsWhichCausesWereTriedAndWhatEachBrought) {
+  CompensatedModel::Parts parts = test::nominal_model(test::small_cell("cell-3"), 12).parts();
+  parts.cause_choice =
+      CauseChoice{60e-6,
+                  {{{"joint_map:2"}, 100e-6, 60e-6, 120.5, 14, true, "the poses show it"},
+                   {{"axis_runout:3"}, 60e-6, 61e-6, 4, 3, false, "it does not predict"}}};
+  const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
+  const std::string text = model_text(model);
+  EXPECT_NE(text.find("predicted to 0.0600 mm"), std::string::npos) << text;
+  EXPECT_NE(
+      text.find("angle error map in joint 2                    0.1000    0.0600     120.5  yes"),
+      std::string::npos)
+      << text;
+  EXPECT_NE(text.find("0.0600    0.0610       4.0  no: it does not predict"), std::string::npos)
+      << text;
+  const auto json = model_json(model)["cause_choice"];
+  EXPECT_NEAR(json["held_out_mm"], 0.06, 1e-12);
+  EXPECT_EQ(json["tried"][0]["sources"][0], "joint_map:2");
+  EXPECT_TRUE(json["tried"][0]["taken"]);
+  EXPECT_NEAR(json["tried"][1]["held_out_after_mm"], 0.061, 1e-12);
+}
+
 }  // namespace
 }  // namespace trammel::cli

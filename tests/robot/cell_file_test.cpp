@@ -44,6 +44,27 @@ TEST(CellFile, EveryShippedRobotAndCellLoads) {
   }
 }
 
+TEST(CellFile, AutoLeavesTheErrorSourcesToTheMeasurementsAndKeepsWhatItNames) {
+  const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
+  const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string before = text.substr(0, text.find("model:"));
+  const auto model_of = [&](const std::string& model) {
+    return parse_cell(before + "model: " + model + "\n", robot, "c.yaml").value().model;
+  };
+  const std::vector<std::string> usual = {"base", "geometry", "compliance"};
+  const ModelSpec alone = model_of("{error_sources: auto}");
+  EXPECT_EQ(alone.beside_auto, std::vector<std::string>{});
+  EXPECT_EQ(alone.error_sources, usual);
+  EXPECT_EQ(alone.bias, "auto");
+  const ModelSpec listed = model_of("{error_sources: [base, backlash:2, auto], bias: none}");
+  EXPECT_EQ(listed.beside_auto, (std::vector<std::string>{"base", "backlash:2"}));
+  EXPECT_EQ(listed.error_sources, (std::vector<std::string>{"base", "backlash:2"}));
+  EXPECT_EQ(listed.bias, "none");
+  EXPECT_FALSE(model_of("{error_sources: [base]}").beside_auto);
+  EXPECT_FALSE(model_of("{bias: se}").beside_auto);
+  EXPECT_FALSE(parse_cell(before + "model: {error_sources: all}\n", robot, "c.yaml"));
+}
+
 TEST(CellFile, NamesExternalAxesThatCarryNothing) {
   const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));

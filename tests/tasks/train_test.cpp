@@ -155,6 +155,28 @@ TEST(Train, ATrackerThatMovedIsNoPartOfWhatIsServed) {
   EXPECT_LT(to_mm(fresh.calibrated.rms), 0.025);
 }
 
+TEST(Train, WithAutoTheModelKeepsWhichCausesWereTried) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  cell->model.beside_auto.emplace();
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 80, 64);
+  TrainOptions options = quick("M2", "none");
+  options.level.reset();
+  const CompensatedModel model = test::demand(train(cell, batch, options));
+  ASSERT_TRUE(model.parts().cause_choice);
+  EXPECT_EQ(model.parts().cause_choice->tried.front().sources.front().find("compliance"), 0U);
+  EXPECT_TRUE(model.parts().cause_choice->tried.front().taken);
+  EXPECT_LT(
+      to_mm(model.evaluate(test::measured(test::chapter_5_robot(cell), 300, 65)).calibrated.rms),
+      0.026);
+  const CompensatedModel stored = test::demand(deserialize(serialize(model), "memory"));
+  EXPECT_EQ(stored.provenance().hash, model.provenance().hash);
+  ASSERT_EQ(stored.parts().cause_choice->tried.size(), model.parts().cause_choice->tried.size());
+  EXPECT_EQ(stored.parts().cause_choice->tried[0].gain, model.parts().cause_choice->tried[0].gain);
+  EXPECT_EQ(test::demand(train(cell, batch, quick("auto", "none"))).provenance().hash,
+            model.provenance().hash);
+  EXPECT_FALSE(test::demand(train(cell, batch, quick("M2", "none"))).parts().cause_choice);
+}
+
 TEST(Train, AutoTakesNoBiasWhereThePhysicsIsCompleteAndThePhysicsItselfWhereItIsNot) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);

@@ -290,7 +290,8 @@ void add_train(CLI::App& app, Action& chosen) {
   command->add_option("--level", arguments->level,
                       "What to identify instead of the cell's error sources: M0 (nothing), M1 "
                       "(base), M2 (base, geometry), M3 (base, geometry, compliance), a list of "
-                      "sources, or a level and more: M2,gear_transmission:3");
+                      "sources, a level and more: M2,gear_transmission:3, or auto (what the poses "
+                      "ask for)");
   command->add_option("--bias", arguments->bias,
                       "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, "
                       "..., none, or auto (the simplest that poses left out say is worth it)");

@@ -211,6 +211,33 @@ std::string choice_text(const BiasChoice& choice) {
          "residual); in time, in space: eighths left out of both\n";
 }
 
+std::string choice_text(const CauseChoice& choice) {
+  std::string text = fmt::format(
+      "error sources chosen by these poses: eighths left out in joint space are predicted to "
+      "{:.4f} "
+      "mm\n  {:<42}{:>10}{:>10}{:>10}  {}\n",
+      to_mm(choice.held_out), "cause tried; left out, mm", "before", "after", "nat", "taken");
+  for (const TriedCause& one : choice.tried)
+    text += fmt::format("  {:<42}{:>10.4f}{:>10.4f}{:>10.1f}  {}\n", causes_in_words(one.sources),
+                        to_mm(one.held_out_before), to_mm(one.held_out_after), one.gain,
+                        one.taken ? "yes" : "no: " + one.why);
+  return text;
+}
+
+ordered_json choice_json(const CauseChoice& choice) {
+  ordered_json tried = ordered_json::array();
+  for (const TriedCause& one : choice.tried)
+    tried.push_back({{"sources", one.sources},
+                     {"cause", causes_in_words(one.sources)},
+                     {"held_out_before_mm", to_mm(one.held_out_before)},
+                     {"held_out_after_mm", to_mm(one.held_out_after)},
+                     {"gain_nat", one.gain},
+                     {"freedom", one.freedom},
+                     {"taken", one.taken},
+                     {"why", one.why}});
+  return {{"held_out_mm", to_mm(choice.held_out)}, {"tried", std::move(tried)}};
+}
+
 ordered_json choice_json(const BiasChoice& choice) {
   ordered_json candidates = ordered_json::array();
   for (const BiasCandidate& c : choice.candidates) {
@@ -305,6 +332,7 @@ std::string model_text(const CompensatedModel& model) {
   std::string text =
       notes_text(grave(notes)) + provenance_text(model) + notes_text(for_information(notes));
   text += rotation_text(parts) + negative_play_text(parts);
+  if (parts.cause_choice) text += choice_text(*parts.cause_choice);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   return text + budget_text(parts) + unidentifiable_text(parts.unidentifiable) +
          suspects_text(parts.suspects);
@@ -438,6 +466,7 @@ ordered_json model_json(const CompensatedModel& model) {
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
+  if (parts.cause_choice) json["cause_choice"] = choice_json(*parts.cause_choice);
   if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);
   if (parts.validation) json["validation"] = evaluation_json(*parts.validation);
   return json;

@@ -64,6 +64,8 @@ constexpr std::array kTopics = {
         "M0 nothing, M1 base, M2 base and geometry, M3 base, geometry and compliance; a list, or a "
         "level and more:\n"
         "  trammel train --cell c.yaml --batch b.csv --level M2,gear_transmission:3 -o m\n"
+        "With auto the measurements choose what is added to base, geometry and tools, and train "
+        "tells what was tried: --level auto, or model: {error_sources: auto} in the cell file.\n"
         "\n"
         "--bias spells the kernel of what is learned of the rest: se, matern32, matern52, none, "
         "auto, sums and products of them. An \"rbf\" kernel of other programs is called se here."},

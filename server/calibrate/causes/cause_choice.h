@@ -11,14 +11,14 @@ struct TriedCause {
   double held_out_before =
       0;                      ///< m, rms of positions that were left out, with the causes before it
   double held_out_after = 0;  ///< m, the same with this cause
-  double gain = 0;     ///< nat: how much likelier the batch is with it, all other causes beside it
+  double gain = 0;     ///< nat: how much likelier the batch is with it, beside those taken before
   double freedom = 0;  ///< how many of its numbers the batch tells
-  double chance = 1;   ///< p: that noise alone would show so much of it
   bool taken = false;
   std::string why;  ///< for people, one clause
 };
 
-/// The causes that a training with `error_sources: auto` tried, the largest gain first.
+/// The causes that a training with `error_sources: auto` tried, in their order: loads and what
+/// gives way under them, then the largest gain first.
 struct CauseChoice {
   double held_out = 0;  ///< m, with all that was taken
   std::vector<TriedCause> tried;

@@ -15,7 +15,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSameAngle = 1e-4;  // rad: nearer ones tell nothing of finer harmonics
-constexpr int kMostHarmonics = 150;  // of a joint: waves of 2.4 degrees
 constexpr int kFewestHarmonics = 4;  // of a joint without a map: that it has none is learned
 constexpr int kMostOfAll =
     580;  // harmonics of all joints: what a model has room for, and a calibration time
@@ -139,9 +138,9 @@ class MapSearch {
       most_[joint] = most_harmonics(without.model.cell->robot, batch, joint);
   }
 
-  std::map<int, MapSpectrum> run() {
+  std::map<int, MapSpectrum> run(int most) {
     for (const Pass& one : kPasses) {
-      set_harmonics(one.harmonics);
+      set_harmonics(std::min(one.harmonics, most));
       pass(one.evaluations);
     }
     return learned_;
@@ -219,8 +218,8 @@ class MapSearch {
 
 std::map<int, MapSpectrum> learned_maps(const CalibrationResult& without,
                                         const MeasurementBatch& batch,
-                                        const std::vector<int>& joints) {
-  return MapSearch(without, batch, joints).run();
+                                        const std::vector<int>& joints, int most) {
+  return MapSearch(without, batch, joints).run(most);
 }
 
 }  // namespace trammel

@@ -113,6 +113,20 @@ BiasChoice choice_from(const Json& json) {
   return choice;
 }
 
+CauseChoice causes_from(const Json& json) {
+  CauseChoice choice{.held_out = number_from(json, "held_out_m"), .tried = {}};
+  for (const Json& one : list_from(json.at("tried"))) {
+    choice.tried.push_back({.sources = one.at("sources").get<std::vector<std::string>>(),
+                            .held_out_before = number_from(one, "held_out_before_m"),
+                            .held_out_after = number_from(one, "held_out_after_m"),
+                            .gain = number_from(one, "gain_nat"),
+                            .freedom = number_from(one, "freedom"),
+                            .taken = truth_from(one.at("taken")),
+                            .why = one.at("why")});
+  }
+  return choice;
+}
+
 RefitRecord refit_from(const Json& json) {
   return {.model = json.at("model"),
           .sources = json.at("sources").get<std::vector<std::string>>(),
@@ -284,6 +298,8 @@ Status read_bias_contexts(const Json& bias, const std::string& where, ModelParts
 }
 
 Status read_bias(const Json& content, const std::string& where, ModelParts& parts) {
+  if (content.contains("cause_choice"))
+    parts.cause_choice = causes_from(content.at("cause_choice"));
   if (content.contains("bias_choice")) parts.bias_choice = choice_from(content.at("bias_choice"));
   if (!content.contains("bias")) return {};
   parts.bias = bias_from(content.at("bias"));

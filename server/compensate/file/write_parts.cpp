@@ -157,6 +157,19 @@ Json json_of(const BiasChoice& choice) {
           {"candidates", list_of(choice.candidates)}};
 }
 
+Json json_of(const CauseChoice& choice) {
+  Json tried = Json::array();
+  for (const TriedCause& one : choice.tried)
+    tried.push_back({{"sources", one.sources},
+                     {"held_out_before_m", one.held_out_before},
+                     {"held_out_after_m", one.held_out_after},
+                     {"gain_nat", one.gain},
+                     {"freedom", one.freedom},
+                     {"taken", one.taken},
+                     {"why", one.why}});
+  return {{"held_out_m", choice.held_out}, {"tried", std::move(tried)}};
+}
+
 /// Frames, sources and values.
 Json json_of(const PhysicalModel& physics) {
   Json tools = Json::object();
@@ -245,6 +258,7 @@ void add_domain(const ModelParts& parts, Json& content) {
 }
 
 void add_bias(const ModelParts& parts, Json& content) {
+  if (parts.cause_choice) content["cause_choice"] = json_of(*parts.cause_choice);
   if (parts.bias_choice) content["bias_choice"] = json_of(*parts.bias_choice);
   if (!parts.bias) return;
   content["bias"] = json_of(*parts.bias);

@@ -17,6 +17,7 @@ std::shared_ptr<const Cell> with_sources(const std::shared_ptr<const Cell>& cell
   if (!level) return cell;
   Result<std::vector<std::string>> names = parse_level(*level);
   if (!names) return cell;
+  if (std::erase(*names, kAutoSources) > 0 && names->empty()) return cell;
   auto asked = std::make_shared<Cell>(*cell);
   asked->model.error_sources = std::move(*names);
   return asked;

@@ -6,6 +6,7 @@
 #include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate_with_maps.h"
+#include "server/calibrate/causes/choose_causes.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/orientation_check.h"
@@ -38,13 +39,36 @@ BatchSplit prepared(const CheckedBatch& batch, double sigma) {
   return {merge_repeats(batch.training(), sigma).batch, batch.held_out()};
 }
 
-/// The sources to identify, as asked.
-Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
-  Result<std::vector<std::string>> names =
-      options.level ? parse_level(*options.level)
-                    : Result<std::vector<std::string>>(cell.model.error_sources);
-  if (!names) return names;
-  return with_unknown_tool(std::move(*names), cell);
+/// What is asked for: the sources to identify, or those to keep while the data choose the others.
+struct Asked {
+  std::vector<std::string> sources;
+  bool chosen_by_data = false;
+};
+
+Result<Asked> asked_of(const Cell& cell, const TrainOptions& options) {
+  Asked asked;
+  if (options.level) {
+    asked.sources = TRY(parse_level(*options.level));
+    asked.chosen_by_data = std::erase(asked.sources, kAutoSources) > 0;
+  } else {
+    asked = {cell.model.beside_auto.value_or(cell.model.error_sources),
+             cell.model.beside_auto.has_value()};
+  }
+  return asked;
+}
+
+/// The sources to identify from these rows; what was chosen goes into `choice`. Distances and
+/// touches do not choose: with them the usual sources are identified.
+Result<std::vector<std::string>> sources_of(const std::shared_ptr<const Cell>& cell,
+                                            const MeasurementBatch& rows,
+                                            const TrainOptions& options,
+                                            std::optional<CauseChoice>& choice) {
+  Asked asked = TRY(asked_of(*cell, options));
+  if (!asked.chosen_by_data) return with_unknown_tool(std::move(asked.sources), *cell);
+  if (has_gauges(rows)) return with_unknown_tool(cell->model.error_sources, *cell);
+  ChosenCauses chosen = TRY(choose_causes(cell, asked.sources, rows));
+  choice = std::move(chosen.choice);
+  return std::move(chosen.sources);
 }
 
 /// What to take the arm's temperature for where a request does not say it.
@@ -222,8 +246,9 @@ Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
 
 /// The physics, identified anew; `split` comes into its world.
 Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
-                                      const TrainOptions& options, const Report& report) {
-  const std::vector<std::string> sources = TRY(sources_of(*cell, options));
+                                      const TrainOptions& options, const Report& report,
+                                      std::optional<CauseChoice>& choice) {
+  const std::vector<std::string> sources = TRY(sources_of(cell, split.train, options, choice));
   auto found = identified_by_most(identified_on(split.train, cell, sources, options, report),
                                   split.train, cell, sources, options, report);
   if (!found) return found;
@@ -238,10 +263,12 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
                                     const CheckedBatch& batch, BatchSplit split,
                                     const TrainOptions& options, const Report& report) {
   std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
-  IdentifiedSessions found = TRY(identified(cell, split, options, report));
+  std::optional<CauseChoice> choice;
+  IdentifiedSessions found = TRY(identified(cell, split, options, report, choice));
   const LeftOut left_out(found.calibration, split.train);
   CompensatedModel::Parts parts = calibrated_parts(std::move(found.calibration), left_out);
   parts.changes = std::move(found.changes);
+  parts.cause_choice = std::move(choice);
   parts.sessions_as_given = !parts.sessions.empty() && !batch.rows().clock;
   parts.sessions_left_out = std::move(unplaced);
   const std::string asked = options.bias.value_or(cell->model.bias);

@@ -1,0 +1,160 @@
+#include "server/calibrate/causes/cause_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/numerics/product.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kRounds = 12;          // to find the noise
+constexpr double kSameNoise = 0.01;  // of its precision
+constexpr double kLeastFreedom = 1;  // equations beyond the parameters
+
+/// Rows of a batch by themselves, and how they are weighed.
+LinearArm block_equations(const CalibrationProblem& problem, const Weights& weights,
+                          const std::vector<std::size_t>& rows) {
+  CalibrationProblem part{problem.model, problem.batch};
+  part.batch.measurements.clear();
+  Weights of_part = weights;
+  of_part.together.clear();
+  for (const std::size_t row : rows) {
+    part.batch.measurements.push_back(problem.batch.measurements[row]);
+    if (!weights.together.empty()) of_part.together.push_back(weights.together[row]);
+  }
+  LinearArm arm = linear_arm(part, of_part);
+  for (LinearEquations& kind : arm.kinds) {
+    if (kind.count > 0) continue;
+    kind = {};  // their zeros would fill the memory
+  }
+  return arm;
+}
+
+void add_equations(const LinearEquations& part, LinearEquations& sum) {
+  if (part.count == 0) return;
+  if (sum.count == 0) {
+    sum = part;
+    return;
+  }
+  sum.information += part.information;
+  sum.downhill += part.downhill;
+  sum.square += part.square;
+  sum.count += part.count;
+}
+
+/// Squared residuals after the change `d`.
+double residual_square(const LinearEquations& equations, const VectorXd& d) {
+  return equations.square - 2 * equations.downhill.dot(d) + d.dot(equations.information * d);
+}
+
+}  // namespace
+
+CauseEvidence::CauseEvidence(const CalibrationProblem& problem, const Weights& weights,
+                             const std::vector<std::vector<std::size_t>>& blocks,
+                             const std::vector<ColumnGroup>& present) {
+  for (const std::vector<std::size_t>& rows : blocks) {
+    blocks_.push_back(block_equations(problem, weights, rows));
+    for (std::size_t k = 0; k < all_.kinds.size(); ++k)
+      add_equations(blocks_.back().kinds[k], all_.kinds[k]);
+  }
+  all_.scaled = blocks_.front().scaled;
+  learn_precision();
+  weigh_all();
+  for (const ColumnGroup& group : present) take(group);
+}
+
+/// Curvature and slope of all columns, under the priors and the present precision.
+void CauseEvidence::weigh_all() {
+  const Index P = all_.scaled.scale.size();
+  curvature_ = MatrixXd::Identity(P, P);
+  downhill_ = VectorXd::Zero(P);
+  for (std::size_t k = 0; k < all_.kinds.size(); ++k) {
+    if (all_.kinds[k].count == 0) continue;
+    curvature_ += precision_(static_cast<Index>(k)) * all_.kinds[k].information;
+    downhill_ += precision_(static_cast<Index>(k)) * all_.kinds[k].downhill;
+  }
+}
+
+/// The noise under which all groups together leave what they are expected to leave (MacKay 1992).
+void CauseEvidence::learn_precision() {
+  for (int round = 0; round < kRounds; ++round) {
+    weigh_all();
+    const std::optional<MatrixXd> factor = inverse_factor(curvature_);
+    if (!factor) return;
+    const MatrixXd covariance = gram(*factor);
+    const VectorXd d = covariance * downhill_;
+    const Eigen::Vector2d before = precision_;
+    for (std::size_t k = 0; k < all_.kinds.size(); ++k) {
+      const LinearEquations& kind = all_.kinds[k];
+      if (kind.count == 0) continue;
+      double& at = precision_(static_cast<Index>(k));
+      const double told = at * kind.information.cwiseProduct(covariance).sum();
+      const double square = residual_square(kind, d);
+      if (square > 0) at = std::max(kind.count - told, kLeastFreedom) / square;
+    }
+    if (((precision_ - before).array().abs() < kSameNoise * before.array()).all()) return;
+  }
+}
+
+CauseEvidence::Gain CauseEvidence::gain_of(const ColumnGroup& group) const {
+  const Eigen::LLT<MatrixXd> factor(
+      curvature_.block(group.first, group.first, group.count, group.count));
+  const VectorXd whitened = factor.matrixL().solve(downhill_.segment(group.first, group.count));
+  const double log_root = VectorXd(factor.matrixLLT().diagonal()).array().log().sum();
+  const MatrixXd inverse = factor.solve(MatrixXd::Identity(group.count, group.count));
+  return {0.5 * whitened.squaredNorm() - log_root,
+          static_cast<double>(group.count) - inverse.trace()};
+}
+
+void CauseEvidence::take(const ColumnGroup& group) {
+  for (Index k = 0; k < group.count; ++k) free_.push_back(group.first + k);
+  if (group.count == 0) return;
+  const Eigen::LLT<MatrixXd> factor(
+      curvature_.block(group.first, group.first, group.count, group.count));
+  const MatrixXd rows = factor.matrixL().solve(curvature_.middleRows(group.first, group.count));
+  const VectorXd whitened = factor.matrixL().solve(downhill_.segment(group.first, group.count));
+  curvature_ -= gram(rows);
+  downhill_ -= rows.transpose() * whitened;
+}
+
+double CauseEvidence::left_out(const ColumnGroup& group) const {
+  std::vector<Index> free = free_;
+  for (Index k = 0; k < group.count; ++k) free.push_back(group.first + k);
+  return left_out_with(free);
+}
+
+double CauseEvidence::left_out_with(const std::vector<Index>& free) const {
+  const auto P = static_cast<Index>(free.size());
+  double square = 0, count = 0;
+  for (const LinearArm& block : blocks_) {
+    MatrixXd curvature = MatrixXd::Identity(P, P);
+    VectorXd downhill = VectorXd::Zero(P);
+    for (std::size_t k = 0; k < block.kinds.size(); ++k) {
+      if (all_.kinds[k].count == 0) continue;
+      const double at = precision_(static_cast<Index>(k));
+      curvature += at * all_.kinds[k].information(free, free);
+      downhill += at * all_.kinds[k].downhill(free);
+      if (block.kinds[k].count == 0) continue;
+      curvature -= at * block.kinds[k].information(free, free);
+      downhill -= at * block.kinds[k].downhill(free);
+    }
+    const Eigen::LLT<MatrixXd> factor(curvature);
+    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+    if (block.kinds.front().count == 0) continue;
+    VectorXd d = VectorXd::Zero(all_.scaled.scale.size());
+    const VectorXd of_free = factor.solve(downhill);
+    d(free) = of_free;
+    square += residual_square(block.kinds.front(), d);
+    count += block.kinds.front().count;
+  }
+  return square / std::max(count, 1.0);
+}
+
+}  // namespace trammel

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "server/calibrate/identify/weighting.h"
+#include "server/calibrate/maps/linear_arm.h"
+
+namespace trammel {
+
+/// Neighbouring columns of a linear arm: the parameters of one source.
+struct ColumnGroup {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// How much likelier groups of parameters make a batch, one after the other, about the present
+/// values of a model (README.md). Each parameter is normal about its present value, with standard
+/// deviation 1 in units of its scale. First order throughout.
+class CauseEvidence {
+ public:
+  /// `blocks`: the rows of the batch, a part each. `present`: the groups that are free to begin
+  /// with.
+  CauseEvidence(const CalibrationProblem& problem, const Weights& weights,
+                const std::vector<std::vector<std::size_t>>& blocks,
+                const std::vector<ColumnGroup>& present);
+
+  struct Gain {
+    double nat = 0;      ///< how much likelier the batch is with the group free, too
+    double freedom = 0;  ///< how many of its numbers the batch tells
+  };
+  /// Beside the groups that are free.
+  [[nodiscard]] Gain gain_of(const ColumnGroup& group) const;
+  /// Frees the group.
+  void take(const ColumnGroup& group);
+  /// Mean square of the residuals of positions, an axis, in units of their sigmas: each block
+  /// predicted by the others with the free groups.
+  [[nodiscard]] double left_out() const { return left_out_with(free_); }
+  /// The same with `group` free, too.
+  [[nodiscard]] double left_out(const ColumnGroup& group) const;
+
+ private:
+  [[nodiscard]] double left_out_with(const std::vector<Eigen::Index>& free) const;
+  void weigh_all();
+  void learn_precision();
+
+  std::vector<LinearArm> blocks_;
+  LinearArm all_;
+  Eigen::Vector2d precision_ = Eigen::Vector2d::Ones();  // of each kind: times 1/sigma²
+  std::vector<Eigen::Index> free_;
+  // Curvature and slope of all columns, with those that are free integrated out.
+  Eigen::MatrixXd curvature_;
+  Eigen::VectorXd downhill_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,253 @@
+#include "server/calibrate/causes/choose_causes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "server/calibrate/calibrate_with_maps.h"
+#include "server/calibrate/causes/cause_evidence.h"
+#include "server/calibrate/causes/joint_blocks.h"
+#include "server/calibrate/frames/frames.h"
+#include "server/calibrate/identify/check_needs.h"
+#include "server/calibrate/maps/learned_maps.h"
+#include "server/error_sources/catalogue.h"
+
+namespace trammel {
+
+namespace {
+
+using causes::Scope;
+using causes::SearchFamily;
+
+constexpr int kHarmonics = 60;  // of a map: waves of 6 degrees; finer ones cost and bring little
+constexpr double kWorth = 3;    // nat: so much likelier must the batch be with a cause
+
+constexpr const char* kTaken = "the poses show it, and it predicts poses that were left out";
+constexpr const char* kPredictsNothing = "it does not predict poses that were left out";
+constexpr const char* kNotShown = "the poses do not show it";
+
+bool is_listed(const std::vector<std::string>& specs, const CauseRecord& record) {
+  return std::any_of(specs.begin(), specs.end(),
+                     [&](const std::string& spec) { return find_cause(spec) == &record; });
+}
+
+/// The sources that are identified whatever the data say.
+std::vector<std::string> always_identified(const Cell& cell, const std::vector<std::string>& kept) {
+  std::vector<std::string> specs = spelled_out(kept, cell);
+  for (const causes::Part part : {causes::Part::kBase, causes::Part::kLinks, causes::Part::kTool}) {
+    const CauseRecord& record = cause_correcting(part);
+    if (part == causes::Part::kTool && cell.tools.empty()) continue;
+    if (!is_listed(specs, record)) specs.emplace_back(record.spelling);
+  }
+  return with_unknown_tool(std::move(specs), cell);
+}
+
+/// The cause that makes this one show, if it is a load on what gives way: neither is linear without
+/// the other.
+const CauseRecord* gives_way_under(const CauseRecord& record) {
+  if (!record.added_by_data) return nullptr;
+  const CauseRecord& beside = cause_spelled(record.added_by_data->beside);
+  return beside.gives_way ? &beside : nullptr;
+}
+
+/// Lasting, of the arm, and linear about an arm without it.
+bool may_be_tried(const CauseRecord& record) {
+  const bool of_robot = record.scope == Scope::kArm || record.scope == Scope::kJoint;
+  const bool linear = record.search == SearchFamily::kColumns ||
+                      record.search == SearchFamily::kPlay || record.search == SearchFamily::kMap;
+  return of_robot && linear && record.lasting == causes::Lasting::kAlways &&
+         record.part == causes::Part::kNone && record.forms.size() == 1 &&
+         gives_way_under(record) == nullptr;
+}
+
+/// The sources of one cause: of the whole arm, or of each joint.
+std::vector<std::string> spellings(const CauseRecord& record, const Cell& cell) {
+  const std::string name(record.spelling);
+  if (record.scope != Scope::kJoint) return {name};
+  return spelled_out({name + ":*"}, cell);
+}
+
+ColumnGroup columns_of_source(const PhysicalModel& model, const std::string& name) {
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    if (source->name() == name) return {first, count};
+    first += count;
+  }
+  return {};
+}
+
+/// m: of one axis, where residuals are 1 in units of their sigmas.
+double mean_sigma(const CalibrationResult& found, const MeasurementBatch& batch) {
+  const Weights weights = weights_of(found, batch);
+  double square = 0;
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const Measurement& m = batch.measurements[i];
+    square += std::pow(position_sigma(m, *found.model.cell), 2) + std::pow(weights.beside(m, i), 2);
+  }
+  return std::sqrt(square / static_cast<double>(batch.measurements.size()));
+}
+
+/// m: Euclidean rms of three axes whose mean square is that, in units of sigma.
+double in_space(double sigma, double mean_square) { return sigma * std::sqrt(3 * mean_square); }
+
+/// A cause that is tried: its columns in the linear arm.
+struct Candidate {
+  std::string named;   ///< as a person would name it
+  std::string source;  ///< in the model and in the list that is identified
+  ColumnGroup columns = {};
+};
+
+class CauseSearch {
+ public:
+  CauseSearch(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch)
+      : cell_(cell), batch_(batch), blocks_(joint_blocks(batch)) {}
+
+  Result<ChosenCauses> run(const std::vector<std::string>& kept) {
+    chosen_.sources = always_identified(*cell_, kept);
+    base_ = TRY(calibrate_with_maps(cell_, chosen_.sources, batch_, {}));
+    chosen_.choice.held_out = missed(base_);
+    try_load();
+    add_candidates();
+    if (!candidates_.empty()) try_others();
+    return std::move(chosen_);
+  }
+
+ private:
+  /// Weights and the joints that give way under them are a product: both are identified together,
+  /// and the arm is made linear where they are.
+  void try_load() {
+    const CauseRecord* yielding = nullptr;
+    std::vector<std::string> load;
+    for (const CauseRecord* record : all_causes()) {
+      const CauseRecord* beside = gives_way_under(*record);
+      if (beside == nullptr) continue;
+      yielding = beside;
+      if (!record->added_by_data->is_known(*cell_) && !is_listed(chosen_.sources, *record))
+        load.emplace_back(record->spelling);
+    }
+    if (yielding == nullptr || is_listed(chosen_.sources, *yielding)) return;
+    load.insert(load.begin(), std::string(yielding->spelling));
+    std::vector<std::string> specs = chosen_.sources;
+    specs.insert(specs.end(), load.begin(), load.end());
+    Result<CalibrationResult> loaded = calibrate_with_maps(cell_, specs, batch_, {});
+    if (!loaded) return;
+    const double after = missed(*loaded);
+    const double gain = loaded->log_evidence - base_.log_evidence;
+    const double freedom = loaded->rank - base_.rank;
+    if (!judged({load, chosen_.choice.held_out, after, gain, freedom, false, {}})) return;
+    chosen_.sources = std::move(specs);
+    base_ = std::move(*loaded);
+  }
+
+  /// Adds the cause to the table; whether it is taken.
+  bool judged(TriedCause tried) {
+    const bool shown = tried.gain > kWorth;
+    tried.taken = shown && tried.held_out_after < tried.held_out_before;
+    tried.why = tried.taken ? kTaken : shown ? kPredictsNothing : kNotShown;
+    if (tried.taken) chosen_.choice.held_out = tried.held_out_after;
+    chosen_.choice.tried.push_back(std::move(tried));
+    return chosen_.choice.tried.back().taken;
+  }
+
+  void add_candidates() {
+    model_ = base_.model;
+    std::vector<int> joints;
+    for (const CauseRecord* record : all_causes()) {
+      if (!may_be_tried(*record)) continue;
+      for (const std::string& spec : spellings(*record, *cell_)) {
+        if (is_kept(spec)) continue;
+        if (const std::optional<int> joint = joint_of_open_map(spec)) {
+          joints.push_back(*joint);
+        } else {
+          add_candidate(spec, spec);
+        }
+      }
+    }
+    if (!joints.empty()) {
+      for (const auto& [joint, spectrum] : learned_maps(base_, batch_, joints, kHarmonics)) {
+        const std::string map = spelled_map(joint, spectrum);
+        add_candidate(without_learned_spectrum(map), map);
+      }
+    }
+    for (Candidate& one : candidates_) one.columns = columns_of_source(model_, one.source);
+  }
+
+  [[nodiscard]] bool is_kept(const std::string& spec) const {
+    const auto& kept = chosen_.sources;
+    return std::any_of(kept.begin(), kept.end(), [&](const std::string& other) {
+      return without_learned_spectrum(other) == spec;
+    });
+  }
+
+  /// If the cell can have the source, and the batch could show it.
+  void add_candidate(const std::string& named, const std::string& spec) {
+    const Result<ErrorSourcePtr> source = make_error_source(spec, *cell_);
+    if (!source || (*source)->parameters().empty()) return;
+    CalibrationProblem alone{model_, batch_};
+    alone.model.sources = {*source};
+    if (!check_needs(alone)) return;
+    add_source(model_, *source);
+    candidates_.push_back({named, (*source)->name()});
+  }
+
+  /// The largest gain first, each beside those that were taken before it.
+  void try_others() {
+    std::vector<ColumnGroup> present;
+    for (const ErrorSourcePtr& source : base_.model.sources)
+      present.push_back(columns_of_source(model_, source->name()));
+    CauseEvidence evidence = evidence_of(base_, model_, present);
+    const double sigma = mean_sigma(base_, batch_);
+    double before = in_space(sigma, evidence.left_out());
+    chosen_.choice.held_out = before;
+    while (!candidates_.empty()) {
+      std::vector<CauseEvidence::Gain> gains;
+      for (const Candidate& one : candidates_) gains.push_back(evidence.gain_of(one.columns));
+      const auto largest = std::max_element(gains.begin(), gains.end(),
+                                            [](auto& a, auto& b) { return a.nat < b.nat; });
+      const auto one = candidates_.begin() + (largest - gains.begin());
+      const double after =
+          largest->nat > kWorth ? in_space(sigma, evidence.left_out(one->columns)) : before;
+      if (judged({{one->named}, before, after, largest->nat, largest->freedom, false, {}})) {
+        evidence.take(one->columns);
+        chosen_.sources.push_back(one->source);
+        before = after;
+      }
+      candidates_.erase(one);
+    }
+  }
+
+  /// About the arm that was `found`; `model` has further sources.
+  [[nodiscard]] CauseEvidence evidence_of(const CalibrationResult& found,
+                                          const PhysicalModel& model,
+                                          const std::vector<ColumnGroup>& present) const {
+    return {{model, aligned(batch_, found.sessions, cell_->tracker)},
+            weights_of(found, batch_),
+            blocks_,
+            present};
+  }
+
+  /// m: how far blocks are missed that are left out, by the sources that were identified.
+  [[nodiscard]] double missed(const CalibrationResult& found) const {
+    const ColumnGroup all{0, found.model.values.size()};
+    return in_space(mean_sigma(found, batch_), evidence_of(found, found.model, {all}).left_out());
+  }
+
+  std::shared_ptr<const Cell> cell_;
+  const MeasurementBatch& batch_;
+  std::vector<std::vector<std::size_t>> blocks_;
+  CalibrationResult base_;
+  PhysicalModel model_;  // with all candidates
+  std::vector<Candidate> candidates_;
+  ChosenCauses chosen_;
+};
+
+}  // namespace
+
+Result<ChosenCauses> choose_causes(const std::shared_ptr<const Cell>& cell,
+                                   const std::vector<std::string>& kept,
+                                   const MeasurementBatch& batch) {
+  return CauseSearch(cell, batch).run(kept);
+}
+
+}  // namespace trammel

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/calibrate/calibration.h"
+#include "server/calibrate/causes/cause_choice.h"
+
+namespace trammel {
+
+struct ChosenCauses {
+  std::vector<std::string> sources;  ///< to identify: those kept, and those taken
+  CauseChoice choice;
+};
+
+/// The causes that `batch` shows, beside base, geometry, tools and `kept` (README.md). All that is
+/// kept stays. Refusals as calibrate().
+[[nodiscard]] Result<ChosenCauses> choose_causes(const std::shared_ptr<const Cell>& cell,
+                                                 const std::vector<std::string>& kept,
+                                                 const MeasurementBatch& batch);
+
+}  // namespace trammel
