@@ -190,7 +190,7 @@ Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
 template <typename Reread>
 Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
                 const Reread& reread) {
-  Reading one{std::move(name), {}};
+  Reading one{.name = std::move(name), .q_FT = {}, .remedy = {}};
   for (std::size_t i = 0; i < group.rows.size(); ++i) {
     const Quaternion q_BF(group.X_BF[i].linear());
     one.q_FT.push_back(q_BF.conjugate() *

@@ -152,7 +152,7 @@ void Look::search() {
   readings_ = position_readings(table_);
   for (auto& one : joint_readings(table_, cell_.robot)) readings_.push_back(std::move(one));
   for (auto& one : row_readings(table_, cell_)) readings_.push_back(std::move(one));
-  for (auto& one : robot_readings(cell_.robot)) readings_.push_back(std::move(one));
+  for (auto& one : reading::robot_readings(cell_.robot)) readings_.push_back(std::move(one));
   std::vector<std::pair<double, Tried>> near;
   for (const Reading& one : readings_) {
     Tried tried{&one, one.of_rows ? thinned(one.apply(table_), kRowsFitted) : one.apply(some), {}};

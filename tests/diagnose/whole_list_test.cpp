@@ -187,7 +187,8 @@ TEST(WholeList, AWristCouplingThatAReflectorNearTheAxisHardlyShowsIsFoundAndBlam
     const Diagnosis found = with_wrist_coupling(share, 0.08);
     EXPECT_TRUE(finds_wrist_coupling(found)) << share << ": " << found.sentence;
     EXPECT_EQ(found.sentence.find("off its drawing"), std::string::npos) << found.sentence;
-    for (const BudgetLine& line : found.budget.beyond_frames.lines)
+    ASSERT_TRUE(found.budget);
+    for (const BudgetLine& line : found.budget->beyond_frames.lines)
       EXPECT_TRUE(line.kind == LineKind::kCause || line.action.empty()) << line.name << line.action;
   }
 }
