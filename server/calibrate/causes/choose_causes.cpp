@@ -20,7 +20,7 @@ using causes::Scope;
 using causes::SearchFamily;
 
 constexpr int kHarmonics = 60;  // of a map: waves of 6 degrees; finer ones cost and bring little
-constexpr double kWorth = 3;    // nat: so much likelier must the batch be with a cause
+constexpr double kWorth = 3;    // nat: so much likelier must the batch be with one cause
 
 constexpr const char* kTaken = "the poses show it, and it predicts poses that were left out";
 constexpr const char* kPredictsNothing = "it does not predict poses that were left out";
@@ -142,7 +142,7 @@ class CauseSearch {
 
   /// Adds the cause to the table; whether it is taken.
   bool judged(TriedCause tried) {
-    const bool shown = tried.gain > kWorth;
+    const bool shown = tried.gain > worth_;
     tried.taken = shown && tried.held_out_after < tried.held_out_before;
     tried.why = tried.taken ? kTaken : shown ? kPredictsNothing : kNotShown;
     if (tried.taken) chosen_.choice.held_out = tried.held_out_after;
@@ -171,6 +171,8 @@ class CauseSearch {
       }
     }
     for (Candidate& one : candidates_) one.columns = columns_of_source(model_, one.source);
+    // The best of many gains something by chance.
+    worth_ += std::log(std::max<double>(1, static_cast<double>(candidates_.size())));
   }
 
   [[nodiscard]] bool is_kept(const std::string& spec) const {
@@ -207,7 +209,7 @@ class CauseSearch {
                                             [](auto& a, auto& b) { return a.nat < b.nat; });
       const auto one = candidates_.begin() + (largest - gains.begin());
       const double after =
-          largest->nat > kWorth ? in_space(sigma, evidence.left_out(one->columns)) : before;
+          largest->nat > worth_ ? in_space(sigma, evidence.left_out(one->columns)) : before;
       if (judged({{one->named}, before, after, largest->nat, largest->freedom, false, {}})) {
         evidence.take(one->columns);
         chosen_.sources.push_back(one->source);
@@ -239,6 +241,7 @@ class CauseSearch {
   CalibrationResult base_;
   PhysicalModel model_;  // with all candidates
   std::vector<Candidate> candidates_;
+  double worth_ = kWorth;  // nat: so much likelier must the batch be with a cause
   ChosenCauses chosen_;
 };
 

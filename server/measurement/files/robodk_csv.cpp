@@ -257,6 +257,16 @@ struct RoboDkTable {
   bool positional = false;
 };
 
+/// True if a column is named as a joint. The export's own names (Axis-1, mx, tx) tell the order.
+bool names_joints(const std::vector<std::string>& fields) {
+  const auto is_named = [&](const auto& holds) {
+    return std::any_of(fields.begin(), fields.end(),
+                       [&](const std::string& field) { return holds(column_name(field).name); });
+  };
+  return is_named([](const std::string& name) { return joint_number(name) > 0; }) &&
+         !is_named([](const std::string& name) { return name == "mx"; });
+}
+
 Result<RoboDkTable> take_apart(const std::string& text, const std::string& where) {
   const std::vector<TextLine> first = first_lines(text, 1);
   if (first.empty()) return refused("empty file, expected joints and measured positions").in(where);
@@ -274,9 +284,7 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
   if (has_header) rows.erase(rows.begin());
   if (rows.empty())
     return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
-  const bool named = std::any_of(
-      header.fields.begin(), header.fields.end(),
-      [](const std::string& field) { return joint_number(column_name(field).name) > 0; });
+  const bool named = names_joints(header.fields);
   if (!named) {
     header.fields = positional_names(header.fields.size());
     if (header.fields.empty()) {
