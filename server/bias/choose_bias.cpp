@@ -310,6 +310,7 @@ class Choosing {
 
   /// Why the kernel cannot be asked; empty: it can.
   [[nodiscard]] std::string too_many_for(const SpelledBias& bias) const {
+    if (!bias.blocks.empty() && most_coupled_ == 0) return "its causes are in the physics already";
     if (!bias.blocks.empty() && all_.q.rows() > most_coupled_)
       return fmt::format("more than {} poses", most_coupled_);
     if (bias.flange && !check_flange(all_.q, all_.features))

@@ -73,9 +73,9 @@ using ResidualWithout =
 /// the sentence says so. The bias that they choose is fitted to all, from where its search ended.
 ///
 /// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled`
-/// observations. At most seven fits. The same problem and seed give the same choice. Of `options`
-/// the kernel is not used. With fewer than 30 observations nothing is taken. Refuses what
-/// BiasModel::fit() refuses.
+/// observations; 0: they are not tried. At most seven fits. The same problem and seed give the same
+/// choice. Of `options` the kernel is not used. With fewer than 30 observations nothing is taken.
+/// Refuses what BiasModel::fit() refuses.
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                              const ResidualWithout& residual_without = {},
                                              Eigen::Index most_coupled = kMostCoupled);

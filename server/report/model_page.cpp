@@ -235,6 +235,23 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
          html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
+/// The causes that the measurements chose, where they did.
+std::string chosen_causes(const CompensatedModel::Parts& parts) {
+  if (!parts.cause_choice) return "";
+  std::vector<HtmlRow> rows;
+  for (const TriedCause& one : parts.cause_choice->tried)
+    rows.push_back({{html_text(causes_in_words(one.sources)),
+                     fmt::format("{:.4f}", to_mm(one.held_out_before)),
+                     fmt::format("{:.4f}", to_mm(one.held_out_after)),
+                     html_text((one.taken ? "taken: " : "not taken: ") + one.why)}});
+  return fmt::format(
+             "<p>The measurements chose the error sources. Each cause was tried beside those above "
+             "it that were taken. The columns tell how far poses are missed that were left out, an "
+             "eighth of joint space at a time; with all that was taken it is {:.4f} mm.</p>\n",
+             to_mm(parts.cause_choice->held_out)) +
+         html_table({"flows", {"cause", "before, mm rms", "after, mm rms", "taken"}, rows}) + "\n";
+}
+
 /// The data that the charts are drawn from.
 ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluation,
                         const ShownPoses& shown, const std::optional<LearningCurve>& curve) {
@@ -313,6 +330,7 @@ std::string model_page(const CompensatedModel& model,
        {"learning", learning_text(curve)},
        {"provenance", provenance_rows(model, compared.evaluation)},
        {"sessions", session_changes_html(session_changes(model))},
+       {"chosen", chosen_causes(model.parts())},
        {"parameters", parameter_table(model)},
        {"unidentifiable", unidentifiable_text(model.parts())},
        {"suspects", suspects_text(model.parts())},

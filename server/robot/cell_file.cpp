@@ -261,26 +261,26 @@ bool says_auto(const YamlMap& model) {
   }
 }
 
-/// A list, or `auto`, alone or in the list. Beside it the bias is chosen, too, unless it is said.
-void read_error_sources(const YamlMap& model, ModelSpec& spec) {
-  std::vector<std::string> names =
-      says_auto(model) ? std::vector<std::string>{} : model.texts("error_sources");
-  if (!says_auto(model) && std::erase(names, kAutoSources) == 0) {
-    spec.error_sources = std::move(names);
-    return;
-  }
-  if (!names.empty()) spec.error_sources = names;
-  spec.beside_auto = std::move(names);
+/// The measurements choose the sources beside those that are named, and the bias.
+void leave_to_data(std::vector<std::string> named, ModelSpec& spec) {
+  if (!named.empty()) spec.error_sources = named;
+  spec.beside_auto = std::move(named);
   spec.bias = kAutoSources;
 }
 
+/// A list, or `auto`, alone or in the list; `auto` where nothing is said.
+void read_error_sources(const YamlMap& model, ModelSpec& spec) {
+  if (!model.has("error_sources") || says_auto(model)) return leave_to_data({}, spec);
+  std::vector<std::string> names = model.texts("error_sources");
+  if (std::erase(names, kAutoSources) > 0) return leave_to_data(std::move(names), spec);
+  spec.error_sources = std::move(names);
+}
+
 void read_model(const YamlMap& map, Cell& cell) {
-  if (!map.has("model")) return;
+  if (!map.has("model")) return leave_to_data({}, cell.model);
   const YamlMap model = map.map("model");
   model.only({"error_sources", "bias"});
-  model.attempt([&] {
-    if (model.has("error_sources")) read_error_sources(model, cell.model);
-  });
+  model.attempt([&] { read_error_sources(model, cell.model); });
   model.attempt([&] { cell.model.bias = model.text("bias", cell.model.bias); });
 }
 

@@ -171,7 +171,8 @@ TEST(ModelText, TellsWhichCausesWereTriedAndWhatEachBrought) {
   parts.cause_choice =
       CauseChoice{60e-6,
                   {{{"joint_map:2"}, 100e-6, 60e-6, 120.5, 14, true, "the poses show it"},
-                   {{"axis_runout:3"}, 60e-6, 61e-6, 4, 3, false, "it does not predict"}}};
+                   {{"axis_runout:3"}, 60e-6, 61e-6, 4, 3, false, "it does not predict"},
+                   {{"wrist_coupling"}, 60e-6, 60e-6, 0.1, 3, false, "the poses do not show it"}}};
   const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
   const std::string text = model_text(model);
   EXPECT_NE(text.find("predicted to 0.0600 mm"), std::string::npos) << text;
@@ -181,6 +182,7 @@ TEST(ModelText, TellsWhichCausesWereTriedAndWhatEachBrought) {
       << text;
   EXPECT_NE(text.find("0.0600    0.0610       4.0  no: it does not predict"), std::string::npos)
       << text;
+  EXPECT_NE(text.find("not shown by these poses: wrist coupling\n"), std::string::npos) << text;
   const auto json = model_json(model)["cause_choice"];
   EXPECT_NEAR(json["held_out_mm"], 0.06, 1e-12);
   EXPECT_EQ(json["tried"][0]["sources"][0], "joint_map:2");

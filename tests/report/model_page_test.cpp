@@ -68,6 +68,16 @@ TEST_F(ModelPage, SaysCoverageAgainstTheStatedSigmaBesideThatOfItsOwnIntervals) 
   EXPECT_TRUE(has(model_page(model, std::nullopt), "inside that of the stated sigma alone"));
 }
 
+TEST_F(ModelPage, ShowsWhichCausesTheMeasurementsChoseAndWhatEachBrought) {
+  CompensatedModel::Parts parts = trained("none").parts();
+  EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "chose the error sources"));
+  parts.cause_choice =
+      CauseChoice{60e-6, {{{"joint_map:2"}, 1e-4, 6e-5, 120, 14, true, "the poses show it"}}};
+  const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
+  EXPECT_TRUE(has(page, "it is 0.0600 mm"));
+  EXPECT_TRUE(has(page, "<td>angle error map in joint 2</td><td>0.1000</td><td>0.0600</td>"));
+}
+
 TEST_F(ModelPage, CallsErrorSourcesByTheirPlainNames) {
   CompensatedModel::Parts parts = trained("none").parts();
   parts.provenance.level = "base,geometry,compliance_linear,gear_transmission:3@48.5";

@@ -61,7 +61,11 @@ TEST(CellFile, AutoLeavesTheErrorSourcesToTheMeasurementsAndKeepsWhatItNames) {
   EXPECT_EQ(listed.error_sources, (std::vector<std::string>{"base", "backlash:2"}));
   EXPECT_EQ(listed.bias, "none");
   EXPECT_FALSE(model_of("{error_sources: [base]}").beside_auto);
-  EXPECT_FALSE(model_of("{bias: se}").beside_auto);
+  EXPECT_EQ(model_of("{bias: se}").beside_auto, std::vector<std::string>{});
+  EXPECT_EQ(model_of("{bias: se}").bias, "se");
+  const ModelSpec unsaid = parse_cell(before, robot, "c.yaml").value().model;
+  EXPECT_EQ(unsaid.beside_auto, std::vector<std::string>{});
+  EXPECT_EQ(unsaid.bias, "auto");
   EXPECT_FALSE(parse_cell(before + "model: {error_sources: all}\n", robot, "c.yaml"));
 }
 

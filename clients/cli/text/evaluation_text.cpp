@@ -1,5 +1,6 @@
 #include "clients/cli/text/evaluation_text.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "clients/cli/text/notes_text.h"
@@ -217,10 +218,18 @@ std::string choice_text(const CauseChoice& choice) {
       "{:.4f} "
       "mm\n  {:<42}{:>10}{:>10}{:>10}  {}\n",
       to_mm(choice.held_out), "cause tried; left out, mm", "before", "after", "nat", "taken");
-  for (const TriedCause& one : choice.tried)
+  std::vector<std::string> without_effect;
+  for (const TriedCause& one : choice.tried) {
+    if (!one.taken && one.held_out_after == one.held_out_before) {
+      without_effect.push_back(causes_in_words(one.sources));
+      continue;
+    }
     text += fmt::format("  {:<42}{:>10.4f}{:>10.4f}{:>10.1f}  {}\n", causes_in_words(one.sources),
                         to_mm(one.held_out_before), to_mm(one.held_out_after), one.gain,
                         one.taken ? "yes" : "no: " + one.why);
+  }
+  if (!without_effect.empty())
+    text += fmt::format("  not shown by these poses: {}\n", fmt::join(without_effect, ", "));
   return text;
 }
 
@@ -298,9 +307,12 @@ std::string provenance_text(const CompensatedModel& model) {
 
 std::string unidentifiable_text(const std::vector<UnidentifiableCombination>& combinations) {
   if (combinations.empty()) return "";
+  constexpr std::size_t kMostTold = 8;  // of the waves of maps there can be hundreds
   std::string text = "not identifiable from these poses:\n";
-  for (const UnidentifiableCombination& one : combinations)
-    text += fmt::format("  {}\n", one.sentence);
+  for (std::size_t i = 0; i < std::min(kMostTold, combinations.size()); ++i)
+    text += fmt::format("  {}\n", combinations[i].sentence);
+  if (combinations.size() > kMostTold)
+    text += fmt::format("  and {} more (--json lists them)\n", combinations.size() - kMostTold);
   return text;
 }
 

@@ -89,6 +89,7 @@ class Search {
   void renew_chance(const Standing& standing);
   [[nodiscard]] Choice choice_of(const Standing& standing, Scan seen) const;
   [[nodiscard]] bool is_closed(const Cause& cause) const;
+  [[nodiscard]] bool is_dropped(const Family& family) const;
   [[nodiscard]] bool is_function(const Standing& standing, const Choice& choice, std::size_t best,
                                  std::optional<std::size_t> named) const;
   [[nodiscard]] double named_path_score(const Standing& standing, const Admitted& open) const;
@@ -129,7 +130,8 @@ class Search {
   std::size_t renewed_for_ = 0;           // how much had been found when chance_ was drawn
   std::size_t formed_for_ = 0;            // the same when the forms were chosen last
   std::vector<Cause> closed_;             // were tried and did not hold
-  std::vector<Accepted> wrong_;           // of them, those whose sign was wrong at the time
+  std::vector<std::vector<std::string>> dropped_functions_;  // by what they depend on
+  std::vector<Accepted> wrong_;  // of them, those whose sign was wrong at the time
 };
 
 struct Search::Together {
@@ -192,8 +194,15 @@ void Search::renew_chance(const Standing& standing) {
 Choice Search::choice_of(const Standing& standing, Scan seen) const {
   std::vector<bool> open;
   for (std::size_t f = 0; f < seen.best.size(); ++f)
-    open.push_back(!is_closed(standing.families[f]->cause(seen.best[f])));
+    open.push_back(!is_closed(standing.families[f]->cause(seen.best[f])) &&
+                   !is_dropped(*standing.families[f]));
   return {std::move(seen), [open = std::move(open)](std::size_t f) { return open[f]; }};
+}
+
+/// A function that passed and then did not pass beside all the rest would do so again for ever.
+bool Search::is_dropped(const Family& family) const {
+  return !family.named() && std::find(dropped_functions_.begin(), dropped_functions_.end(),
+                                      family.depends_on()) != dropped_functions_.end();
 }
 
 bool Search::is_closed(const Cause& cause) const {
@@ -417,8 +426,12 @@ bool Search::prune() {
     return true;
   }
   const auto weak = weak_function(result_, chance_.limit);
-  if (weak) result_.unnamed.erase(result_.unnamed.begin() + static_cast<std::ptrdiff_t>(*weak));
-  return weak.has_value();
+  if (!weak) return false;
+  const auto one = result_.unnamed.begin() + static_cast<std::ptrdiff_t>(*weak);
+  dropped_functions_.push_back(one->depends_on);
+  result_.unnamed.erase(one);
+  refine_all();
+  return true;
 }
 
 bool Search::name_functions() {

@@ -58,14 +58,16 @@ std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics,
 }
 
 /// The bias that is worth it, with the physics identified anew where observations are left out.
+/// Beside causes that the measurements chose, kernels with blocks would only choose them again.
 Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts,
                                              const BiasProblem& problem, const BiasOptions& options,
                                              const LeftOut& left_out) {
+  const auto residual_without = [&](const std::vector<Eigen::Index>& observations) {
+    const auto without = left_out.without(observations);
+    return without ? std::optional(without->residual_B) : std::nullopt;
+  };
   ChosenBias chosen =
-      TRY(choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
-        const auto without = left_out.without(observations);
-        return without ? std::optional(without->residual_B) : std::nullopt;
-      }));
+      TRY(choose_bias(problem, options, residual_without, parts.cause_choice ? 0 : kMostCoupled));
   parts.bias_choice = std::move(chosen.choice);
   return std::move(chosen.model);
 }
