@@ -40,11 +40,17 @@ const Drawing* drawing_of(const std::string& name) {
   return nullptr;
 }
 
+/// What is farther off its drawing than a robot may be.
+struct OffDrawing {
+  std::string numbers;
+  bool zeros_alone = true;
+};
+
 /// The parameters of an error source of the arm that are farther off than a robot may be by more
 /// than their uncertainty.
-std::string off_drawing(const PhysicalModel& model,
-                        const std::vector<IdentifiedParameter>& parameters) {
-  std::string off;
+OffDrawing off_drawing(const PhysicalModel& model,
+                       const std::vector<IdentifiedParameter>& parameters) {
+  OffDrawing off;
   std::size_t first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
     const std::size_t count = source->parameters().size();
@@ -53,9 +59,14 @@ std::string off_drawing(const PhysicalModel& model,
       const IdentifiedParameter& one = parameters[i];
       const Drawing* drawing = drawing_of(one.parameter.name);
       if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
-      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ",
-                         one.parameter.name, drawing->per_si * one.value, drawing->unit,
-                         drawing->per_si * drawing->limit);
+      const bool is_zero = drawing == kDrawing;
+      off.zeros_alone = off.zeros_alone && is_zero;
+      // A zero as the controller counts, which is what people read of it everywhere else.
+      const double sign =
+          is_zero ? model.cell->robot.joint(std::stoi(one.parameter.name.substr(1)) - 1).sign : 1.0;
+      off.numbers += fmt::format(
+          "{}{} by {:.3g} {} (limit {:.3g})", off.numbers.empty() ? "" : ", ", one.parameter.name,
+          sign * drawing->per_si * one.value, drawing->unit, drawing->per_si * drawing->limit);
     }
     first += count;
   }
@@ -95,8 +106,8 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
                                       const std::vector<IdentifiedParameter>& parameters,
                                       double discrepancy) {
   constexpr double kMuchLeft = 3;  // times the stated sigma
-  const std::string off = off_drawing(model, parameters);
-  if (off.empty()) return std::nullopt;
+  const OffDrawing off = off_drawing(model, parameters);
+  if (off.numbers.empty()) return std::nullopt;
   const double stated = model.cell->tracker.sigma;
   const double times = std::hypot(discrepancy, stated) / stated;
   const std::string lacking =
@@ -106,6 +117,14 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
                 "{:.0f} times the stated sigma is left as well: is it something that the "
                 "error sources lack, and the number makes up for (trammel diagnose)? Else ",
                 times);
+  // Lengths and angles that fit the drawing are this robot's: it lost its zeros.
+  if (off.zeros_alone && lacking.empty())
+    return Note{
+        kOffDrawing, Severity::kStop,
+        fmt::format("no mastered joint is so far off its zero: {}; re-master it and measure "
+                    "again. Where it is mastered, the robot file counts from another zero "
+                    "than the controller: compare them (trammel confirm-robot)",
+                    off.numbers)};
   // A model of the wrong robot file fits positions and is of no use for corrected poses.
   return Note{
       kOffDrawing, Severity::kStop,
@@ -115,7 +134,7 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
           "cell file the one that was measured (null in its place finds it)? Where the file is not "
           "the controller's, corrected poses land off by the difference, since the controller "
           "solves them with its own arm: compare them (trammel confirm-robot)",
-          off, lacking)};
+          off.numbers, lacking)};
 }
 
 }  // namespace trammel

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/compensate/budget/budget_words.h"
 #include "server/report/html.h"
@@ -17,19 +16,44 @@ namespace {
 
 constexpr double kWorthARow = 1e-3;  // of the error: shorter bars are not seen
 
-/// A bar as long as its part of the longest one, and its length in words.
-std::string bar(double length, double longest) {
-  return bar_of(longest > 0 ? length / longest : 0, "budget_bar") +
-         fmt::format("{:.4f}", to_mm(length));
-}
-
 std::string named(const BudgetLine& line) {
   std::string text = html_text(line.name);
   if (!line.with.empty() && line.kind != LineKind::kUntold)
     text += "<span class=\"note\"> and, not told from it by these poses, " +
-            html_text(fmt::format("{}", fmt::join(line.with, ", "))) + "</span>";
+            html_text(partners_in_words(line)) + "</span>";
+  if (!line.action.empty()) text += "<span class=\"action\">" + html_text(line.action) + "</span>";
   return text;
 }
+
+double share_of(const BudgetLine& line) { return std::isfinite(line.share) ? line.share : 0; }
+
+/// The steps from the drawing (nothing explained) to the whole error, each where the one before it
+/// ended.
+class Waterfall {
+ public:
+  explicit Waterfall(const std::vector<BudgetLine>& lines) {
+    double sum = 0;
+    for (const BudgetLine& line : lines) {
+      sum += share_of(line);
+      low_ = std::min(low_, sum);
+      high_ = std::max(high_, sum);
+    }
+  }
+  std::string step(double share) {
+    const double from = at(sum_), to = at(sum_ += share);
+    return fmt::format(
+        R"(<svg class="fall" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">)"
+        R"(<path d="M0 9.5H100"/><rect x="{:.2f}" width="{:.2f}" height="9"/></svg>)",
+        std::min(from, to), std::max(std::abs(to - from), kLeastBar));
+  }
+
+ private:
+  static constexpr double kLeastBar = 0.6;  // of 100: still seen
+  [[nodiscard]] double at(double sum) const {
+    return (100 - kLeastBar) * (sum - low_) / (high_ - low_);
+  }
+  double low_ = 0, high_ = 1, sum_ = 0;
+};
 
 /// Shares of the same lines beyond frames.
 std::map<std::string, double> shares_of(const BudgetView& view) {
@@ -38,24 +62,31 @@ std::map<std::string, double> shares_of(const BudgetView& view) {
   return shares;
 }
 
-HtmlRow row_of(const BudgetLine& line, double longest,
+HtmlRow row_of(const BudgetLine& line, Waterfall& waterfall,
                const std::map<std::string, double>& beyond_frames) {
   const auto beyond = beyond_frames.find(line.line);
-  return {
-      {named(line), value_html(line), bar(line.alone_rms, longest),
-       fmt::format("{:.1f} %", 100 * line.share),
-       beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
-       fmt::format("{:.4f}", to_mm(line.left_if_right)),
-       line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : "", html_text(line.action)},
-      line.action.empty() ? "" : "stands_out"};
+  return {{named(line), value_html(line), waterfall.step(share_of(line)),
+           fmt::format("{:.1f} %", 100 * line.share),
+           beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
+           fmt::format("{:.4f}", to_mm(line.alone_rms)),
+           fmt::format("{:.4f}", to_mm(line.left_if_right)),
+           line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : ""},
+          line.action.empty() ? "" : "stands_out"};
+}
+
+/// Lines whose bars are not seen, in one row, so that the steps lead to the whole.
+HtmlRow row_of_small(int count, double share, Waterfall& waterfall) {
+  return {{fmt::format("{} lines of less than {:g} % each", count, 100 * kWorthARow), "",
+           waterfall.step(share), fmt::format("{:.1f} %", 100 * share), "", "", "", ""}};
 }
 
 }  // namespace
 
 std::string value_html(const BudgetLine& line) {
-  if (!line.value) return "";
-  const ShownValue read = show_read(line.value->value, line.value->u95, {1, line.value->unit});
-  return fmt::format("{} ± {} {}", read.value, read.expanded, html_text(line.value->unit));
+  std::string text = html_text(value_in_words(line));
+  if (const std::size_t comma = text.find(", "); comma != std::string::npos)
+    text.replace(comma, 2, ",<br>");
+  return text;
 }
 
 std::string bar_of(double share, const char* kind) {
@@ -71,20 +102,23 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
         "Where the millimetres come from",
         "<p class=\"note\">Not known: no pose has a measured position, or the model is older.</p>");
   const BudgetView& view = budget->as_it_stands;
-  double longest = 0;
-  for (const BudgetLine& line : view.lines) longest = std::max(longest, line.alone_rms);
   const std::map<std::string, double> beyond = shares_of(budget->beyond_frames);
+  Waterfall waterfall(view.lines);
   std::vector<HtmlRow> rows;
-  std::size_t small = 0;
+  int small = 0;
+  double small_share = 0;
   std::string untold;
   for (const BudgetLine& line : view.lines) {
-    if (line.kind == LineKind::kUntold) untold = fmt::format("{}", fmt::join(line.with, ", "));
+    if (line.kind == LineKind::kUntold) untold = partners_in_words(line);
     const auto share = beyond.find(line.line);
     const bool worth = std::abs(line.share) > kWorthARow || !line.action.empty() ||
                        (share != beyond.end() && std::abs(share->second) > kWorthARow);
-    if (worth) rows.push_back(row_of(line, longest, beyond));
-    small += worth || line.kind == LineKind::kUntold ? 0 : 1;
+    if (worth) rows.push_back(row_of(line, waterfall, beyond));
+    if (worth || line.kind == LineKind::kUntold) continue;
+    ++small;
+    small_share += share_of(line);
   }
+  if (small > 0) rows.push_back(row_of_small(small, small_share, waterfall));
   std::string text;
   if (const std::string doubt = doubt_of_file(*budget); !doubt.empty())
     text += "<p class=\"verdict\">" + html_text(doubt) + "</p>";
@@ -93,15 +127,19 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
             html_text(fmt::format("Since session {}, at its poses: {}", line.since_session,
                                   sentence(line))) +
             "</p>";
+  const auto stands_out = [](const BudgetLine& line) { return !line.action.empty(); };
   text += fmt::format(
       "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool "
-      "frames would leave {:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. "
-      "Left: what would be left if only this line were put right.{}</p>",
+      "frames would leave {:.4f} mm. {}Steps lead from the drawing to the whole error: each begins "
+      "where the one above it ends, and their shares add to 100 %. Alone: what a line does to the "
+      "poses. Left: what would be left if only this line were put right.</p>",
       to_mm(view.error_rms), budget->poses, to_mm(budget->beyond_frames.error_rms),
-      small > 0 ? fmt::format(" {} more lines have less than 0.1 %.", small) : "");
+      std::any_of(view.lines.begin(), view.lines.end(), stands_out)
+          ? ""
+          : "No zero, length, angle or tool is far from what arms of its kind show. ");
   text += html_table({"budget stacks",
-                      {"line", "value ± U (k = 2)", "alone, mm rms", "share", "share beyond frames",
-                       "left, mm rms", "times usual", "what to do"},
+                      {"line", "value ± U (k = 2)", "steps", "share", "share beyond frames",
+                       "alone, mm rms", "left, mm rms", "times usual"},
                       rows});
   if (!untold.empty())
     text += "<p class=\"note\">What these poses cannot tell: " + html_text(untold) + ".</p>";

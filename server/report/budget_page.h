@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// A section of a page: the lines of the budget with their values, bars of what each does alone,
-/// shares, and what to do. Says so where there is none.
+/// A section of a page: the lines of the budget with their values, steps from the drawing to the
+/// whole error, shares, and what to do. Says so where there is none.
 [[nodiscard]] std::string budget_section(const std::optional<ErrorBudget>& budget);
 
 /// The value of a line with its U and unit, as HTML; empty where it has none.

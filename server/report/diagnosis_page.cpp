@@ -67,11 +67,12 @@ std::string p_value_after_p(double p) {
 std::string estimates_of(const Finding& finding) {
   std::string html;
   for (const Estimate& estimate : finding.parameters) {
-    const ShownValue shown = show_with_uncertainty(estimate.value, estimate.u95);
+    const Reading reading = reading_of(estimate.unit);
+    const ShownValue shown = show_read(estimate.value, estimate.u95, reading);
     html +=
         fmt::format("{}<span class=\"estimate\">{}\u00a0=\u00a0{}\u00a0±\u00a0{}\u00a0{}</span>",
                     html.empty() ? "" : "<br>", html_text(estimate.name), shown.value,
-                    shown.expanded, html_text(unit_shown(estimate.unit)));
+                    shown.expanded, html_text(unit_shown(reading.unit)));
   }
   return html.empty() ? "–" : html;
 }

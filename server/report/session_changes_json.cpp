@@ -75,10 +75,11 @@ std::string session_changes_html(const std::vector<SessionChange>& changes) {
   std::vector<HtmlRow> rows;
   for (const SessionChange& change : changes) {
     for (const SessionChange::Size& one : change.sizes) {
-      const ShownValue shown = show_with_uncertainty(one.value, one.u95);
+      const Reading reading = reading_of(one.unit);
+      const ShownValue shown = show_read(one.value, one.u95, reading);
       rows.push_back(
           {{since_words(change), html_text(cause_in_words(change.source)), html_text(one.name),
-            shown.value, shown.expanded, html_text(one.unit), others_words(change)}});
+            shown.value, shown.expanded, html_text(reading.unit), others_words(change)}});
     }
   }
   return "<h3>What changed on the arm between sessions</h3>\n" +

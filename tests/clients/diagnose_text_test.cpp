@@ -1,5 +1,6 @@
 #include "clients/cli/text/diagnose_text.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "server/measurement/files/joint_list.h"
@@ -20,6 +21,17 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
         "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
+  EXPECT_NE(text.find("gear_cos3 = 0.00112 ± 0.00011 deg"), std::string::npos) << text;
+  EXPECT_EQ(text.find(" rad"), std::string::npos) << text;
+}
+
+TEST(DiagnoseText, ALongListOfParametersIsNoLineThatNobodyReads) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  for (int k = 1; k <= 24; ++k)
+    diagnosis.findings[0].parameters.push_back({fmt::format("number{}", k), "mm", 0.1, 0.01});
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  const std::size_t at = text.find("number12"), begin = text.rfind('\n', at) + 1;
+  EXPECT_LT(text.find('\n', at) - begin, 160U) << text;
 }
 
 TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {

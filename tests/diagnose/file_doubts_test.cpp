@@ -65,6 +65,17 @@ TEST(FileDoubts, ALinkThatIsWrongInTheFileLeadsThoughTheListOfCausesExplainsIt) 
   EXPECT_EQ(right.sentence.find("drawing"), std::string::npos) << right.sentence;
 }
 
+TEST(FileDoubts, OfLostZerosAloneItAsksForMasteringAndLeadsWithTheirMillimetres) {
+  const VirtualRobot robot = with_value(test::chapter_5_robot(test::cell_7()), "q4", from_deg(3));
+  const Diagnosis found = diagnosed(test::cell_7(), test::measured(robot, 80, 5));
+  ASSERT_FALSE(found.notes.empty());
+  EXPECT_EQ(found.notes.front().code, kOffDrawing);
+  EXPECT_EQ(found.sentence.find("is it this robot's file"), std::string::npos) << found.sentence;
+  for (const char* part : {"so far off its zero: q4 by 2.99 deg", "because of the zero of joint 4",
+                           "re-master joint 4", "Beyond that nothing was found in 80 poses"})
+    EXPECT_NE(found.sentence.find(part), std::string::npos) << part << "\n" << found.sentence;
+}
+
 TEST(FileDoubts, BesideMuchThatIsLeftTheNumberMayMakeUpForSomethingElse) {
   const PhysicalModel model = test::demand(make_physical_model(test::cell_7(), {"geometry"}));
   std::vector<IdentifiedParameter> parameters;

@@ -28,6 +28,9 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kCellOption = "--cell-out";
+constexpr const char* kSinceOnFiles =
+    "write the service's model with trammel export --model CELL@VERSION, then diagnose without "
+    "--service";
 
 Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 std::uint64_t seed) {
@@ -233,7 +236,7 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
       if (!arguments->since.empty())
-        return failure(ErrorCode::kUsage, "--since is for files").of("--since");
+        return failure(ErrorCode::kUsage, "--since is for files").of("--since").next(kSinceOnFiles);
       return diagnose_at_service(*arguments).map([](bool all) {
         return all ? Extent::kAll : Extent::kPart;
       });

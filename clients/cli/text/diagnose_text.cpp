@@ -41,15 +41,20 @@ std::string micrometres(const ordered_json& millimetres) {
                                : fmt::format("{:.3g} um", kMicrometres * millimetres.get<double>());
 }
 
-std::string parameters_line(const ordered_json& parameters) {
+/// A long list would be one line that nobody reads.
+std::string parameter_lines(const ordered_json& parameters) {
+  constexpr int kInALine = 5;
   std::string text;
+  int count = 0;
   for (const auto& [name, estimate] : parameters.items()) {
-    const ShownValue shown = show_with_uncertainty(estimate.at("value"), estimate.at("u95"));
-    const std::string unit = estimate.at("unit");
-    text += fmt::format("{}{} = {} ± {}{}{}", text.empty() ? "" : ", ", name, shown.value,
-                        shown.expanded, unit.empty() ? "" : " ", unit);
+    const Reading reading = reading_of(estimate.at("unit"));
+    const ShownValue shown = show_read(estimate.at("value"), estimate.at("u95"), reading);
+    const char* between = count == 0 ? "      " : count % kInALine == 0 ? ",\n      " : ", ";
+    text += fmt::format("{}{} = {} ± {}{}{}", between, name, shown.value, shown.expanded,
+                        reading.unit.empty() ? "" : " ", reading.unit);
+    ++count;
   }
-  return text;
+  return text.empty() ? "" : text + "\n";
 }
 
 std::string beginning_line(const ordered_json& beginning) {
@@ -81,8 +86,7 @@ std::string finding_lines(const ordered_json& finding, std::size_t width) {
                   finding.at("strength").get<double>(), p_text(finding.at("p_value")),
                   finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
-  if (!finding.at("parameters").empty())
-    text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
+  text += parameter_lines(finding.at("parameters"));
   if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
     text += beginning_line(finding.at("may_begin_at"));
   }

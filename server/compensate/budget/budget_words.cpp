@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
+#include "server/error_sources/spelling.h"
 
 namespace trammel {
 
@@ -14,6 +17,8 @@ namespace {
 constexpr double kAlwaysShown =
     0.1;  // of the error: a line beyond the first ones that has more is shown as well
 
+constexpr std::ptrdiff_t kMostToLead = 3;
+
 constexpr std::size_t kFewestWrongLengths =
     2;  // that stand out: one may be a link, more are another arm
 
@@ -21,12 +26,27 @@ std::string joined(const std::vector<std::string>& all) {
   return fmt::format("{}", fmt::join(all, ", "));
 }
 
+/// By how much a frame is turned; its uncertainty along its axis, of numbers that stand alone.
+std::optional<BudgetNumber> turn_of(const BudgetLine& line) {
+  if (line.kind != LineKind::kBase && line.kind != LineKind::kTool) return std::nullopt;
+  double square = 0, variance = 0;
+  for (const BudgetNumber& number : line.numbers) {
+    if (number.unit != "deg") continue;
+    square += number.value * number.value;
+    variance += std::pow(number.value * number.u95, 2);
+  }
+  if (square <= 0) return std::nullopt;
+  return BudgetNumber{"turn", std::sqrt(square), std::sqrt(variance / square), "deg"};
+}
+
+bool stands_out(const BudgetLine& line) { return !line.action.empty(); }
+
 /// What stands behind the name, in brackets.
 std::string detail(const BudgetLine& line) {
   std::vector<std::string> parts;
-  if (line.value) parts.push_back(in_words(*line.value));
+  if (line.value) parts.push_back(value_in_words(line));
   if (!line.with.empty() && line.kind != LineKind::kUntold)
-    parts.push_back("these poses cannot tell it from " + joined(line.with));
+    parts.push_back("these poses cannot tell it from " + partners_in_words(line));
   if (line.times_usual && !line.action.empty())
     parts.push_back(fmt::format("{:.0f} times what is usual", *line.times_usual));
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, "; "));
@@ -39,8 +59,31 @@ std::string in_words(const BudgetNumber& number) {
   return fmt::format("{} ± {} {}", read.value, read.expanded, number.unit);
 }
 
+std::string value_in_words(const BudgetLine& line) {
+  if (!line.value) return "";
+  const std::optional<BudgetNumber> turn = turn_of(line);
+  return in_words(*line.value) + (turn ? ", turned by " + in_words(*turn) : "");
+}
+
+std::string line_in_words(const std::string& line) {
+  static constexpr std::array<std::array<std::string_view, 2>, 3> kOfLinks = {
+      {{"zero:", "the zero of joint "},
+       {"length:", "the lengths of link "},
+       {"twist:", "the angles of link "}}};
+  for (const auto& [spelled, words] : kOfLinks)
+    if (line.starts_with(spelled)) return fmt::format("{}{}", words, line.substr(spelled.size()));
+  return in_words(line);
+}
+
+std::string partners_in_words(const BudgetLine& line) {
+  std::vector<std::string> names;
+  std::transform(line.with.begin(), line.with.end(), std::back_inserter(names), line_in_words);
+  return joined(names);
+}
+
 std::string sentence(const BudgetLine& line) {
-  if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));
+  if (line.kind == LineKind::kUntold)
+    return fmt::format("{}: {}", line.name, partners_in_words(line));
   std::string text = line.name + detail(line);
   if (std::isfinite(line.alone_rms))
     text += fmt::format(": {:.3f} mm alone", to_mm(line.alone_rms));
@@ -68,14 +111,31 @@ std::string doubt_of_file(const ErrorBudget& budget) {
   return "is this the file of this robot? Several lengths differ from it: " + joined(lengths);
 }
 
+std::string lead_of(const ErrorBudget& budget) {
+  std::vector<std::string> largest, actions;
+  for (const BudgetLine& line : budget.as_it_stands.lines) {
+    if (!stands_out(line) || std::ssize(largest) == kMostToLead) continue;
+    largest.push_back(fmt::format("{}, {}: {:.3f} mm alone", line.name, value_in_words(line),
+                                  to_mm(line.alone_rms)));
+    actions.push_back(line.action);
+  }
+  if (largest.empty()) return "";
+  return fmt::format("the drawing is off by {:.3f} mm rms, because of {}. What to do: {}",
+                     to_mm(budget.as_it_stands.error_rms), fmt::join(largest, "; "),
+                     fmt::join(actions, "; "));
+}
+
 std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   if (budget.as_it_stands.lines.empty()) return {};
   std::vector<std::string> text;
   if (std::string doubt = doubt_of_file(budget); !doubt.empty()) text.push_back(std::move(doubt));
+  const std::vector<BudgetLine>& lines = budget.as_it_stands.lines;
+  const bool usual = std::none_of(lines.begin(), lines.end(), stands_out);
   text.push_back(fmt::format(
       "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave "
-      "{:.3f} mm",
-      to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms)));
+      "{:.3f} mm{}",
+      to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms),
+      usual ? "; no zero, length, angle or tool is far from what arms of its kind show" : ""));
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     const bool shown =
         most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;

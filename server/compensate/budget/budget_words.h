@@ -11,6 +11,14 @@ namespace trammel {
 /// `3.000 ± 0.004 deg`.
 [[nodiscard]] std::string in_words(const BudgetNumber& number);
 
+/// The value of a line; of a frame also by how much it is turned. Empty: it has none.
+[[nodiscard]] std::string value_in_words(const BudgetLine& line);
+
+/// For people: `the zero of joint 4` for `zero:4`.
+[[nodiscard]] std::string line_in_words(const std::string& line);
+/// The lines that the poses cannot tell from this one.
+[[nodiscard]] std::string partners_in_words(const BudgetLine& line);
+
 /// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it
 /// shows): 14.6 mm alone, 46
 /// %`.
@@ -18,6 +26,9 @@ namespace trammel {
 
 /// `is this the file of this robot? ...` where several lengths stand out; else empty.
 [[nodiscard]] std::string doubt_of_file(const ErrorBudget& budget);
+
+/// What stands out and what to do, in one sentence. Empty: nothing does.
+[[nodiscard]] std::string lead_of(const ErrorBudget& budget);
 
 /// The budget in its `most` first lines, beneath a heading that names the whole error, and
 /// above it doubt_of_file(). Empty

@@ -14,6 +14,7 @@ constexpr double kNothingTold =
     0.1;  // of one comparison size: a direction with less is not told by the poses
 constexpr double kPartner = 0.3;     // of the effect: a parameter with more is a partner
 constexpr double kBeyondChance = 3;  // standard deviations
+constexpr double kPull = 0.05;       // of what two frames do apart: together they do less
 constexpr int kSteps = 2;            // of Gauss-Newton: the change of the datum is small
 constexpr double kMatched = 1e-7;    // m
 constexpr double kLaterJoint =
@@ -148,6 +149,56 @@ void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
   datum.covariance(kept, kept) = wider.asDiagonal() * C * wider.asDiagonal();
 }
 
+/// The shifts among `kept` of the frames.
+std::vector<Eigen::Index> shifts_of_frames(const PhysicalModel& model,
+                                           const std::vector<Eigen::Index>& kept) {
+  std::vector<Eigen::Index> shifts;
+  Eigen::Index place = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const causes::Part part = source->cause().part;
+    for (const Parameter& parameter : source->parameters()) {
+      const bool of_frame = part == causes::Part::kBase || part == causes::Part::kTool;
+      if (of_frame && parameter.unit == "mm" &&
+          std::find(kept.begin(), kept.end(), place) != kept.end())
+        shifts.push_back(place);
+      ++place;
+    }
+  }
+  return shifts;
+}
+
+/// Takes out shifts of base and tools that do nearly nothing together where each alone does much:
+/// of a tool that is always held one way. The model leaves more (`left`, 3 x N, m) than they do, so
+/// that no number of poses makes a measurement of them.
+void take_out_pulls(Datum& datum, const std::vector<Eigen::Index>& kept,
+                    const Eigen::VectorXd& sizes, const std::vector<PoseContext>& poses,
+                    const Eigen::Matrix3Xd& left) {
+  const std::vector<Eigen::Index> shifts = shifts_of_frames(datum.model, kept);
+  if (shifts.empty()) return;
+  const Eigen::VectorXd scale = sizes(shifts);
+  const Eigen::MatrixXd J =
+      jacobian_of(datum.model, poses)(Eigen::all, shifts) * scale.asDiagonal();
+  const auto n = static_cast<double>(poses.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(J.transpose() * J / n);
+  for (Eigen::Index k = 0; k < scale.size(); ++k) {
+    const Eigen::VectorXd along = solved.eigenvectors().col(k);
+    const double value = along.dot(datum.model.values(shifts).cwiseQuotient(scale));
+    const double together = std::sqrt(std::max(solved.eigenvalues()(k), 0.0));
+    if (together > kPull * along.cwiseProduct(scale).norm() ||
+        together * std::abs(value) > std::sqrt(left.squaredNorm() / n))
+      continue;
+    datum.model.values(shifts) -= value * scale.cwiseProduct(along);
+    Eigen::MatrixXd keeps = Eigen::MatrixXd::Identity(sizes.size(), sizes.size());
+    keeps(shifts, shifts) -= scale.cwiseProduct(along) * along.cwiseQuotient(scale).transpose();
+    datum.covariance = keeps * datum.covariance * keeps.transpose();
+    datum.pulls.push_back({});
+    for (std::size_t i = 0; i < shifts.size(); ++i)
+      if (std::abs(along(static_cast<Eigen::Index>(i)) * scale(static_cast<Eigen::Index>(i))) >
+          kPartner * along.cwiseProduct(scale).cwiseAbs().maxCoeff())
+        datum.pulls.back().push_back(shifts[i]);
+  }
+}
+
 /// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that
 /// it is named after.
 std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index named,
@@ -202,7 +253,9 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
   }
   if (kept.empty()) return datum;
   settle(datum, kept, sizes, told.information(kept_of_free, kept_of_free));
-  if (left != nullptr) widen(datum, kept, poses, *left);
+  if (left == nullptr) return datum;
+  widen(datum, kept, poses, *left);
+  take_out_pulls(datum, kept, sizes, poses, *left);
   return datum;
 }
 

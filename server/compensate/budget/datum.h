@@ -22,6 +22,9 @@ struct Datum {
     std::vector<Eigen::Index> with;
   };
   std::vector<OnDrawing> on_drawing;
+  /// Shifts of base and tools that move the poses by less than what is left, taken out: each is
+  /// told together with the others.
+  std::vector<std::vector<Eigen::Index>> pulls = {};
 };
 
 /// The identified parameters of an arm.

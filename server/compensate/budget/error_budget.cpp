@@ -44,6 +44,8 @@ double counted(const BudgetItem& item, const Chain& robot) {
   return item.line.kind == LineKind::kJointZero ? robot.joint(item.line.joint).sign : 1.0;
 }
 
+bool is_frame(LineKind kind) { return kind == LineKind::kBase || kind == LineKind::kTool; }
+
 /// The values of the parameters of a line.
 void add_values(const Datum& datum, const std::vector<Parameter>& parameters, BudgetItem& item) {
   BudgetLine& line = item.line;
@@ -92,17 +94,34 @@ std::ptrdiff_t item_with(const std::vector<BudgetItem>& items, Eigen::Index plac
   return found == items.end() ? -1 : found - items.begin();
 }
 
+void add_name(const std::string& name, std::vector<std::string>& names) {
+  if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+}
+
 /// Names a line that counts as being on its drawing where it is counted: beside its partners, or,
-/// where they have many or none, in one line of what is not told.
-void name_partners(const std::string& name, const std::set<std::ptrdiff_t>& partners,
+/// where they have many or none, in one line of what is not told. A frame of which other numbers
+/// stand names its partners, too.
+void name_partners(BudgetItem& item, const std::set<std::ptrdiff_t>& partners,
                    std::vector<BudgetItem>& items, BudgetLine& untold) {
   constexpr std::size_t kMostPartners = 2;
-  const auto add = [&](std::vector<std::string>& names) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
-  if (partners.empty() || partners.size() > kMostPartners) return add(untold.with);
-  for (const std::ptrdiff_t partner : partners)
-    add(items[static_cast<std::size_t>(partner)].line.with);
+  const std::string& name = item.line.line;
+  if (partners.empty() || partners.size() > kMostPartners) return add_name(name, untold.with);
+  for (const std::ptrdiff_t partner : partners) {
+    BudgetLine& other = items[static_cast<std::size_t>(partner)].line;
+    add_name(name, other.with);
+    if (item.places.size() > 1 && is_frame(item.line.kind)) add_name(other.line, item.line.with);
+  }
+}
+
+/// Each line of the pull names the others.
+void name_all_of(const std::vector<Eigen::Index>& pull, std::vector<BudgetItem>& items) {
+  std::set<std::ptrdiff_t> together;
+  for (const Eigen::Index place : pull) together.insert(item_with(items, place));
+  for (const std::ptrdiff_t one : together)
+    for (const std::ptrdiff_t other : together)
+      if (one != other)
+        add_name(items[static_cast<std::size_t>(other)].line.line,
+                 items[static_cast<std::size_t>(one)].line.with);
 }
 
 /// Leaves out parameters that count as being on their drawing, and lines that have no other.
@@ -112,15 +131,18 @@ void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold
     if (own < 0) continue;
     BudgetItem& item = items[static_cast<std::size_t>(own)];
     const bool of_links = item.line.kind == LineKind::kLength || item.line.kind == LineKind::kTwist;
-    if (item.places.size() > 1 && !of_links) continue;
+    const bool of_frame = is_frame(item.line.kind);
+    if (item.places.size() > 1 && !of_links && !of_frame) continue;
     std::set<std::ptrdiff_t> partners;
     for (const Eigen::Index place : one.with) {
       const std::ptrdiff_t partner = item_with(items, place);
       if (partner >= 0 && partner != own) partners.insert(partner);
     }
-    name_partners(item.line.line, partners, items, untold);
-    std::erase(item.places, one.parameter);
+    if (of_frame && partners.empty()) continue;  // its other numbers are told
+    name_partners(item, partners, items, untold);
+    if (!of_frame) std::erase(item.places, one.parameter);
   }
+  for (const std::vector<Eigen::Index>& pull : datum.pulls) name_all_of(pull, items);
   std::erase_if(items,
                 [](const BudgetItem& item) { return item.places.empty() && !item.whole_source; });
 }
@@ -178,8 +200,6 @@ void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, doubl
   noise.left_if_right = std::sqrt(std::max(whole - of_instrument, 0.0));
   view.lines.push_back(std::move(noise));
 }
-
-bool is_frame(LineKind kind) { return kind == LineKind::kBase || kind == LineKind::kTool; }
 
 struct ViewAsked {
   const std::vector<BudgetItem>& items;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
 #include "server/diagnose/search/surrogates.h"
 #include "server/diagnose/thresholds.h"
 #include "server/measurement/computed_positions.h"
@@ -253,6 +254,8 @@ std::string sentence_for(const Diagnosis& d) {
   const auto add = [&](const std::string& sentence) {
     if (!sentence.empty()) text += (text.empty() ? "" : " ") + as_sentence(sentence);
   };
+  const std::string drawing = d.budget ? lead_of(*d.budget) : "";
+  add(drawing);
   if (!all.sure.empty())
     add("Missing from the simulation: " + listed_clauses(clauses_of(all.sure, said)));
   if (!all.parts.empty())
@@ -269,7 +272,8 @@ std::string sentence_for(const Diagnosis& d) {
   add(held_out_said(d.suspects));
   if (!found && !d.unexplained.present) {
     const std::string nothing = fmt::format(
-        "Nothing {} found in {} poses: ", all.bad_poses.empty() ? "was" : "else was", d.poses);
+        "{} {} found in {} poses: ", drawing.empty() ? "Nothing" : "Beyond that nothing",
+        all.bad_poses.empty() ? "was" : "else was", d.poses);
     const auto computed = computed_not_measured(d.before.rms, d.instrument, d.poses);
     add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise",
                                                 1e6 * d.after.rms)));
