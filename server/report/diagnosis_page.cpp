@@ -1,6 +1,7 @@
 #include "server/report/diagnosis_page.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "server/base/shown_value.h"
@@ -21,10 +22,15 @@ namespace trammel {
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
+constexpr double kBeyondDoubt = 1e6;  // a strength of which the digits say nothing more
 constexpr double kDepends =
     0.01;  // p-value below which the table says yes: 1 of 100 batches by chance
 
-std::string micrometres(double m) { return fmt::format("{:.3g}\u00a0µm", m * 1e6); }
+/// Three digits, and all of those in front of the point.
+std::string plain(double number) {
+  return std::abs(number) < 1000 ? fmt::format("{:.3g}", number) : fmt::format("{:.0f}", number);
+}
+std::string micrometres(double m) { return plain(m * 1e6) + "\u00a0µm"; }
 std::string millimetres(double m) { return fmt::format("{:.4f}", to_mm(m)); }
 
 /// A table that scrolls by itself where the page is narrow.
@@ -98,10 +104,12 @@ HtmlRow finding_row(const Finding& finding) {
   return {.cells = {"<b>" + html_text(kind_called(finding.cause, !finding.could_also_be.empty())) +
                         "</b>",
                     html_text(where_of(finding.cause)), estimates_of(finding),
-                    fmt::format("{:.3g}", finding.effect_rms * 1e6),
-                    millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" +
+                    plain(finding.effect_rms * 1e6),
+                    millimetres(finding.held_out_before.rms) + " → " +
                         millimetres(finding.held_out_after.rms),
-                    fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
+                    finding.strength > kBeyondDoubt ? "&gt; 10⁶"
+                                                    : fmt::format("{:.0f}", finding.strength),
+                    p_value_shown(finding.p_value),
                     others.empty() ? "no other known cause"
                                    : "<span class=\"doubt\">" + html_text(others) + "</span>"},
           .kind = "found"};

@@ -263,6 +263,36 @@ TEST(ErrorBudget, CountsWhatThePosesCannotTellApartOnceAndNamesBoth) {
   }
 }
 
+TEST(ErrorBudget, TwoNumbersThatThePosesTellTogetherOnlyNameEachOther) {
+  World world;
+  world.tool += Vector3(0, 0, 0.005);
+  const CompensatedModel model = trained(world, "base, geometry, tool");
+  ModelParts parts = model.parts();
+  std::vector<Eigen::Index> both;
+  for (Eigen::Index k = 0; k < std::ssize(parts.parameters); ++k) {
+    const std::string& name = parts.parameters[static_cast<std::size_t>(k)].parameter.name;
+    if (name == "tz" || name == "d6") both.push_back(k);
+  }
+  ASSERT_EQ(both.size(), 2u);
+  const auto with_correlation = [&](double correlation) {
+    parts.covariance(both, Eigen::all).setZero();
+    parts.covariance(Eigen::all, both).setZero();
+    const double variance = 0.3e-3 * 0.3e-3;  // each is told, to 0.3 mm
+    parts.covariance(both, both) << variance, correlation * variance, correlation * variance,
+        variance;
+    const auto changed = test::demand(CompensatedModel::make(parts));
+    return error_budget(changed, measured(world, drawn_poses(60)));
+  };
+  const auto names = [](const BudgetLine* line, const char* other) {
+    return line != nullptr &&
+           std::find(line->with.begin(), line->with.end(), other) != line->with.end();
+  };
+  const ErrorBudget together = with_correlation(-0.9999), apart = with_correlation(-0.9);
+  EXPECT_TRUE(names(together.line("length:6"), "tool"));
+  ASSERT_NE(apart.line("length:6"), nullptr);
+  EXPECT_FALSE(names(apart.line("length:6"), "tool"));
+}
+
 TEST(ErrorBudget, TellsAHealthyArmThatNothingStandsOut) {
   World world;
   world.zeros << 2e-4, -3e-4, 2e-4, 4e-4, -5e-4, 3e-4;

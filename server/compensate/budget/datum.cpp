@@ -12,11 +12,12 @@ namespace {
 
 constexpr double kNothingTold =
     0.1;  // of one comparison size: a direction with less is not told by the poses
-constexpr double kPartner = 0.3;     // of the effect: a parameter with more is a partner
-constexpr double kBeyondChance = 3;  // standard deviations
-constexpr double kPull = 0.05;       // of what two frames do apart: together they do less
-constexpr int kSteps = 2;            // of Gauss-Newton: the change of the datum is small
-constexpr double kMatched = 1e-7;    // m
+constexpr double kPartner = 0.3;      // of the effect: a parameter with more is a partner
+constexpr double kBeyondChance = 3;   // standard deviations
+constexpr double kPull = 0.05;        // of what two frames do apart: together they do less
+constexpr double kOneNumber = 0.999;  // a correlation: apart 20 times worse than together
+constexpr int kSteps = 2;             // of Gauss-Newton: the change of the datum is small
+constexpr double kMatched = 1e-7;     // m
 constexpr double kLaterJoint =
     1e-6;  // of two equal candidates the later joint counts as being on its drawing
 
@@ -149,6 +150,16 @@ void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
   datum.covariance(kept, kept) = wider.asDiagonal() * C * wider.asDiagonal();
 }
 
+/// Pairs of which the poses tell one number: each of the two is known far worse than that.
+void pair_up(Datum& datum, const std::vector<Eigen::Index>& kept) {
+  const Eigen::VectorXd stddev = datum.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  for (std::size_t a = 0; a < kept.size(); ++a)
+    for (std::size_t b = a + 1; b < kept.size(); ++b)
+      if (std::abs(datum.covariance(kept[a], kept[b])) >
+          kOneNumber * stddev(kept[a]) * stddev(kept[b]))
+        datum.told_together.push_back({kept[a], kept[b]});
+}
+
 /// The shifts among `kept` of the frames.
 std::vector<Eigen::Index> shifts_of_frames(const PhysicalModel& model,
                                            const std::vector<Eigen::Index>& kept) {
@@ -191,11 +202,11 @@ void take_out_pulls(Datum& datum, const std::vector<Eigen::Index>& kept,
     Eigen::MatrixXd keeps = Eigen::MatrixXd::Identity(sizes.size(), sizes.size());
     keeps(shifts, shifts) -= scale.cwiseProduct(along) * along.cwiseQuotient(scale).transpose();
     datum.covariance = keeps * datum.covariance * keeps.transpose();
-    datum.pulls.push_back({});
+    datum.told_together.push_back({});
     for (std::size_t i = 0; i < shifts.size(); ++i)
       if (std::abs(along(static_cast<Eigen::Index>(i)) * scale(static_cast<Eigen::Index>(i))) >
           kPartner * along.cwiseProduct(scale).cwiseAbs().maxCoeff())
-        datum.pulls.back().push_back(shifts[i]);
+        datum.told_together.back().push_back(shifts[i]);
   }
 }
 
@@ -253,6 +264,7 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
   }
   if (kept.empty()) return datum;
   settle(datum, kept, sizes, told.information(kept_of_free, kept_of_free));
+  pair_up(datum, kept);
   if (left == nullptr) return datum;
   widen(datum, kept, poses, *left);
   take_out_pulls(datum, kept, sizes, poses, *left);

@@ -22,9 +22,9 @@ struct Datum {
     std::vector<Eigen::Index> with;
   };
   std::vector<OnDrawing> on_drawing;
-  /// Shifts of base and tools that move the poses by less than what is left, taken out: each is
-  /// told together with the others.
-  std::vector<std::vector<Eigen::Index>> pulls = {};
+  /// Parameters that the poses tell together only, though each has a value: their lines name each
+  /// other.
+  std::vector<std::vector<Eigen::Index>> told_together = {};
 };
 
 /// The identified parameters of an arm.

@@ -113,10 +113,11 @@ void name_partners(BudgetItem& item, const std::set<std::ptrdiff_t>& partners,
   }
 }
 
-/// Each line of the pull names the others.
-void name_all_of(const std::vector<Eigen::Index>& pull, std::vector<BudgetItem>& items) {
+/// Each line that has one of the parameters names the others.
+void name_all_of(const std::vector<Eigen::Index>& parameters, std::vector<BudgetItem>& items) {
   std::set<std::ptrdiff_t> together;
-  for (const Eigen::Index place : pull) together.insert(item_with(items, place));
+  for (const Eigen::Index place : parameters)
+    if (const std::ptrdiff_t item = item_with(items, place); item >= 0) together.insert(item);
   for (const std::ptrdiff_t one : together)
     for (const std::ptrdiff_t other : together)
       if (one != other)
@@ -142,7 +143,8 @@ void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold
     name_partners(item, partners, items, untold);
     if (!of_frame) std::erase(item.places, one.parameter);
   }
-  for (const std::vector<Eigen::Index>& pull : datum.pulls) name_all_of(pull, items);
+  for (const std::vector<Eigen::Index>& parameters : datum.told_together)
+    name_all_of(parameters, items);
   std::erase_if(items,
                 [](const BudgetItem& item) { return item.places.empty() && !item.whole_source; });
 }
