@@ -250,9 +250,28 @@ TEST(Train, AutoGoesOnWithoutABiasWhereThePosesAreTooFewForOne) {
   EXPECT_TRUE(deserialize(serialize(model), "memory"));
 }
 
+/// Turntable, shoulder and elbow of the shipped robot, a little off: maps of three joints are
+/// learned in a fifth of the time of those of six.
+VirtualRobot three_joints() {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  std::vector<Joint> joints;
+  for (int j = 0; j < 3; ++j) joints.push_back(cell->robot.joint(j));
+  cell->robot = test::demand(Chain::make("three joints", joints));
+  cell->joint_ranges.resize(3);
+  VirtualRobot robot{test::demand(make_physical_model(cell, {"base", "geometry", "compliance"})),
+                     cell->tracker.sigma,
+                     cell->tracker.sigma_rotation,
+                     {}};
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    robot.truth.values(static_cast<Eigen::Index>(k)) +=
+        (k % 2 == 0 ? 0.3 : -0.3) * parameters[k].prior_scale;
+  return robot;
+}
+
 TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointMap) {
-  const auto cell = test::cell_7();
-  VirtualRobot robot = test::chapter_5_robot(cell);
+  VirtualRobot robot = three_joints();
+  const auto cell = robot.truth.cell;
   for (const char* spec : {"joint_map:1@9", "joint_map:2@7", "joint_map:3@8"}) {
     const ErrorSourcePtr map = test::demand(make_error_source(spec, *cell));
     const Eigen::Index first = add_source(robot.truth, map);
