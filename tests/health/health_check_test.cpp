@@ -218,38 +218,6 @@ TEST_F(HealthTest, ACheckIsOneSetUpOfTheInstrument) {
   EXPECT_FALSE(check.error().next.empty());
 }
 
-TEST_F(HealthTest, AFileThatWasReadOtherwiseThanItWasMeantIsNoChangeOfTheRobot) {
-  MeasurementBatch batch = test::measured_check(*robot_, {}, 4);
-  for (Measurement& m : batch.measurements) m.context.q(4) *= -1;
-  const Cell& cell = robot_->model.cell();
-  const auto check =
-      check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
-  ASSERT_FALSE(check) << check->sentence;
-  EXPECT_EQ(check.error().code, ErrorCode::kRefused);
-}
-
-TEST_F(HealthTest, OfPosesThatAreFarOffOnlyAnotherToolIsNamed) {
-  const Cell& cell = robot_->model.cell();
-  MeasurementBatch batch = test::measured_check(*robot_, {}, 5);
-  MeasurementBatch stirred = batch;
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
-    const Vector3 up_T = *batch.measurements[i].R_WT * Vector3(0.03, -0.02, 0.01);
-    batch.measurements[i].p_W += up_T;
-    stirred.measurements[i].p_W +=
-        Vector3::Unit(static_cast<Eigen::Index>(i % 3)) * (i % 2 == 0 ? 0.03 : -0.03);
-  }
-  const HealthCheck tool =
-      check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05))
-          .value();
-  ASSERT_EQ(tool.changed.size(), 1u) << tool.sentence;
-  EXPECT_EQ(tool.changed.front().cause.record->spelling.substr(0, 4), "tool");
-  const auto nothing =
-      check_health(robot_->model, check_against_cell(stirred, cell).value(), tolerance_mm(0.05));
-  if (!nothing) return;  // taken for a mistake of reading
-  EXPECT_EQ(nothing->verdict, HealthVerdict::kCannotTell) << nothing->sentence;
-  EXPECT_TRUE(nothing->changed.empty());
-}
-
 TEST_F(HealthTest, ZerosOfSeveralJointsAreOneAnswerWithEachZeroInDegrees) {
   for (const auto& [one, other] :
        {std::pair(3, 4), std::pair(3, 6), std::pair(4, 6), std::pair(4, 5)}) {
@@ -397,22 +365,6 @@ TEST_F(HealthTest, LengthsThatAreAllTooLongAreAWarmArmOrTheInstrumentAndNoLink) 
   }
 }
 
-TEST_F(HealthTest, NoCauseIsSaidToDoFarMoreThanThePosesAreOff) {
-  const Cell& cell = robot_->model.cell();
-  hidden::Random random(11);
-  std::normal_distribution<double> normal;
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
-    for (Measurement& m : batch.measurements)
-      m.p_W += 2e-3 * Vector3(normal(random), normal(random), normal(random));
-    const auto check =
-        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
-    if (!check) continue;  // taken for a mistake of reading
-    for (const SeenChange& change : check->changed)
-      EXPECT_LT(change.effect_rms, 0.05) << seed << check->sentence;
-  }
-}
-
 TEST_F(HealthTest, ACauseThatExplainsAsMuchWithMoreNumbersIsSaidToBePossible) {
   const Cell& cell = robot_->model.cell();
   int listed = 0;
@@ -431,24 +383,6 @@ TEST_F(HealthTest, ACauseThatExplainsAsMuchWithMoreNumbersIsSaidToBePossible) {
     listed += is_tool(first.cause) || std::any_of(others.begin(), others.end(), is_tool) ? 1 : 0;
   }
   EXPECT_EQ(listed, 5);
-}
-
-TEST_F(HealthTest, PosesThatAreNotThisRobotsAreNeverCalledChance) {
-  const Cell& cell = robot_->model.cell();
-  hidden::Random random(7);
-  std::normal_distribution<double> normal;
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
-    for (Measurement& m : batch.measurements)
-      m.p_W += 0.04 * Vector3(normal(random), normal(random), normal(random));
-    const auto check =
-        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
-    if (!check) continue;  // taken for a mistake of reading
-    EXPECT_EQ(check->sentence.find("chance"), std::string::npos) << check->sentence;
-    EXPECT_EQ(check->verdict, HealthVerdict::kCannotTell) << check->sentence;
-    EXPECT_NE(check->sentence.find("was the file read as it was meant"), std::string::npos)
-        << check->sentence;
-  }
 }
 
 }  // namespace
