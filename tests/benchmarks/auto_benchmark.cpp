@@ -7,6 +7,7 @@
 #include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
+#include "tests/support/from_rows.h"
 #include "tests/support/heavy_arm.h"
 
 namespace trammel {

@@ -49,6 +49,27 @@ void add_equations(const LinearEquations& part, LinearEquations& sum) {
   sum.count += part.count;
 }
 
+LinearEquations of_columns(const LinearEquations& all, const std::vector<Index>& columns) {
+  LinearEquations some = all;
+  some.information = all.information(columns, columns);
+  some.downhill = all.downhill(columns);
+  return some;
+}
+
+/// Of each kind: how much more precise, as a variance, the stated sigmas are than the weights.
+Eigen::Vector2d of_stated_sigmas(const CalibrationProblem& problem, const Weights& weights) {
+  Eigen::Vector2d stated = Eigen::Vector2d::Zero(), beside = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < problem.batch.measurements.size(); ++i) {
+    const Measurement& m = problem.batch.measurements[i];
+    const Cell& cell = *problem.model.cell;
+    stated +=
+        Eigen::Vector2d(std::pow(position_sigma(m, cell), 2), std::pow(rotation_sigma(m, cell), 2));
+    beside += Eigen::Vector2d(std::pow(weights.beside(m, i), 2),
+                              std::pow(weights.discrepancy_rotation, 2));
+  }
+  return (beside.array() / stated.array() + 1).matrix();
+}
+
 /// Squared residuals after the change `d`.
 double residual_square(const LinearEquations& equations, const VectorXd& d) {
   return equations.square - 2 * equations.downhill.dot(d) + d.dot(equations.information * d);
@@ -65,9 +86,28 @@ CauseEvidence::CauseEvidence(const CalibrationProblem& problem, const Weights& w
       add_equations(blocks_.back().kinds[k], all_.kinds[k]);
   }
   all_.scaled = blocks_.front().scaled;
+  most_precision_ = of_stated_sigmas(problem, weights);
+  for (const ColumnGroup& group : present) add_free(group);
+  free_anew();
+}
+
+void CauseEvidence::add_free(const ColumnGroup& group) {
+  for (Index k = 0; k < group.count; ++k) free_.push_back(group.first + k);
+}
+
+void CauseEvidence::take(const ColumnGroup& group) {
+  add_free(group);
+  free_anew();
+}
+
+void CauseEvidence::free_anew() {
   learn_precision();
   weigh_all();
-  for (const ColumnGroup& group : present) take(group);
+  const Eigen::LLT<MatrixXd> factor(curvature_(free_, free_));
+  const MatrixXd rows = factor.matrixL().solve(curvature_(free_, Eigen::all));
+  const VectorXd whitened = factor.matrixL().solve(downhill_(free_));
+  curvature_ -= gram(rows);
+  downhill_ -= rows.transpose() * whitened;
 }
 
 /// Curvature and slope of all columns, under the priors and the present precision.
@@ -82,22 +122,35 @@ void CauseEvidence::weigh_all() {
   }
 }
 
-/// The noise under which all groups together leave what they are expected to leave (MacKay 1992).
+/// The noise under which the groups that are free leave what they are expected to leave (MacKay
+/// 1992).
 void CauseEvidence::learn_precision() {
+  const auto P = static_cast<Index>(free_.size());
+  std::array<LinearEquations, 2> kinds;
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    if (all_.kinds[k].count > 0) kinds[k] = of_columns(all_.kinds[k], free_);
+  }
   for (int round = 0; round < kRounds; ++round) {
-    weigh_all();
-    const std::optional<MatrixXd> factor = inverse_factor(curvature_);
+    MatrixXd curvature = MatrixXd::Identity(P, P);
+    VectorXd downhill = VectorXd::Zero(P);
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      if (kinds[k].count == 0) continue;
+      curvature += precision_(static_cast<Index>(k)) * kinds[k].information;
+      downhill += precision_(static_cast<Index>(k)) * kinds[k].downhill;
+    }
+    const std::optional<MatrixXd> factor = inverse_factor(curvature);
     if (!factor) return;
     const MatrixXd covariance = gram(*factor);
-    const VectorXd d = covariance * downhill_;
+    const VectorXd d = covariance * downhill;
     const Eigen::Vector2d before = precision_;
-    for (std::size_t k = 0; k < all_.kinds.size(); ++k) {
-      const LinearEquations& kind = all_.kinds[k];
-      if (kind.count == 0) continue;
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      if (kinds[k].count == 0) continue;
       double& at = precision_(static_cast<Index>(k));
-      const double told = at * kind.information.cwiseProduct(covariance).sum();
-      const double square = residual_square(kind, d);
-      if (square > 0) at = std::max(kind.count - told, kLeastFreedom) / square;
+      const double told = at * kinds[k].information.cwiseProduct(covariance).sum();
+      const double square = residual_square(kinds[k], d);
+      if (square > 0)
+        at = std::min(std::max(kinds[k].count - told, kLeastFreedom) / square,
+                      most_precision_(static_cast<Index>(k)));
     }
     if (((precision_ - before).array().abs() < kSameNoise * before.array()).all()) return;
   }
@@ -111,17 +164,6 @@ CauseEvidence::Gain CauseEvidence::gain_of(const ColumnGroup& group) const {
   const MatrixXd inverse = factor.solve(MatrixXd::Identity(group.count, group.count));
   return {0.5 * whitened.squaredNorm() - log_root,
           static_cast<double>(group.count) - inverse.trace()};
-}
-
-void CauseEvidence::take(const ColumnGroup& group) {
-  for (Index k = 0; k < group.count; ++k) free_.push_back(group.first + k);
-  if (group.count == 0) return;
-  const Eigen::LLT<MatrixXd> factor(
-      curvature_.block(group.first, group.first, group.count, group.count));
-  const MatrixXd rows = factor.matrixL().solve(curvature_.middleRows(group.first, group.count));
-  const VectorXd whitened = factor.matrixL().solve(downhill_.segment(group.first, group.count));
-  curvature_ -= gram(rows);
-  downhill_ -= rows.transpose() * whitened;
 }
 
 double CauseEvidence::left_out(const ColumnGroup& group) const {

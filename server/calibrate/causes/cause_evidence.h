@@ -16,7 +16,8 @@ struct ColumnGroup {
 
 /// How much likelier groups of parameters make a batch, one after the other, about the present
 /// values of a model (README.md). Each parameter is normal about its present value, with standard
-/// deviation 1 in units of its scale. First order throughout.
+/// deviation 1 in units of its scale. The noise is what the groups that are free leave, no less
+/// than the stated sigmas. First order throughout.
 class CauseEvidence {
  public:
   /// `blocks`: the rows of the batch, a part each. `present`: the groups that are free to begin
@@ -40,13 +41,17 @@ class CauseEvidence {
   [[nodiscard]] double left_out(const ColumnGroup& group) const;
 
  private:
+  void add_free(const ColumnGroup& group);
   [[nodiscard]] double left_out_with(const std::vector<Eigen::Index>& free) const;
-  void weigh_all();
+  /// Learns the noise beside the groups that are free, and integrates these out.
+  void free_anew();
   void learn_precision();
+  void weigh_all();
 
   std::vector<LinearArm> blocks_;
   LinearArm all_;
   Eigen::Vector2d precision_ = Eigen::Vector2d::Ones();  // of each kind: times 1/sigma²
+  Eigen::Vector2d most_precision_ = Eigen::Vector2d::Ones();
   std::vector<Eigen::Index> free_;
   // Curvature and slope of all columns, with those that are free integrated out.
   Eigen::MatrixXd curvature_;
