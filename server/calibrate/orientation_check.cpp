@@ -58,6 +58,9 @@ struct Reading {
   bool by_order =
       true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
   std::string remedy;  ///< what to write in the file; empty: nothing that holds for certain
+  Quaternions or_else = {};  ///< what each pose may be instead; empty: nothing
+
+  [[nodiscard]] const Quaternions& second() const { return or_else.empty() ? q_FT : or_else; }
 };
 
 double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
@@ -79,22 +82,23 @@ std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about) {
 }
 
 /// Angle of every pose from `about`, by that of two readings which brings it nearer.
-std::vector<double> nearer(const Reading& one, const Reading& other, const Quaternion& about) {
-  std::vector<double> all = angles(one.q_FT, about);
-  const std::vector<double> others = angles(other.q_FT, about);
+std::vector<double> nearer(const Quaternions& one, const Quaternions& other,
+                           const Quaternion& about) {
+  std::vector<double> all = angles(one, about);
+  const std::vector<double> others = angles(other, about);
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = std::min(all[i], others[i]);
   return all;
 }
 
 /// The rotation that most poses have in common, each by the nearer of two readings. First the best
 /// of those of single poses, then the mean of the poses near it.
-Quaternion common(const Reading& one, const Reading& other) {
-  const std::size_t n = one.q_FT.size();
+Quaternion common(const Quaternions& one, const Quaternions& other) {
+  const std::size_t n = one.size();
   const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
-  Quaternion best = one.q_FT.front();
+  Quaternion best = one.front();
   double least = -1;
   for (std::size_t i = 0; i < n; i += step) {
-    for (const Quaternion& tried : {one.q_FT[i], other.q_FT[i]}) {
+    for (const Quaternion& tried : {one[i], other[i]}) {
       double sum = 0;
       for (const double off : nearer(one, other, tried)) sum += std::min(off, kMostCounted);
       if (least < 0 || sum < least) least = sum, best = tried;
@@ -106,8 +110,8 @@ Quaternion common(const Reading& one, const Reading& other) {
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
     for (std::size_t i = 0; i < n; ++i) {
       if (off[i] > near) continue;
-      const bool by_other = angle(other.q_FT[i], best) < angle(one.q_FT[i], best);
-      const Eigen::Vector4d q = (by_other ? other : one).q_FT[i].coeffs();
+      const bool by_other = angle(other[i], best) < angle(one[i], best);
+      const Eigen::Vector4d q = (by_other ? other : one)[i].coeffs();
       sum += q.dot(best.coeffs()) < 0 ? Eigen::Vector4d(-q) : q;
     }
     best = Quaternion(Eigen::Vector4d(sum.normalized()));
@@ -190,7 +194,7 @@ Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
 template <typename Reread>
 Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
                 const Reread& reread) {
-  Reading one{.name = std::move(name), .q_FT = {}, .remedy = {}};
+  Reading one{.name = std::move(name), .q_FT = {}, .remedy = {}, .or_else = {}};
   for (std::size_t i = 0; i < group.rows.size(); ++i) {
     const Quaternion q_BF(group.X_BF[i].linear());
     one.q_FT.push_back(q_BF.conjugate() *
@@ -262,61 +266,102 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
 
 /// How three numbers tell an orientation, and what to call that.
 struct Told {
-  const char* name;
-  Quaternion (*from)(const Vector3&);  ///< from rad
-  Vector3 (*numbers)(const Matrix3&);  ///< the reverse; those of the shortest turns
+  std::string name;
+  std::array<int, 3> axes;     ///< of the turns, each about the axis as turned so far
+  bool from_behind = false;    ///< the last number is of the first turn
+  std::string columns = {};    ///< what to name them in a file; empty: no names are read so
+  bool is_vector = false;      ///< a rotation vector, which has no turns
+
+  [[nodiscard]] Quaternion from(const Vector3& rad) const {
+    if (is_vector) return Quaternion(rotation_exp(rad));
+    Quaternion q = Quaternion::Identity();
+    for (int k = 0; k < 3; ++k)
+      q = q * Eigen::AngleAxisd(rad(from_behind ? 2 - k : k), Vector3::Unit(axes[k]));
+    return q;
+  }
+  /// The numbers (within half a turn) that tell R, the smaller ones first: of turns there are two
+  /// ways.
+  [[nodiscard]] std::array<Vector3, 2> numbers(const Matrix3& R) const {
+    if (is_vector) return {rotation_log(R), rotation_log(R)};
+    const auto wrapped = [&](const Vector3& turns) {
+      const Vector3 within =
+          turns.unaryExpr([](double angle) { return std::remainder(angle, 2 * kPi); });
+      return from_behind ? Vector3(within.reverse()) : within;
+    };
+    const Vector3 one = R.eulerAngles(axes[0], axes[1], axes[2]);
+    const double half = axes[0] == axes[2] ? 0 : kPi;
+    std::array<Vector3, 2> both = {wrapped(one),
+                                   wrapped({one.x() + kPi, half - one.y(), one.z() + kPi})};
+    if (both[1].cwiseAbs().maxCoeff() < both[0].cwiseAbs().maxCoeff()) std::swap(both[0], both[1]);
+    return both;
+  }
 };
 
-Quaternion turns(double x, double y, double z, bool z_first) {
-  const Eigen::AngleAxisd about_x(x, Vector3::UnitX()), about_y(y, Vector3::UnitY()),
-      about_z(z, Vector3::UnitZ());
-  return z_first ? about_z * about_y * about_x : about_x * about_y * about_z;
+constexpr std::size_t kToldInFiles = 5;  // the first ways: files with three numbers are read so
+
+/// The ways of controllers, then all other orders of turns.
+const std::vector<Told>& ways_to_tell() {
+  static const std::vector<Told> all = [] {
+    std::vector<Told> ways = {{"as A B C", {2, 1, 0}, false, "A, B, C"},
+                              {"as W P R", {2, 1, 0}, true, "W, P, R"},
+                              {"as Rx Ry Rz", {0, 1, 2}, false, "Rx, Ry, Rz"},
+                              {"as a rotation vector", {}, false, "rvx, rvy, rvz", true},
+                              {"as O A T (turns about z, y, z)", {2, 1, 2}, false, "O, A, T"}};
+    constexpr std::array<const char*, 3> kNames = {"x", "y", "z"};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        for (int k = 0; k < 3; ++k) {
+          const std::array<int, 3> axes = {i, j, k};
+          const auto is_there = [&](const Told& way) { return way.axes == axes; };
+          if (i == j || j == k || std::any_of(ways.begin(), ways.end(), is_there)) continue;
+          ways.push_back({fmt::format("as turns about {}, {}, {}", kNames[i], kNames[j], kNames[k]),
+                          axes});
+        }
+      }
+    }
+    return ways;
+  }();
+  return all;
 }
 
-const std::array<Told, 4> kTold = {
-    {{"as A B C", [](const Vector3& n) { return turns(n.z(), n.y(), n.x(), true); },
-      [](const Matrix3& R) {
-        return Vector3(std::atan2(R(1, 0), R(0, 0)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
-                       std::atan2(R(2, 1), R(2, 2)));
-      }},
-     {"as W P R", [](const Vector3& n) { return turns(n.x(), n.y(), n.z(), true); },
-      [](const Matrix3& R) {
-        return Vector3(std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
-                       std::atan2(R(1, 0), R(0, 0)));
-      }},
-     {"as Rx Ry Rz", [](const Vector3& n) { return turns(n.x(), n.y(), n.z(), false); },
-      [](const Matrix3& R) {
-        return Vector3(std::atan2(-R(1, 2), R(2, 2)), std::asin(std::clamp(R(0, 2), -1.0, 1.0)),
-                       std::atan2(-R(0, 1), R(0, 0)));
-      }},
-     {"as a rotation vector", [](const Vector3& n) { return Quaternion(rotation_exp(n)); },
-      [](const Matrix3& R) { return rotation_log(R); }}}};
+/// What to write where three numbers were meant `way`.
+std::string remedy_of(const Told& way, bool in_radians) {
+  if (way.columns.empty()) return "write the orientation as a quaternion: qw, qx, qy, qz";
+  const char* unit = in_radians ? "rad" : "deg";
+  if (way.is_vector) return fmt::format("name its columns rvx_{0}, rvy_{0}, rvz_{0}", unit);
+  if (in_radians) return "write the unit into the names of their columns: A_rad, Rx (rad)";
+  return fmt::format("name the columns {}, as they are meant", way.columns);
+}
 
 /// Adds the same three numbers as radians, in another order of turns, or as a rotation vector. The
-/// file may have told them in each way; of the wrong way the numbers fit nothing.
+/// file may have told them in each way; of the wrong way the numbers fit nothing. Of turns only
+/// the orientation is left, and two triples of numbers that it may have been.
 void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
-  const std::size_t vector = kTold.size() - 1;
-  for (std::size_t was = 0; was < kTold.size(); ++was) {
+  const std::vector<Told>& ways = ways_to_tell();
+  for (std::size_t k = 0; k < kToldInFiles; ++k) {
+    const Told& was = ways[k];
     const bool small = std::all_of(group.rows.begin(), group.rows.end(), [&](const Measurement* m) {
-      return kTold[was].numbers(*m->R_WT).cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
+      return was.numbers(*m->R_WT)[0].cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
     });
-    for (std::size_t meant = 0; meant < kTold.size(); ++meant) {
-      if (was == meant && (!small || was == vector)) continue;
-      const bool reversed = was + meant == 1;  // A B C are W P R from behind
-      if (reversed && was > meant) continue;
-      std::string name = was == meant ? "as angles"
-                         : reversed   ? "with the three angles from behind (A B C, W P R)"
-                                      : kTold[meant].name;
+    for (const Told& meant : ways) {
+      const bool same = &was == &meant;
+      if (same && (!small || was.is_vector)) continue;
+      const bool reversed = !same && was.axes == meant.axes && !was.is_vector;
+      if (reversed && was.from_behind) continue;  // A B C are W P R from behind
+      std::string name = same       ? "as angles"
+                         : reversed ? "with the three angles from behind (A B C, W P R)"
+                                    : meant.name;
       if (small) name += " in radians";
-      all.push_back(reading(std::move(name), group, q_WB, [&](const Quaternion& q) {
-        return kTold[meant].from((small ? to_deg(1) : 1) * kTold[was].numbers(q.matrix()));
-      }));
-      all.back().by_order = false;
-      const char* unit = small ? "rad" : "deg";
-      all.back().remedy =
-          meant == vector ? fmt::format("name its columns rvx_{0}, rvy_{0}, rvz_{0}", unit)
-          : small         ? "write the unit into the names of their columns: A_rad, Rx (rad)"
-                          : "name the columns as they are meant";
+      const auto reread = [&](std::size_t way) {
+        return [&, way](const Quaternion& q) {
+          return meant.from((small ? to_deg(1) : 1) * was.numbers(q.matrix())[small ? 0 : way]);
+        };
+      };
+      Reading one = reading(std::move(name), group, q_WB, reread(0));
+      one.or_else = reading("", group, q_WB, reread(1)).q_FT;
+      one.by_order = false;
+      one.remedy = remedy_of(meant, small);
+      all.push_back(std::move(one));
     }
   }
 }
@@ -373,7 +418,7 @@ struct Judged {
   double fit = 0;           ///< rad rms of both
 };
 
-Judged judged(const Reading& one, const Reading& other, const std::optional<Pose>& X_FT) {
+Judged judged(const Quaternions& one, const Quaternions& other, const std::optional<Pose>& X_FT) {
   Judged result;
   result.q_FT = common(one, other);
   result.scatter = rms(nearer(one, other, result.q_FT));
@@ -393,10 +438,11 @@ class Question {
  public:
   Question(const Oriented& group, const Quaternion& q_WB, const Cell& cell)
       : group_(group), X_FT_(cell.tools.at(group.tool)), all_(readings(group, q_WB, cell.robot)) {
-    given_ = judged(all_.front(), all_.front(), X_FT_);
+    const Quaternions& given = all_.front().q_FT;
+    given_ = judged(given, given, X_FT_);
     if (follow()) return;
     for (std::size_t k = 1; k < all_.size(); ++k) {
-      const Judged other = judged(all_[k], all_[k], X_FT_);
+      const Judged other = judged(all_[k].q_FT, all_[k].second(), X_FT_);
       if (best_ == 0 || other.fit < of_best_.fit) best_ = k, of_best_ = other;
     }
     look_for_two_orders();
@@ -437,7 +483,7 @@ class Question {
 
   void look_for_two_orders() {
     for (std::size_t k = 1; k < all_.size() && all_[k].by_order; ++k) {
-      const Judged both = judged(all_.front(), all_[k], X_FT_);
+      const Judged both = judged(all_.front().q_FT, all_[k].q_FT, X_FT_);
       if (both.fit > std::min(kMostOff, kMuchBetter * given_.fit)) continue;
       if (two_orders_ == 0 || both.fit < of_both_.fit) two_orders_ = k, of_both_ = both;
     }

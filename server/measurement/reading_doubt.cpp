@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/measurement/one_place.h"
 #include "server/measurement/pose_columns.h"
+#include "server/measurement/pose_groups.h"
 #include "server/measurement/reading/arm_fit.h"
 #include "server/measurement/reading/catalogue.h"
 #include "server/measurement/reading_units.h"
@@ -36,6 +37,8 @@ constexpr double kFollow =
 constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joints
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
+constexpr double kSamePlace = 1e-6;   // spread of positions that were not measured
+constexpr double kOtherPlace = 50e-3;  // farther, no base stands from where the cell file has it
 // A larger zero error than any robot has.
 constexpr double kMostZero = from_deg(15);
 constexpr double kCertainZero = from_deg(4);  // its standard deviation is below that
@@ -100,6 +103,9 @@ class Look {
     ReadingLook seen;
     seen.zeros = JointVector::Zero(cell_.robot.size());
     if (!given_) return seen;
+    seen.doubt = of_several_points();
+    if (!seen.doubt) seen.doubt = of_place();
+    if (seen.doubt) return seen;
     if (given_->quality > kWorthAsking) {
       search();
       if (!found_.empty()) {
@@ -124,6 +130,8 @@ class Look {
   void search();
   [[nodiscard]] bool is_much_better(const Tried& tried) const;
   void keep_best(std::vector<Tried> tried);
+  [[nodiscard]] std::optional<Error> of_several_points() const;
+  [[nodiscard]] std::optional<Error> of_place() const;
   [[nodiscard]] Error of_reading() const;
   [[nodiscard]] std::optional<Error> of_units() const;
   [[nodiscard]] std::optional<Error> of_some_rows();
@@ -219,6 +227,77 @@ void Look::keep_best(std::vector<Tried> tried) {
     tried = std::move(all);
   }
   found_ = std::move(tried);
+}
+
+/// Rows that follow each other at one joint vector, and tell places far apart at most of those
+/// vectors: several reflectors under one name. Averaged, they would tell a place where none is.
+std::optional<Error> Look::of_several_points() const {
+  std::size_t repeated = 0, apart = 0;
+  double worst = 0;
+  int first = 0, second = 0;
+  for (const PoseGroup& rows : pose_groups(table_.q.transpose())) {
+    double farthest = -1;
+    for (std::size_t k = 1; k < rows.size(); ++k) {
+      const Measurement &before = *table_.from[static_cast<std::size_t>(rows[k - 1])],
+                        &row = *table_.from[static_cast<std::size_t>(rows[k])];
+      if (rows[k] != rows[k - 1] + 1 || row.context.tool != before.context.tool) continue;
+      const double distance = (row.p_W - before.p_W).norm();
+      farthest = std::max(farthest, distance);
+      if (distance > worst) worst = distance, first = before.row, second = row.row;
+    }
+    repeated += farthest >= 0 ? 1 : 0;
+    apart += farthest > kBadRow ? 1 : 0;
+  }
+  if (apart < kFewestBadRows || 2 * apart <= repeated) return std::nullopt;
+  return refused(
+             "{} of {} times, rows that follow each other have the same joints and positions far "
+             "apart, up to {} in rows {} and {}: they would be several points of the tool",
+             apart, repeated, mm(worst), first, second)
+      .of("tool_id")
+      .at_row(first)
+      .beyond(to_mm(worst), to_mm(kBadRow))
+      .with_text("several points of the tool")
+      .next(
+          "several reflectors? name in tool_id which one each row is of, and in the cell file "
+          "each of them as a tool (null: unknown)")
+      .value();
+}
+
+/// Positions at one place where a base that stands where the cell says does not have it. They do
+/// not tell how it stands instead, and the arm would be bent until it reached there.
+std::optional<Error> Look::of_place() const {
+  const bool tools_known = std::all_of(table_.from.begin(), table_.from.end(), [&](const auto* m) {
+    return cell_.tools.at(m->context.tool).has_value();
+  });
+  if (!are_at_one_place(table_.p_W) || (!cell_.X_WB && !tools_known)) return std::nullopt;
+  const Vector3 place = table_.p_W.rowwise().mean();
+  const auto shown = [](const Vector3& p) {
+    return fmt::format("[{:.1f}, {:.1f}, {:.1f}]", to_mm(p.x()), to_mm(p.y()), to_mm(p.z()));
+  };
+  if (!cell_.X_WB) {
+    if (spread_of(table_.p_W) > kSamePlace) return std::nullopt;
+    return refused("all positions are {} mm, and do not tell how the base is turned", shown(place))
+        .of("x_mm,y_mm,z_mm")
+        .with_text("one place")
+        .next(
+            "a tip on a fixed point tells the tool, where the cell file says null for it; give "
+            "the base in the cell file, or measure at other places, too")
+        .value();
+  }
+  const Vector3 drawn = *cell_.X_WB * (given_->X_WB.inverse() * place);
+  const double away = (drawn - place).norm();
+  if (given_->off > kFollow || away < kOtherPlace) return std::nullopt;
+  return refused(
+             "the positions are all at {} mm, and the joints lead to {} mm where the base stands "
+             "as in the cell file, {} away",
+             shown(place), shown(drawn), mm(away))
+      .of("x_mm,y_mm,z_mm")
+      .beyond(to_mm(away), to_mm(kOtherPlace))
+      .with_text("another place")
+      .next(
+          "a fixed point whose place nobody measured? write base: null in the cell file, and null "
+          "for the tool; else measure the point in the frame of the base")
+      .value();
 }
 
 Error Look::of_reading() const {
@@ -319,14 +398,14 @@ std::optional<Error> Look::of_zero() const {
     if (j + 1 == cell_.robot.size() && !is_turn)
       continue;  // the tool turned about the last axis, or another one
     const std::string column = joint_column(j, JointType::kRevolute);
-    const double added = is_turn ? turns : to_deg(zero);
+    const double added = std::remainder(is_turn ? turns : to_deg(zero), 360);
     const std::string name = fmt::format("with {:.3g} deg added to {}", added, column);
     return refused(
                "the positions follow the joints only {}: the zero of joint {} would be {:.1f} deg "
                "from the robot file's",
-               name, j + 1, to_deg(zero))
+               name, j + 1, added)
         .of(column)
-        .beyond(std::abs(to_deg(zero)), to_deg(kMostZero))
+        .beyond(std::abs(added), to_deg(kMostZero))
         .with_text(name)
         .next("another convention, or another robot?")
         .value();

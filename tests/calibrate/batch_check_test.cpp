@@ -110,6 +110,64 @@ TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
   }
 }
 
+/// Each pose of `of_one` in as many rows as there are `reflectors` (m, from the tool's point, in T).
+MeasurementBatch seen_by(const std::vector<Vector3>& reflectors, const MeasurementBatch& of_one) {
+  MeasurementBatch batch = of_one;
+  batch.measurements.clear();
+  for (const Measurement& m : of_one.measurements) {
+    for (const Vector3& reflector : reflectors) {
+      Measurement row = m;
+      row.p_W += *m.R_WT * reflector;
+      row.pose_id = fmt::format("{}", batch.measurements.size());
+      row.row = static_cast<int>(batch.measurements.size()) + 2;
+      row.context.index = static_cast<int>(batch.measurements.size());
+      batch.measurements.push_back(std::move(row));
+    }
+  }
+  return batch;
+}
+
+TEST(BatchCheck, SeveralReflectorsUnderOneNameAreNotAveraged) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch of_one = test::measured(test::chapter_5_robot(cell), 40, 5);
+  const std::vector<Vector3> two = {Vector3::Zero(), Vector3(0.02, 0.01, 0)};
+  const std::vector<Vector3> three = {Vector3::Zero(), Vector3(0.1, 0, 0.05), Vector3(0, 0.1, 0)};
+  for (const auto& reflectors : {two, three}) {
+    const auto said = test::said_of(seen_by(reflectors, of_one), *cell);
+    ASSERT_TRUE(said) << reflectors.size();
+    EXPECT_EQ(said->field, "tool_id") << sentence(*said);
+    EXPECT_EQ(said->text, "several points of the tool") << sentence(*said);
+  }
+  MeasurementBatch repeats = seen_by({Vector3::Zero(), Vector3(2e-4, 0, 0)}, of_one);
+  repeats.measurements[10].p_W += Vector3(0.3, 0, 0);  // one bad row is no second reflector
+  const auto nothing = test::said_of(repeats, *cell);
+  EXPECT_FALSE(nothing) << sentence(*nothing);
+}
+
+TEST(BatchCheck, APointWhosePlaceNobodyMeasuredBendsNoArmToTheOrigin) {
+  const auto zeros = [](const Cell& cell) {
+    MeasurementBatch batch =
+        test::one_point(cell, 1e-3 * Vector3(1, -1, 2), Pose::Identity(), 30, 3);
+    for (Measurement& m : batch.measurements) m.p_W.setZero();
+    return batch;
+  };
+  const std::string model = "{error_sources: [geometry]}";
+  const auto known = test::cell_of_one_point("{xyz_mm: [0, 0, 0]}", test::kToolOfOnePoint, model);
+  const auto said = test::said_of(zeros(*known), *known);
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->text, "another place") << sentence(*said);
+  EXPECT_NE(said->next.find("base: null"), std::string::npos) << sentence(*said);
+  const auto elsewhere = test::cell_of_one_point("null", test::kToolOfOnePoint, model);
+  const auto turned = test::said_of(zeros(*elsewhere), *elsewhere);
+  ASSERT_TRUE(turned);
+  EXPECT_EQ(turned->text, "one place") << sentence(*turned);
+  Cell unknown = *elsewhere;
+  for (auto& [name, X_FT] : unknown.tools) X_FT.reset();
+  MeasurementBatch batch = zeros(*elsewhere);
+  const auto nothing = test::said_of(std::move(batch), unknown);
+  EXPECT_FALSE(nothing) << sentence(*nothing);
+}
+
 TEST(BatchCheck, OnePointSeenFromAllSidesWithAToolThatIsOffIsNotReadAsPositionsInUm) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto known = test::cell_of_one_point("{xyz_mm: [0, 0, 0]}", test::kToolOfOnePoint,

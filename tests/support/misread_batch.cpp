@@ -152,6 +152,18 @@ std::vector<Misreading> all_misreadings() {
     for (Measurement& m : b.measurements) m.context.q(j) *= -1;
     return fmt::format("with the other sign of {}", column(j));
   });
+  add("signs of several joints", false, [](MeasurementBatch& b, const Cell&, Random&) {
+    for (Measurement& m : b.measurements) {
+      for (const int j : {0, 3, 5}) m.context.q(j) *= -1;
+    }
+    return std::string("with the other sign of q1_deg and q4_deg and q6_deg");
+  });
+  add("half of the rows in metres", false, [](MeasurementBatch& b, const Cell&, Random&) {
+    for (std::size_t i = b.measurements.size() / 2; i < b.measurements.size(); ++i)
+      b.measurements[i].p_W /= 1000;
+    return fmt::format("{} of {} rows in metres",
+                       b.measurements.size() - b.measurements.size() / 2, b.measurements.size());
+  });
   add("sign of a coordinate", false, [](MeasurementBatch& b, const Cell&, Random& random) {
     const int k = pick(random, 3);
     for (Measurement& m : b.measurements) m.p_W(k) *= -1;
@@ -205,6 +217,26 @@ std::vector<Misreading> all_misreadings() {
                         Eigen::AngleAxisd(vector.z(), Vector3::UnitZ()));
     });
     return std::string("as a rotation vector in radians");
+  });
+  add("rotation vector in degrees in columns of angles", true,
+      [](MeasurementBatch& b, const Cell&, Random&) {
+        turn_all(b, [](const Quaternion& q) {
+          const Vector3 vector = rotation_log(q.toRotationMatrix());
+          return Quaternion(Eigen::AngleAxisd(vector.x(), Vector3::UnitX()) *
+                            Eigen::AngleAxisd(vector.y(), Vector3::UnitY()) *
+                            Eigen::AngleAxisd(vector.z(), Vector3::UnitZ()));
+        });
+        return std::string("as a rotation vector");
+      });
+  add("turns about z, y, z in columns of A B C", true, [](MeasurementBatch& b, const Cell&,
+                                                          Random&) {
+    turn_all(b, [](const Quaternion& q) {
+      const Vector3 zyz = q.toRotationMatrix().eulerAngles(2, 1, 2);
+      return Quaternion(Eigen::AngleAxisd(zyz.x(), Vector3::UnitZ()) *
+                        Eigen::AngleAxisd(zyz.y(), Vector3::UnitY()) *
+                        Eigen::AngleAxisd(zyz.z(), Vector3::UnitX()));
+    });
+    return std::string("as O A T");
   });
   add("left-handed tracker frame", true, [](MeasurementBatch& b, const Cell&, Random&) {
     for (Measurement& m : b.measurements) m.p_W.y() *= -1;

@@ -19,10 +19,10 @@ namespace trammel {
 /// or behind an underscore:
 ///
 ///     joints (deg; rad or mm where it says so), X Y Z (mm; m or in where it says so), at most one
-///     of A B C       Rz(A) Ry(B) Rx(C), deg or rad W P R       Rz(R) Ry(P) Rx(W), deg or rad Rx Ry
-///     Rz    Rx(rx) Ry(ry) Rz(rz), deg or rad rvx rvy rvz a rotation vector, rad, as Universal
-///     Robots' Rx Ry Rz are qw qx qy qz Hamilton, unit and pose_id (id, name, point, target). Other
-///     columns are kept as they are.
+///     of A B C (Rz(A) Ry(B) Rx(C)), W P R (Rz(R) Ry(P) Rx(W)), O A T (Rz(O) Ry(A) Rz(T)),
+///     Rx Ry Rz (Rx(rx) Ry(ry) Rz(rz)), deg or rad; rvx rvy rvz, a rotation vector, rad, as
+///     Universal Robots' Rx Ry Rz are; qw qx qy qz, Hamilton, unit; and pose_id (id, name, point,
+///     target). Other columns are kept as they are.
 ///
 /// By position, with or without a first line of other names, as the exports have them that RoboDK's
 /// validation macros read (joints, what was measured, the tool centre point in F):

@@ -26,10 +26,10 @@ constexpr std::size_t kColumnsOfPoses = 18;  // of the one with orientations
 constexpr double kMetresPerInch = 0.0254;    // m
 constexpr std::size_t kMostTcps = 2;         // more, another one in most rows, are none
 constexpr const char* kNameTheColumns =
-    "name the columns in the first line: J1 ... J6, X, Y, Z, and the angles A B C, W P R, Rx Ry Rz "
-    "(deg) or rvx_rad rvy_rad rvz_rad";
+    "name the columns in the first line: J1 ... J6, X, Y, Z, and the angles A B C, W P R, O A T, "
+    "Rx Ry Rz (deg) or rvx_rad rvy_rad rvz_rad";
 
-enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kVector, kQuaternion };
+enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kOat, kVector, kQuaternion };
 
 /// A column and the factor from its unit to ours: rad if `angle`, else m.
 struct ScaledColumn {
@@ -175,12 +175,16 @@ class NamedColumns {
   }
 
   [[nodiscard]] Status find_orientation() {
-    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 4> kinds = {
-        {{Orientation::kAbc, {"a", "b", "c"}},
+    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 5> kinds = {
+        {{Orientation::kOat, {"o", "a", "t"}},
+         {Orientation::kAbc, {"a", "b", "c"}},
          {Orientation::kWpr, {"w", "p", "r"}},
          {Orientation::kRxRyRz, {"rx", "ry", "rz"}},
          {Orientation::kVector, {"rvx", "rvy", "rvz"}}}};
     for (const auto& [kind, names] : kinds) {
+      // The `a` of `o a t` is not that of `a b c`.
+      if (kind == (find_name("o") && find_name("t") ? Orientation::kAbc : Orientation::kOat))
+        continue;
       std::vector<ScaledColumn> angles;
       TRY(find_three(names, kind == Orientation::kVector ? "rad" : "deg", angles));
       if (angles.empty()) continue;
@@ -207,7 +211,9 @@ class NamedColumns {
       return refused("two orientations")
           .in(table_.where())
           .of("orientation")
-          .next("expected one of A B C, W P R, Rx Ry Rz, rvx_rad rvy_rad rvz_rad, qw qx qy qz");
+          .next(
+              "expected one of A B C, W P R, O A T, Rx Ry Rz, rvx_rad rvy_rad rvz_rad, qw qx qy "
+              "qz");
     }
     found_.orientation = kind;
     return {};
@@ -344,6 +350,8 @@ Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t 
         if (columns.orientation == Orientation::kVector) return rotation_exp(angles);
         if (columns.orientation == Orientation::kAbc)
           return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
+        if (columns.orientation == Orientation::kOat)
+          return turn(2, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
         if (columns.orientation == Orientation::kWpr)
           return turn(2, angles(2)) * turn(1, angles(1)) * turn(0, angles(0));
         return turn(0, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -12,6 +14,8 @@ namespace trammel::reading {
 namespace {
 
 constexpr double kGon = 0.9;  // deg
+constexpr int kMostWithManySigns = 7;  // joints of a robot: of more only single signs are tried
+constexpr double kOtherUnit = 3;       // times: rows that are nearer than the others by that much
 constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
 constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
 
@@ -40,10 +44,7 @@ class JointReadings {
   JointReadings(const NumberTable& table, const Chain& robot) : table_(table), robot_(robot) {}
 
   std::vector<Reading> all() {
-    for (int j = 0; j < robot_.size(); ++j) {
-      const std::string column = name(j);
-      add("with the other sign of " + column, column, [j](Eigen::MatrixXd& q) { q.row(j) *= -1; });
-    }
+    signs();
     exchanges();
     for (int j = 0; j < robot_.size(); ++j) {
       if (turns(j)) units(j);
@@ -67,6 +68,26 @@ class JointReadings {
     all_.push_back(of_joints(std::move(name), std::move(columns), std::move(change)));
   }
 
+  /// One joint that counts the other way, then two, and so on: a drawing that was mirrored has
+  /// several.
+  void signs() {
+    const int most = robot_.size() <= kMostWithManySigns ? robot_.size() : 1;
+    for (int count = 1; count <= most; ++count) {
+      for (unsigned set = 1; set < 1u << static_cast<unsigned>(robot_.size()); ++set) {
+        if (std::popcount(set) != count) continue;
+        std::vector<std::string> columns;
+        Eigen::VectorXd sign = Eigen::VectorXd::Ones(robot_.size());
+        for (int j = 0; j < robot_.size(); ++j) {
+          if ((set >> static_cast<unsigned>(j) & 1u) == 0) continue;
+          columns.push_back(name(j));
+          sign(j) = -1;
+        }
+        add(fmt::format("with the other sign of {}", fmt::join(columns, " and ")),
+            fmt::format("{}", fmt::join(columns, ",")),
+            [sign](Eigen::MatrixXd& q) { q = (sign.asDiagonal() * q).eval(); });
+      }
+    }
+  }
   void exchanges() {
     for (int i = 0; i < robot_.size(); ++i) {
       for (int j = i + 1; j < robot_.size(); ++j) {
@@ -120,6 +141,34 @@ class JointReadings {
   const Chain& robot_;
   std::vector<Reading> all_;
 };
+
+/// Adds readings of the rows nearest to the origin in another unit than the others: beyond the
+/// widest gap between the rows' distances from it.
+void add_rows_in_other_units(const NumberTable& table, std::vector<Reading>& all) {
+  std::vector<double> far;
+  for (std::size_t i = 0; i < table.size(); ++i) far.push_back(table.position(i).norm());
+  std::sort(far.begin(), far.end());
+  double widest = 0, limit = 0;
+  for (std::size_t i = 1; i < far.size(); ++i) {
+    if (far[i - 1] == 0 || far[i] < widest * far[i - 1]) continue;
+    widest = far[i] / far[i - 1];
+    limit = std::sqrt(far[i] * far[i - 1]);
+  }
+  if (widest < kOtherUnit) return;
+  std::vector<int> rows;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    if (table.position(i).norm() < limit) rows.push_back(table.from[i]->row);
+  for (const UnitOfLength& unit : kUnitsOfLength) {
+    if (unit.factor < 1) continue;
+    all.push_back(of_positions(
+        fmt::format("with {} of {} rows in {} (the first is row {})", rows.size(), table.size(),
+                    unit.name, rows.front()),
+        kAllAxes, [limit, unit](Eigen::Matrix3Xd& p) {
+          for (Eigen::Index i = 0; i < p.cols(); ++i)
+            if (p.col(i).norm() < limit) p.col(i) *= unit.factor;
+        }));
+  }
+}
 
 Reading left_handed(int axis) {
   return {fmt::format("as of a left-handed frame (mirrored {} axis)",
@@ -191,6 +240,7 @@ std::vector<Reading> position_readings(const NumberTable& table) {
     all.push_back(of_positions(fmt::format("with all positions in {}", unit.name), kAllAxes,
                                [unit](Eigen::Matrix3Xd& p) { p *= unit.factor; }));
   }
+  add_rows_in_other_units(table, all);
   return all;
 }
 
