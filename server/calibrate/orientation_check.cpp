@@ -41,6 +41,7 @@ constexpr std::size_t kFewestOriented =
     3;  // of a tool: two orientations agree with too many readings
 constexpr std::size_t kMostTries =
     40;  // poses whose own R_FT is tried: half may be wrong, one must be right
+constexpr std::size_t kRowsOfFirstLook = 24;  // evenly drawn: which of many readings are hopeless
 constexpr std::size_t kMostPositions =
     300;  // evenly drawn beyond: more do not make the base more certain
 
@@ -333,11 +334,23 @@ std::string remedy_of(const Told& way, bool in_radians) {
   return fmt::format("name the columns {}, as they are meant", way.columns);
 }
 
+/// At most `count` rows of a tool, evenly drawn.
+Oriented some_of(const Oriented& group, std::size_t count) {
+  const std::size_t n = group.rows.size(), kept = std::min(n, count);
+  Oriented some{group.tool, {}, {}};
+  for (std::size_t k = 0; k < kept; ++k) {
+    some.rows.push_back(group.rows[k * n / kept]);
+    some.X_BF.push_back(group.X_BF[k * n / kept]);
+  }
+  return some;
+}
+
 /// Adds the same three numbers as radians, in another order of turns, or as a rotation vector. The
 /// file may have told them in each way; of the wrong way the numbers fit nothing. Of turns only
 /// the orientation is left, and two triples of numbers that it may have been.
 void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
   const std::vector<Told>& ways = ways_to_tell();
+  const Oriented few = some_of(group, kRowsOfFirstLook);
   for (std::size_t k = 0; k < kToldInFiles; ++k) {
     const Told& was = ways[k];
     const bool small = std::all_of(group.rows.begin(), group.rows.end(), [&](const Measurement* m) {
@@ -357,6 +370,9 @@ void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vecto
           return meant.from((small ? to_deg(1) : 1) * was.numbers(q.matrix())[small ? 0 : way]);
         };
       };
+      const Quaternions q = reading("", few, q_WB, reread(0)).q_FT,
+                        other = reading("", few, q_WB, reread(1)).q_FT;
+      if (median(nearer(q, other, common(q, other))) > kMostOff) continue;
       Reading one = reading(std::move(name), group, q_WB, reread(0));
       one.or_else = reading("", group, q_WB, reread(1)).q_FT;
       one.by_order = false;
@@ -560,6 +576,25 @@ class Question {
   std::size_t two_orders_ = 0;  // a reading of some rows only; 0: none
 };
 
+/// Orientations that are the same in all rows, though the flange turns: nobody measured them.
+std::optional<Error> doubt_of_same(const Oriented& group) {
+  double turned = 0;
+  for (std::size_t i = 0; i < group.rows.size(); ++i) {
+    if (*group.rows[i]->R_WT != *group.rows.front()->R_WT) return std::nullopt;
+    turned = std::max(turned, angle(Quaternion(group.X_BF[i].linear()),
+                                    Quaternion(group.X_BF.front().linear())));
+  }
+  if (turned < kMostOff) return std::nullopt;
+  return refused("all {} orientations are the same, while the joints turn the flange by up to {}",
+                 group.rows.size(), deg(turned))
+      .of("qw,qx,qy,qz")
+      .at_row(group.rows.front()->row)
+      .beyond(0, to_deg(kMostOff))
+      .with_text("the same in all rows")
+      .next("were they not measured? Then leave their columns out")
+      .value();
+}
+
 /// The poses of each tool that have an orientation.
 std::vector<Oriented> by_tool(const MeasurementBatch& batch, const Chain& robot) {
   std::map<std::string, Oriented> groups;
@@ -611,6 +646,7 @@ bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented
 
 std::optional<Error> doubt_of(Oriented group, const Cell& cell, const std::optional<Pose>& X_WB) {
   const std::optional<Pose>& X_FT = cell.tools.at(group.tool);
+  if (auto same = doubt_of_same(group)) return same;
   if (X_WB) return Question(group, Quaternion(X_WB->linear()), cell).doubt();
   const Located located = by_positions(group, X_FT);
   if (!located.belong) return std::nullopt;  // the joints themselves are in question

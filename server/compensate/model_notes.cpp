@@ -220,14 +220,6 @@ void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
                  "larger")});
 }
 
-/// The drawing knows no number of the batch, so nothing can make its errors small.
-void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  const Evaluation& training = parts.training;
-  if (auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma,
-                                        training.poses))
-    notes.push_back({"computed_positions", Severity::kWarning, *std::move(text)});
-}
-
 /// A base that the cell does not say, and whose turn the poses do not tell.
 void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   if (parts.physics.cell->X_WB) return;
@@ -292,6 +284,17 @@ void add_sessions(const CompensatedModel::Parts& parts, std::vector<Note>& notes
 long measured_numbers(const Evaluation& training) {
   const long turns = training.orientation ? 3L * training.orientation->poses : 0;
   return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);
+}
+
+/// The drawing knows no number of the batch, so nothing can make its errors small; an identified arm
+/// makes them small where the numbers are few.
+void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const Evaluation& training = parts.training;
+  auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma,
+                                    training.poses);
+  if (!text && !training.gauges && measured_numbers(training) >= 2L * parts.rank)
+    text = computed_by_its_arm(training.calibrated.rms, training.poses);
+  if (text) notes.push_back({"computed_positions", Severity::kWarning, *std::move(text)});
 }
 
 /// A fit of r combinations to n numbers leaves sqrt(1 - r/n) of their rms: below n = 2 r more than

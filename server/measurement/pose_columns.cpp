@@ -28,7 +28,7 @@ std::optional<JointColumn> as_joint_column(std::string_view column_name) {
   const auto [end, error] =
       std::from_chars(name.data() + 1, name.data() + name.size(), column.number);
   const std::string_view unit(end, static_cast<std::size_t>(name.data() + name.size() - end));
-  if (error != std::errc() || column.number < 1 || (unit != "_deg" && unit != "_mm"))
+  if (error != std::errc() || column.number < 0 || (unit != "_deg" && unit != "_mm"))
     return std::nullopt;
   column.type = unit == "_deg" ? JointType::kRevolute : JointType::kPrismatic;
   return column;
@@ -49,6 +49,11 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   std::map<int, std::pair<std::size_t, JointType>> joints;
   for (std::size_t i = 0; i < table.columns().size(); ++i) {
     const auto joint = as_joint_column(table.columns()[i]);
+    if (joint && joint->number == 0)
+      return refused("column {}: joints count from 1", table.columns()[i])
+          .in(table.where())
+          .of(table.columns()[i])
+          .next("name the columns q1_deg, q2_deg and so on");
     if (joint && !joints.emplace(joint->number, std::pair(i, joint->type)).second) {
       return refused("two columns for joint {}: {} and {}", joint->number,
                      table.columns()[joints[joint->number].first], table.columns()[i])

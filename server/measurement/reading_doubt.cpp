@@ -113,7 +113,11 @@ class Look {
         return seen;
       }
     }
-    if (given_->off > kFollow) return seen;
+    if (given_->off > kFollow) {
+      if (anywhere().quality < kMuchBetter * given_->quality) seen.doubt = of_tool();
+      seen.of_tool = seen.doubt.has_value();
+      return seen;
+    }
     seen.zeros = given_->arm.head(cell_.robot.size());
     if (given_->base_turn_stddev < kCertainBase) seen.X_WB = given_->X_WB;
     seen.doubt = of_units();
@@ -129,6 +133,7 @@ class Look {
  private:
   void search();
   [[nodiscard]] bool is_much_better(const Tried& tried) const;
+  [[nodiscard]] const ArmFit& anywhere();
   void keep_best(std::vector<Tried> tried);
   [[nodiscard]] std::optional<Error> of_several_points() const;
   [[nodiscard]] std::optional<Error> of_place() const;
@@ -137,7 +142,7 @@ class Look {
   [[nodiscard]] std::optional<Error> of_some_rows();
   [[nodiscard]] std::optional<Error> of_zero() const;
   [[nodiscard]] std::optional<Error> of_sigma() const;
-  [[nodiscard]] std::optional<Error> of_tool() const;
+  [[nodiscard]] std::optional<Error> of_tool();
   [[nodiscard]] Error of_tool_at(const std::string& tool, const Vector3& p_FT) const;
 
   /// The cell with the robot as the reading has it.
@@ -149,7 +154,7 @@ class Look {
 
   const Cell& cell_;
   const NumberTable table_;
-  std::optional<ArmFit> given_;
+  std::optional<ArmFit> given_, anywhere_;
   std::vector<Reading> readings_;
   std::vector<Tried> found_;  // readings that fit and cannot be told apart, the most likely first
 };
@@ -179,7 +184,27 @@ void Look::search() {
     const bool worth = !one.reading->of_rows || given_->quality > kOfRows;
     if (worth && is_much_better(one)) tried.push_back(std::move(one));
   }
-  if (!tried.empty()) keep_best(std::move(tried));
+  const auto fits_best = [](const Tried& a, const Tried& b) {
+    return a.fit.quality < b.fit.quality;
+  };
+  const auto best = std::min_element(tried.begin(), tried.end(), fits_best);
+  if (best == tried.end()) return;
+  // A joint's zero or sign may make up in part for a tool whose point is elsewhere.
+  const bool is_rather_the_tool =
+      kAsGood * anywhere().quality + 0.2 * kWorthAsking < best->fit.quality;
+  if (!is_rather_the_tool) keep_best(std::move(tried));
+}
+
+/// The arm with the points of its tools wherever they fit best.
+const ArmFit& Look::anywhere() {
+  if (anywhere_) return *anywhere_;
+  using reading::ToolPoints;
+  const NumberTable some = thinned(table_, kRowsFitted);
+  const ArmFit start = located(thinned(table_, kRowsLocated), cell_, ToolPoints::kAnywhere);
+  anywhere_ = fitted(some, cell_, start, ToolPoints::kAnywhere);
+  ArmFit near = fitted(some, cell_, *given_, ToolPoints::kAnywhere);
+  if (near.quality < anywhere_->quality) anywhere_ = std::move(near);
+  return *anywhere_;
 }
 
 /// A reading that shrinks the positions shrinks what is left of them, too: it must fit better
@@ -229,37 +254,50 @@ void Look::keep_best(std::vector<Tried> tried) {
   found_ = std::move(tried);
 }
 
-/// Rows that follow each other at one joint vector, and tell places far apart at most of those
-/// vectors: several reflectors under one name. Averaged, they would tell a place where none is.
+/// Rows at one joint vector that tell places far apart at most of those vectors: several reflectors
+/// under one name, or something changed in between. Averaged, they would tell a place where none
+/// is. Of rows that do not follow each other a few may be a check whether something changed.
 std::optional<Error> Look::of_several_points() const {
-  std::size_t repeated = 0, apart = 0;
-  double worst = 0;
-  int first = 0, second = 0;
+  struct Apart {
+    std::size_t repeated = 0, apart = 0;
+    double worst = 0;
+    int first = 0, second = 0;
+    [[nodiscard]] bool is_told() const {
+      return apart >= kFewestBadRows && 2 * apart > repeated;
+    }
+  };
+  Apart next, any;
   for (const PoseGroup& rows : pose_groups(table_.q.transpose())) {
-    double farthest = -1;
+    double far = -1, far_next = -1;
     for (std::size_t k = 1; k < rows.size(); ++k) {
       const Measurement &before = *table_.from[static_cast<std::size_t>(rows[k - 1])],
                         &row = *table_.from[static_cast<std::size_t>(rows[k])];
-      if (rows[k] != rows[k - 1] + 1 || row.context.tool != before.context.tool) continue;
+      if (row.context.tool != before.context.tool) continue;
       const double distance = (row.p_W - before.p_W).norm();
-      farthest = std::max(farthest, distance);
-      if (distance > worst) worst = distance, first = before.row, second = row.row;
+      far = std::max(far, distance);
+      if (rows[k] == rows[k - 1] + 1) far_next = std::max(far_next, distance);
+      if (distance > any.worst)
+        any.worst = distance, any.first = before.row, any.second = row.row;
     }
-    repeated += farthest >= 0 ? 1 : 0;
-    apart += farthest > kBadRow ? 1 : 0;
+    for (auto& [all, farthest] : {std::pair(&next, far_next), std::pair(&any, far)}) {
+      all->repeated += farthest >= 0 ? 1 : 0;
+      all->apart += farthest > kBadRow ? 1 : 0;
+    }
   }
-  if (apart < kFewestBadRows || 2 * apart <= repeated) return std::nullopt;
+  const bool are_most_repeated = 3 * any.repeated > table_.size();
+  if (!next.is_told() && !(are_most_repeated && any.is_told())) return std::nullopt;
   return refused(
-             "{} of {} times, rows that follow each other have the same joints and positions far "
-             "apart, up to {} in rows {} and {}: they would be several points of the tool",
-             apart, repeated, mm(worst), first, second)
+             "at {} of {} joint vectors that several rows have, their positions are far apart, by "
+             "up to {} in rows {} and {}: they would be several points of the tool",
+             any.apart, any.repeated, mm(any.worst), any.first, any.second)
       .of("tool_id")
-      .at_row(first)
-      .beyond(to_mm(worst), to_mm(kBadRow))
+      .at_row(any.first)
+      .beyond(to_mm(any.worst), to_mm(kBadRow))
       .with_text("several points of the tool")
       .next(
           "several reflectors? name in tool_id which one each row is of, and in the cell file "
-          "each of them as a tool (null: unknown)")
+          "each of them as a tool (null: unknown). Was the tracker moved in between? name each "
+          "set-up in session_id")
       .value();
 }
 
@@ -429,17 +467,14 @@ std::optional<Error> Look::of_sigma() const {
 }
 
 /// A measured point that is not that of the tool.
-std::optional<Error> Look::of_tool() const {
-  const NumberTable some = thinned(table_, kRowsFitted);
-  std::optional<ArmFit> anywhere;
+std::optional<Error> Look::of_tool() {
   for (const auto& [tool, X_FT] : given_->tools) {
     const auto& drawn = cell_.tools.at(tool);
     if (!drawn || (X_FT.translation() - drawn->translation()).norm() < kToolStddev) continue;
-    if (!anywhere) anywhere = fitted(some, cell_, *given_, reading::ToolPoints::kAnywhere);
-    const Vector3 p_FT = anywhere->tools.at(tool).translation();
+    const Vector3 p_FT = anywhere().tools.at(tool).translation();
     const Vector3 moved = p_FT - drawn->translation();
     const Matrix3 spread =
-        anywhere->tool_covariance.at(tool) + kToolStddev * kToolStddev * Matrix3::Identity();
+        anywhere().tool_covariance.at(tool) + kToolStddev * kToolStddev * Matrix3::Identity();
     if (moved.dot(spread.ldlt().solve(moved)) > kToolSigmas * kToolSigmas)
       return of_tool_at(tool, p_FT);
   }

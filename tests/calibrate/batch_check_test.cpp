@@ -90,6 +90,22 @@ TEST(BatchCheck, AToolOfAnotherNameIsNamed) {
   EXPECT_EQ(said->text, "those of tool 'probe'") << sentence(*said);
 }
 
+TEST(BatchCheck, AToolWithAnotherSignInItsPlaceIsNoMistakeInAJoint) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const Vector3 point(0.08, -0.06, 0.15);
+  robot.truth.tools.at("spindle").translation() = point;
+  const MeasurementBatch batch = test::measured(robot, 60, 5, false);
+  for (int k = 0; k < 3; ++k) {
+    Vector3 drawn = point;
+    drawn(k) *= -1;
+    cell->tools["spindle"] = make_pose(Matrix3::Identity(), drawn);
+    const auto said = test::said_of(batch, *cell);
+    ASSERT_TRUE(said) << k;
+    EXPECT_EQ(said->text, "another point of the tool") << k << ": " << sentence(*said);
+  }
+}
+
 TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   Pose probe = *cell->tools.at("spindle");
@@ -138,6 +154,12 @@ TEST(BatchCheck, SeveralReflectorsUnderOneNameAreNotAveraged) {
     EXPECT_EQ(said->field, "tool_id") << sentence(*said);
     EXPECT_EQ(said->text, "several points of the tool") << sentence(*said);
   }
+  MeasurementBatch one_after_the_other = seen_by({Vector3::Zero()}, of_one);
+  for (const Measurement& m : seen_by({three.back()}, of_one).measurements)
+    one_after_the_other.measurements.push_back(m);
+  const auto blocks = test::said_of(one_after_the_other, *cell);
+  ASSERT_TRUE(blocks);
+  EXPECT_EQ(blocks->text, "several points of the tool") << sentence(*blocks);
   MeasurementBatch repeats = seen_by({Vector3::Zero(), Vector3(2e-4, 0, 0)}, of_one);
   repeats.measurements[10].p_W += Vector3(0.3, 0, 0);  // one bad row is no second reflector
   const auto nothing = test::said_of(repeats, *cell);

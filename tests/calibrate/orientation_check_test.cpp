@@ -137,6 +137,15 @@ TEST(OrientationCheck, SomeRowsOfAnotherOrderAreCountedAndTheFirstIsNamed) {
   }
 }
 
+TEST(OrientationCheck, OrientationsThatAreTheSameInAllRowsWereNotMeasured) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = measured(cell, 40, 3);
+  for (Measurement& m : batch.measurements) m.R_WT = Matrix3::Identity();
+  const auto doubt = orientation_doubt(batch, *cell);
+  ASSERT_TRUE(doubt);
+  EXPECT_EQ(doubt->text, "the same in all rows") << sentence(*doubt);
+}
+
 TEST(OrientationCheck, OneWrongOrientationIsNamed) {
   MeasurementBatch batch = measured(test::cell_7(), 80, 8);
   batch.measurements[30].R_WT = *batch.measurements[30].R_WT * rotation_exp({0, 0.5, 0});

@@ -173,6 +173,22 @@ TEST(ModelNotes, PositionsThatTheDrawingHasBetterThanTheInstrumentMeasuresWereCo
   EXPECT_TRUE(codes(0.02, 3).empty());
 }
 
+TEST(ModelNotes, PositionsOfAControllerThatKnowsItsArmsErrorsWereComputed) {
+  const auto is_told = [](double left, int poses) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.training.poses = poses;
+    parts.training.nominal.rms = 1.5e-3;
+    parts.training.calibrated.rms = left;
+    parts.rank = 30;
+    const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    return std::any_of(notes.begin(), notes.end(),
+                       [](const Note& note) { return note.code == "computed_positions"; });
+  };
+  EXPECT_TRUE(is_told(0.5e-6, 60));
+  EXPECT_FALSE(is_told(20e-6, 60)) << "a good arm, whatever sigma is stated";
+  EXPECT_FALSE(is_told(0.5e-6, 12)) << "as many numbers as parameters";
+}
+
 TEST(ModelNotes, RowsThatFitNothingAreNamedAndManyOfThemWaitForAPerson) {
   CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
   parts.provenance.training_poses = 42;

@@ -145,6 +145,8 @@ TEST(Wording, SaysThatPositionsWereComputedWhereTheyAreBetterThanTheInstrument) 
   log.before.rms = log.after.rms = 0.5e-6;
   const std::string sentence = sentence_for(log);
   EXPECT_NE(sentence.find("computed, not measured"), std::string::npos) << sentence;
+  log.before.rms = log.after.rms = 8e-6;  // a good arm beside a sigma that is stated too large
+  EXPECT_EQ(sentence_for(log).find("computed"), std::string::npos) << sentence_for(log);
   EXPECT_EQ(sentence.find("noise"), std::string::npos) << sentence;
 }
 

@@ -45,6 +45,23 @@ TEST(RoboDkCsv, FindsNamedColumnsWithEverySeparatorAndDecimalCommas) {
   }
 }
 
+TEST(RoboDkCsv, KnowsJointsInOtherLanguagesAndCountsThemFromOne) {
+  for (const char* text : {"Achse1 [Grad];Achse2 [Grad];X [mm];Y [mm];Z [mm]\n90;-45,5;1;2;3\n",
+                           "axe1 (\u00b0);axe2 (\u00b0);X;Y;Z\n90;-45,5;1;2;3\n",
+                           "theta_1,theta_2,X,Y,Z\n90,-45.5,1,2,3\n"}) {
+    const auto batch = parse_batch(text, "cell.csv");
+    ASSERT_TRUE(batch) << text << sentence(batch.error());
+    EXPECT_NEAR(batch->measurements[0].context.q(1), from_deg(-45.5), 1e-15) << text;
+  }
+  EXPECT_EQ(refusal_of(parse_batch("J0,J1,X,Y,Z\n90,-45.5,1,2,3\n", "cell.csv")),
+            Refusal("cell.csv", {}, "J0"));
+  EXPECT_EQ(refusal_of(parse_batch("q0_deg,q1_deg,x_mm,y_mm,z_mm\n90,-45.5,1,2,3\n", "cell.csv")),
+            Refusal("cell.csv", {}, "q0_deg"));
+  const auto twice = parse_batch("J1,X,Y,Z,q1,q2,q3,q4\n9,1,2,3,1,0,0,0\n", "cell.csv");
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().next.find("qw, qx, qy, qz"), std::string::npos) << twice.error().next;
+}
+
 TEST(RoboDkCsv, TurnsEachKindOfAnglesAsItsControllerDoes) {
   const double x = 0.1, y = -0.2, z = 2.5;
   const auto rotation = [](const std::string& names, const std::string& values) {

@@ -108,6 +108,33 @@ TEST(CsvTable, NamesTheColumnThatWasMeant) {
   EXPECT_NE(table->require("q1_deg").error().next.find("q1_dge"), std::string::npos);
   EXPECT_NE(table->require("x_mm").error().next.find("x_m"), std::string::npos);
   EXPECT_EQ(table->require("y_mm").value(), 2u) << "upper and lower case are the same name";
+  const auto next_of = [](const char* header) {
+    const auto other = CsvTable::parse(header, "f.csv");
+    return other ? other->require("x_mm").error().next : other.error().next;
+  };
+  const std::string both = next_of("x_nom_mm,x_meas_mm\n");
+  EXPECT_NE(both.find("x_nom_mm or x_meas_mm"), std::string::npos) << both;
+  for (const char* one : {"x_mm|y_mm|z_mm\n", "x_mm y_mm z_mm\n"})
+    EXPECT_NE(next_of(one).find("separate names and values"), std::string::npos) << next_of(one);
+}
+
+TEST(CsvTable, SaysHowATextBecomesANumberAndATitleAComment) {
+  const auto table =
+      CsvTable::parse("x_mm;y_mm\n1\u00a0840,774;\u22125\n1'840.5;7 mm\n1e9;0\n", "f.csv");
+  ASSERT_TRUE(table) << sentence(table.error());
+  const auto next_of = [&](std::size_t row, std::size_t column) {
+    return table->number(row, column, 1e6).error().next;
+  };
+  for (const std::size_t row : {0, 1})
+    EXPECT_NE(next_of(row, 0).find("separates thousands"), std::string::npos) << next_of(row, 0);
+  EXPECT_NE(next_of(0, 1).find("minus"), std::string::npos) << next_of(0, 1);
+  EXPECT_NE(next_of(1, 1).find("digits alone"), std::string::npos) << next_of(1, 1);
+  EXPECT_NE(next_of(2, 0).find("another unit"), std::string::npos) << next_of(2, 0);
+  const auto titled = CsvTable::parse("Report of Monday\nx_mm,y_mm\n1,2\n", "f.csv");
+  EXPECT_EQ(refusal_of(titled), Refusal("f.csv", 2).beyond(2, 1));
+  EXPECT_NE(titled.error().next.find("'Report of Monday'"), std::string::npos)
+      << titled.error().next;
+  EXPECT_FALSE(CsvTable::parse("x_mm,y_mm\r1,2\r", "f.csv")) << "line ends of old programs";
 }
 
 }  // namespace

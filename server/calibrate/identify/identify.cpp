@@ -75,8 +75,9 @@ Status check_positions_belong(const MeasurementBatch& batch, double rms) {
       .of("x_mm")
       .beyond(to_mm(rms), to_mm(std::max(kNoModelError, kNoModelShare * spread)))
       .next(
-          "look at the order of the joints, their signs and zeros, and which row belongs to which "
-          "position");
+          "look at the order of the joints, their signs and zeros, which row belongs to which "
+          "position and to which reflector (tool_id), and at a base that the cell file says and no "
+          "error source finds");
 }
 
 /// Checks the same for gauges.

@@ -274,7 +274,9 @@ std::string sentence_for(const Diagnosis& d) {
     const std::string nothing = fmt::format(
         "{} {} found in {} poses: ", drawing.empty() ? "Nothing" : "Beyond that nothing",
         all.bad_poses.empty() ? "was" : "else was", d.poses);
-    const auto computed = computed_not_measured(d.before.rms, d.instrument, d.poses);
+    auto computed = computed_by_its_arm(d.before.rms, d.poses);
+    if (!computed && d.budget)
+      computed = computed_not_measured(d.budget->beyond_frames.error_rms, d.instrument, d.poses);
     add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise",
                                                 1e6 * d.after.rms)));
   }

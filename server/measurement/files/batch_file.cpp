@@ -22,8 +22,7 @@ bool is_ours(const std::string& field) {
 }
 
 bool is_first_joint(const std::string& field) {
-  const std::string name = column_name(field).name;
-  return name == "j1" || name == "joint1" || name == "axis1" || name == "a1" || name == "q1";
+  return joint_number(column_name(field).name).value_or(2) <= 1;
 }
 
 bool is_text(const std::string& field) { return !field.empty() && !is_number(field); }

@@ -93,6 +93,10 @@ Status check_is_text(std::string_view text, const std::string& where) {
     return refused("not text but a spreadsheet (.xls)").in(where).next(kExport);
   if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv))
     return refused("text in UTF-16, expected UTF-8").in(where).next(kExport);
+  if (text.find('\r') != std::string_view::npos && text.find('\n') == std::string_view::npos)
+    return refused("lines end with CR alone, as old programs write them")
+        .in(where)
+        .next("save it with line ends of Windows (CRLF) or Unix (LF)");
   if (text.starts_with("%PDF"sv) || text.starts_with("\x1F\x8B"sv))
     return refused("not text but a {}", text.front() == '%' ? "PDF" : "compressed file")
         .in(where)

@@ -27,6 +27,22 @@ constexpr const char* kTwoCommas =
 constexpr const char* kThousands =
     "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
 
+/// How a value that is no number becomes one. Blanks of all kinds and apostrophes separate
+/// thousands; word processors write another minus.
+const char* mended(std::string text) {
+  for (const std::string_view minus : {"\u2212", "\u2013"})
+    if (text.starts_with(minus)) return "its minus is another character: write it as '-'";
+  for (const std::string_view apart : {" ", "\u00a0", "\u202f", "\u2009", "'"}) {
+    for (auto at = text.find(apart); at != std::string::npos; at = text.find(apart)) {
+      text.erase(at, apart.size());
+      if (decimal_sign(text)) return kThousands;
+    }
+  }
+  const bool comma = text.find(',') != std::string::npos;
+  if (comma && text.find('.') != std::string::npos) return kThousands;
+  return comma ? kTwoCommas : "write it with digits alone: the unit stands in the column's name";
+}
+
 /// Checks that the values of a row may stand in a table.
 Status check_values(const CsvTable::Row& row, const std::string& where) {
   if (row.fields.size() > CsvTable::kMostColumns)
@@ -166,7 +182,7 @@ Status CsvTable::set_columns(Row header) {
     return refused("numbers where the names of the columns are expected")
         .in(where_)
         .at_row(header.line)
-        .next("put a line of names above them; trammel help formats tells the names");
+        .next("put a line of names above them, without #; trammel help formats tells the names");
   std::set<std::string> seen;
   for (const std::string& name : header.fields) {
     if (name.empty())
@@ -176,7 +192,10 @@ Status CsvTable::set_columns(Row header) {
           .with_value(seen.size() + 1)
           .next("name it, or delete it where it is empty");
     if (const Status plain = check_name(name, "column name"); !plain)
-      return Failure(plain.error()).in(where_).at_row(header.line);
+      return Failure(plain.error())
+          .in(where_)
+          .at_row(header.line)
+          .next(is_utf8(name) ? "rename it" : kSaveAsUtf8);
     if (!seen.insert(name).second) {
       return refused("column {} appears twice", shown_short(name))
           .in(where_)
@@ -195,11 +214,19 @@ Status CsvTable::add_row(Row row) {
         std::all_of(row.fields.begin(), row.fields.end(),
                     [](const std::string& field) { return field.find('.') == std::string::npos; });
     const bool commas = separator_ == ',' && row.fields.size() > columns_.size() && pointless;
+    const std::string title =
+        columns_.size() > 1
+            ? ""
+            : fmt::format("is '{}' no name of a column? Delete what stands above the line of names, "
+                          "or begin each such line with #",
+                          shown_short(columns_.front()));
     return refused("{} values, the header has {} columns", row.fields.size(), columns_.size())
         .in(where_)
         .beyond(row.fields.size(), columns_.size())
         .at_row(row.line)
-        .next(commas ? kTwoCommas : "a value that is not known stays empty between its separators");
+        .next(!title.empty() ? title
+              : commas       ? kTwoCommas
+                             : "a value that is not known stays empty between its separators");
   }
   if (rows_.size() == most_rows_)
     return failure(ErrorCode::kTooLarge, "more than {} rows", most_rows_)
@@ -309,7 +336,7 @@ std::optional<std::size_t> CsvTable::find(std::string_view column) const {
 
 namespace {
 
-/// A column that was meant, by its spelling or by what stands before its unit; empty where none
+/// Columns of which one was meant, by spelling or by what stands before the unit; empty where none
 /// looks like it.
 std::string meant_by(const std::string& column, const std::vector<std::string>& columns) {
   std::vector<std::string> names;
@@ -321,9 +348,12 @@ std::string meant_by(const std::string& column, const std::vector<std::string>& 
   const auto stem = [](const std::string& name) {
     return name.substr(0, name.find_first_of("_ (["));
   };
+  std::vector<std::string> alike;
   for (const std::string& name : names) {
-    if (stem(name) == stem(column) && column.find('_') != std::string::npos) return spelled(name);
+    if (stem(name) == stem(column) && column.find('_') != std::string::npos)
+      alike.push_back(shown_short(spelled(name)));
   }
+  if (!alike.empty()) return fmt::format("{}", fmt::join(alike, " or "));
   // `x_mm` and `y_mm`, `q1_deg` and `q2_deg` are near to each other and mean different things.
   constexpr std::size_t kTellsNothing = 2;
   std::erase_if(names, [&](const std::string& name) {
@@ -331,7 +361,7 @@ std::string meant_by(const std::string& column, const std::vector<std::string>& 
            (stem(name).size() <= kTellsNothing || stem(column).size() <= kTellsNothing);
   });
   const std::string near = near_miss(column, names);
-  return near.empty() ? "" : spelled(near);
+  return near.empty() ? "" : shown_short(spelled(near));
 }
 
 }  // namespace
@@ -339,6 +369,14 @@ std::string meant_by(const std::string& column, const std::vector<std::string>& 
 Result<std::size_t> CsvTable::require(std::string_view column) const {
   if (const auto at = find(column)) return *at;
   const std::string wanted(column);
+  if (columns_.size() == 1 && columns_.front().find_first_of("| ") != std::string::npos)
+    return refused("missing column {}", wanted)
+        .in(where_)
+        .of(wanted)
+        .next(
+            fmt::format("the only name is '{}': separate names and values by commas, semicolons "
+                        "or tabs, and delete lines above the names",
+                        shown_short(columns_.front())));
   const std::string meant = meant_by(wanted, columns_);
   const std::string names = shown_short(fmt::format("{}", fmt::join(columns_, ",")));
   return refused("missing column {}", wanted)
@@ -347,7 +385,7 @@ Result<std::size_t> CsvTable::require(std::string_view column) const {
       .next(meant.empty()
                 ? fmt::format("the header has: {}; trammel help formats tells them all", names)
                 : fmt::format("is it column {}? then call it {}, with its values in that unit",
-                              shown_short(meant), wanted));
+                              meant, wanted));
 }
 
 Result<std::vector<std::size_t>> CsvTable::all_or_none(
@@ -397,15 +435,11 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
             limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
-    const bool comma = text.find(',') != std::string_view::npos,
-               point = text.find('.') != std::string_view::npos;
     return refuse(row, "{} is '{}', expected a number", columns_[column],
                   shown_short(field(row, column)))
         .of(columns_[column])
         .with_text(shown_short(field(row, column)))
-        .next(comma && point ? kThousands
-              : comma        ? kTwoCommas
-                             : "write it with digits alone: the unit stands in the column's name");
+        .next(mended(std::string(text)));
   }
   if (!std::isfinite(value)) {
     return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column))
@@ -415,7 +449,8 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
   if (std::abs(value) > limit) {
     return refuse(row, "{} is {:g}, limit {:g}", columns_[column], value, limit)
         .of(columns_[column])
-        .beyond(value, limit);
+        .beyond(value, limit)
+        .next("are its values in another unit? The column's name says in which they are");
   }
   return value;
 }

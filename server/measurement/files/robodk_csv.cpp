@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kFarthest = 1e3;   // m
 constexpr double kTurnsLimit = 10;  // of a joint
-constexpr std::size_t kMostJoints = 12;
 constexpr std::size_t kPositionalJoints = 6;
 constexpr std::size_t kFewestColumns = 9;    // of a layout by position
 constexpr std::size_t kColumnsOfPoses = 18;  // of the one with orientations
@@ -45,19 +44,6 @@ struct RoboDkColumns {
   std::optional<std::size_t> pose_id;
   Orientation orientation = Orientation::kNone;
 };
-
-/// `j3`, `joint3`, `axis3`, `a3`, `q3` -> 3; 0 for any other name.
-std::size_t joint_number(std::string_view name) {
-  for (const std::string_view prefix : {"joint", "axis", "j", "a", "q"}) {
-    if (!name.starts_with(prefix)) continue;
-    const std::string_view digits = name.substr(prefix.size());
-    std::size_t number = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-    const bool whole = error == std::errc() && end == digits.data() + digits.size();
-    if (whole && number >= 1 && number <= kMostJoints) return number;
-  }
-  return 0;
-}
 
 /// The column with the unit that its header names, or `unit`.
 Result<ScaledColumn> scaled(const CsvTable& table, std::size_t column, std::string unit) {
@@ -121,14 +107,21 @@ class NamedColumns {
   [[nodiscard]] Status find_joints() {
     std::map<std::size_t, std::size_t> column_of_joint;
     for (std::size_t column = 0; column < names_.size(); ++column) {
-      const std::size_t number = joint_number(names_[column]);
-      if (number == 0) continue;
-      const auto [earlier, is_new] = column_of_joint.emplace(number, column);
+      const std::optional<int> number = joint_number(names_[column]);
+      if (!number) continue;
+      if (*number == 0)
+        return refused("column {}: joints count from 1", table_.columns()[column])
+            .in(table_.where())
+            .of(table_.columns()[column])
+            .next("name the columns J1, J2 and so on; a column of no joint by another letter");
+      const auto [earlier, is_new] =
+          column_of_joint.emplace(static_cast<std::size_t>(*number), column);
       if (is_new) continue;
-      return refused("two columns for joint {}: {} and {}", number,
+      return refused("two columns for joint {}: {} and {}", *number,
                      table_.columns()[earlier->second], table_.columns()[column])
           .in(table_.where())
-          .of(table_.columns()[column]);
+          .of(table_.columns()[column])
+          .next("is one of them a quaternion's? Name its columns qw, qx, qy, qz");
     }
     for (const auto& [number, column] : column_of_joint) {
       if (number != found_.joints.size() + 1) {
@@ -438,11 +431,12 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
   const RoboDkTable parts = TRY(take_apart(text, where));
   Result<MeasurementBatch> batch = batch_of(parts, text, where);
   if (batch || !parts.positional) return batch;
-  return Failure(batch.error())
-      .next(fmt::format("no column is named J1, so they were taken by their places, as RoboDK "
+  Error failed = batch.error();
+  failed.next = fmt::format("no column is named J1, so they were taken by their places, as RoboDK "
                         "writes them (six joints, X Y Z{}, the TCP's): {}",
                         parts.table.columns().size() == kColumnsOfPoses ? " Rx Ry Rz" : "",
-                        kNameTheColumns));
+                        kNameTheColumns);
+  return Failure(std::move(failed));
 }
 
 Result<MeasurementBatch> read_robodk_csv(const std::string& path) {

@@ -162,6 +162,20 @@ bool is_number(std::string_view field) {
   return error == std::errc() && end == field.data() + field.size() && !field.empty();
 }
 
+std::optional<int> joint_number(std::string_view name) {
+  constexpr int kMostJoints = 12;
+  for (const std::string_view prefix : {"joint", "axis", "achse", "axe", "asse", "eje", "gelenk",
+                                        "theta", "j", "a", "q"}) {
+    if (!name.starts_with(prefix)) continue;
+    const std::string_view digits = name.substr(prefix.size());
+    int number = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    const bool whole = error == std::errc() && end == digits.data() + digits.size();
+    if (whole && number >= 0 && number <= kMostJoints) return number;
+  }
+  return std::nullopt;
+}
+
 ColumnName column_name(std::string_view field) {
   ColumnName column;
   const auto bracket = std::min(field.find_first_of("([{"), field.size());
@@ -171,6 +185,8 @@ ColumnName column_name(std::string_view field) {
   for (const std::string_view unit : {"deg", "rad", "in"}) {
     if (column.unit.starts_with(unit)) column.unit = unit;
   }
+  // German, Italian and Spanish degrees. Gon, which English calls so, do not follow the joints.
+  if (column.unit.starts_with("grad")) column.unit = "deg";
   std::string_view name = trimmed(field.substr(0, bracket));
   if (const auto underscore = name.rfind('_');
       column.unit.empty() && underscore != std::string_view::npos) {

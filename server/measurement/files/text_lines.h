@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -50,5 +51,9 @@ struct ColumnName {
   std::string unit;  ///< lower case; longer spellings become deg, rad and in; empty: none given
 };
 [[nodiscard]] ColumnName column_name(std::string_view field);
+/// The joint that a column_name() is of, from 1: `j3`, `joint3`, `axis3`, `a3`, `q3`, and in other
+/// languages `achse3`, `axe3`, `asse3`, `eje3`, `gelenk3`, `theta3`. 0 is one of those that count
+/// from 0; nothing for any other name, and beyond 12 joints.
+[[nodiscard]] std::optional<int> joint_number(std::string_view name);
 
 }  // namespace trammel
