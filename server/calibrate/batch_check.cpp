@@ -4,6 +4,7 @@
 
 #include "server/calibrate/gauges/gauge_doubt.h"
 #include "server/calibrate/orientation_check.h"
+#include "server/measurement/computed_positions.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/reading_doubt.h"
 #include "server/measurement/sessions.h"
@@ -33,6 +34,20 @@ std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell
   return std::nullopt;
 }
 
+/// Positions that are the drawing's, of which a model in force would say that its arm has changed.
+std::optional<Error> computed_doubt(double off_drawing, const MeasurementBatch& batch,
+                                    const Cell& cell) {
+  if (off_drawing < 0) return std::nullopt;
+  const auto computed = computed_not_measured(off_drawing, cell.tracker.sigma,
+                                              static_cast<int>(batch.measurements.size()));
+  if (!computed) return std::nullopt;
+  return refused("{}", *computed)
+      .of("x_mm,y_mm,z_mm")
+      .with_text("computed")
+      .next("are they the controller's own? Only measured positions tell anything of the arm")
+      .value();
+}
+
 }  // namespace
 
 std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell) {
@@ -43,8 +58,9 @@ std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell
 }
 
 std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell) {
-  return doubt_of_sessions(batch, cell, [](const ReadingLook& seen) {
-    return seen.of_tool ? std::optional<Error>() : seen.doubt;
+  return doubt_of_sessions(batch, cell, [&](const ReadingLook& seen) {
+    if (seen.doubt && !seen.of_tool) return seen.doubt;
+    return computed_doubt(seen.off_drawing, batch, cell);
   });
 }
 

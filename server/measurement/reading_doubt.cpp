@@ -37,7 +37,8 @@ constexpr double kFollow =
 constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joints
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
-constexpr double kSamePlace = 1e-6;   // spread of positions that were not measured
+constexpr double kFixedPoint = 1e-3;   // spread of a tip's places on a spike
+constexpr double kSamePlace = 1e-6;    // the same where nobody measured it
 constexpr double kOtherPlace = 50e-3;  // farther, no base stands from where the cell file has it
 // A larger zero error than any robot has.
 constexpr double kMostZero = from_deg(15);
@@ -94,7 +95,9 @@ class Look {
       : cell_(cell), table_(reading::table_of(batch)) {
     if (table_.size() < kFewestPoses) return;
     const NumberTable some = thinned(table_, kRowsFitted);
-    given_ = fitted(some, cell_, located(thinned(table_, kRowsLocated), cell_));
+    const ArmFit drawn = located(thinned(table_, kRowsLocated), cell_);
+    off_drawing_ = drawn.off;
+    given_ = fitted(some, cell_, drawn);
     if (given_->quality > kWorthAsking && are_at_one_place(table_.p_W))
       given_ = fitted_from_all_sides(some, cell_, *given_);
   }
@@ -102,9 +105,12 @@ class Look {
   ReadingLook look() {
     ReadingLook seen;
     seen.zeros = JointVector::Zero(cell_.robot.size());
+    seen.off_drawing = off_drawing_;
     if (!given_) return seen;
     seen.doubt = of_several_points();
-    if (!seen.doubt) seen.doubt = of_place();
+    if (seen.doubt) return seen;
+    seen.doubt = of_place();
+    seen.of_tool = seen.doubt.has_value();
     if (seen.doubt) return seen;
     if (given_->quality > kWorthAsking) {
       search();
@@ -155,6 +161,7 @@ class Look {
   const Cell& cell_;
   const NumberTable table_;
   std::optional<ArmFit> given_, anywhere_;
+  double off_drawing_ = -1;
   std::vector<Reading> readings_;
   std::vector<Tried> found_;  // readings that fit and cannot be told apart, the most likely first
 };
@@ -301,13 +308,14 @@ std::optional<Error> Look::of_several_points() const {
       .value();
 }
 
-/// Positions at one place where a base that stands where the cell says does not have it. They do
+/// Positions at one fixed point where a base that stands where the cell says does not have it. They do
 /// not tell how it stands instead, and the arm would be bent until it reached there.
 std::optional<Error> Look::of_place() const {
   const bool tools_known = std::all_of(table_.from.begin(), table_.from.end(), [&](const auto* m) {
     return cell_.tools.at(m->context.tool).has_value();
   });
-  if (!are_at_one_place(table_.p_W) || (!cell_.X_WB && !tools_known)) return std::nullopt;
+  if (spread_of(table_.p_W) > kFixedPoint || (!cell_.X_WB && !tools_known)) return std::nullopt;
+  if (pose_groups(table_.q.transpose()).size() < kFewestPoses) return std::nullopt;
   const Vector3 place = table_.p_W.rowwise().mean();
   const auto shown = [](const Vector3& p) {
     return fmt::format("[{:.1f}, {:.1f}, {:.1f}]", to_mm(p.x()), to_mm(p.y()), to_mm(p.z()));

@@ -32,10 +32,14 @@ struct ReadingLook {
   /// about. Empty where they follow the joints, where no other reading fits much better, and of
   /// fewer than 6 poses.
   std::optional<Error> doubt;
-  bool of_tool =
-      false;  ///< the doubt is of another tool or another point of it, and of no mistake of reading
+  /// The doubt is of another tool, another point of it or another place of the base, and of no
+  /// mistake of reading.
+  bool of_tool = false;
   JointVector zeros;  ///< rad (m), of each joint: where the positions put its zero; 0 where they do
                       ///< not tell
+  /// m: how far the positions are off the drawing itself, base and unknown tools wherever they fit
+  /// best; of the seven of ten that fit best. Negative: fewer than 6 poses.
+  double off_drawing = -1;
   /// Where the base stands by the positions, if they tell to a degree how it is turned.
   std::optional<Pose> X_WB;
 };

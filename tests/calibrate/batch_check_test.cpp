@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/base/units.h"
 #include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
 #include "tests/support/gauged_arm.h"
@@ -213,6 +214,39 @@ TEST(BatchCheck, PositionsThatAreInUmAreStillNamed) {
   const auto said = test::said_of(std::move(batch), *cell);
   ASSERT_TRUE(said);
   EXPECT_EQ(said->text, "with all positions in um") << sentence(*said);
+}
+
+TEST(BatchCheck, ALogInRadiansAndMetresIsNamedAsOne) {
+  FirstBatch first;
+  first.robot = "universal-robots_ur5";
+  first.base_known = first.tool_known = first.orientation = false;
+  const auto cell = test::new_cell(first);
+  MeasurementBatch batch = test::measured_first(first, *cell);
+  for (Measurement& m : batch.measurements) {
+    m.context.q *= kPi / 180;
+    m.p_W /= 1000;
+  }
+  const auto said = test::said_of(std::move(batch), *cell);
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->text, "with all joints in radians and all positions in metres")
+      << sentence(*said);
+}
+
+TEST(BatchCheck, PositionsThatAControllerComputedAreNoChangeOfAnArm) {
+  const auto cell = test::cell_7_unlocated();
+  MeasurementBatch batch = test::demand(check_against_cell(
+      test::measured(test::chapter_5_robot(test::cell_7()), 60, 3), *cell)).rows();
+  const auto measured = reading_doubt(batch, *cell);
+  EXPECT_FALSE(measured) << sentence(*measured);
+  for (Measurement& m : batch.measurements) {
+    const Pose X_BT = cell->robot.flange_pose(m.context.q) * *test::cell_7()->tools.at("spindle");
+    m.p_W = X_BT.translation();
+    m.R_WT.reset();
+  }
+  const auto computed = reading_doubt(batch, *cell);
+  ASSERT_TRUE(computed);
+  EXPECT_EQ(computed->text, "computed") << sentence(*computed);
+  EXPECT_FALSE(batch_doubt(batch, *cell)) << "a training says it as a note";
 }
 
 TEST(BatchCheck, ARobotFileInCraigsConventionIsTold) {

@@ -18,6 +18,7 @@ constexpr int kMostWithManySigns = 7;  // joints of a robot: of more only single
 constexpr double kOtherUnit = 3;       // times: rows that are nearer than the others by that much
 constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
 constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
+constexpr const char* kAllRadians = "with all joints in radians";
 
 constexpr std::array<double, 3> kTurns = {90, -90, 180};
 
@@ -50,6 +51,7 @@ class JointReadings {
       if (turns(j)) units(j);
     }
     unit_of_all("radians", 180 / kPi);
+    all_in_si();
     unit_of_all("gon", kGon);
     couplings();
     for (int j = 0; j < robot_.size(); ++j) {
@@ -116,6 +118,17 @@ class JointReadings {
         [turning, factor](Eigen::MatrixXd& q) {
           for (const int j : turning) q.row(j) *= factor;
         });
+  }
+  /// Logs of programs that count in rad and m, under our names.
+  void all_in_si() {
+    if (all_.empty() || all_.back().name != kAllRadians) return;
+    all_.push_back({std::string(kAllRadians) + " and all positions in metres",
+                    std::string("q1_deg,") + kAllAxes, false,
+                    [radians = all_.back().apply](NumberTable table) {
+                      table = radians(std::move(table));
+                      table.p_W *= to_mm(1);
+                      return table;
+                    }});
   }
   /// A controller that reports a joint together with one that drives it, or the joint file without
   /// it.
