@@ -58,7 +58,7 @@ struct Reading {
   Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
   bool by_order =
       true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
-  std::string remedy;  ///< what to write in the file; empty: nothing that holds for certain
+  std::string remedy;        ///< what to write in the file; empty: nothing that holds for certain
   Quaternions or_else = {};  ///< what each pose may be instead; empty: nothing
 
   [[nodiscard]] const Quaternions& second() const { return or_else.empty() ? q_FT : or_else; }
@@ -268,10 +268,10 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
 /// How three numbers tell an orientation, and what to call that.
 struct Told {
   std::string name;
-  std::array<int, 3> axes;     ///< of the turns, each about the axis as turned so far
-  bool from_behind = false;    ///< the last number is of the first turn
-  std::string columns = {};    ///< what to name them in a file; empty: no names are read so
-  bool is_vector = false;      ///< a rotation vector, which has no turns
+  std::array<int, 3> axes;   ///< of the turns, each about the axis as turned so far
+  bool from_behind = false;  ///< the last number is of the first turn
+  std::string columns = {};  ///< what to name them in a file; empty: no names are read so
+  bool is_vector = false;    ///< a rotation vector, which has no turns
 
   [[nodiscard]] Quaternion from(const Vector3& rad) const {
     if (is_vector) return Quaternion(rotation_exp(rad));
@@ -315,8 +315,8 @@ const std::vector<Told>& ways_to_tell() {
           const std::array<int, 3> axes = {i, j, k};
           const auto is_there = [&](const Told& way) { return way.axes == axes; };
           if (i == j || j == k || std::any_of(ways.begin(), ways.end(), is_there)) continue;
-          ways.push_back({fmt::format("as turns about {}, {}, {}", kNames[i], kNames[j], kNames[k]),
-                          axes});
+          ways.push_back(
+              {fmt::format("as turns about {}, {}, {}", kNames[i], kNames[j], kNames[k]), axes});
         }
       }
     }
@@ -581,8 +581,8 @@ std::optional<Error> doubt_of_same(const Oriented& group) {
   double turned = 0;
   for (std::size_t i = 0; i < group.rows.size(); ++i) {
     if (*group.rows[i]->R_WT != *group.rows.front()->R_WT) return std::nullopt;
-    turned = std::max(turned, angle(Quaternion(group.X_BF[i].linear()),
-                                    Quaternion(group.X_BF.front().linear())));
+    turned = std::max(
+        turned, angle(Quaternion(group.X_BF[i].linear()), Quaternion(group.X_BF.front().linear())));
   }
   if (turned < kMostOff) return std::nullopt;
   return refused("all {} orientations are the same, while the joints turn the flange by up to {}",

@@ -286,8 +286,8 @@ long measured_numbers(const Evaluation& training) {
   return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);
 }
 
-/// The drawing knows no number of the batch, so nothing can make its errors small; an identified arm
-/// makes them small where the numbers are few.
+/// The drawing knows no number of the batch, so nothing can make its errors small; an identified
+/// arm makes them small where the numbers are few.
 void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const Evaluation& training = parts.training;
   auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma,

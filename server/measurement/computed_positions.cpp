@@ -28,7 +28,8 @@ std::optional<std::string> computed_not_measured(double rms, double sigma, int p
 std::optional<std::string> computed_by_its_arm(double rms, int poses) {
   if (poses < kEnoughPoses || !(rms > 0 && rms < kNoArmRepeats)) return std::nullopt;
   return fmt::format(
-      "the positions are the model's to {:.4f} mm, and no arm repeats to {:.3f} mm: these positions "
+      "the positions are the model's to {:.4f} mm, and no arm repeats to {:.3f} mm: these "
+      "positions "
       "were computed, not measured",
       to_mm(rms), to_mm(kNoArmRepeats));
 }

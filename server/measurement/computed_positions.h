@@ -12,8 +12,8 @@ namespace trammel {
 [[nodiscard]] std::optional<std::string> computed_not_measured(double rms, double sigma, int poses);
 
 /// The same of `rms` (m) that is left when all of an arm was identified: as little as no arm
-/// repeats, whatever the instrument is said to measure. The controller knows its arm's errors. 0: not
-/// known.
+/// repeats, whatever the instrument is said to measure. The controller knows its arm's errors. 0:
+/// not known.
 [[nodiscard]] std::optional<std::string> computed_by_its_arm(double rms, int poses);
 
 }  // namespace trammel

@@ -61,7 +61,8 @@ Status check_pose(PoseContext& context, const Cell& cell) {
         .of(joint_column(*outside, joint.type))
         .beyond(joint_to_column(value, joint.type), joint_to_column(limit, joint.type))
         .next(
-            "is the joint told in this unit, and with the sign and the zero of the robot file? Else "
+            "is the joint told in this unit, and with the sign and the zero of the robot file? "
+            "Else "
             "the limit in that file is another one");
   }
   Result<std::string> tool = resolve_tool(cell, context.tool);

@@ -269,9 +269,7 @@ std::optional<Error> Look::of_several_points() const {
     std::size_t repeated = 0, apart = 0;
     double worst = 0;
     int first = 0, second = 0;
-    [[nodiscard]] bool is_told() const {
-      return apart >= kFewestBadRows && 2 * apart > repeated;
-    }
+    [[nodiscard]] bool is_told() const { return apart >= kFewestBadRows && 2 * apart > repeated; }
   };
   Apart next, any;
   for (const PoseGroup& rows : pose_groups(table_.q.transpose())) {
@@ -283,8 +281,7 @@ std::optional<Error> Look::of_several_points() const {
       const double distance = (row.p_W - before.p_W).norm();
       far = std::max(far, distance);
       if (rows[k] == rows[k - 1] + 1) far_next = std::max(far_next, distance);
-      if (distance > any.worst)
-        any.worst = distance, any.first = before.row, any.second = row.row;
+      if (distance > any.worst) any.worst = distance, any.first = before.row, any.second = row.row;
     }
     for (auto& [all, farthest] : {std::pair(&next, far_next), std::pair(&any, far)}) {
       all->repeated += farthest >= 0 ? 1 : 0;
@@ -308,8 +305,8 @@ std::optional<Error> Look::of_several_points() const {
       .value();
 }
 
-/// Positions at one fixed point where a base that stands where the cell says does not have it. They do
-/// not tell how it stands instead, and the arm would be bent until it reached there.
+/// Positions at one fixed point where a base that stands where the cell says does not have it. They
+/// do not tell how it stands instead, and the arm would be bent until it reached there.
 std::optional<Error> Look::of_place() const {
   const bool tools_known = std::all_of(table_.from.begin(), table_.from.end(), [&](const auto* m) {
     return cell_.tools.at(m->context.tool).has_value();

@@ -19,10 +19,10 @@
 /// What cannot be told: of positions alone from a tracker that may stand anywhere, which of three
 /// axes is mirrored, and that two of them were exchanged instead; a turned joint 1, which is a
 /// turned base; a mistake in a joint that moves the measured point by less than a millimetre, which
-/// does no harm to positions; a mirrored axis from a mirrored drawing (several joints that count the
-/// other way). Single rows are outliers, not mistakes of reading, but for those that
-/// are in another unit of length than the others. Rows that follow each other at the same joints and
-/// tell places far apart are several reflectors under one name.
+/// does no harm to positions; a mirrored axis from a mirrored drawing (several joints that count
+/// the other way). Single rows are outliers, not mistakes of reading, but for those that are in
+/// another unit of length than the others. Rows that follow each other at the same joints and tell
+/// places far apart are several reflectors under one name.
 namespace trammel {
 
 /// The doubts about how a batch was read.

@@ -127,7 +127,8 @@ TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
   }
 }
 
-/// Each pose of `of_one` in as many rows as there are `reflectors` (m, from the tool's point, in T).
+/// Each pose of `of_one` in as many rows as there are `reflectors` (m, from the tool's point, in
+/// T).
 MeasurementBatch seen_by(const std::vector<Vector3>& reflectors, const MeasurementBatch& of_one) {
   MeasurementBatch batch = of_one;
   batch.measurements.clear();
@@ -234,8 +235,10 @@ TEST(BatchCheck, ALogInRadiansAndMetresIsNamedAsOne) {
 
 TEST(BatchCheck, PositionsThatAControllerComputedAreNoChangeOfAnArm) {
   const auto cell = test::cell_7_unlocated();
-  MeasurementBatch batch = test::demand(check_against_cell(
-      test::measured(test::chapter_5_robot(test::cell_7()), 60, 3), *cell)).rows();
+  MeasurementBatch batch =
+      test::demand(
+          check_against_cell(test::measured(test::chapter_5_robot(test::cell_7()), 60, 3), *cell))
+          .rows();
   const auto measured = reading_doubt(batch, *cell);
   EXPECT_FALSE(measured) << sentence(*measured);
   for (Measurement& m : batch.measurements) {

@@ -82,8 +82,8 @@ TEST(RoboDkCsv, TurnsEachKindOfAnglesAsItsControllerDoes) {
   EXPECT_LT((rotation("Rx,Ry,Rz", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "xyz"))
                 .norm(),
             1e-12);
-  EXPECT_LT(
-      (rotation("O,A,T", values(to_deg(z), to_deg(y), 0)) - turned(0, y, z, "zyx")).norm(), 1e-12);
+  EXPECT_LT((rotation("O,A,T", values(to_deg(z), to_deg(y), 0)) - turned(0, y, z, "zyx")).norm(),
+            1e-12);
   EXPECT_LT((rotation("O,A,T", values(0, 0, to_deg(z))) - turned(0, 0, z, "z")).norm(), 1e-12);
   EXPECT_LT((rotation("A (rad),B (rad),C (rad)", values(z, y, x)) - turned(x, y, z, "zyx")).norm(),
             1e-12);

@@ -161,8 +161,8 @@ std::vector<Misreading> all_misreadings() {
   add("half of the rows in metres", false, [](MeasurementBatch& b, const Cell&, Random&) {
     for (std::size_t i = b.measurements.size() / 2; i < b.measurements.size(); ++i)
       b.measurements[i].p_W /= 1000;
-    return fmt::format("{} of {} rows in metres",
-                       b.measurements.size() - b.measurements.size() / 2, b.measurements.size());
+    return fmt::format("{} of {} rows in metres", b.measurements.size() - b.measurements.size() / 2,
+                       b.measurements.size());
   });
   add("sign of a coordinate", false, [](MeasurementBatch& b, const Cell&, Random& random) {
     const int k = pick(random, 3);
@@ -228,16 +228,16 @@ std::vector<Misreading> all_misreadings() {
         });
         return std::string("as a rotation vector");
       });
-  add("turns about z, y, z in columns of A B C", true, [](MeasurementBatch& b, const Cell&,
-                                                          Random&) {
-    turn_all(b, [](const Quaternion& q) {
-      const Vector3 zyz = q.toRotationMatrix().eulerAngles(2, 1, 2);
-      return Quaternion(Eigen::AngleAxisd(zyz.x(), Vector3::UnitZ()) *
-                        Eigen::AngleAxisd(zyz.y(), Vector3::UnitY()) *
-                        Eigen::AngleAxisd(zyz.z(), Vector3::UnitX()));
-    });
-    return std::string("as O A T");
-  });
+  add("turns about z, y, z in columns of A B C", true,
+      [](MeasurementBatch& b, const Cell&, Random&) {
+        turn_all(b, [](const Quaternion& q) {
+          const Vector3 zyz = q.toRotationMatrix().eulerAngles(2, 1, 2);
+          return Quaternion(Eigen::AngleAxisd(zyz.x(), Vector3::UnitZ()) *
+                            Eigen::AngleAxisd(zyz.y(), Vector3::UnitY()) *
+                            Eigen::AngleAxisd(zyz.z(), Vector3::UnitX()));
+        });
+        return std::string("as O A T");
+      });
   add("left-handed tracker frame", true, [](MeasurementBatch& b, const Cell&, Random&) {
     for (Measurement& m : b.measurements) m.p_W.y() *= -1;
     turn_all(b, [](const Quaternion& q) { return Quaternion(q.w(), -q.x(), q.y(), -q.z()); });

@@ -217,9 +217,10 @@ Status CsvTable::add_row(Row row) {
     const std::string title =
         columns_.size() > 1
             ? ""
-            : fmt::format("is '{}' no name of a column? Delete what stands above the line of names, "
-                          "or begin each such line with #",
-                          shown_short(columns_.front()));
+            : fmt::format(
+                  "is '{}' no name of a column? Delete what stands above the line of names, "
+                  "or begin each such line with #",
+                  shown_short(columns_.front()));
     return refused("{} values, the header has {} columns", row.fields.size(), columns_.size())
         .in(where_)
         .beyond(row.fields.size(), columns_.size())
@@ -373,10 +374,9 @@ Result<std::size_t> CsvTable::require(std::string_view column) const {
     return refused("missing column {}", wanted)
         .in(where_)
         .of(wanted)
-        .next(
-            fmt::format("the only name is '{}': separate names and values by commas, semicolons "
-                        "or tabs, and delete lines above the names",
-                        shown_short(columns_.front())));
+        .next(fmt::format("the only name is '{}': separate names and values by commas, semicolons "
+                          "or tabs, and delete lines above the names",
+                          shown_short(columns_.front())));
   const std::string meant = meant_by(wanted, columns_);
   const std::string names = shown_short(fmt::format("{}", fmt::join(columns_, ",")));
   return refused("missing column {}", wanted)

@@ -432,10 +432,10 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
   Result<MeasurementBatch> batch = batch_of(parts, text, where);
   if (batch || !parts.positional) return batch;
   Error failed = batch.error();
-  failed.next = fmt::format("no column is named J1, so they were taken by their places, as RoboDK "
-                        "writes them (six joints, X Y Z{}, the TCP's): {}",
-                        parts.table.columns().size() == kColumnsOfPoses ? " Rx Ry Rz" : "",
-                        kNameTheColumns);
+  failed.next = fmt::format(
+      "no column is named J1, so they were taken by their places, as RoboDK "
+      "writes them (six joints, X Y Z{}, the TCP's): {}",
+      parts.table.columns().size() == kColumnsOfPoses ? " Rx Ry Rz" : "", kNameTheColumns);
   return Failure(std::move(failed));
 }
 

@@ -164,8 +164,8 @@ bool is_number(std::string_view field) {
 
 std::optional<int> joint_number(std::string_view name) {
   constexpr int kMostJoints = 12;
-  for (const std::string_view prefix : {"joint", "axis", "achse", "axe", "asse", "eje", "gelenk",
-                                        "theta", "j", "a", "q"}) {
+  for (const std::string_view prefix :
+       {"joint", "axis", "achse", "axe", "asse", "eje", "gelenk", "theta", "j", "a", "q"}) {
     if (!name.starts_with(prefix)) continue;
     const std::string_view digits = name.substr(prefix.size());
     int number = 0;

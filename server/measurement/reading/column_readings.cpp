@@ -13,7 +13,7 @@ namespace trammel::reading {
 
 namespace {
 
-constexpr double kGon = 0.9;  // deg
+constexpr double kGon = 0.9;           // deg
 constexpr int kMostWithManySigns = 7;  // joints of a robot: of more only single signs are tried
 constexpr double kOtherUnit = 3;       // times: rows that are nearer than the others by that much
 constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
@@ -173,13 +173,12 @@ void add_rows_in_other_units(const NumberTable& table, std::vector<Reading>& all
     if (table.position(i).norm() < limit) rows.push_back(table.from[i]->row);
   for (const UnitOfLength& unit : kUnitsOfLength) {
     if (unit.factor < 1) continue;
-    all.push_back(of_positions(
-        fmt::format("with {} of {} rows in {} (the first is row {})", rows.size(), table.size(),
-                    unit.name, rows.front()),
-        kAllAxes, [limit, unit](Eigen::Matrix3Xd& p) {
-          for (Eigen::Index i = 0; i < p.cols(); ++i)
-            if (p.col(i).norm() < limit) p.col(i) *= unit.factor;
-        }));
+    all.push_back(of_positions(fmt::format("with {} of {} rows in {} (the first is row {})",
+                                           rows.size(), table.size(), unit.name, rows.front()),
+                               kAllAxes, [limit, unit](Eigen::Matrix3Xd& p) {
+                                 for (Eigen::Index i = 0; i < p.cols(); ++i)
+                                   if (p.col(i).norm() < limit) p.col(i) *= unit.factor;
+                               }));
   }
 }
 
