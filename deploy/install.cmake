@@ -42,7 +42,7 @@ endif()
 # The rooms: find_package(trammel COMPONENTS session offline). `common` comes with both. Rooms above the trainer are the daemon's own.
 set(common_rooms headers base)
 set(session_rooms idl_types idl clients_session)
-set(offline_rooms numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
+set(offline_rooms dense_algebra numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
   tasks trainer offline)
 
 set_target_properties(trammel_clients_session PROPERTIES EXPORT_NAME session)

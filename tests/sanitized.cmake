@@ -21,8 +21,6 @@ foreach(room base robot measurement compensate store dds config idl_types idl id
   # Of these rooms what reads and writes files, not their numerics.
   if(room MATCHES "^(compensate|robot)$")
     list(FILTER sources INCLUDE REGEX "(_file|/gauge|compensate/file/[a-z_]+)[.]cpp$")
-  elseif(room STREQUAL base)
-    list(FILTER sources EXCLUDE REGEX "dense_algebra[.]cpp$")
   elseif(room STREQUAL measurement)
     list(FILTER sources INCLUDE REGEX "(measurement/files/[a-z_]+|/checked_batch|_columns|/split|/gauges)[.]cpp$")
   endif()
