@@ -239,17 +239,28 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
 std::string chosen_causes(const CompensatedModel::Parts& parts) {
   if (!parts.cause_choice) return "";
   std::vector<HtmlRow> rows;
-  for (const TriedCause& one : parts.cause_choice->tried)
-    rows.push_back({{html_text(causes_in_words(one.sources)),
-                     fmt::format("{:.4f}", to_mm(one.held_out_before)),
-                     fmt::format("{:.4f}", to_mm(one.held_out_after)),
-                     html_text((one.taken ? "taken: " : "not taken: ") + one.why)}});
+  std::vector<std::string> not_shown;
+  for (const TriedCause& one : parts.cause_choice->tried) {
+    if (one.not_shown())
+      not_shown.push_back(causes_in_words(one.sources));
+    else
+      rows.push_back({{html_text(causes_in_words(one.sources)),
+                       fmt::format("{:.4f}", to_mm(one.held_out_before)),
+                       fmt::format("{:.4f}", to_mm(one.held_out_after)),
+                       html_text((one.taken ? "taken: " : "not taken: ") + one.why)}});
+  }
+  const std::string others =
+      not_shown.empty()
+          ? ""
+          : fmt::format("<p class=\"note\">Tried, and not shown by these poses: {}.</p>\n",
+                        html_text(fmt::format("{}", fmt::join(not_shown, ", "))));
   return fmt::format(
              "<p>The measurements chose the error sources. Each cause was tried beside those above "
              "it that were taken. The columns tell how far poses are missed that were left out, an "
              "eighth of joint space at a time; with all that was taken it is {:.4f} mm.</p>\n",
              to_mm(parts.cause_choice->held_out)) +
-         html_table({"flows", {"cause", "before, mm rms", "after, mm rms", "taken"}, rows}) + "\n";
+         html_table({"flows", {"cause", "before, mm rms", "after, mm rms", "taken"}, rows}) + "\n" +
+         others;
 }
 
 /// The data that the charts are drawn from.

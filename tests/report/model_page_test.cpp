@@ -72,9 +72,12 @@ TEST_F(ModelPage, ShowsWhichCausesTheMeasurementsChoseAndWhatEachBrought) {
   CompensatedModel::Parts parts = trained("none").parts();
   EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "chose the error sources"));
   parts.cause_choice =
-      CauseChoice{60e-6, {{{"joint_map:2"}, 1e-4, 6e-5, 120, 14, true, "the poses show it"}}};
+      CauseChoice{60e-6,
+                  {{{"joint_map:2"}, 1e-4, 6e-5, 120, 14, true, "the poses show it"},
+                   {{"wrist_coupling"}, 6e-5, 6e-5, 0.1, 3, false, "the poses do not show it"}}};
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
   EXPECT_TRUE(has(page, "it is 0.0600 mm"));
+  EXPECT_TRUE(has(page, "not shown by these poses: wrist coupling."));
   for (const char* part : {">angle error map in joint 2</td>", ">0.1000</td>", ">0.0600</td>",
                            ">taken: the poses show it</td>"})
     EXPECT_TRUE(has(page, part)) << part;

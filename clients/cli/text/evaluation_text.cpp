@@ -220,7 +220,7 @@ std::string choice_text(const CauseChoice& choice) {
       to_mm(choice.held_out), "cause tried; left out, mm", "before", "after", "nat", "taken");
   std::vector<std::string> without_effect;
   for (const TriedCause& one : choice.tried) {
-    if (!one.taken && one.held_out_after == one.held_out_before) {
+    if (one.not_shown()) {
       without_effect.push_back(causes_in_words(one.sources));
       continue;
     }

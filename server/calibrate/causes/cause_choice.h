@@ -15,6 +15,9 @@ struct TriedCause {
   double freedom = 0;  ///< how many of its numbers the batch tells
   bool taken = false;
   std::string why;  ///< for people, one clause
+
+  /// The poses do not show it; how far blocks are missed with it was not asked.
+  [[nodiscard]] bool not_shown() const { return !taken && held_out_after == held_out_before; }
 };
 
 /// The causes that a training with `error_sources: auto` tried, in their order: loads and what
