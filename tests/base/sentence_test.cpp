@@ -76,7 +76,9 @@ TEST(Sentence, OfBatches) {
             "unit stands in the column's name");
   EXPECT_EQ(of_batch(header + "nan,2,3,4\n"),
             "lt-07.csv row 2: q1_deg is nan, expected a finite number");
-  EXPECT_EQ(of_batch(header + "1,2,3e7,4\n"), "lt-07.csv row 2: y_mm is 3e+07, limit 1e+06");
+  EXPECT_EQ(of_batch(header + "1,2,3e7,4\n"),
+            "lt-07.csv row 2: y_mm is 3e+07, limit 1e+06; are its values in another unit? The "
+            "column's name says in which they are");
   EXPECT_EQ(of_batch("q1_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,4,1,0,0,0.1\n"),
             "lt-07.csv row 2: quaternion qw,qx,qy,qz has length 1.00499, expected 1 (limit 0.001)");
   EXPECT_EQ(of_batch("q1_deg,x_mm,y_mm,z_mm,qw\n1,2,3,4,1\n"),
@@ -101,7 +103,9 @@ TEST(Sentence, OfWhatTheCellDoesNotTake) {
   m.context.q(2) = 4.21;
   batch.measurements = {m};
   EXPECT_EQ(said(check_against_cell(batch, *cell)),
-            "batch lt-07 row 12: joint 3 is 241.215 deg, limit 70 deg");
+            "batch lt-07 row 12: joint 3 is 241.215 deg, limit 70 deg; is the joint told in this "
+            "unit, and with the sign and the zero of the robot file? Else the limit in that file is "
+            "another one");
   batch.measurements[0].context.q(2) = 0;
   batch.measurements[0].context.tool = "saw";
   EXPECT_EQ(said(check_against_cell(batch, *cell)),

@@ -561,7 +561,7 @@ TEST_F(TrainerTest, DoesNotServeAModelOfAToolThatHasChanged) {
 TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   start();
   train("a");
-  train("b", {.noise = 1e-6, .seed = 2});
+  train("b", {.noise = 4e-6, .seed = 2});
   if (in_force() != 2) {
     ASSERT_TRUE(trainer_->activate("cell-7", 2));
   }
