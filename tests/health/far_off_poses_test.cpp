@@ -64,16 +64,6 @@ TEST_F(FarOffPoses, OfPosesThatAreFarOffOnlyAnotherToolIsNamed) {
   EXPECT_TRUE(nothing->changed.empty());
 }
 
-TEST_F(FarOffPoses, NoCauseIsSaidToDoFarMoreThanThePosesAreOff) {
-  const Spoiling spoil = noise(11, 2e-3);
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    const auto check = checked(seed, spoil);
-    if (!check) continue;  // taken for a mistake of reading
-    for (const SeenChange& change : check->changed)
-      EXPECT_LT(change.effect_rms, 0.05) << seed << check->sentence;
-  }
-}
-
 TEST_F(FarOffPoses, PosesThatAreNotThisRobotsAreNeverCalledChance) {
   const Spoiling spoil = noise(7, 0.04);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

@@ -561,9 +561,10 @@ TEST_F(TrainerTest, DoesNotServeAModelOfAToolThatHasChanged) {
 TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   start();
   train("a");
-  train("b", {.noise = 4e-6, .seed = 2});
+  train("b", {.noise = 15e-6, .seed = 2});
   if (in_force() != 2) {
-    ASSERT_TRUE(trainer_->activate("cell-7", 2));
+    const auto activated = trainer_->activate("cell-7", 2);
+    ASSERT_TRUE(activated) << activated.error().message;
   }
   const auto back = trainer_->rollback("cell-7");
   ASSERT_TRUE(back) << back.error().message;
