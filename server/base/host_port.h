@@ -24,7 +24,7 @@ inline constexpr std::size_t kMostDiscoveryServers = 8;
 /// address. `port`: where none is said. kUsage: it is neither, or nobody knows the name.
 [[nodiscard]] Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port);
 
-/// The same of several; one without a port is at each of `ports`.
+/// Several hosts at once; one without a port is at each of `ports`.
 [[nodiscard]] Result<std::vector<HostPort>> parse_hosts(const std::vector<std::string>& hosts,
                                                         const std::vector<std::uint16_t>& ports);
 

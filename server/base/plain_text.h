@@ -8,14 +8,14 @@
 /// it here; whoever shows a foreign text to people shows it by shown().
 namespace trammel {
 
-/// Whether the bytes are UTF-8 (RFC 3629) without NUL.
+/// True if the bytes are UTF-8 (RFC 3629) without NUL.
 [[nodiscard]] bool is_utf8(std::string_view text);
-/// Whether the text is UTF-8 without control characters: C0, DEL, C1, line and paragraph
+/// True if the text is UTF-8 without control characters: C0, DEL, C1, line and paragraph
 /// separators, marks that change the direction of writing. Nor has it characters that nobody sees,
 /// by which two texts that look the same differ (zero width, fillers, tags, selectors of variants),
 /// nor code points that are no characters. A terminal or a log shows it as it is.
 [[nodiscard]] bool is_plain(std::string_view text);
-/// Whether it is UTF-8 without control characters but tabs and line ends: the text of a file.
+/// True if the text is UTF-8 without control characters but tabs and line ends: the text of a file.
 [[nodiscard]] bool is_plain_lines(std::string_view text);
 
 /// The text with everything that is not plain spelled out, as JSON spells it: `\u001b`, `\u009b`; a

@@ -39,7 +39,7 @@ class YamlMap {
   /// The errors noted so far, of the whole file.
   [[nodiscard]] const std::vector<Error>& problems() const { return *problems_; }
   [[nodiscard]] bool has(const std::string& key) const;
-  /// Whether the key is `null` or absent.
+  /// True if the key is `null` or absent.
   [[nodiscard]] bool is_null(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key, double otherwise) const;
@@ -82,7 +82,7 @@ class YamlMap {
 [[nodiscard]] std::optional<long> line_of(const YAML::Mark& mark);
 /// `column 5: `, counted from 1; empty if the parser does not know it.
 [[nodiscard]] std::string column_text(const YAML::Mark& mark);
-/// Whether the line of the mark begins with a tab among its blanks.
+/// True if the line of the mark begins with a tab among its blanks.
 [[nodiscard]] bool is_indented_by_tab(const std::string& text, const YAML::Mark& mark);
 
 /// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one

@@ -58,8 +58,8 @@ struct BiasState {
       offset;  ///< of each coordinate, m: the mean residual, predicted far from all data
   Eigen::MatrixXd hyperparameters;  ///< a column for each coordinate, natural logarithms: kernel,
                                     ///< log σ_f, log σ_n
-  /// Of all blocks in their order, natural logarithms; of `flange` kernel and log σ (rad) of the
-  /// rotation.
+  /// The hyperparameters of all blocks in their order, natural logarithms; of `flange` those of the
+  /// kernel and log σ (rad) of the rotation.
   Eigen::VectorXd block_hyperparameters = {};
   std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };

@@ -44,10 +44,11 @@ class BiasModel {
   /// new starts.
   [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
 
-  /// Whether the kernel has blocks or is of the flange. Only then features must be given; else they
+  /// True if the kernel has blocks or is of the flange. Only then features must be given; else they
   /// are ignored.
   [[nodiscard]] bool needs_features() const;
-  /// Whether it has blocks: parts that do not fade with the distance from the training poses.
+  /// True if the kernel has blocks: parts that do not fade with the distance from the training
+  /// poses.
   [[nodiscard]] bool has_blocks() const;
   [[nodiscard]] BiasPrediction predict(const JointVector& q,
                                        const BiasFeatures& features = {}) const;

@@ -46,7 +46,7 @@ inline constexpr std::string_view kAutoBias = "auto";
 using ResidualWithout =
     std::function<std::optional<Eigen::MatrixXd>(const std::vector<Eigen::Index>&)>;
 
-/// Whether `model`, fitted to `problem`, is clearly likelier than `none`: its leave-one-out log
+/// True if `model`, fitted to `problem`, is clearly likelier than `none`: its leave-one-out log
 /// density exceeds that of `none` by more than one nat for each additional hyperparameter and twice
 /// the standard error.
 [[nodiscard]] bool is_worth_it(const BiasProblem& problem, const BiasModel& model);
@@ -69,7 +69,7 @@ using ResidualWithout =
 /// as in `problem`). A block that the physics cannot be identified without does not judge, and the
 /// sentence says so. Where fewer than half of the blocks judge, nothing is taken.
 ///
-/// Of more than 1200 observations some 900, whole poses evenly in the order of measuring, choose;
+/// Beyond 1200 observations some 900 of them choose: whole poses, evenly in the order of measuring;
 /// the sentence says so. The bias that they choose is fitted to all, from where its search ended.
 ///
 /// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled`

@@ -13,9 +13,9 @@ namespace trammel {
 /// Whoever looks at a batch before anything is learned asks this.
 [[nodiscard]] std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell);
 
-/// The same without doubts about the tool, for a batch of which a model in force can judge that
-/// better; and positions that were computed from the drawing, which such a model would take for a
-/// change of its arm.
+/// batch_doubt() without doubts about the tool, for a batch of which a model in force can judge
+/// that better. It doubts also positions that were computed from the drawing, which such a model
+/// would take for a change of its arm.
 [[nodiscard]] std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 /// Refuses a batch with a batch_doubt().

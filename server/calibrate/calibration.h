@@ -73,7 +73,7 @@ struct CalibrationResult {
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  /// Of a batch of several sessions: what belongs to each, the newest last. aligned() moves its
+  /// The sessions of a batch of several: what belongs to each, the newest last. aligned() moves its
   /// measurements into the world of the model. Empty: one session.
   std::vector<SessionSetting> sessions;
   std::vector<double>

@@ -17,8 +17,8 @@ struct Change {
   double p_value =
       1;  ///< chance that the best of all candidates at all boundaries gains as much with no change
   std::vector<std::string> could_also_be = {};  ///< explain it nearly as well: `tool_changed@121`
-  /// Of a joint's zero that wanders instead: rad from session to session, a random walk; 0: it
-  /// changed once.
+  /// The rate of a joint's zero that wanders instead, rad from session to session, a random walk;
+  /// 0: it changed once.
   double rate = 0;
   std::vector<std::string> steps =
       {};  ///< of a wandering zero: its sources, one for each session but the first

@@ -5,7 +5,7 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// How far the tool is from where a model says it is, at a pose of its domain that nobody has
+/// The distance of the tool from where a model says it is, at a pose of its domain that nobody has
 /// measured.
 ///
 /// The true error t of such a pose is normal with the covariance S(q) that the model states, the

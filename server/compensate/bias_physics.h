@@ -28,7 +28,7 @@ class BiasPhysics {
   [[nodiscard]] static BiasPhysics learned_at(PhysicalModel whole) {
     return BiasPhysics(std::move(whole), {});
   }
-  /// The same arm with the tools of `now`, with all their errors. Tools that did not move stay bit
+  /// The arm with the tools of `now`, with all their errors. Tools that did not move stay bit
   /// for bit.
   [[nodiscard]] BiasPhysics with_tools_of(const PhysicalModel& now) const;
   /// The rotation from B of then to B of `now`: what was learned belongs to the arm, which a source

@@ -27,8 +27,8 @@ struct ErrorPrediction {
   Vector3 true_stddev_B = Vector3::Zero();
   /// The covariance of one measurement, m²; stddev_B is the root of its diagonal.
   Matrix3 covariance_B = Matrix3::Zero();
-  /// Of one measured orientation, rad, about the axes of B; only where the model learned
-  /// orientations.
+  /// The standard deviation of one measured orientation, rad, about the axes of B; only where the
+  /// model learned orientations.
   std::optional<Vector3> rotation_stddev_B;
   bool in_domain = false;  ///< false: far from all training poses, or the bias is not fully taken
   double bias_weight =
@@ -75,7 +75,7 @@ class CompensatedModel {
     Eigen::Matrix3Xd nominal, calibrated, compensated;
     Eigen::Matrix3Xd stddev;  ///< as predicted, of compensated
     std::vector<bool> in_domain;
-    /// The same of the measured orientations, rotation vectors, rad; `stddev` is 3 x 0 where none
+    /// The errors of the measured orientations, rotation vectors, rad; `stddev` is 3 x 0 where none
     /// was learned.
     struct Rotations {
       Eigen::Matrix3Xd nominal, calibrated, compensated, stddev;
@@ -114,7 +114,7 @@ class CompensatedModel {
   /// Restores the biases that `parts` have; `then`: the physics that they were learned beside.
   [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then,
                                              Inside* inside);
-  /// Whether the bias holds for this tool and payload.
+  /// True if the bias holds for this tool and payload.
   [[nodiscard]] bool learned_with(const std::string& tool, const std::string& payload) const;
   /// The biases' prediction at a pose.
   struct Learned {
@@ -192,7 +192,7 @@ class CompensatedModel {
   std::shared_ptr<const Inside> inside_;
 };
 
-/// Of the compensated positions of `batch`, which both models know the tools of.
+/// The gain in the compensated positions of `batch`, whose tools both models know.
 [[nodiscard]] PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
                                      const MeasurementBatch& batch);
 

@@ -7,12 +7,12 @@
 
 namespace trammel {
 
-/// Whether the model was trained with the tool and the payload of this measurement, and both are
+/// True if the model was trained with the tool and the payload of this measurement, and both are
 /// still in its cell.
 [[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
 
-/// Whether the model learned from this row of a batch: it is the batch that it was trained on or
-/// refitted with, but for the rows that its column `set` holds out; or its bias was learned at
+/// Tells whether the model learned from this row of a batch: it is the batch that it was trained on
+/// or refitted with, but for the rows that its column `set` holds out; or its bias was learned at
 /// these joints, to the last digit.
 class LearnedFrom {
  public:

@@ -10,7 +10,7 @@ namespace trammel {
 
 /// The model as text: JSON, one object. Same data, same seed, same content, same hash, same id.
 [[nodiscard]] std::string serialize(const CompensatedModel& model);
-/// How much is asked of the names, sentences and times of a model, which change no answer.
+/// The strictness towards the names, sentences and times of a model, which change no answer.
 enum class ModelTexts {
   kChecked,   ///< of a file from outside: see check_texts()
   kAsTheyAre  ///< of a model that was accepted before: it goes on, and whoever shows them cleans
@@ -22,8 +22,8 @@ enum class ModelTexts {
                                                    const std::string& where,
                                                    ModelTexts texts = ModelTexts::kChecked);
 [[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
-/// Whether no byte of a model's text was changed since it was written, by its own hashes; returns
-/// that of its content. Cheap: makes no model of it.
+/// The hash of a model's content. Refuses a text with a byte that was changed since it was written,
+/// by the text's own hashes. Cheap: makes no model of it.
 [[nodiscard]] Result<std::string> undamaged_hash(const std::string& text, const std::string& where);
 
 }  // namespace trammel

@@ -9,10 +9,10 @@
 
 namespace trammel {
 
-/// Of a robot file that nobody compared with the controller: what most models have.
+/// The note on a robot file that nobody compared with the controller: most models have it.
 constexpr const char* kNotConfirmed = "robot_not_confirmed";
-/// Of joints that came to the training poses from one side: what is promised is not known from the
-/// other.
+/// The note on joints that came to the training poses from one side: what is promised is not known
+/// from the other.
 constexpr const char* kOneSide = "approached_from_one_side";
 
 /// The notes for a user of the model, the gravest first. Every door asks here: command line,

@@ -31,7 +31,7 @@ struct PairedGain {
 
   /// Chance alone takes one of the two so far in one of a hundred cases.
   static constexpr double kBeyondChance = 2.576;
-  /// Whether the gain is beyond chance and the rms does not rise: better at most poses is no gain
+  /// True if the gain is beyond chance and the rms does not rise: better at most poses is no gain
   /// where others are much worse.
   [[nodiscard]] bool beyond_chance() const {
     return z() > kBeyondChance && rms_after <= rms_before;

@@ -35,15 +35,15 @@ struct WhatWasMeasured {
   Eigen::VectorXd outline;
   static constexpr int kDirections = 16;
 
-  /// Whether the nominal flange at `q` is within reach of a place where it was measured, and inside
+  /// True if the nominal flange at `q` is within reach of a place where it was measured, and inside
   /// their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
-  /// Of a joint's range, how far beyond that of these poses others of the same kind come: a
+  /// The share of a joint's range by which other poses of the same kind go beyond these: a
   /// twentieth, more where they are few.
   [[nodiscard]] double range_margin() const;
 };
 
-/// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances
+/// The record of the poses of `batch`, whose tools `physics` knows. `reach` follows the distances
 /// between the poses themselves: 1.5 times that within which 95 % of them have a neighbour, more
 /// where they are few, and no less than a twentieth of the region. The outline goes beyond the
 /// places by the median distance between neighbours, and away from the base by more where the
@@ -52,7 +52,8 @@ struct WhatWasMeasured {
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics,
                                                 const MeasurementBatch& batch);
 
-/// The same for people, each part by itself. Of a model without it, parts are `not on record`.
+/// WhatWasMeasured in words, each part by itself, for people. Where a model has none, parts are
+/// `not on record`.
 struct MeasuredWords {
   std::string sides;        ///< `every joint from both sides`
   std::string temperature;  ///< `20.0 to 23.5 degrees Celsius`

@@ -18,7 +18,7 @@ struct WorkAsked {
   int poses = 0;  ///< whose tool and payload the models know; the others are left out
   PromisedAtWork in_force;
   std::optional<PromisedAtWork> other;
-  /// How far the predictions of the two are apart, m; 0 without another one.
+  /// The distance between the predictions of the two, m; 0 without another one.
   double difference_rms = 0, difference_max = 0;
   /// Where they are farthest apart, the farthest first.
   struct Step {

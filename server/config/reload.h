@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What becomes of a server file that is read again while it is served.
+/// The plan for a server file that is read again while it is served.
 struct ReloadPlan {
   ServerConfig config;             ///< from now on
   std::vector<std::string> now;    ///< keys that have changed

@@ -37,7 +37,7 @@ struct ServerConfig {
 /// the first training would refuse.
 [[nodiscard]] Result<ServerConfig> read_server_config(const std::string& path);
 
-/// What could be read of a server file, and all errors in the rest.
+/// The part of a server file that could be read, and all errors in the rest.
 struct ServerReading {
   ServerConfig config;
   std::vector<Error> problems;  ///< each by itself

@@ -7,7 +7,8 @@
 
 namespace trammel {
 
-/// What a start would meet on this host. Found without starting: nothing is changed or created.
+/// The outcome that a start would have on this host. Found without starting: nothing is changed or
+/// created.
 struct StartCheck {
   std::vector<Error> problems;     ///< a start would fail; with file, key and what to do
   std::vector<std::string> notes;  ///< good to know

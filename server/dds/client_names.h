@@ -16,15 +16,15 @@ class ClientNames {
   using Time = std::chrono::steady_clock::time_point;
   /// Requests of a participant that has left are still carried out; its name is kept so long.
   static constexpr std::chrono::seconds kKept{30};
-  /// Of how many participants at once it is kept what they say, where that is no name that fits.
+  /// The number of participants whose claims are kept at once, where these are no names that fit.
   static constexpr std::size_t kClaims = 4096;
 
-  /// What a participant says of itself, before it is let in. Only a name that fits its GUID counts.
-  /// `address`: where it says that it can be reached.
+  /// Notes what a participant says of itself, before it is let in. Only a name that fits its GUID
+  /// counts. `address`: where it says that it can be reached.
   void announced(const std::string& participant, const std::string& claimed,
                  const std::string& address = "");
   void let_in(const std::string& participant);
-  /// What the participant has said of itself, which nobody could confirm: `says it is
+  /// The claim of the participant about itself, which nobody could confirm: `says it is
   /// CN=anna,O=Works, at 10.1.0.7`.
   std::string refused(const std::string& participant);
   void left(const std::string& participant, Time now = std::chrono::steady_clock::now());

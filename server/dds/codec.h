@@ -46,7 +46,7 @@ namespace trammel {
 
 /// Which DDS participant sent the request, and its trace.
 [[nodiscard]] std::string requester(const wire::RequestHeader& header);
-/// What is asked for, in one line: the verb, the cell, and a hash of all the rest.
+/// The request in one line: the verb, the cell, and a hash of all the rest.
 [[nodiscard]] std::string in_few_words(const std::string& verb, const std::string& cell,
                                        const std::vector<std::string>& rest);
 /// Empty: whatever. Refuses a version that there cannot be.
@@ -55,7 +55,7 @@ namespace trammel {
 /// The error in the header of a reply: code, sentence and data.
 void put_error(const Error& error, wire::ReplyHeader& header);
 void put_error(const wire::Fault& fault, wire::ReplyHeader& header);
-/// Of what this server knows, and does not do.
+/// The reply about something that this server knows, and does not do.
 template <typename Reply>
 [[nodiscard]] Reply unsupported(const std::string& field) {
   Reply reply;

@@ -15,10 +15,10 @@
 
 namespace trammel {
 
-/// What start() would refuse in the folder of certificates and permissions
+/// Refuses what start() would refuse in the folder of certificates and permissions
 /// (idl/transport/security.h); nothing where it is empty.
 [[nodiscard]] Status check_security(const std::string& folder);
-/// Whether requests can be recorded there; makes nothing.
+/// Checks that requests can be recorded there; makes nothing.
 [[nodiscard]] Status check_records(const RecordOptions& options);
 
 /// Told of what did not reach the service: `packets_dropped` or `participant_refused`, and a
@@ -60,9 +60,9 @@ class DdsService {
   void set_limits(const DdsOptions& options);
   /// The trainer serves more cells: clients are told.
   void cells_added();
-  /// What was done since start(); nothing where it does not run.
+  /// The work done since start(); none where the service does not run.
   [[nodiscard]] ServiceFigures figures();
-  /// Whether its threads do their work. Waits for none of them.
+  /// Tells whether its threads do their work. Waits for none of them.
   [[nodiscard]] Movement movement();
 
  private:

@@ -18,7 +18,7 @@ namespace trammel {
 
 class ClientNames;
 
-/// What a request is about, looked up once. The whole answer comes from this one model.
+/// The subject of a request, looked up once. The whole answer comes from this one model.
 struct Subject {
   std::shared_ptr<const ServedModel> served;
   bool in_force = false;
@@ -63,7 +63,7 @@ class Handlers {
   /// The subject of the certificate of a DDS participant; empty: it has shown none.
   [[nodiscard]] std::string name_of(const std::string& participant) const;
 
-  /// What the cells were asked for since the start.
+  /// The counts of what the cells were asked for since the start.
   [[nodiscard]] const WorkCounts& work() const { return work_; }
 
   using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
@@ -104,7 +104,8 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
-  /// What was lately asked of the cell, by the model in force and by `version` beside it; 0: alone.
+  /// The questions lately asked of the cell, answered by the model in force and by `version` beside
+  /// it; 0: alone.
   [[nodiscard]] Result<wire::ReadModelsReply> replayed(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell,
                                                        const std::string& id) const;
@@ -114,7 +115,7 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job,
                                                           bool page) const;
   [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
-  /// Of one cell or (empty) of all: the newest `most` checks of each since then.
+  /// The newest `most` checks since then of one cell, or (empty) of each of all cells.
   [[nodiscard]] Result<wire::ReadModelsReply> health_of(const std::string& cell, std::int64_t since,
                                                         std::size_t most) const;
 
@@ -134,7 +135,7 @@ template <typename Reply>
   return (*begun)->take();
 }
 
-/// Whether the request changes something. A repeat of such a request must not be carried out again.
+/// True if the request changes something. A repeat of such a request must not be carried out again.
 [[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);
 [[nodiscard]] bool happens_once(const wire::CorrectTargetRequest& request);
 [[nodiscard]] bool happens_once(const wire::SubmitMeasurementsRequest& request);

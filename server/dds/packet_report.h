@@ -22,7 +22,7 @@ class PacketReport {
   explicit PacketReport(std::shared_ptr<const wire::DropCounts> counts)
       : counts_(std::move(counts)) {}
 
-  /// What is new since the last report, by reason; empty when nothing is, or when the last report
+  /// The news since the last report, by reason; empty when there are none, or when the last report
   /// is too young.
   [[nodiscard]] std::optional<std::string> due(Time now);
 

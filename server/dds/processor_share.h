@@ -4,8 +4,8 @@
 
 namespace trammel {
 
-/// How much of the processor time that this process wanted it was given. On a crowded machine its
-/// threads stand in a queue; time that passes there says nothing of whether they hang. A thread
+/// The share that this process was given of the processor time that it wanted. On a crowded machine
+/// its threads stand in a queue; time that passes there says nothing of whether they hang. A thread
 /// that waits for a lock, or for news, wants none. Uses no heap and no lock, so that a thread that
 /// watches others may ask. Not thread-safe.
 class ProcessorShare {

@@ -20,7 +20,7 @@ struct SpelledBias {
   KernelPtr kernel;                    ///< of each coordinate by itself
   std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share
   bool flange = false;  ///< the kernel is of the flange's error, seen through the tool's lever
-  /// Whether it must be told more of a pose than its joints.
+  /// True if it must be told more of a pose than its joints.
   [[nodiscard]] bool needs_features() const { return flange || !blocks.empty(); }
   [[nodiscard]] bool has(std::string_view block) const;
 };
@@ -31,10 +31,10 @@ struct SpelledBias {
 /// has no kernel beside it; and `flange` beside a block.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
 
-/// The same without the word `flange`: a rotation is the same at every lever.
+/// The spelling without the word `flange`: a rotation is the same at every lever.
 [[nodiscard]] std::string without_flange(std::string_view spelling);
 
-/// Whether a bias may be written so: as above, `none`, or `auto` (choose_bias.h).
+/// Checks that a bias may be written so: as above, `none`, or `auto` (choose_bias.h).
 [[nodiscard]] Status check_bias_spelling(std::string_view spelling);
 
 }  // namespace trammel

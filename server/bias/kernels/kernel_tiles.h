@@ -7,7 +7,7 @@
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/numerics.h"
 
-/// What the kernels share that work with Eigen on tiles.
+/// The parts shared by kernels that work with Eigen on tiles.
 namespace trammel {
 
 using StridedColumns = Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>>;

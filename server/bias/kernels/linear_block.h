@@ -11,7 +11,7 @@
 /// diag(variances)). The coordinates share the weights.
 namespace trammel {
 
-/// How the tool moves when the arm changes a little. Rows: position (m), rotation vector (rad),
+/// The motion of the tool when the arm changes a little. Rows: position (m), rotation vector (rad),
 /// both in B.
 struct BiasFeatures {
   Eigen::MatrixXd
@@ -30,7 +30,7 @@ class LinearBlock {
 
   /// As it is written in a bias.
   [[nodiscard]] virtual std::string_view name() const = 0;
-  /// How many weights and how many hyperparameters it has for features of that shape.
+  /// The number of weights and the number of hyperparameters for features of that shape.
   [[nodiscard]] virtual Eigen::Index column_count(const BiasFeatures& shape) const = 0;
   [[nodiscard]] virtual Eigen::Index parameter_count(const BiasFeatures& shape) const = 0;
   /// Prior of the hyperparameters: mean, where the search starts, and standard deviation.
@@ -54,8 +54,8 @@ using LinearBlockPtr = std::shared_ptr<const LinearBlock>;
 /// periodic and once differentiable. Hyperparameters of each joint: log amplitude, rad; log of the
 /// harmonic from which on the spectrum falls.
 [[nodiscard]] LinearBlockPtr make_joint_map_block();
-/// What errors of the physical parameters leave, identified or not: H = J_θ(q). No hyperparameters:
-/// the weights have the prior variances of the parameters.
+/// The effect that errors of the physical parameters leave, identified or not: H = J_θ(q). No
+/// hyperparameters: the weights have the prior variances of the parameters.
 [[nodiscard]] LinearBlockPtr make_parameter_block();
 
 /// Several blocks side by side.

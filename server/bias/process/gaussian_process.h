@@ -83,7 +83,7 @@ struct GpHyperparameters {
   double log_noise_stddev;   ///< log σ_n, m
 };
 
-/// How a process computes its variance.
+/// The ways in which a process computes its variance.
 enum class VarianceForm {
   /// From a few of its points, where few are enough: several times faster. At the data it is never
   /// below the exact
@@ -91,17 +91,14 @@ enum class VarianceForm {
   /// be at most 0.2 %
   /// too small (bound: decision 25). Exact where many points would be needed.
   kCompressed,
-  /// What a model is served with. From the 24 or 48 points nearest to a target, where these say as
-  /// much as all: mostly
-  /// of a signal below the noise. Else from at most 400 points that stand for all. Else from all
-  /// points, in single
-  /// precision where the noise allows it. Never below the exact variance; above it by less than 2 %
-  /// at every training
-  /// point when it is left out, mostly by far less. Nothing else is kept: what is for with(),
-  /// without() and
+  /// The form in which a model is served. From the 24 or 48 points nearest to a target, where these
+  /// say as much as all: mostly of a signal below the noise. Else from at most 400 points that
+  /// stand for all. Else from all points, in single precision where the noise allows it. Never
+  /// below the exact variance; above it by less than 2 % at every training point when it is left
+  /// out, mostly by far less. Nothing else is kept: what is for with(), without() and
   /// left_out_error() alone is computed anew when one of them is called.
   kServed,
-  /// The same variances, and all is kept.
+  /// The variances of kServed, and all is kept.
   kLearned,
   /// As kServed, and less than 2 % is of the variance of a measurement: where what the process
   /// leaves is one part of
@@ -150,9 +147,9 @@ class GaussianProcess {
                                                         std::vector<NearWeights>* near = nullptr,
                                                         double* mean = nullptr) const;
 
-  /// Whether variances are computed from near points.
+  /// True if variances are computed from near points.
   [[nodiscard]] bool is_near_enough() const { return near_ > 0; }
-  /// How many points the variance of a target is computed from.
+  /// The number of points from which the variance of a target is computed.
   [[nodiscard]] Eigen::Index variance_points() const {
     return near_ > 0 ? near_ : compressed_ ? compressed_->size() : size_;
   }
@@ -187,11 +184,11 @@ class GaussianProcess {
   [[nodiscard]] NearPoints near_points(Eigen::Index count) const;
   // The most that few points may leave where all leave `left`.
   [[nodiscard]] Eigen::VectorXd at_most(const Eigen::VectorXd& left, bool as_part) const;
-  // Whether so many near points leave at most this at the points when they are left out, and at the
+  // True if so many near points leave at most this at the points when they are left out, and at the
   // rows of `asked`.
   [[nodiscard]] bool near_is_enough(Eigen::Index count, const Eigen::VectorXd& most_of_points,
                                     const FeatureBlock& asked, const Eigen::VectorXd& most) const;
-  // Of the exact variance table; VarianceTable::rows().
+  // The rows of the exact variance table: see VarianceTable::rows().
   [[nodiscard]] std::vector<double> root_rows(Eigen::Index more) const;
 
   std::shared_ptr<const Kernel> kernel_;

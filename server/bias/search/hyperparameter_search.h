@@ -31,7 +31,7 @@ struct SearchResult {
 /// - Where much more noise is left than the instrument has, shorter length scales are tried on more
 /// points. With more
 ///   than 1000 points, shorter and longer ones are tried on up to 2000 of them.
-/// The same seed gives the same answer, bit for bit. Empty when no start gave a positive definite
+/// One seed gives one answer, bit for bit. Empty when no start gave a positive definite
 /// covariance.
 [[nodiscard]] std::optional<SearchResult> search_hyperparameters(
     const std::shared_ptr<const Kernel>& kernel, const GpData& data, double metrology_stddev,

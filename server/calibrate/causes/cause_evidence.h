@@ -14,10 +14,10 @@ struct ColumnGroup {
   Eigen::Index count = 0;
 };
 
-/// How much likelier groups of parameters make a batch, one after the other, about the present
-/// values of a model (README.md). Each parameter is normal about its present value, with standard
-/// deviation 1 in units of its scale. The noise is what the groups that are free leave, no less
-/// than the stated sigmas. First order throughout.
+/// The evidence that groups of parameters make a batch likelier, one after the other, about the
+/// present values of a model (README.md). Each parameter is normal about its present value, with
+/// standard deviation 1 in units of its scale. The noise is what the groups that are free leave, no
+/// less than the stated sigmas. First order throughout.
 class CauseEvidence {
  public:
   /// `blocks`: the rows of the batch, a part each. `present`: the groups that are free to begin
@@ -37,7 +37,7 @@ class CauseEvidence {
   /// Mean square of the residuals of positions, an axis, in units of their sigmas: each block
   /// predicted by the others with the free groups.
   [[nodiscard]] double left_out() const { return left_out_with(free_); }
-  /// The same with `group` free, too.
+  /// left_out() with `group` free, too.
   [[nodiscard]] double left_out(const ColumnGroup& group) const;
 
  private:

@@ -21,7 +21,8 @@ namespace trammel {
 /// base: X_WB alone.
 [[nodiscard]] std::vector<Pose> likely_bases(const PhysicalModel& model,
                                              const MeasurementBatch& batch);
-/// What positions at one place do not tell of an unknown base, in words; empty where they tell it.
+/// The turn that positions at one place do not tell of an unknown base, in words; empty where they
+/// tell it.
 [[nodiscard]] std::string untold_turn(const Cell& cell, const MeasurementBatch& batch);
 /// Names of the numbers that say how the base is turned.
 [[nodiscard]] std::vector<std::string> turn_of_base();

@@ -15,7 +15,7 @@ class WeightedPose {
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s,
                const Measurement& measurement, const Weights& weights, std::size_t row = 0);
 
-  /// How many equations: 6, 3 without an orientation, 1 of a gauge.
+  /// The number of equations: 6, 3 without an orientation, 1 of a gauge.
   [[nodiscard]] int size() const { return measurement_.gauge ? 1 : measurement_.R_WT ? 6 : 3; }
   /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null.
   /// False: not finite.

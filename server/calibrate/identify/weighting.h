@@ -28,7 +28,7 @@ struct Weights {
 /// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's
 /// own, else the tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
-/// The same of the measured orientation, rad.
+/// Standard deviation of one axis of the measured orientation, rad: likewise.
 [[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
 /// At how many poses the model's own error enters: 1, or 2 of a gauge that is told against another
@@ -61,8 +61,8 @@ struct Residuals {
 [[nodiscard]] std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch,
                                                                       const Residuals& r);
 
-/// How many parameters were fitted to the residuals of either kind: what each kind decides, not the
-/// priors.
+/// The number of parameters that were fitted to the residuals of either kind: what each kind
+/// decides, not the priors.
 struct Freedom {
   double positions = 0;  ///< and gauges
   double turns = 0;
@@ -73,13 +73,13 @@ struct Freedom {
 /// fitted to them. `drop_suspects`: positions that are suspects under `before` do not count.
 [[nodiscard]] Weights estimated_weights(const Residuals& r, const Freedom& freedom,
                                         const Weights& before, bool drop_suspects);
-/// Whether measurements of `tracker` have nearly the same sigmas under both.
+/// True if measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
-/// How far each measurement is off: 1 as far as 1 in 10^6 good ones.
+/// The deviation of each measurement: 1 is as far off as 1 in 10^6 good ones.
 [[nodiscard]] Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r,
                                          const Weights& weights);
-/// How far each measurement is off, those with a position first.
+/// The deviation of each measurement, those with a position first.
 [[nodiscard]] std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r,
                                               const Weights& weights);
 /// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.

@@ -45,7 +45,7 @@ struct SessionSetting {
   friend bool operator==(const SessionSetting& a, const SessionSetting& b);
 };
 
-/// Whether they have scales of their own.
+/// True if the sessions have scales of their own.
 [[nodiscard]] bool are_stretched(const std::vector<SessionSetting>& settings);
 
 /// A setting for each of several sessions of the batch, of the rows that it has: all in W. None

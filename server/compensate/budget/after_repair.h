@@ -6,7 +6,8 @@
 
 #include "server/compensate/budget/between.h"
 
-/// Whether a repair helped: the model of the measurements after it, held against the one before.
+/// The check whether a repair helped: the model of the measurements after it, held against the one
+/// before.
 namespace trammel {
 
 /// The outcome of a line that was to be put right.

@@ -84,7 +84,7 @@ struct ErrorBudget {
   /// the error is taken out of it and of every line. Lines of frames do not stand here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
-  /// Of several sessions: what changed on the arm between them, each line at the poses where it
+  /// The changes of the arm between several sessions, each line at the poses where it
   /// acts. The lines stand in `as_it_stands`, too, at all poses. Empty: nothing changed.
   std::vector<BudgetLine> between_sessions;
 

@@ -27,7 +27,7 @@ namespace trammel {
 /// `is this the file of this robot? ...` where several lengths stand out; else empty.
 [[nodiscard]] std::string doubt_of_file(const ErrorBudget& budget);
 
-/// What stands out and what to do, in one sentence. Empty: nothing does.
+/// The lines that stand out and what to do, in one sentence. Empty: nothing does.
 [[nodiscard]] std::string lead_of(const ErrorBudget& budget);
 
 /// The budget in its `most` first lines, beneath a heading that names the whole error, and

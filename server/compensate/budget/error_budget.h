@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// Whether a budget can be told from such rows: some have a position, and not all of a tool stand
+/// True if a budget can be told from such rows: some have a position, and not all of a tool stand
 /// at one place, where base, tool and zeros of the last joints do the same.
 [[nodiscard]] bool tells_a_budget(const MeasurementBatch& measured);
 

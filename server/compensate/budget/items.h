@@ -31,7 +31,7 @@ struct BudgetItem {
 /// The model without the sources that change what the arm carries (payload, balancer): what they do
 /// is counted in their own lines, and not once more in those of the gearboxes.
 [[nodiscard]] PhysicalModel with_told_load(const PhysicalModel& model);
-/// Whether the source changes what the arm carries (payload, balancer).
+/// True if the source changes what the arm carries (payload, balancer).
 [[nodiscard]] bool changes_load(const ErrorSource& source);
 /// The model with what another model's arm carries: the payloads of its cell, and its sources that
 /// change the load.

@@ -9,8 +9,8 @@
 
 namespace trammel {
 
-/// What is done to the zero of one joint: the controller shows an angle, and the joint stands `add`
-/// beyond it.
+/// The correction of the zero of one joint: the controller shows an angle, and the joint stands
+/// `add` beyond it.
 struct ZeroRemedy {
   int joint = 0;  ///< 0-based
   double add = 0, u95 = 0;
@@ -19,7 +19,7 @@ struct ZeroRemedy {
 /// The steps for every joint whose zero is off by more than its U.
 [[nodiscard]] std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget);
 
-/// Whether a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`,
+/// True if a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`,
 /// `loads`.
 [[nodiscard]] bool is_of_step(const BudgetLine& line, std::string_view step);
 

@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// Whether what is asked and answered is kept for `trammel replay`.
+/// The settings by which requests and answers are kept for `trammel replay`.
 struct RecordOptions {
   std::string folder;  ///< empty: it is not
   int max_mb = 100;    ///< of all files; the oldest goes
