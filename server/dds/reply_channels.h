@@ -37,7 +37,7 @@ class ReplyChannels final : public ReplySink {
   /// Adds a topic of replies, and what is answered `instead` of one that cannot be written. Call it
   /// before any other function.
   void add_topic(wire::dds::Topic* topic, InsteadOf instead);
-  /// What discovery has found since.
+  /// Takes in what discovery has found since.
   void heard(const std::vector<ReaderEvent>& events);
   /// Opens and closes channels. Call it from one thread only. True while clients wait for a
   /// channel.
@@ -66,8 +66,8 @@ class ReplyChannels final : public ReplySink {
   /// Writes what was posted, and what was kept once its reader is matched, until `stop`.
   void deliver(const std::stop_token& stop);
 
-  /// How often deliver() has looked; it does at least twice a second. For the watchdog: takes no
-  /// lock.
+  /// The number of times that deliver() has looked; it does at least twice a second. For the
+  /// watchdog: takes no lock.
   [[nodiscard]] std::uint64_t looks() const { return looks_; }
   /// Replies that were dropped because nobody listened.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }

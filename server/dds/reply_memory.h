@@ -67,7 +67,7 @@ class UnderWay {
     [[nodiscard]] bool is_first() const { return stand_ == Stand::kFirst; }
     /// Something else is being answered under the same id.
     [[nodiscard]] bool is_other() const { return stand_ == Stand::kOther; }
-    /// Of the first: whether a repeat has come that has no answer yet; it counts as answered then.
+    /// For the first: true if a repeat has come that has no answer yet; it counts as answered then.
     /// False is the end.
     [[nodiscard]] bool has_repeat() { return all_.take_repeat(request_); }
 

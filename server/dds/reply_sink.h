@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// How long a reply is kept for a reader that is not matched: DDS matches it within a few
+/// The time for which a reply is kept for a reader that is not matched: DDS matches it within a few
 /// announcements, or never.
 inline constexpr auto kReplyPatience = wire::kLease;
 
@@ -26,7 +26,7 @@ class ReplySink {
   /// Sends the reply, at once where that is possible. `reply` is a sample of the topic's type, of
   /// about so many bytes.
   virtual void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;
-  /// The same for threads that must not write: another one does.
+  /// send() for threads that must not write: another one does.
   virtual void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;
 };
 

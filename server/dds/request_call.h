@@ -25,7 +25,7 @@
 
 namespace trammel {
 
-/// What all operations of a service count.
+/// The counts that all operations of a service keep.
 struct CallCounts {
   std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
   std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
@@ -35,7 +35,7 @@ struct CallCounts {
   std::atomic<std::uint64_t> misdirected{0};
 };
 
-/// Of a request that claims to be of another DDS writer than the one that sent it.
+/// The fault of a request that claims to be of another DDS writer than the one that sent it.
 [[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(
     const wire::RequestHeader& header, const eprosima::fastrtps::rtps::GUID_t& writer) {
   if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
@@ -47,7 +47,7 @@ struct CallCounts {
                      {}};
 }
 
-/// Of a request whose id was given to something else before.
+/// The fault of a request whose id was given to something else before.
 inline const wire::Fault kIdIsUsed{
     wire::RESULT_CONFLICT, "request_id is that of another request", {}, "request_id", {}, {}};
 
@@ -59,7 +59,7 @@ inline const wire::Fault kIdIsUsed{
   return text;
 }
 
-/// What the calls of one operation share. Outlives them.
+/// The parts that the calls of one operation share. They outlive the calls.
 template <typename Operation>
 struct CallContext {
   using Reply = typename Operation::Reply::type;
@@ -86,7 +86,7 @@ class Call final : public Job {
  public:
   using Request = wire::Received<typename Operation::Request::type>;
   using Reply = typename Operation::Reply::type;
-  /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
+  /// True if an answer is computed in portions. Then a repeat gets the kept reply.
   static constexpr bool kComputes = AsksForTargets<Request> || AsksForPoses<Request>;
 
   /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids.

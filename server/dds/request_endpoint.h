@@ -20,7 +20,7 @@
 
 namespace trammel {
 
-/// What all operations of a service share. Must outlive them.
+/// The parts that all operations of a service share. They must outlive the operations.
 struct ServiceCore {
   std::string server_id;
   wire::dds::DomainParticipant& participant;
@@ -51,11 +51,11 @@ class RequestEndpointBase {
   [[nodiscard]] virtual OperationFigures figures() const = 0;
 };
 
-/// What the schedule must know of a request of this participant.
+/// The facts that the schedule must know of a request of this participant.
 template <typename Operation, typename Request>
 [[nodiscard]] Ask ask_of(const Trainer& trainer, const Request& request,
                          const std::string& participant) {
-  /// How long a request waits for its turn whose client does not say how long it waits.
+  /// The time that a request waits for its turn if its client does not say how long it waits.
   constexpr std::chrono::milliseconds kPatience{5000};
   const std::string& cell = request.about().cell();
   const bool is_served = trainer.cells().contains(cell);

@@ -6,7 +6,8 @@
 
 #include "idl/topics.h"
 
-/// What the schedule is told of a request: how much it asks for, and how much memory it takes.
+/// The figures that the schedule is told of a request: how much it asks for, and how much memory it
+/// takes.
 namespace trammel {
 
 template <typename Request>

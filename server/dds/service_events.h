@@ -16,16 +16,16 @@
 
 namespace trammel {
 
-/// What discovery has found of a client. Of a participant that has left, only the participant is
-/// told.
+/// A change of a client that discovery has found. If a participant has left, only the participant
+/// is told.
 struct ReaderEvent {
   enum class Kind { kFound, kLost, kLeft } kind;
   ReplyReader reader;
 };
 
-/// What the status thread of a service waits for. As the participant's listener it notes the
-/// readers of replies, and the participants that have left, and the names of those that were let
-/// in. Thread-safe.
+/// The events for which the status thread of a service waits. As the participant's listener it
+/// notes the readers of replies, and the participants that have left, and the names of those that
+/// were let in. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
   /// The status is to be published.
@@ -33,7 +33,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   /// The status thread has something else to do.
   void wake();
 
-  /// What has happened since the last call of wait().
+  /// The news since the last call of wait().
   struct News {
     bool status_changed = false;
     std::vector<ReaderEvent> readers = {};
@@ -41,9 +41,9 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   /// Waits until something has happened, at most `limit`.
   [[nodiscard]] News wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
-  /// How often participants were refused: one participant tries again and again.
+  /// The number of times that participants were refused: one participant tries again and again.
   [[nodiscard]] std::uint64_t refusals() const;
-  /// What StrangerReport has to say by then.
+  /// The sentences of StrangerReport that are due by then.
   [[nodiscard]] std::vector<std::string> strangers_due(PacketReport::Time now);
   [[nodiscard]] const ClientNames& names() const { return names_; }
 

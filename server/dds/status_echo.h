@@ -24,7 +24,7 @@ class StatusEcho final : private wire::dds::DataReaderListener {
   StatusEcho(const StatusEcho&) = delete;
   StatusEcho& operator=(const StatusEcho&) = delete;
 
-  /// How many of the server's own samples have arrived.
+  /// The number of the server's own samples that have arrived.
   [[nodiscard]] std::uint64_t heard() const { return heard_; }
 
  private:

@@ -11,8 +11,8 @@
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/catalogue.h"
 
-/// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what
-/// cannot be told.
+/// The findings of a batch about the simulation: which physical causes it lacks, how sure that is,
+/// and what cannot be told.
 namespace trammel {
 
 /// The smallest p-value that is given: no tail of a few hundred draws or permutations is known
@@ -71,8 +71,8 @@ struct Finding {
   std::string source =
       {};  ///< as a cell file's list of error sources would spell it; empty for an outlier
   std::vector<Estimate> parameters = {};
-  /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in
-  /// the order of measuring.
+  /// The poses where a cause that begins at a pose may have begun: those that the data cannot tell
+  /// from that pose (95 %), it among them, in the order of measuring.
   std::vector<PossibleBeginning> may_begin_at = {};
   std::string since_session = {};  ///< of a batch of several sessions: the one in which it began
   double effect_rms =
@@ -159,7 +159,7 @@ struct NextPoses {
   double stddev_random = 0;    ///< with as many random ones
 };
 
-/// How large an effect must be to be named at these poses: measured by hiding it in simulated
+/// The size that an effect must have to be named at these poses: measured by hiding it in simulated
 /// noise.
 struct Recovery {
   Cause cause;
@@ -167,7 +167,7 @@ struct Recovery {
   Eigen::VectorXd named;       ///< share of repetitions that were named rightly
 };
 
-/// How strongly what is left depends on something, by permutation.
+/// The dependence of what is left on something, by permutation.
 struct Dependence {
   std::string on;        ///< `q3`, `torque`, `time`
   bool of_size = false;  ///< of |residual| rather than of the residual
@@ -185,7 +185,7 @@ struct Diagnosis {
   LeftOver left_position, left_rotation;  ///< m; rad
   ErrorFigures before, after;             ///< of all poses used, before and after extension
   std::optional<ErrorFigures> held_out_before, held_out_after;
-  /// The same without the poses held out that fit neither model; empty where there are none.
+  /// The figures without the poses held out that fit neither model; empty where there are none.
   std::optional<ErrorFigures> held_out_before_without, held_out_after_without;
   std::string held_out_how;  ///< `validation rows` or `8 blocks, each predicted from the others`
   std::vector<Finding> findings;

@@ -40,7 +40,7 @@ inline constexpr double kStepChance = 3;
 inline constexpr double kLeastGain = 0.02;
 /// Standard deviations by which that gain must be beyond chance: 95 %, one side.
 inline constexpr double kGainBeyondChance = 1.645;
-/// How many named causes together may beat one anonymous function.
+/// The number of named causes that together may beat one anonymous function.
 inline constexpr int kNamedPath = 3;
 /// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and
 /// a map of a joint an eccentric encoder: what choosing one of 150 poses is worth (log 150).
@@ -76,10 +76,10 @@ inline constexpr double kMuchBetterHeldOut = 0.5;
 inline constexpr double kSameEffect = 0.95;
 /// Share of an effect's strength that another cause explains at least if it has the same effect.
 inline constexpr double kSameShare = kSameEffect * kSameEffect;
-/// The same of a cause that explains all of it: however strong the effect is, the two cannot be
+/// The share of a cause that explains all of it: however strong the effect is, the two cannot be
 /// told apart.
 inline constexpr double kWholeShare = 0.995;
-/// The same of a cause that is related, and may be there instead. A correlation of 0.63.
+/// The share of a cause that is related, and may be there instead. A correlation of 0.63.
 inline constexpr double kRelatedShare = 0.4;
 /// A cause that wins a repetition, and explains less than this share of the effect, has won by
 /// another effect, by chance. A correlation of 0.32.
@@ -94,7 +94,7 @@ inline constexpr double kNamingContender = 0.15;
 /// Nat by which these data favour a cause when they have decided for it: odds of 4.5 to 1. At 3 nat
 /// 87 % of the effects of strength 60 were named, at 1.5 nat 92 %, and 6 of 1510 names were wrong.
 inline constexpr double kDecided = 1.5;
-/// The same where less than kSureFrequency of the repetitions give the name: odds of 12 to 1.
+/// kDecided where less than kSureFrequency of the repetitions give the name: odds of 12 to 1.
 inline constexpr double kDecidedUnsure = 2.5;
 /// Strength by which a cause of the same effect may explain less and is as good: 3 nat of
 /// likelihood.
@@ -135,7 +135,7 @@ inline constexpr double kUnlikelyEccentricity = 2;
 inline constexpr double kUnlikelyPayload = 5;
 /// Standard deviations below zero at which the play of a joint has the wrong sign: 95 %, one side.
 inline constexpr double kWrongSign = 1.645;
-/// The same number for the play at one pose, of which there are many: 98 %, one side.
+/// kWrongSign for the play at one pose, of which there are many: 98 %, one side.
 inline constexpr double kWrongSignOfPose = 2;
 /// Share of the poses that may have play of the wrong sign. A quarter is more than the side of a
 /// pose is mistaken.
@@ -163,7 +163,7 @@ inline constexpr double kShowsItsSide = 4;
 /// poses.
 inline constexpr double kSureOfSide = 12;
 
-// What is left, against what is stated for one measurement.
+// The rest of the residual, against what is stated for one measurement.
 
 /// Times the stated standard deviation up to which poses measured repeatedly say how noisy the
 /// measurement is. Where they scatter by more, something moved between them.
@@ -181,7 +181,7 @@ inline constexpr double kMoreThanNoise = 1.23;
 /// though no function was found that says how.
 inline constexpr double kChangesWith = 1e-3;
 
-// What these poses could not have shown, and what they cannot tell apart.
+// Causes that these poses could not have shown, and causes that they cannot tell apart.
 
 /// Standard deviations by which an effect must exceed the line to pass it in nine of ten batches.
 inline constexpr double kPower = 1.2816;

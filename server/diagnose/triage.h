@@ -21,8 +21,9 @@ enum class TriageVerdict {
 struct Triage {
   TriageVerdict verdict = TriageVerdict::kClean;
   bool learn = true;  ///< false: keep the batch apart until somebody who knows has looked at it
-  /// Of kExplained: `tracker_moved`, `tool_changed`, `payload_changed`, `joint_slip`, `outlier`, or
-  /// `drift`, which is the arm itself; with the pose at which it began where that is not the first.
+  /// The cause of kExplained: `tracker_moved`, `tool_changed`, `payload_changed`, `joint_slip`,
+  /// `outlier`, or `drift`, which is the arm itself; with the pose at which it began where that is
+  /// not the first.
   Cause cause;
   bool tracker_elsewhere = false;     ///< besides `cause`, the tracker or the base stands elsewhere
   std::vector<Cause> could_also_be;   ///< explain it as well
@@ -42,7 +43,7 @@ struct Triage {
 /// fewer than 8 poses nothing else is said: clean.
 [[nodiscard]] Triage triage(const CompensatedModel& model, const CheckedBatch& batch);
 
-/// The same where tools and base are to be those of `cell`, which may say others than the model's.
+/// triage() where tools and base are to be those of `cell`, which may say others than the model's.
 [[nodiscard]] Triage triage(const CompensatedModel& model, const CheckedBatch& batch,
                             const Cell& cell);
 

@@ -7,7 +7,7 @@
 #include "server/error_sources/physical_model.h"
 #include "server/robot/gauge.h"
 
-/// What instruments that tell one number have of their own: where their anchors are, and what they
+/// The parameters of instruments that tell one number: where their anchors are, and what they
 /// tell too much. A model has them in its list of sources as `anchors` and `instrument_zero`, with
 /// values and covariances beside those of the arm. They are no errors of the robot: they move no
 /// tool, and nobody looks for them.
@@ -26,9 +26,9 @@ struct PlacedAnchor {
 /// `said` is null where the model has no `anchors`, or none of that id.
 [[nodiscard]] PlacedAnchor placed_anchor(const PhysicalModel& model, const std::string& id);
 
-/// What the instrument would tell at a pose, m, and its derivative by the P parameters where
-/// `jacobian` is given: h(q) = l(p_WT(q), p_WA) + zero, of a gauge told against another pose h(q) -
-/// h(q'). The model must have the anchor.
+/// The number that the instrument would tell at a pose, m, and its derivative by the P parameters
+/// where `jacobian` is given: h(q) = l(p_WT(q), p_WA) + zero, of a gauge told against another pose
+/// h(q) - h(q'). The model must have the anchor.
 double predicted_gauge(const PhysicalModel& model, const PoseContext& context, const Gauge& gauge,
                        const Eigen::VectorXd& values, Eigen::RowVectorXd* jacobian = nullptr);
 

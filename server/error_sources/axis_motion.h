@@ -6,8 +6,8 @@
 /// error of the joint.
 namespace trammel {
 
-/// What a unit of each parameter does: shift along x, y and z of the frame that the joint starts
-/// from (z its axis), m, and tilt about its x and y, rad.
+/// The motion that a unit of each parameter makes: shift along x, y and z of the frame that the
+/// joint starts from (z its axis), m, and tilt about its x and y, rad.
 using AxisMotion = Eigen::Matrix<double, 5, Eigen::Dynamic>;
 
 /// Moves the axis of `joint` by `rates` * `values`: shifted along the frame as it

@@ -51,7 +51,7 @@ enum class Scope {
   kSession,  ///< of the measurement: position and clock of the instrument
 };
 
-/// How long the cause lasts.
+/// The duration of the cause.
 enum class Lasting {
   kAlways,        ///< belongs into the cell file
   kFromAPose,     ///< begins at a pose of a batch: its spelling ends in `@row`
@@ -61,7 +61,7 @@ enum class Lasting {
 /// Which part of the nominal cell its parameters correct.
 enum class Part { kNone, kBase, kLinks, kTool, kPayload };
 
-/// How diagnosis searches for the cause.
+/// The way in which diagnosis searches for the cause.
 enum class SearchFamily {
   kNone,      ///< not at all
   kColumns,   ///< its parameters, all at once
@@ -81,7 +81,7 @@ enum class StandsFor {
                      ///< force
 };
 
-/// Whether a cause may be wrong in single parameters only.
+/// Tells whether a cause may be wrong in single parameters only.
 enum class Numbers {
   kTogether,   ///< all parameters together
   kSingly,     ///< one by one, and each is this same cause
@@ -92,7 +92,7 @@ enum class Numbers {
 /// The summary that reports print before the parameters.
 enum class Summary { kNone, kOrderAndAmplitude, kAmplitude, kPeakToPeak };
 
-/// How another cause resembles this one.
+/// The way in which another cause resembles this one.
 enum class Likeness {
   kFromTheFirstPose,  ///< the other is this one, begun before the first pose
   kSpecialCase,       ///< the other is a special case of this one
@@ -110,7 +110,7 @@ struct Rival {
   double surprise = 0;  ///< nat: penalty on this cause while the model has no source of the rival
 };
 
-/// What to measure so that a cause can be told from its rivals. Of the remedies of two causes, the
+/// The measurement by which a cause can be told from its rivals. Of the remedies of two causes, the
 /// one with the lower rank is named.
 struct Remedy {
   int rank = 0;
@@ -201,7 +201,7 @@ struct CauseRecord {
   std::optional<double> order = {};  ///< cycles per joint turn, if always the same
   std::optional<causes::WholeBatch> whole_batch = {};
   std::optional<causes::Example> example = {};
-  /// Whether the forms give different results in a cell. If not, only the usual one is used.
+  /// True if the forms give different results in a cell. If not, only the usual one is used.
   bool (*forms_differ)(const Cell& cell) = nullptr;
   causes::StandsFor stands_for = causes::StandsFor::kACause;
   std::optional<causes::AddedByData> added_by_data = {};

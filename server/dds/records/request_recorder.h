@@ -18,7 +18,7 @@
 
 namespace trammel {
 
-/// What was asked and answered, as one line of JSON: README.md has its members. Nothing in it says
+/// A request and its answer as one line of JSON: README.md has its members. Nothing in it says
 /// who asked.
 [[nodiscard]] std::string record_line(const wire::PredictErrorRequest& request,
                                       const wire::PredictErrorReply& reply, std::int64_t at_unix_s);
@@ -31,7 +31,7 @@ namespace trammel {
 /// and counted. Thread-safe.
 class RequestRecorder {
  public:
-  /// Whether open() could make its folder; makes nothing.
+  /// Checks that open() could make its folder; makes nothing.
   [[nodiscard]] static Status check(const RecordOptions& options);
   /// Null where nothing is to be recorded. Makes the folder; refuses one that cannot be written.
   [[nodiscard]] static Result<std::unique_ptr<RequestRecorder>> open(const RecordOptions& options);
@@ -53,8 +53,8 @@ class RequestRecorder {
   void run(const std::stop_token& stop);
   void write(const std::string& line);
   void next_file();
-  /// What the disk has not taken whole goes; what was written before stays. A disk that is full now
-  /// may not be later.
+  /// Drops what the disk has not taken whole; what was written before stays. A disk that is full
+  /// now may not be later.
   void give_up_file();
 
   const RecordOptions options_;

@@ -36,7 +36,7 @@ class ChannelBook {
   void lost(const ReplyReader& reader);
   void left(const std::string& participant);
 
-  /// Whether the participant may be answered in the partition: it listens there, or nobody does
+  /// True if the participant may be answered in the partition: it listens there, or nobody does
   /// yet.
   [[nodiscard]] bool may_listen(const std::string& participant, const std::string& partition) const;
   [[nodiscard]] bool listens(const std::string& participant, const std::string& partition) const;
@@ -45,7 +45,7 @@ class ChannelBook {
   /// The request has been answered. Between the two the client keeps its channel.
   void answered(const std::string& partition, SteadyTime now);
 
-  /// What is to be done now. The caller does it.
+  /// A step that is to be taken now. The caller does it.
   struct Change {
     enum class Kind { kOpen, kClose } kind;
     std::string partition;
@@ -53,7 +53,7 @@ class ChannelBook {
     std::string participant = {};  ///< of kOpen: the client's
   };
   [[nodiscard]] std::vector<Change> changes(SteadyTime now);
-  /// Whether clients wait for a channel.
+  /// True if clients wait for a channel.
   [[nodiscard]] bool somebody_waits() const { return open_ < clients_.size(); }
   [[nodiscard]] std::size_t open() const { return open_; }
 

@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// What an item has cost lately, by the kind of work. A figure fades while nothing is measured: one
+/// The recent cost of an item, by the kind of work. A figure fades while nothing is measured: one
 /// that was taken on a stalled machine must not refuse work for ever. Not thread-safe.
 class CostBook {
  public:

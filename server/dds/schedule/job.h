@@ -36,7 +36,7 @@ class Job {
   virtual void shed(const Shed& shed) = 0;
 };
 
-/// What the schedule must know of a request.
+/// The facts that the schedule must know of a request.
 struct Ask {
   std::string client;     ///< who sent it; clients are served in turn
   std::string cell = {};  ///< empty: of no cell in particular

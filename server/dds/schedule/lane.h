@@ -59,7 +59,7 @@ class Lane {
   [[nodiscard]] std::optional<Turns::Portion> next(Turns::Which which) TRAMMEL_REQUIRES(mutex_);
   void run(const Turns::Portion& portion);
   [[nodiscard]] Turns::Done work_on(const Turns::Portion& portion);
-  /// Whether there is something to compute.
+  /// True if there is something to compute.
   [[nodiscard]] bool begin(Turns::Entry& entry);
   /// Items of the request until the portion that began at `begun` is over.
   void compute(Turns::Entry& entry, SteadyTime begun, Turns::Done* done);

@@ -49,7 +49,7 @@ class Turns {
     [[nodiscard]] Job& job() { return *job_; }
     /// The next `most` items, or fewer; `first` is their first. 0: none is left. Thread-safe.
     [[nodiscard]] std::size_t claim(std::size_t most, std::size_t* first);
-    /// Whether these were the last items. Thread-safe.
+    /// True if these were the last items. Thread-safe.
     [[nodiscard]] bool computed(std::size_t count) {
       return computed_.fetch_add(count) + count == items_;
     }
@@ -70,14 +70,14 @@ class Turns {
   };
 
   enum class Part { kBegin, kCompute, kShed };
-  /// What a worker does next. settle() ends it.
+  /// The next piece of work of a worker. settle() ends it.
   struct Portion {
     std::shared_ptr<Entry> entry;
     Part part = Part::kBegin;
     Shed shed = {};  ///< why, of kShed
   };
 
-  /// What became of a portion.
+  /// The outcome of a portion.
   struct Done {
     Cost took{0};           ///< all of it
     Cost computing{0};      ///< of this, for the items
@@ -94,7 +94,7 @@ class Turns {
   enum class Which { kAll, kShort };
   /// Empty when there is nothing that may be worked on.
   [[nodiscard]] std::optional<Portion> next(SteadyTime now, Which which = Which::kAll);
-  /// Whether next(kAll) would give a portion.
+  /// True if next(kAll) would give a portion.
   [[nodiscard]] bool has_work() const;
   /// A request that nobody works on and whose time is over, taken out; empty when there is none.
   [[nodiscard]] std::optional<Portion> next_late(SteadyTime now);
@@ -126,7 +126,7 @@ class Turns {
 
   [[nodiscard]] std::optional<Shed> refusal(const Client& client, const Ask& ask, Cost own,
                                             SteadyTime now) const;
-  /// How long it takes until the client has had `own` more, everybody being served in turn.
+  /// The time until the client has had `own` more, everybody being served in turn.
   [[nodiscard]] Cost served_in(const Client& client, Cost own, std::size_t items) const;
   [[nodiscard]] Client& arrived(const std::string& client);
   [[nodiscard]] bool may_run(const Entry& entry) const;

@@ -18,7 +18,7 @@ namespace trammel::cause_search {
 [[nodiscard]] double independence_p_value(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y,
                                           std::uint64_t seed);
 
-/// Whether what is left, or its size, depends on a joint, on the torque of gravity or on time:
+/// The dependence of what is left, or of its size, on a joint, on the torque of gravity or on time:
 /// distance covariance, Holm-corrected, sorted by p-value. `left`: what `background` leaves of the
 /// residual, whitened rows. Each pose is brought to unit variance, because a fit leaves less where
 /// it leans on few poses.

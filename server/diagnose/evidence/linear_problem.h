@@ -70,14 +70,14 @@ class LinearProblem {
   [[nodiscard]] double noise() const { return position_.noise; }
   /// m per axis: standard deviation that is stated for a measured position. A root mean square.
   [[nodiscard]] double instrument() const { return position_.stated; }
-  /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of
+  /// The noise of positions (m per axis) and of orientations (rad per axis), with the degrees of
   /// freedom behind them.
   struct Spread {
     double noise = 0, stated = 0;
     double freedom =
         0;  ///< 0 where none were measured; positions of a pose that share an error count as fewer
   };
-  /// What is left of the residual (SI) beside the model's own parameters, and the share of freedom
+  /// The rest of the residual (SI) beside the model's own parameters, and the share of freedom
   /// that they leave.
   struct Leftover {
     Eigen::VectorXd residual;

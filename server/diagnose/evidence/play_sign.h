@@ -23,7 +23,7 @@ struct PlaySign {
                                     int joint, const Eigen::VectorXd& change,
                                     const Eigen::MatrixXd& covariance);
 
-/// What may stand behind play of the wrong sign, for people. `every`: no joint has play of the
+/// The possible reasons for play of the wrong sign, for people. `every`: no joint has play of the
 /// right sign.
 [[nodiscard]] std::string what_negative_play_may_be(const std::vector<PlaySign>& negative,
                                                     bool every);

@@ -14,8 +14,8 @@ namespace trammel::cause_search {
                                                          const MeasurementBatch& batch,
                                                          std::vector<Unseen>* unseen);
 
-/// Whether its poses follow one another closely, as on a path measured in motion, and nobody
-/// recorded when.
+/// True if the poses of the batch follow one another closely, as on a path measured in motion, and
+/// nobody recorded when.
 [[nodiscard]] bool is_path_without_times(const MeasurementBatch& batch);
 
 /// Every cause that may be lacking, and its anonymous rivals: a smooth function of each joint, of
@@ -23,7 +23,7 @@ namespace trammel::cause_search {
 /// candidate_sources() and outlives them.
 [[nodiscard]] std::vector<FamilyPtr> make_families(const LinearProblem& problem);
 
-/// Whether the model has a source of that cause and joint.
+/// True if the model has a source of that cause and joint.
 [[nodiscard]] bool has_cause(const PhysicalModel& model, const Cause& cause);
 
 /// The cause that a source in a model's list stands for.

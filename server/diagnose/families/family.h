@@ -68,14 +68,14 @@ class Family {
   [[nodiscard]] virtual std::string source(const Best&) const { return {}; }
   /// False: a function of some joints that no physics stands behind.
   [[nodiscard]] virtual bool named() const { return true; }
-  /// What an anonymous one depends on: `q4`, `time`.
+  /// The circumstances that an anonymous family depends on: `q4`, `time`.
   [[nodiscard]] virtual std::vector<std::string> depends_on() const { return {}; }
-  /// What moves slowly, for people, where it says no more than that: `the zero of joint 3`; else
-  /// empty.
+  /// The thing that moves slowly, for people, where the family says no more than that: `the zero of
+  /// joint 3`; else empty.
   [[nodiscard]] virtual std::string wanderer() const { return {}; }
   /// False where it says nothing of other poses.
   [[nodiscard]] virtual bool predicts() const { return true; }
-  /// What it is called among the others: the same on every background.
+  /// The name among the other families: the same on every background.
   [[nodiscard]] std::string label() const;
   /// nat: how much less it is to be expected than other causes.
   [[nodiscard]] virtual double surprise() const { return 0; }

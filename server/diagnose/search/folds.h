@@ -20,7 +20,7 @@ class Folds {
   /// R: what is left of every row of `data` by a fit of all columns to the poses of the other
   /// folds.
   [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data) const;
-  /// The same of the columns in `chosen` alone, which may be none.
+  /// R: likewise by a fit of the columns in `chosen` alone, which may be none.
   [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data,
                                                   const std::vector<Eigen::Index>& chosen) const;
 

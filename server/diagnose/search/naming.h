@@ -4,7 +4,7 @@
 
 namespace trammel::cause_search {
 
-/// Whether `whole` is `step` from the first pose on: a base that is elsewhere for a tracker that
+/// True if `whole` is `step` from the first pose on: a base that is elsewhere for a tracker that
 /// moved, and so on. A step near the first pose looks like it, and is the less likely of the two.
 [[nodiscard]] bool is_whole_of(const Cause& whole, const Cause& step);
 
@@ -12,17 +12,17 @@ namespace trammel::cause_search {
 /// pose on.
 [[nodiscard]] causes::Part part_of(const Cause& cause);
 
-/// Whether `general` is only a more general description of `special`, not another cause.
+/// True if `general` is only a more general description of `special`, not another cause.
 [[nodiscard]] bool is_description_of(const Cause& general, const Cause& special);
 
-/// Whether `simple` is the one to name where it explains nearly as much as `general` does.
+/// True if `simple` is the one to name where it explains nearly as much as `general` does.
 [[nodiscard]] bool is_simpler_case(const Cause& simple, const Cause& general);
 
-/// Whether the name `special` is unsure if `general`, of which it is a case, is as likely: an order
+/// True if the name `special` is unsure if `general`, of which it is a case, is as likely: an order
 /// of a gear beside a map of its joint's angle.
 [[nodiscard]] bool is_doubtful_case(const Cause& general, const Cause& special);
 
-/// How sure the name of a cause is.
+/// The certainty of a cause's name.
 struct Naming {
   double frequency = 1;  ///< share of repetitions of the batch, the effect as fitted, that name it
   std::vector<Cause> could_also_be;  ///< explain the data as well

@@ -9,7 +9,7 @@ namespace trammel::cause_search {
 /// better: a name that gains nothing is none. Empty where all do.
 [[nodiscard]] std::optional<std::size_t> weak_cause(const SearchResult& result, double limit);
 
-/// The same of an anonymous function in `result.unnamed`.
+/// The place in `result.unnamed` of the first anonymous function that is weak likewise.
 [[nodiscard]] std::optional<std::size_t> weak_function(const SearchResult& result, double limit);
 
 }  // namespace trammel::cause_search

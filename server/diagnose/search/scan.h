@@ -36,7 +36,7 @@ struct Chance {
 [[nodiscard]] Chance chance_of(const std::vector<FamilyPtr>& families, const Background& background,
                                Eigen::Index draws, std::uint64_t seed);
 
-/// How well every family explains one data vector.
+/// The evidence of every family about one data vector.
 struct Scan {
   std::vector<Best> best;     ///< one a family
   std::vector<double> score;  ///< nat: evidence less penalty

@@ -42,7 +42,7 @@ struct SearchResult {
   /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not
   /// among the accepted.
   std::vector<PlaySign> negative_play;
-  /// The same of other causes with numbers beyond their bounds.
+  /// Other causes with numbers beyond their bounds.
   std::vector<WrongSign> wrong_signs;
   Chance chance;
   std::vector<Reformed> reformed;

@@ -6,8 +6,8 @@
 
 namespace trammel::cause_search {
 
-/// What moves slowly where a cause is said to move at once (a step) or steadily (a drift): what the
-/// cause moves, on a course that warms up, follows the recorded temperature, or is any smooth
+/// The slow motion behind a cause that is said to move at once (a step) or steadily (a drift): what
+/// the cause moves, on a course that warms up, follows the recorded temperature, or is any smooth
 /// function of time.
 struct SlowRival {
   Eigen::MatrixXd columns;  ///< R x k, whitened, of the fitted size
@@ -15,7 +15,8 @@ struct SlowRival {
   std::string wanderer;  ///< what moves, for people
   double gap = 0;        ///< nat: evidence beyond the cause's own
 };
-/// Of the family at `place`, as `seen`. Empty where it moves neither at once nor steadily.
+/// The slow rival of the family at `place`, as `seen`. Empty where it moves neither at once nor
+/// steadily.
 [[nodiscard]] std::optional<SlowRival> slow_rival(const Standing& standing, const Scan& seen,
                                                   std::size_t place);
 

@@ -22,9 +22,9 @@ void take_over_surrogates(const Surrogates& surrogates, const MeasurementBatch& 
 /// Takes them out again.
 void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch);
 
-/// Whether the cause was looked for by a surrogate only.
+/// True if the cause was looked for by a surrogate only.
 [[nodiscard]] bool is_by_surrogate(const Surrogates& surrogates, const Cause& cause);
-/// Whether its numbers are per hour or per kelvin that a surrogate made up.
+/// True if its numbers are per hour or per kelvin that a surrogate made up.
 [[nodiscard]] bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause);
 
 /// Causes that depend on something that was recorded and never changed (one side of approach, one

@@ -7,7 +7,7 @@
 
 namespace trammel::cause_search {
 
-/// What takes the place of everything that has no name.
+/// The cause that takes the place of everything that has no name.
 struct NamedInstead {
   Cause cause;
   PriorModel model;           ///< with it, identified without the functions

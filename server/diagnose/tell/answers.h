@@ -25,7 +25,7 @@ struct PreparedBatch {
   bool sorted = false;  ///< rows had to be moved into the order of their times
 };
 
-/// What was found, about the poses that were searched: everything that is told is read from here.
+/// The findings about the poses that were searched: everything that is told is read from here.
 /// Before and after are compared on the same poses: leaving one out is no gain.
 struct Explained {
   Explained(const Cell& cell, SearchResult search);
@@ -34,7 +34,7 @@ struct Explained {
   LinearProblem before,
       after;       ///< about the cell's own model and about the extended one, with all candidates
   Background all;  ///< all that was found, named or not
-  /// What the extended model leaves when it is fitted by itself, as a training would: nothing
+  /// The problem of the extended model when it is fitted by itself, as a training would: nothing
   /// unnamed beside it.
   LinearProblem served;
 };

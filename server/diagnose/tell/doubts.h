@@ -29,7 +29,7 @@ struct Evidence {
   bool changes = false;        ///< its size changed while the batch was measured
 };
 
-/// How sure the name of a finding is, and what people do about it.
+/// The certainty of a finding's name, and what people do about it.
 struct Judgement {
   std::vector<Cause> could_also_be;  ///< empty: its name is sure
   bool whole = true;  ///< false: it has the best known shape, and is not all of what is there
@@ -56,15 +56,15 @@ struct Judgement {
 /// explained in part by
 ///   the nearest of them: the finding may be the best known shape of that. Where half of the poses
 ///   do not show it by themselves, it may be nothing at all.
-/// Of several doubts the action answers the one that comes last in this list.
+/// The action answers one of several doubts: the one that comes last in this list.
 [[nodiscard]] Judgement judge(const Cause& cause, const Evidence& evidence,
                               const std::vector<Cause>& rivals, const Beside& beside);
 
-/// Whether all of `others` are the cause itself by another number or a description of it: which of
+/// True if all of `others` are the cause itself by another number or a description of it: which of
 /// them it is may stay open, for they do the same to the poses.
 [[nodiscard]] bool differ_in_form_only(const Cause& cause, const std::vector<Cause>& others);
 
-/// Whether numbers of that size (in units of their priors) are larger than robots have them.
+/// True if numbers of that size (in units of their priors) are larger than robots have them.
 [[nodiscard]] bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size);
 
 }  // namespace trammel::cause_search

@@ -5,7 +5,7 @@
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/findings.h"
 
-/// Whether what is left after all that was found is still the noise that is stated for a
+/// Tells whether what is left after all that was found is still the noise that is stated for a
 /// measurement.
 ///
 /// sigma is known to a tenth (one standard uncertainty), and the sum of squares left over sigma^2
@@ -28,7 +28,7 @@ enum class NoiseVerdict {
 /// scatter by more than measurements do, something moved between them, and they vouch for nothing.
 [[nodiscard]] double vouched_by(const RepeatStatistics& repeats);
 
-/// Whether what the extended model leaves, of all poses or of one session, is more than noise, or
+/// True if what the extended model leaves, of all poses or of one session, is more than noise, or
 /// repeated poses scatter by more.
 [[nodiscard]] bool leaves_more_than_noise(const Explained& explained,
                                           const PreparedBatch& prepared);

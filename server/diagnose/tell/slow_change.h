@@ -7,9 +7,9 @@
 
 namespace trammel::cause_search {
 
-/// What moved in the course of the batch, for people, by its size and its course: what warms up
-/// moves slowly and little, what slips moves in steps. Empty where nothing moved. `all`: the
-/// background of `problem`, with the functions found.
+/// The part that moved in the course of the batch, for people, by its size and its course: what
+/// warms up moves slowly and little, what slips moves in steps. Empty where nothing moved. `all`:
+/// the background of `problem`, with the functions found.
 [[nodiscard]] std::string what_moves(const SearchResult& found, const LinearProblem& problem,
                                      const Background& all, const Surrogates& unrecorded);
 

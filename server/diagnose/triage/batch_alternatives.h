@@ -7,7 +7,7 @@
 
 namespace trammel::batch_triage {
 
-/// Whether the cause is told by the base standing elsewhere, as the tracker sees it.
+/// True if the cause is told by the base standing elsewhere, as the tracker sees it.
 [[nodiscard]] bool moves_base(const CauseRecord& record);
 
 /// The alternatives that a model and a batch allow.
@@ -19,11 +19,11 @@ class Alternatives {
   [[nodiscard]] Alternative none() const;
   /// One cause each, from pose `first` (0: the whole batch) on.
   [[nodiscard]] std::vector<Alternative> from(int first, const std::string& pose_id) const;
-  /// The same of the whole batch, while the tracker stands elsewhere.
+  /// The alternatives of the whole batch, while the tracker stands elsewhere.
   [[nodiscard]] std::vector<Alternative> with_the_tracker() const;
 
  private:
-  /// Whether the model lets a payload show.
+  /// True if the model lets a payload show.
   [[nodiscard]] bool carries() const;
   void add_drift(std::vector<Alternative>& all) const;
 

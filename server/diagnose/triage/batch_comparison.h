@@ -6,7 +6,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/diagnose/diagnosis.h"
 
-/// How triage() fits one explanation of a batch; the model is at the head of triage.cpp.
+/// The fit of one explanation of a batch for triage(); the model is at the head of triage.cpp.
 namespace trammel::batch_triage {
 
 constexpr int kFewOutliers = 2;  ///< more than these may be a step
@@ -59,7 +59,7 @@ class Comparison {
   /// Deviations of the orientations that the model expects; none are judged where it was never told
   /// any.
   void expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors);
-  /// How many numbers are judged: of a pose, 6 or 3 without an orientation; of all.
+  /// The count of the numbers that are judged: of a pose, 6 or 3 without an orientation; of all.
   [[nodiscard]] Eigen::Index rows(int pose) const {
     return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3;
   }
