@@ -10,8 +10,8 @@ namespace trammel {
 /// `link geometry, gear ripple in joint 3` for {`geometry`, `gear_transmission:3@48`}.
 [[nodiscard]] std::string causes_in_words(const std::vector<std::string>& spellings);
 
-/// The same for a level as models have it: `geometry,gear_transmission:3`; `none` where it is
-/// empty.
+/// `link geometry, gear ripple in joint 3` for a level as models have it:
+/// `geometry,gear_transmission:3`; `none` where it is empty.
 [[nodiscard]] std::string level_in_words(const std::string& level);
 
 }  // namespace trammel

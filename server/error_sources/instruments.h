@@ -8,7 +8,7 @@
 #include "server/error_sources/error_source.h"
 #include "server/robot/gauge.h"
 
-/// What instruments that tell one number have of their own, as sources of a model.
+/// The parameters of instruments that tell one number, as sources of a model.
 namespace trammel {
 
 inline constexpr std::string_view kAnchors = "anchors";

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-/// How large the harmonics of a joint's map are expected to be.
+/// The size that the harmonics of a joint's map are expected to have.
 namespace trammel {
 
 /// The sine and the cosine of harmonic h are normal with standard deviation amplitude / (1 +

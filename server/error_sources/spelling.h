@@ -39,7 +39,7 @@ namespace trammel {
 /// The sources of level M3, which a bias is told of in any case.
 [[nodiscard]] std::vector<std::string> standard_sources();
 
-/// Whether both spellings are of one cause, whichever of its forms: `compliance` and
+/// True if both spellings are of one cause, whichever of its forms: `compliance` and
 /// `compliance_linear`; joints and what begins at a pose apart.
 [[nodiscard]] bool are_forms_of_one(const std::string& source, const std::string& other);
 
@@ -48,7 +48,7 @@ namespace trammel {
 [[nodiscard]] std::string as_listed(const std::string& source,
                                     const std::vector<std::string>& list);
 
-/// Whether one of these sources corrects that part of the nominal cell.
+/// True if one of these sources corrects that part of the nominal cell.
 [[nodiscard]] bool corrects(const std::vector<std::string>& sources, causes::Part part);
 
 /// For people: `gear ripple in joint 3` for `gear_transmission:3@48`, `link geometry (d6)` for

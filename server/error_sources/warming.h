@@ -5,7 +5,7 @@
 
 #include "server/error_sources/error_source.h"
 
-/// How warm a part of the arm is that follows the recorded temperature with a lag.
+/// The warmth of a part of the arm that follows the recorded temperature with a lag.
 namespace trammel {
 
 /// Its time constant: half an hour, give or take; within kHeatLags.
@@ -15,8 +15,8 @@ struct Warming {
   double kelvin = 0;  ///< above the 20 degrees Celsius of drawings
   double by_lag = 0;  ///< K/s, its derivative by the time constant
 };
-/// Of a part with the time constant `lag` (s). Where the history of the temperature is unknown it
-/// is as warm as the thermometer says; empty without a temperature.
+/// The warmth of a part with the time constant `lag` (s). Where the history of the temperature is
+/// unknown it is as warm as the thermometer says; empty without a temperature.
 [[nodiscard]] std::optional<Warming> warming_at(const PoseContext& context, double lag);
 
 }  // namespace trammel

@@ -15,7 +15,7 @@ struct FleetMember {
   CompensatedModel model;
 };
 
-/// Of one parameter of the arm.
+/// One parameter of the arm, over the robots of the fleet.
 struct FleetParameter {
   std::string name;   ///< `C3`, `d4`
   double mean = 0;    ///< SI, over the robots
@@ -39,7 +39,7 @@ struct FleetPrior {
 /// Fewer robots say nothing of a spread.
 inline constexpr int kFewestTwins = 3;
 
-/// Whether both cells have robots of one type: the same drawing.
+/// True if both cells have robots of one type: the same drawing.
 [[nodiscard]] bool same_type(const Chain& one, const Chain& other);
 
 /// The model: robot r's parameters theta_r ~ N(mean, spread²), each parameter's deviations with

@@ -2,7 +2,7 @@
 
 namespace trammel {
 
-/// How probable it is that a value of Student's t with `freedom` degrees of freedom is farther from
+/// The probability that a value of Student's t with `freedom` degrees of freedom is farther from
 /// 0 than `t`.
 [[nodiscard]] double two_sided(double t, double freedom);
 

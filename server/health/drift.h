@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-/// How fast an arm drifts away from its model, by all checks that were made of it.
+/// The rate at which an arm drifts away from its model, by all checks that were made of it.
 ///
 /// Drift is a random walk of all single causes together: after a time t their effects over the
 /// working poses are normal, of variance r t in all. A check says how likely each variance is;
@@ -14,7 +14,7 @@
 /// length), and all together count for as many as are independent.
 namespace trammel {
 
-/// What one check says of it.
+/// The evidence of one check about the drift.
 struct DriftSeen {
   std::int64_t from = 0, until = 0;  ///< Unix time, s: when the model was measured, and the check
   std::vector<double>

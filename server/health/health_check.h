@@ -13,7 +13,7 @@
 #include "server/measurement/checked_batch.h"
 #include "server/plan/check_design.h"
 
-/// Whether a robot still is the one that its model was trained on, by a few poses.
+/// The check whether a robot still is the one that its model was trained on, by a few poses.
 namespace trammel {
 
 /// Holds `batch` against `model`. The tracker may stand anywhere: the base is found anew. Poses

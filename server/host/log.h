@@ -15,7 +15,7 @@ namespace trammel {
 
 enum class LogLevel { kDebug, kInfo, kWarn, kError };
 
-/// What a fact is about, by name: `cell`, `who`, `trace`. Empty values are left out.
+/// The subject of a fact, by name: `cell`, `who`, `trace`. Empty values are left out.
 using LogAbout = std::vector<std::pair<const char*, std::string>>;
 
 /// Call it before any other thread starts. Refuses a file that cannot be opened.

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-/// What the manager of services (systemd) that started this process is told. Without one all of
+/// The messages to the manager of services (systemd) that started this process. Without one all of
 /// this does nothing. Thread-safe.
 namespace trammel {
 
@@ -16,7 +16,7 @@ void tell_manager_stopping();
 void tell_manager_status(const std::string& status);
 /// A sign of life.
 void tell_manager_alive();
-/// How often it wants one at most; empty: never.
+/// The time within which it wants the next one; empty: it wants none.
 [[nodiscard]] std::optional<std::chrono::microseconds> manager_watches_every();
 
 }  // namespace trammel

@@ -29,7 +29,7 @@ struct CheckRows {
   [[nodiscard]] bool base_turns() const { return by_base.cols() == 6; }
 };
 
-/// How the poses of a request to the model are, beside what is measured there.
+/// The poses of the batch as the model is asked for them, without what is measured there.
 [[nodiscard]] std::vector<PoseContext> contexts_of(const CompensatedModel& model,
                                                    const MeasurementBatch& batch);
 

@@ -31,11 +31,11 @@ class CheckTests {
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& directions() const { return directions_; }
   /// Chance of explaining as much of `left` (R, whitened, refitted) where nothing is.
   [[nodiscard]] double p_value(std::size_t hypothesis, const Eigen::VectorXd& left) const;
-  /// Of everything together.
+  /// The p-value of everything together.
   [[nodiscard]] double whole_p(const Eigen::VectorXd& left) const;
   /// The smallest of all causes and of the whole.
   [[nodiscard]] double smallest_p(const Eigen::VectorXd& left) const;
-  /// What each hypothesis explains, less Schwarz's price of its numbers.
+  /// The score of each hypothesis: what it explains, less Schwarz's price of its numbers.
   [[nodiscard]] std::vector<double> scores(const Eigen::VectorXd& left) const;
 
  private:
@@ -50,8 +50,8 @@ struct Sifted {
   double smallest_p = 1;
 };
 
-/// How healthy robots look at these very poses: simulated checks, with the tails that the model's
-/// own errors have, from which bad poses are taken out as from a real one.
+/// The checks of healthy robots at these very poses: simulated ones, with the tails that the
+/// model's own errors have, from which bad poses are taken out as from a real one.
 class HealthyChecks {
  public:
   /// `frames`: R x f, refitted in any case. `tail_freedom`: of Student's t; 0: normal.

@@ -2,8 +2,8 @@
 
 #include "server/health/evidence/check_rows.h"
 
-/// What a cause explains where positions alone, or orientations alone, may be noisier than they
-/// should be.
+/// The part that a cause explains where positions alone, or orientations alone, may be noisier than
+/// they should be.
 namespace trammel::health {
 
 enum class RowKind { kPositions, kOrientations };

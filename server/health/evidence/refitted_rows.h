@@ -11,7 +11,7 @@ namespace trammel::health {
 /// Share of a column: less that is left of it is rounding, or made up for.
 inline constexpr double kLeastLeft = 1e-3;
 
-/// How far numbers of a cause can be off at all, in units of their prior scales (standard
+/// The farthest that numbers of a cause can be off at all, in units of their prior scales (standard
 /// deviations): 20 mm and 50 mrad of links and tools, 0.1 rad of a zero, 2 mrad of an error that
 /// goes with the angle.
 inline constexpr double kWidest = 10, kWidestZero = 50, kWidestFunction = 1;
@@ -38,7 +38,7 @@ struct Hypothesis {
 /// For every pose.
 [[nodiscard]] std::vector<Hypothesis> pose_hypotheses(const CheckRows& rows);
 
-/// What is left of residuals and effects after whitening, and after what is refitted anyway.
+/// The rest of residuals and effects after whitening, and after what is refitted anyway.
 class RefittedRows {
  public:
   /// `nuisance`: R x f, refitted: base, tool, bad poses, what was found before.
@@ -50,7 +50,7 @@ class RefittedRows {
   }
   /// R x k of R x k.
   [[nodiscard]] Eigen::MatrixXd left(const Eigen::MatrixXd& columns) const;
-  /// The same of what is whitened already.
+  /// left() of a vector that is whitened already.
   [[nodiscard]] Eigen::VectorXd refitted(const Eigen::VectorXd& whitened) const {
     return whitened - nuisance_ * (nuisance_.transpose() * whitened);
   }

@@ -7,8 +7,8 @@
 
 namespace trammel::health {
 
-/// What the tests of a check see once some of its poses are refitted as bad, found without touching
-/// its R rows again.
+/// The view of the tests of a check once some of its poses are refitted as bad, found without
+/// touching its R rows again.
 ///
 /// With D_h the orthonormal directions of hypothesis h beside the frames, and l the residuals
 /// whitened and refitted with the frames, everything follows from D_h' l and D_h' D_g: bad poses
@@ -32,7 +32,7 @@ class TestsBesidePoses {
     [[nodiscard]] int whole_freedom() const { return whole_freedom_; }
     /// The residuals beside the bad poses.
     [[nodiscard]] Seen left(const Seen& seen) const;
-    /// What a hypothesis explains of what is left().
+    /// The part of what is left() that a hypothesis explains.
     [[nodiscard]] double explained(std::size_t hypothesis, const Seen& left) const;
     /// Numbers that it holds.
     [[nodiscard]] std::size_t size() const;
@@ -60,7 +60,7 @@ class TestsBesidePoses {
   /// `left`: R, whitened, refitted with the frames.
   [[nodiscard]] Seen seen(const Eigen::VectorXd& left) const;
   [[nodiscard]] Beside beside(const std::vector<int>& bad) const;
-  /// How many hypotheses there are.
+  /// The number of hypotheses.
   [[nodiscard]] std::size_t size() const { return first_.size() - 1; }
 
  private:

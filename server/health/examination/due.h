@@ -15,7 +15,7 @@ struct CheckTimes {
   std::optional<std::int64_t> model, check;
 };
 
-/// How likely each of drift_variances() is, by the residuals: the effects of all single causes are
+/// The misfit of each of drift_variances() to the residuals: the effects of all single causes are
 /// normal, alike. `drift`: R x S, what signals of 1 m rms do at the check's poses. Both whitened
 /// and refitted.
 [[nodiscard]] std::vector<double> misfits_of_drift(Eigen::MatrixXd drift,

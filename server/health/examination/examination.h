@@ -82,9 +82,9 @@ class Examination {
   void tell_what_is_left();
   /// m rms of the positions, refitted.
   [[nodiscard]] double distance_of(const RefittedRows& refitted) const;
-  /// Whether the cause is a tool that sits elsewhere, whose shift stays linear however far it is.
+  /// True if the cause is a tool that sits elsewhere, whose shift stays linear however far it is.
   [[nodiscard]] bool is_tool(std::size_t hypothesis) const;
-  /// Whether a cause was found, and the rest is to be looked at again.
+  /// Looks once. True if a cause was found, and the rest is to be looked at again.
   bool look_once(const CheckTests& tests);
   /// Each cause once more beside the others: one that they make needless goes, one that now fits
   /// better comes.
@@ -109,7 +109,8 @@ class Examination {
   /// `over`, or where it is more than the poses are off by, what they show of it.
   void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here,
                 SeenChange& change) const;
-  /// Whether it would do far more elsewhere than these poses are off by: they do not show it.
+  /// True if the cause would do far more elsewhere than these poses are off by: they do not show
+  /// it.
   [[nodiscard]] bool is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const;
   void tell_change(const Named& named, const CheckTests& tests);
   void tell_rivals(std::size_t hypothesis, const CheckTests& tests,

@@ -7,7 +7,7 @@
 /// The figures beside a change that was seen.
 namespace trammel::health {
 
-/// Of one joint, or of several.
+/// True if the cause is the zero of one joint, or of several.
 [[nodiscard]] bool is_zero(const SingleCause& cause);
 [[nodiscard]] SingleCause unknown_cause();
 /// Unless it stands there already.

@@ -2,7 +2,7 @@
 
 #include "server/health/evidence/refitted_rows.h"
 
-/// How large an effect is, by what was estimated of it.
+/// The size of an effect, by what was estimated of it.
 namespace trammel::health {
 
 /// m, and U(k=2).

@@ -19,7 +19,7 @@ struct Doubt {
   std::vector<int>
       in_tool{};  ///< joints (0-based) whose zeros a tool that was named makes up for at any poses
 };
-/// Of a check whose other members are told.
+/// Tells the verdict of a check whose other members are told.
 void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck& check);
 
 }  // namespace trammel::health
