@@ -48,7 +48,8 @@ class BoundedServer {
   std::unique_ptr<Running> running_;
 };
 
-/// Whether the address and the port could be listened on now. Refuses as BoundedServer::start().
+/// Checks that the address and the port could be listened on now. Refuses as
+/// BoundedServer::start().
 [[nodiscard]] Status check_http_address(const std::string& address, std::uint16_t port);
 
 }  // namespace trammel

@@ -14,7 +14,7 @@ namespace trammel {
 /// Thread-safe.
 class HttpServer {
  public:
-  /// What `server` refers to outlives it.
+  /// The parts that `server` refers to outlive it.
   HttpServer(HttpOptions options, Watched server);
   ~HttpServer();  ///< stops listening
   HttpServer(const HttpServer&) = delete;
@@ -32,7 +32,8 @@ class HttpServer {
   const std::unique_ptr<Running> running_;
 };
 
-/// Whether it could listen now. Refuses an address that leaves this host and a port that is taken.
+/// Checks that the server could listen now. Refuses an address that leaves this host and a port
+/// that is taken.
 [[nodiscard]] Status check_http_options(const HttpOptions& options);
 
 }  // namespace trammel

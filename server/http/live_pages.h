@@ -20,7 +20,7 @@ namespace trammel {
 /// The report of a model; `version` need not be in memory.
 [[nodiscard]] Result<std::string> model_report(const Watched& server, const std::string& cell,
                                                int version);
-/// What the cell has been through, over its last versions.
+/// The history of the cell, over its last versions.
 [[nodiscard]] Result<std::string> history_report(const Watched& server, const std::string& cell);
 
 }  // namespace trammel

@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// What Prometheus scrapes: README.md of this folder lists every name. Thread-safe.
+/// The figures that Prometheus scrapes: README.md of this folder lists every name. Thread-safe.
 class Metrics {
  public:
   explicit Metrics(const Watched& server) : server_(server) {}
@@ -29,8 +29,8 @@ class Metrics {
     std::int64_t trained_at = 0;
     std::optional<std::int64_t> measured_at;
   };
-  /// Of each cell's model in force, as far as they are known; learns those that are in memory, and
-  /// asks the store about a few others.
+  /// The stamps of each cell's model in force, as far as they are known; learns those that are in
+  /// memory, and asks the store about a few others.
   [[nodiscard]] std::map<std::string, Stamp> stamps();
 
   const Watched& server_;

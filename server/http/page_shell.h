@@ -19,8 +19,8 @@ struct ServicePage {
 
 /// A page that stands for itself (a model, a history), with the way back to the others above it.
 [[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell);
-/// The same of a page that an earlier version of the program may have written: its scripts run,
-/// shut off from everything else.
+/// report_reply() of a page that an earlier version of the program may have written: its scripts
+/// run, shut off from everything else.
 [[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);
 
 /// The page of a cell, whatever its name is.

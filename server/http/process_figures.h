@@ -5,8 +5,8 @@
 
 namespace trammel {
 
-/// What the system says of this process, and of the disk that the store is on. What it does not say
-/// is 0.
+/// The system's figures of this process, and of the disk that the store is on. A figure that it
+/// does not tell is 0.
 struct ProcessFigures {
   double resident_bytes = 0;
   double processor_s = 0;

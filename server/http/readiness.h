@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// Whether a cell is answered for, and if not, why. README.md of this folder has the table.
+/// Tells whether a cell is answered for, and if not, why. README.md of this folder has the table.
 struct CellReadiness {
   enum class State {
     kServed,
@@ -34,10 +34,10 @@ struct CellReadiness {
 /// `served`, `in_training`.
 [[nodiscard]] const char* to_text(CellReadiness::State state);
 
-/// Of every cell, by name. Asks the store about at most a few dark cells.
+/// The readiness of every cell, by name. Asks the store about at most a few dark cells.
 [[nodiscard]] std::vector<CellReadiness> cells_readiness(const Watched& server);
 
-/// What /readyz answers: ready where every cell asked about is, and the server moves.
+/// The answer of /readyz: ready where every cell asked about is, and the server moves.
 struct Readiness {
   bool ready = false;
   nlohmann::ordered_json told;

@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// How far a server is. Only while it serves may its parts be asked from other threads.
+/// The phase of a server's life. Only while it serves may its parts be asked from other threads.
 enum class ServerPhase { kStarting, kServing, kStopping };
 
 /// The server whose state is shown. Everything that is referred to outlives what shows it.

@@ -7,7 +7,7 @@
 namespace trammel {
 
 [[nodiscard]] bool has_gauges(const MeasurementBatch& batch);
-/// Whether some row has a position.
+/// True if some row has a position.
 [[nodiscard]] bool has_positions(const MeasurementBatch& batch);
 /// The rows that have a position. Indices and rows stay.
 [[nodiscard]] MeasurementBatch positions_of(const MeasurementBatch& batch);

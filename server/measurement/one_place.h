@@ -9,10 +9,10 @@ namespace trammel {
 
 /// m, rms distance of the points from their centroid; there is one point at least.
 [[nodiscard]] double spread_of(const Eigen::Matrix3Xd& points);
-/// Whether they lie within 50 mm rms of one place: an arm that is off by 3 mm is a turn of 3
+/// True if the points lie within 50 mm rms of one place: an arm that is off by 3 mm is a turn of 3
 /// degrees there, so that they hardly tell how anything is turned. No points are at no place.
 [[nodiscard]] bool are_at_one_place(const Eigen::Matrix3Xd& points);
-/// Whether the positions of each tool are, with as many places as there are tools.
+/// True if the positions of each tool lie at one place, with as many places as there are tools.
 [[nodiscard]] bool is_each_tool_at_one_place(const MeasurementBatch& batch);
 
 }  // namespace trammel

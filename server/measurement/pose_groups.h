@@ -17,7 +17,7 @@ using PoseGroup = std::vector<Eigen::Index>;
 [[nodiscard]] std::vector<PoseGroup> pose_groups(const std::vector<JointVector>& q);
 [[nodiscard]] std::vector<PoseGroup> pose_groups(const MeasurementBatch& batch);
 
-/// Whether both are positions of one session, approached the same way: at one joint vector the arm
+/// True if both are positions of one session, approached the same way: at one joint vector the arm
 /// is off by the same.
 [[nodiscard]] bool are_seen_together(const Measurement& a, const Measurement& b);
 /// The rows of `batch` by joint vector, those that are not seen together apart.

@@ -6,8 +6,8 @@
 #include "server/base/result.h"
 #include "server/measurement/measurement.h"
 
-/// Whether the measured positions belong to the commanded joints, asked before anything is learned
-/// from them.
+/// The check whether the measured positions belong to the commanded joints, made before anything is
+/// learned from them.
 ///
 /// Nothing is known of the robot but its drawing. So an arm is fitted that may be anything a robot
 /// can be: base free, zeros off by degrees, links and tool by millimetres, gears that give way. A
@@ -16,18 +16,18 @@
 /// two columns exchanged, another sign, unit or zero in one of them, mirrored axes, another point
 /// of the tool, a robot file in another convention.
 ///
-/// What cannot be told: of positions alone from a tracker that may stand anywhere, which of three
-/// axes is mirrored, and that two of them were exchanged instead; a turned joint 1, which is a
-/// turned base; a mistake in a joint that moves the measured point by less than a millimetre, which
-/// does no harm to positions; a mirrored axis from a mirrored drawing (several joints that count
-/// the other way). Single rows are outliers, not mistakes of reading, but for those that are in
-/// another unit of length than the others. Rows that follow each other at the same joints and tell
-/// places far apart are several reflectors under one name.
+/// Some mistakes cannot be told: of positions alone from a tracker that may stand anywhere, which
+/// of three axes is mirrored, and that two of them were exchanged instead; a turned joint 1, which
+/// is a turned base; a mistake in a joint that moves the measured point by less than a millimetre,
+/// which does no harm to positions; a mirrored axis from a mirrored drawing (several joints that
+/// count the other way). Single rows are outliers, not mistakes of reading, but for those that are
+/// in another unit of length than the others. Rows that follow each other at the same joints and
+/// tell places far apart are several reflectors under one name.
 namespace trammel {
 
 /// The doubts about how a batch was read.
 struct ReadingLook {
-  /// What speaks against the positions: how far they are off (`value`, mm), the reading that would
+  /// The doubt about the positions: how far they are off (`value`, mm), the reading that would
   /// fit (`text`, `with q2_deg and q3_deg exchanged`), its columns and the first row that it is
   /// about. Empty where they follow the joints, where no other reading fits much better, and of
   /// fewer than 6 poses.

@@ -7,7 +7,7 @@
 /// Set-ups of the instrument within one batch.
 namespace trammel {
 
-/// Whether there is more than one.
+/// True if the batch has more than one session.
 [[nodiscard]] bool has_sessions(const MeasurementBatch& batch);
 
 /// Divides the batch by the session ids of its rows: the rows of one stand together and keep their

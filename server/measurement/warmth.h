@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// Whether every pose has a temperature, and the warmest more than 2 K above the coldest: what
+/// True if every pose has a temperature, and the warmest more than 2 K above the coldest: what
 /// grows with it shows.
 [[nodiscard]] bool shows_warmth(const MeasurementBatch& batch);
 

@@ -9,8 +9,8 @@
 
 namespace trammel {
 
-/// How long pieces of work took, counted in classes whose bounds never change. Thread-safe, without
-/// a lock; add() costs some ten nanoseconds.
+/// The durations of pieces of work, counted in classes whose bounds never change. Thread-safe,
+/// without a lock; add() costs some ten nanoseconds.
 class LatencyHistogram {
  public:
   /// Upper bounds of the classes, s. One more class holds what is above the last.

@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// What is counted of the requests of one operation. Thread-safe, without a lock.
+/// The counts of the requests of one operation. Thread-safe, without a lock.
 class OperationCounts {
  public:
   static constexpr std::size_t kResults =

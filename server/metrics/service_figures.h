@@ -10,7 +10,7 @@
 #include "server/metrics/latency_histogram.h"
 #include "server/metrics/work_counts.h"
 
-/// What a service tells those who watch it: plain values, read at one moment.
+/// The figures that a service tells those who watch it: plain values, read at one moment.
 namespace trammel {
 
 struct OperationFigures {
@@ -41,7 +41,7 @@ struct ServiceFigures {
   std::optional<std::uint64_t> not_recorded = {};  ///< requests that were to be; empty: none are
 };
 
-/// Whether the threads of a service do their work.
+/// Tells whether the threads of a service do their work.
 struct Movement {
   bool watched = false;            ///< the service runs
   std::vector<std::string> still;  ///< parts that have not moved for longer than they ever need

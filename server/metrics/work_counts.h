@@ -11,8 +11,8 @@
 
 namespace trammel {
 
-/// What a cell was asked for, and how sure the answers were: whether the work is where the model
-/// knows the arm.
+/// The requests to a cell, and how sure the answers were: they tell whether the work is where the
+/// model knows the arm.
 struct WorkFigures {
   /// Upper bounds of the classes of promised deviations, mm. One more class holds what is above the
   /// last.

@@ -5,7 +5,8 @@ namespace trammel {
 
 /// Chance of more than `x`.
 [[nodiscard]] double chi_square_tail(double x, int freedom);
-/// The same where the mean is shifted: `noncentrality` is the squared length of the shift.
+/// Chance of more than `x` where the mean is shifted: `noncentrality` is the squared length of the
+/// shift.
 [[nodiscard]] double chi_square_tail(double x, int freedom, double noncentrality);
 /// The x that is exceeded with this chance, in (0, 1).
 [[nodiscard]] double chi_square_limit(double chance, int freedom);

@@ -39,8 +39,8 @@ struct Numerics {
   bool (*sweep)(std::ptrdiff_t n, std::ptrdiff_t extra, double* a, std::ptrdiff_t ld, double* work,
                 double* log_det);
 
-  /// The same in; out: L⁻¹ of M = L Lᵀ in the lower triangle, -Y M⁻¹ in the extra rows. 2/3 n³
-  /// flops.
+  /// In: as of sweep(). Out: L⁻¹ of M = L Lᵀ in the lower triangle, -Y M⁻¹ in the extra rows. 2/3
+  /// n³ flops.
   bool (*inverse_root)(std::ptrdiff_t n, std::ptrdiff_t extra, double* a, std::ptrdiff_t ld,
                        double* work, double* log_det);
 
@@ -72,8 +72,8 @@ struct Numerics {
   void (*square_norms)(std::ptrdiff_t n, const double* packed, std::ptrdiff_t count,
                        const double* k, double* out);
 
-  /// The same of a packed triangle that was rounded to single precision, number by number; sums are
-  /// in double.
+  /// square_norms() of a packed triangle that was rounded to single precision, number by number;
+  /// sums are in double.
   void (*square_norms_single)(std::ptrdiff_t n, const float* packed, std::ptrdiff_t count,
                               const double* k, double* out);
 

@@ -6,11 +6,11 @@
 
 #include "server/robot/chain.h"
 
-/// How a measuring pose is approached, so that it is known from which side play in the gears is
+/// The approach of a measuring pose, so that it is known from which side play in the gears is
 /// taken up.
 namespace trammel {
 
-/// How each gear turns into a pose: +1 rising, -1 falling (PoseContext::direction).
+/// The way each gear turns into a pose: +1 rising, -1 falling (PoseContext::direction).
 using Sides = std::vector<int>;
 
 /// The sides from which pose `number` (from 0) of a plan is approached: all from above first, then

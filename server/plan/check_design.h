@@ -22,8 +22,8 @@ struct CheckTest {
 /// Numbers that the test of a cause looks at, of `poses` poses.
 [[nodiscard]] int freedom_of(const CauseEffects::Entry& entry, int poses);
 
-/// How small an effect of a cause is seen at some poses; m, rms over the working poses. Empty: none
-/// is.
+/// The smallest effect of a cause that is seen at some poses; m, rms over the working poses. Empty:
+/// none is.
 struct SmallestEffect {
   SingleCause cause;
   std::optional<double> rms;
@@ -40,7 +40,7 @@ struct CheckDesign {
                                                const std::vector<CauseSignal>& signals,
                                                const std::vector<PoseContext>& candidates,
                                                int count, const CheckTest& test);
-/// The same for poses that are given.
+/// The smallest effects for poses that are given.
 [[nodiscard]] std::vector<SmallestEffect> smallest_effects(const CauseEffects& effects,
                                                            const std::vector<CauseSignal>& signals,
                                                            const std::vector<PoseContext>& poses,

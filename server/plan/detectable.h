@@ -6,7 +6,7 @@
 
 #include "server/plan/single_causes.h"
 
-/// How small an effect of a single cause may be and still be seen at given poses.
+/// The smallest effect of a single cause that can still be seen at given poses.
 ///
 /// A pose shows r = B b + T t + s theta + e, e of covariance S: the base b stands anywhere, so does
 /// the tool t where it is a new one. What is left of the effect s after whitening and after both

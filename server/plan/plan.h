@@ -30,7 +30,7 @@ using JointRanges =
 [[nodiscard]] Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count,
                                               std::uint64_t seed);
 
-/// How poses are chosen among those that the cell allows.
+/// The criterion by which poses are chosen among those that the cell allows.
 enum class PlanCriterion {
   kLatinHypercube,  ///< evenly over the joint ranges
   kObservability,   ///< D-optimal for the parameters of the cell's error sources

@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/error_sources/physical_model.h"
 
-/// Whether poses can tell two physical causes apart.
+/// The question whether poses can tell two physical causes apart.
 namespace trammel {
 
 /// Two causes in a model that has every other source of the cell as well.
@@ -22,8 +22,8 @@ struct CausePair {
 [[nodiscard]] Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell,
                                                 const std::string& cause, const std::string& other);
 
-/// What a least-squares fit of all other parameters (with their priors) leaves of the effect of
-/// one.
+/// The rest that a least-squares fit of all other parameters (with their priors) leaves of the
+/// effect of one.
 struct ParameterSeparation {
   std::string parameter;
   double effect = 0;    ///< |effect|^2 / sigma^2 of one prior scale of it
@@ -47,7 +47,7 @@ constexpr double kLeastStrength = 15;
 /// Below this share a fit takes the effect for that of others: no plan makes up for it.
 constexpr double kLeastShare = 0.02;
 
-/// What else would have to change, for people: `a second known payload, or a run without any`.
+/// The change that is needed besides, for people: `a second known payload, or a run without any`.
 [[nodiscard]] std::string what_would_separate(const std::string& cause, const std::string& other);
 
 }  // namespace trammel

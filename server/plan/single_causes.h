@@ -53,7 +53,7 @@ class CauseEffects {
 
   [[nodiscard]] const std::vector<Entry>& causes() const { return causes_; }
   [[nodiscard]] const std::vector<CauseNotAsked>& not_asked() const { return not_asked_; }
-  /// Of a tool that sits elsewhere on the flange.
+  /// The columns of a tool that sits elsewhere on the flange.
   [[nodiscard]] const std::vector<Eigen::Index>& tool_columns() const { return tool_; }
   /// Number of columns, K.
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(numbers_.size()); }
@@ -63,7 +63,7 @@ class CauseEffects {
   [[nodiscard]] PoseEffects at(const PoseContext& context) const;
   /// Where the causes have these numbers (K, in units of their prior scales).
   [[nodiscard]] PoseEffects at(const PoseContext& context, const Eigen::VectorXd& numbers) const;
-  /// The same with the columns of warmth 0: a third of the work where no temperature is recorded.
+  /// at() with the columns of warmth 0: a third of the work where no temperature is recorded.
   [[nodiscard]] PoseEffects without_warmth(const PoseContext& context,
                                            const Eigen::VectorXd& numbers) const;
 
@@ -80,7 +80,7 @@ class CauseEffects {
   /// cannot have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
-  /// Of the model with these numbers of the causes.
+  /// The values of the model with these numbers of the causes.
   [[nodiscard]] Eigen::VectorXd values_at(const Eigen::VectorXd& numbers) const;
   [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context,
                                             const Eigen::VectorXd& values, Pose* X_WT) const;

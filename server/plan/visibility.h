@@ -5,7 +5,7 @@
 #include "server/base/result.h"
 #include "server/robot/cell.h"
 
-/// Whether the tracker sees the target that the tool carries (source section 6.1.2).
+/// The test whether the tracker sees the target that the tool carries (source section 6.1.2).
 namespace trammel {
 
 /// Angle (rad, 0 to pi) between the target's normal and the line of sight from the target to a
@@ -22,7 +22,7 @@ class Visibility {
   /// both, refuses an unknown base or tool: there is no line of sight to tell.
   [[nodiscard]] static Result<Visibility> of(const Cell& cell, const std::string& tool);
 
-  /// Whether the nominal robot at `q` (rad, m) shows its target within the aperture, edge included.
+  /// True if the nominal robot at `q` (rad, m) shows its target within the aperture, edge included.
   [[nodiscard]] bool sees(const JointVector& q) const;
 
  private:

@@ -49,7 +49,7 @@ class ModelRegistry {
   [[nodiscard]] int version_in_force(const std::string& cell) const;
   /// Any version of the cell. Waits while it is loaded; refuses what its source refuses.
   [[nodiscard]] Result<ServedModelPtr> version(const std::string& cell, int version) const;
-  /// What in_force() gives, without waiting.
+  /// The model that in_force() gives, without waiting.
   struct Ready {
     ServedModelPtr model;
     bool comes = false;  ///< it is not in memory, and will be
@@ -75,9 +75,9 @@ class ModelRegistry {
       kOnDisk  ///< it is loaded when it is asked for
     } where = Where::kOnDisk;
   };
-  /// Of every cell that has a model in force.
+  /// The place of every cell that has a model in force.
   [[nodiscard]] std::map<std::string, Place> places() const;
-  /// How many cells have a model in force.
+  /// The number of cells that have a model in force.
   [[nodiscard]] std::size_t cells_served() const;
   [[nodiscard]] std::size_t bytes() const;
 
@@ -99,7 +99,7 @@ class ModelRegistry {
     std::size_t bytes = 0;
     std::uint64_t used = 0;
   };
-  /// Of a model in memory; counts as a use.
+  /// The model if it is in memory; counts as a use.
   [[nodiscard]] ServedModelPtr held(const Key& key) const TRAMMEL_REQUIRES(mutex_);
   /// Puts it into memory. What has to leave goes to `left`, to be freed without the lock.
   void hold(ServedModelPtr model, std::vector<ServedModelPtr>* left) const TRAMMEL_REQUIRES(mutex_);
@@ -111,7 +111,7 @@ class ModelRegistry {
   void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const
       TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
-  /// Whether models are loaded that nobody has asked for.
+  /// True if models are loaded that nobody has asked for.
   [[nodiscard]] bool has_room() const TRAMMEL_REQUIRES(mutex_) {
     return bytes_ < budget_ - budget_ / 8;
   }

@@ -12,7 +12,7 @@ namespace trammel {
 /// what moved line by line (`moved`, a budget), and the same in words (`sentences`).
 [[nodiscard]] nlohmann::ordered_json after_repair_json(const AfterRepair& repair);
 
-/// The same as a section of a page.
+/// The outcome of a repair as a section of a page.
 [[nodiscard]] std::string after_repair_section(const AfterRepair& repair);
 
 }  // namespace trammel

@@ -18,7 +18,7 @@ struct CheckOnRecord {
   std::string check;                 ///< as health_json() has it
 };
 
-/// What a cell is served with, and how that was judged.
+/// The model that a cell is served with, and how that was judged.
 struct ServedOnRecord {
   int version = 0;
   std::string model;                       ///< its id
@@ -30,7 +30,7 @@ struct ServedOnRecord {
   std::vector<SessionChange> between_sessions = {};
 };
 
-/// What a service knows of a cell's health.
+/// The record that a service has of a cell's health.
 struct CellHealth {
   std::string cell;
   std::optional<ServedOnRecord> served = {};  ///< empty: none is in force

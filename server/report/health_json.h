@@ -20,7 +20,7 @@ struct CheckedSince {
 /// door tells.
 [[nodiscard]] nlohmann::ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch,
                                                 const CompensatedModel& model);
-/// What the check that health_json() wrote says of the arm's drift; empty: nothing.
+/// The evidence about the arm's drift in a check that health_json() wrote; empty: none.
 [[nodiscard]] std::optional<DriftSeen> drift_of(const std::string& check);
 /// For people: the verdict, what changed, what would have been seen, when the next check is due.
 [[nodiscard]] std::string health_text(const HealthCheck& check);

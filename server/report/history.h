@@ -49,7 +49,7 @@ struct EventOnRecord {
   std::string what, subject, why, who;
 };
 
-/// What a cell has been through, oldest first.
+/// The history of a cell, oldest first.
 struct CellHistory {
   std::string cell;
   std::vector<VersionOnRecord> versions = {};

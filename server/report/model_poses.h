@@ -31,7 +31,8 @@ struct ShownPoses {
 [[nodiscard]] ShownPoses poses_to_show(const CompensatedModel& model,
                                        const std::optional<MeasurementBatch>& batch);
 
-/// How many poses have which error at each level: bins of thirds of a decade. Null without poses.
+/// The number of poses by their error at each level: bins of thirds of a decade. Null without
+/// poses.
 [[nodiscard]] nlohmann::ordered_json histogram_json(const ShownPoses& shown);
 /// Which share of coordinates lies inside the interval that should hold 50 %, 68 %...; null with
 /// fewer than 8 poses.
@@ -40,15 +41,15 @@ struct ShownPoses {
 /// The poses with the largest errors, as HTML.
 [[nodiscard]] std::string worst_poses(const ShownPoses& shown);
 
-/// What fewer and more poses are worth.
+/// The worth of fewer and of more poses.
 struct LearningCurve {
   std::string what, sentence;      ///< for people
   std::vector<int> poses = {};     ///< rising
   std::vector<double> error = {};  ///< m
 };
-/// Of a bias: the error at the poses left out, with a part of the poses and with all but one. Of a
-/// model without: the promise (PositionAccuracy) if the parameters' covariance shrinks as poses are
-/// added. Empty where there are too few poses, or so many that it would take long.
+/// The curve of a bias: the error at the poses left out, with a part of the poses and with all but
+/// one. Of a model without: the promise (PositionAccuracy) if the parameters' covariance shrinks as
+/// poses are added. Empty where there are too few poses, or so many that it would take long.
 [[nodiscard]] std::optional<LearningCurve> learning_curve(const CompensatedModel& model);
 
 }  // namespace trammel

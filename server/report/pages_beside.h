@@ -5,7 +5,7 @@
 
 namespace trammel {
 
-/// What a page is about; it stands in its head, so that other pages find it.
+/// The subject of a page; it stands in its head, so that other pages find it.
 struct PageMark {
   std::string_view
       kind;          ///< model, diagnosis, program, health, remedies, comparison, history or fleet

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// What a shop can put right where, and what each step leaves, as a page for the wall. `where`: of
-/// which poses.
+/// The repairs that a shop can make, where, and what each step leaves, as a page for the wall.
+/// `where`: of which poses.
 [[nodiscard]] std::string remedies_page(const CompensatedModel& model, const ErrorBudget& budget,
                                         const std::string& where);
 

@@ -8,12 +8,12 @@
 
 namespace trammel {
 
-/// What changed between sessions, for programs: cause and joint (from 1), since which session and
+/// The changes between sessions, for programs: cause and joint (from 1), since which session and
 /// pose, sizes with U(k=2) in the unit that stands beside them, what else it could be, and whether
 /// it rests on the order of the sessions.
 [[nodiscard]] nlohmann::ordered_json session_changes_json(
     const std::vector<SessionChange>& changes);
-/// The same as a table of a page; empty where nothing changed.
+/// The changes between sessions as a table of a page; empty where nothing changed.
 [[nodiscard]] std::string session_changes_html(const std::vector<SessionChange>& changes);
 
 }  // namespace trammel

@@ -80,7 +80,7 @@ constexpr int kMaxStateRows = 8 * kMaxJoints + 22;
 /// The derivative of `Rows` numbers by the state: one column for each of StateRows.
 template <int Rows>
 using StateMatrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, kMaxStateRows>;
-/// The same with a row for each joint.
+/// A StateMatrix with a row for each joint.
 using JointStateMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxStateRows>;
 
@@ -92,7 +92,7 @@ class StateJacobian {
   StateJacobian(const Chain& chain, int parameters);
   /// Records that the parameter in `column` moves state row `row` by `rate` per unit.
   void add(int row, int column, double rate);
-  /// The same for several rows from `first_row` and columns from `first_column`; zeros cost
+  /// add() for several rows from `first_row` and columns from `first_column`; zeros cost
   /// nothing.
   void add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates);
   /// Records that the parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per
@@ -155,8 +155,8 @@ class ArmKinematics {
   /// 6 x n: the tool's motion in W per turn of each joint about its axis (signs and couplings do
   /// not enter).
   [[nodiscard]] JointJacobian axis_jacobian() const;
-  /// The same per deflection of each joint's gear (signs do not enter, bars do), the J of eq.
-  /// (3.6).
+  /// 6 x n: the tool's motion in W per deflection of each joint's gear (signs do not enter, bars
+  /// do), the J of eq. (3.6).
   [[nodiscard]] JointJacobian deflection_jacobian() const;
   /// Derivative of deflection_jacobian() * `of_gears` with that deflection (n) held.
   [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& of_gears) const;

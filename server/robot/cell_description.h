@@ -6,9 +6,9 @@
 
 namespace trammel {
 
-/// What tells two descriptions of a cell apart: hashes of what its two files say that decides
-/// numbers. The order of keys, how a number is spelled, comments, where the robot file lies and
-/// what is written for people only do not count.
+/// The marks that tell two descriptions of a cell apart: hashes of what its two files say that
+/// decides numbers. The order of keys, how a number is spelled, comments, where the robot file lies
+/// and what is written for people only do not count.
 struct CellDescription {
   std::string cell, robot;  ///< 32 hex digits each
   bool operator==(const CellDescription&) const = default;

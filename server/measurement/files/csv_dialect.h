@@ -6,8 +6,8 @@
 
 #include "server/base/result.h"
 
-/// What spreadsheets make of a table: which character separates values, and which one stands before
-/// decimals. What the text does not decide is refused, never guessed.
+/// The dialect that spreadsheets give a table: which character separates values, and which one
+/// stands before decimals. A dialect that the text does not decide is refused, never guessed.
 namespace trammel {
 
 /// Refuses what is no text: a spreadsheet (.xlsx, .ods, .xls), UTF-16, an archive. The error says
@@ -27,7 +27,7 @@ struct CsvStart {
 /// and a first row that leave several.
 [[nodiscard]] Result<CsvStart> start_of_csv(std::string_view text, const std::string& where);
 
-/// Whether a column of this name holds quantities, as tables of measurements call them: `x_mm`,
+/// True if a column of this name holds quantities, as tables of measurements call them: `x_mm`,
 /// `Q1_DEG`, `Rx [deg]`, `qw`.
 [[nodiscard]] bool holds_quantities(std::string_view column);
 

@@ -62,11 +62,12 @@ struct PointList {
 /// underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines above the header, in which a program
 /// tells of itself, are passed over.
 ///
-/// Of Leica Tracker Pilot, also `pointid`; `u95` of the point (k = 2, of its three axes together:
-/// sigma of one axis is U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx qy qz` or
-/// `q0 q1 q2 q3`, active W <- frame; a `timestamp` (`2026-11-22 10:11:12.3`, `22.11.2026 10:11:12`,
-/// taken for UTC, or Unix time), which else stays as text; `temperature`, `pressure`, `humidity` of
-/// the air, which are kept as `air_temperature_c`, `air_pressure_hpa`, `air_humidity_percent`.
+/// Files of Leica Tracker Pilot have also `pointid`; `u95` of the point (k = 2, of its three axes
+/// together: sigma of one axis is U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx
+/// qy qz` or `q0 q1 q2 q3`, active W <- frame; a `timestamp` (`2026-11-22 10:11:12.3`, `22.11.2026
+/// 10:11:12`, taken for UTC, or Unix time), which else stays as text; `temperature`, `pressure`,
+/// `humidity` of the air, which are kept as `air_temperature_c`, `air_pressure_hpa`,
+/// `air_humidity_percent`.
 ///
 /// Coordinates: cartesian; cylindrical R, theta (from +x about +z), z; spherical R, theta (the
 /// same), phi (from +z). A comment with `cylindric`, `spherical` or `polar` says so. Angles are deg

@@ -6,7 +6,7 @@
 
 #include "server/measurement/reading/number_table.h"
 
-/// How well joints lead to positions for any arm that the robot of a cell may be.
+/// The fit of joints to positions, for any arm that the robot of a cell may be.
 namespace trammel::reading {
 
 /// An arm as it may have been built, mounted and mastered, and how the positions of a table fit it.
@@ -34,11 +34,11 @@ enum class ToolPoints {
 /// Base and tools alone, by closed forms that a third of bad rows does not mislead.
 [[nodiscard]] ArmFit located(const NumberTable& table, const Cell& cell,
                              ToolPoints points = ToolPoints::kAsDrawn);
-/// The same with all of the arm, from `start`.
+/// All of the arm, from `start`.
 [[nodiscard]] ArmFit fitted(const NumberTable& table, const Cell& cell, const ArmFit& start,
                             ToolPoints points = ToolPoints::kAsDrawn);
 
-/// The same of positions at one place, which do not tell how the base is turned: from several
+/// fitted() of positions at one place, which do not tell how the base is turned: from several
 /// turns, the best fit.
 [[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell,
                                            const ArmFit& start);
