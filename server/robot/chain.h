@@ -85,9 +85,9 @@ class Chain {
   /// n x n: drive() of gears that are counted as their axes turn. What a gear gives way moves the
   /// joints by it; its transpose makes the torques on the gears of those about the axes.
   [[nodiscard]] const Eigen::MatrixXd& bars() const { return bars_; }
-  /// Whether bars couple joints: else bars() is the identity.
+  /// True if bars couple joints: else bars() is the identity.
   [[nodiscard]] bool has_bars() const { return has_bars_; }
-  /// Whether the controller counts the angles of the gears: else gear_angles() changes something.
+  /// True if the controller counts the angles of the gears: else gear_angles() changes something.
   [[nodiscard]] bool counts_gears() const { return transmission_ == drive_; }
   /// The angles of the gears at the commanded `q`; commanded() is the way back. Linear: of
   /// differences as well.
@@ -105,7 +105,7 @@ class Chain {
   /// The Jacobian per gear angle.
   [[nodiscard]] Eigen::MatrixXd gear_jacobian(const JointVector& q,
                                               const Vector3& p_F = Vector3::Zero()) const;
-  /// Whether any link's weight is known.
+  /// True if any link's weight is known.
   [[nodiscard]] bool has_link_masses() const;
   /// Index of the first joint outside its limits (beyond `tolerance`), if any.
   [[nodiscard]] std::optional<int> joint_outside_limits(const JointVector& q,

@@ -28,7 +28,7 @@ struct InverseResult {
 [[nodiscard]] InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF,
                                                const JointVector& seed);
 
-/// What is to say of joints that bring the flange to where it is wanted: kOk, kJointLimit or
+/// The status of joints that bring the flange to where it is wanted: kOk, kJointLimit or
 /// kSingular, as above.
 [[nodiscard]] InverseResult judged_joints(const Chain& chain, const JointVector& q, int iterations);
 
@@ -44,8 +44,8 @@ struct InverseResult {
     const Chain& chain, const Pose& X_BF, int conf,
     const std::optional<JointVector>& near = std::nullopt);
 
-/// The same joints, not held against limits and singular places. For an arm with a spherical wrist;
-/// `conf` is 0..7. Empty where the flange cannot be brought there.
+/// The joints of one branch, not held against limits and singular places. For an arm with a
+/// spherical wrist; `conf` is 0..7. Empty where the flange cannot be brought there.
 [[nodiscard]] std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF,
                                                           int conf,
                                                           const std::optional<JointVector>& near);

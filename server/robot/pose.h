@@ -27,7 +27,7 @@ using JointVector = Eigen::VectorXd;
 /// Its gamma, beta, alpha of R, beta at most 90 degrees. There gamma and alpha turn about one axis,
 /// and gamma is 0.
 [[nodiscard]] Vector3 zyx_angles(const Matrix3& R);
-/// Whether beta is 90 degrees up or down.
+/// True if beta is 90 degrees up or down.
 [[nodiscard]] bool is_beta_upright(const Matrix3& R);
 [[nodiscard]] Pose make_pose(const Matrix3& R, const Vector3& p);
 /// measured - model: [p_measured - p_model; rotation_log(R_measured R_modelᵀ)], in the frame of

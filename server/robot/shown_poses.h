@@ -5,8 +5,8 @@
 
 #include "server/robot/cell.h"
 
-/// Whether a robot file is the controller's: joints and poses that the controller shows, against
-/// the file's forward kinematics.
+/// The check whether a robot file is the controller's: joints and poses that the controller shows,
+/// against the file's forward kinematics.
 ///
 /// A model corrects positions against the robot file, but it is the controller that solves a
 /// corrected pose for joints, with its own lengths. Where the two arms differ, every corrected pose

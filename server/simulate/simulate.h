@@ -12,7 +12,7 @@
 /// A virtual robot and its tracker: a truth goes in, batches come out.
 namespace trammel {
 
-/// How a measuring session runs. Poses without time or temperature get them from here.
+/// The course of a measuring session. Poses without time or temperature get them from here.
 struct MeasuringCourse {
   double seconds_per_pose = 0;              ///< s; 0: no time is recorded
   std::optional<double> temperature_start;  ///< degrees Celsius; empty: none is recorded
@@ -52,7 +52,7 @@ struct SimulateOptions {
 /// joints outside their limits, and an unknown tool or payload.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
                                                 const SimulateOptions& options);
-/// The same for poses with their own direction, time, temperature, tool and payload; what they
+/// simulate() for poses with their own direction, time, temperature, tool and payload; what they
 /// leave open comes from the course and the options.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot,
                                                 const std::vector<PoseContext>& poses,

@@ -29,7 +29,7 @@ struct AuditRow {
       {};  ///< that made the change; empty: the one that has the store alone, or a command
 };
 
-/// What `hash` of the row must be.
+/// The value that `hash` of the row must have.
 [[nodiscard]] std::string hash_of(const AuditRow& row);
 
 /// Which rows are asked for.
@@ -39,7 +39,7 @@ struct AuditQuery {
   std::size_t most = 0;    ///< the newest; 0: all
 };
 
-/// What a trail says, and whether it can be believed: it is always verified as a whole.
+/// The rows of a trail, and whether it can be believed: it is always verified as a whole.
 struct AuditTrail {
   std::vector<AuditRow> rows;  ///< oldest first
   std::int64_t verified =

@@ -12,7 +12,7 @@ namespace trammel {
 /// Where a shared database tells that the trail has grown.
 constexpr const char* kChangesChannel = "trammel_changes";
 
-/// What a change did.
+/// The effect of a change, as the trail records it.
 struct AuditEntry {
   std::string cell, what, subject, before, after;
   std::string why = {};
@@ -25,7 +25,7 @@ void record_audit(Database& database, const AuditEntry& entry, const ChangeId& b
 /// Makes the trail where there is none, and records how it began.
 void prepare_audit(Database& database, bool is_new, std::int64_t schema_before);
 
-/// Whether the rows say which server made the change: a file of before does not.
+/// True if the rows say which server made the change: a file of before does not.
 [[nodiscard]] bool trail_names_servers(Database& database);
 /// From now on they do.
 void name_servers_in_trail(Database& database);
@@ -34,7 +34,7 @@ void name_servers_in_trail(Database& database);
 /// be read.
 [[nodiscard]] std::int64_t last_audit_at(Database& database);
 
-/// How many rows the trail has.
+/// The number of rows of the trail.
 [[nodiscard]] std::int64_t audit_rows(Database& database);
 
 /// Takes the next rows into the chain and, as far as they are asked for, into the trail; false:

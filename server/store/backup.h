@@ -26,8 +26,9 @@ struct StoreCopy {
     const std::string& from, const std::string& to,
     const std::function<void(double)>& progress = nullptr);
 
-/// Whether a store that nobody has open is whole: its size and pages, its audit trail row by row,
-/// and every batch and model by its hash. Changes nothing. Refuses (kInternal) what is damaged.
+/// Checks that a store that nobody has open is whole: its size and pages, its audit trail row by
+/// row, and every batch and model by its hash. Changes nothing. Refuses (kInternal) what is
+/// damaged.
 [[nodiscard]] Result<StoreCopy> check_store_copy(const std::string& path);
 
 }  // namespace trammel

@@ -19,7 +19,7 @@ struct ChangeId {
       {};  ///< that is in force, 0: none; with another one nothing changes (kConflict)
 };
 
-/// What such a change came to.
+/// The outcome of such a change.
 struct ChangeOutcome {
   int version = 0;           ///< of the model that was put in force or stored; 0: of none
   std::int64_t job = 0;      ///< that was queued; 0: none

@@ -7,7 +7,8 @@
 /// Changes that happen once, for the transactions of batches, jobs and models.
 namespace trammel {
 
-/// What was recorded under the id, if anything. kConflict: for something else than is asked for.
+/// The outcome that was recorded under the id, if anything. kConflict: for something else than is
+/// asked for.
 [[nodiscard]] Result<std::optional<ChangeOutcome>> find_change(Database& database,
                                                                const ChangeId& change_id);
 /// Records what was made, in the transaction that is open.

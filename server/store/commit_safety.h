@@ -5,8 +5,8 @@
 
 #include "server/store/database/database.h"
 
-/// What a change that PostgreSQL has committed survives, by its settings and the standbys that are
-/// there.
+/// The safety of a change that PostgreSQL has committed: what it survives, by its settings and the
+/// standbys that are there.
 namespace trammel {
 
 struct CommitSettings {

@@ -20,7 +20,7 @@
 
 namespace trammel {
 
-/// How a store reaches its database, and what is known of it. Thread-safe.
+/// The way in which a store reaches its database, and what is known of it. Thread-safe.
 class StoreConnection {
  public:
   StoreConnection(std::string place, std::unique_ptr<ServedCopies> kept)
@@ -35,14 +35,14 @@ class StoreConnection {
   std::invoke_result_t<const Work&, Database&> exclusively(const Work& work) {
     return through([this](const Job& job) { return read(job); }, work);
   }
-  /// The same in one transaction, committed only if `work` succeeds. Where several servers write,
-  /// `work` may run more than once: only its last run counts.
+  /// Runs `work(database)` in one transaction, committed only if `work` succeeds. Where several
+  /// servers write, `work` may run more than once: only its last run counts.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> in_transaction(const Work& work) {
     return through([this](const Job& job) { return write(job); }, work);
   }
 
-  /// The same for what must not wait for others of this server that wait: a heartbeat.
+  /// in_transaction() for what must not wait for others of this server that wait: a heartbeat.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> urgently(const Work& work) {
     return through([this](const Job& job) { return write_urgently(job); }, work);

@@ -34,17 +34,17 @@ class FileConnection final : public StoreConnection {
   [[nodiscard]] Status read(const Job& job) override;
   [[nodiscard]] Status write(const Job& job) override;
   [[nodiscard]] Status transacted(const Job& job, bool* changed) TRAMMEL_REQUIRES(mutex_);
-  /// Whether the file is as this process left it, and can be written as far as is known.
+  /// True if the file is as this process left it, and can be written as far as is known.
   [[nodiscard]] bool is_in_order();
   /// Opens a file again that could not be written when it was opened, or that is not as it was
   /// left.
   [[nodiscard]] Status be_sure_of_file() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status opened_anew() TRAMMEL_REQUIRES(mutex_);
-  /// Whether what is at the path now is the store as it was left. Closes the database if that was
-  /// written by others.
+  /// Checks that the file at the path now is the store as it was left. Closes the database if that
+  /// was written by others.
   [[nodiscard]] Status check_as_left() TRAMMEL_REQUIRES(mutex_);
-  /// Whether what was just committed is in the file that the path leads to.
+  /// Checks that what was just committed is in the file that the path leads to.
   [[nodiscard]] Status check_in_place() TRAMMEL_REQUIRES(mutex_);
   /// The journal of a file that is no longer at the path would be taken for that of the next one
   /// there.

@@ -10,7 +10,7 @@
 
 namespace trammel {
 
-/// What became of a job.
+/// The outcome of a job.
 enum class JobVerdict {
   kOpen,       ///< nothing yet; also of jobs from before outcomes were recorded
   kInForce,    ///< its model was put in force

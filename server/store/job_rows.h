@@ -15,7 +15,7 @@ namespace trammel {
 /// Numbers as SQL lists them, `1, 2, 3`: they need not be bound.
 [[nodiscard]] std::string list_of(const std::set<std::int64_t>& ids);
 
-/// Of another kind of job: empty.
+/// Empty for another kind of job.
 [[nodiscard]] AskedTraining training_of(const StoredJob& job);
 /// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in
 /// health_checks, too.

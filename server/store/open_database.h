@@ -32,7 +32,7 @@ struct OpenedDatabase {
 /// has no journal nobody writes it, and none is made.
 [[nodiscard]] std::string uri_to_look_at(const std::string& path);
 
-/// Whether the file, which this process does not have open, is a store in the state of `mark`
+/// Checks that the file, which this process does not have open, is a store in the state of `mark`
 /// (empty: in any state). Looks at the file alone, not at a journal beside it, and leaves both as
 /// they are.
 [[nodiscard]] Status check_state(const std::string& path, const std::optional<StoreMark>& mark);

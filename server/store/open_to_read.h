@@ -15,7 +15,7 @@ namespace trammel {
 /// The same, to change what the services know nothing of. Of a file the caller holds the lock of
 /// who writes it.
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_write(const std::string& place);
-/// What is told where it cannot be read.
+/// The failure of a store that cannot be read.
 [[nodiscard]] Failure unreadable(const DatabaseError& error, const std::string& place);
 
 /// Runs `work(database)` on one moment of the store at `place`.

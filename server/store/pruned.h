@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// Whether the text of this `version`, `batch` or `answer of job` was pruned.
+/// True if the text of this `version`, `batch` or `answer of job` was pruned.
 [[nodiscard]] bool is_pruned(Database& database, const char* kind, const std::string& cell,
                              const std::string& id);
 /// kNotFound.

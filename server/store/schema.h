@@ -17,8 +17,8 @@ inline constexpr const char* kSchemaField = "schema";  // what the error of a ne
 /// For a file that is only read: refuses (kRefused) what prepare_file() refuses and what it would
 /// have to change.
 [[nodiscard]] Status check_readable(Database& database, const std::string& path);
-/// What tells this store from any other one. A store of before it was recorded gets `otherwise`, or
-/// a new one.
+/// The identity that tells this store from any other one. A store of before it was recorded gets
+/// `otherwise`, or a new one.
 [[nodiscard]] Result<std::string> identity_of(Database& database, const std::string& otherwise);
 /// Tells a state of a store from what it was before and from other stores.
 struct StoreMark {
@@ -27,7 +27,7 @@ struct StoreMark {
 };
 /// Empty: it cannot be read.
 [[nodiscard]] std::optional<StoreMark> mark_of(Database& database);
-/// Whether any model was ever stored.
+/// True if any model was ever stored.
 [[nodiscard]] bool has_models(Database& database);
 
 }  // namespace trammel

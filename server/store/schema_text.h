@@ -14,9 +14,9 @@ extern const char* const kSchemaAdded;  ///< what version 2 added to version 1
 /// newest measurement was taken (Unix time, s; NULL = not recorded). They also hold the batches in
 /// quarantine that a job may train from; these are released if its model is put in force. Also
 /// which jobs are checks of a robot's health, which look like diagnoses to programs that know none.
-/// How a version was judged when a person put it in force. And the changes that clients asked for
-/// under an id, with what came of them; what of the rest has lost its text; which batches nothing
-/// takes any more; and the store's identity. Which server works on a job, which start of it
+/// They hold how a version was judged when a person put it in force, and the changes that clients
+/// asked for under an id, with what came of them; what of the rest has lost its text; which batches
+/// nothing takes any more; and the store's identity. Which server works on a job, which start of it
 /// (`token`), until when it is believed to live, and who wants the job to end. And of each cell the
 /// highest number that a version was given: its row is what is locked where several servers write.
 extern const char* const kTablesBeside;
@@ -25,13 +25,14 @@ extern const char* const kTablesBeside;
 extern const char* const kTablesGone;
 extern const char* const kAuditTables;
 extern const char* const kAuditServer;  ///< what was added to them: which server made the change
-/// What was added to outcomes of jobs: why a person decides about the model (HeldBack).
+/// The column that was added to outcomes of jobs: why a person decides about the model (HeldBack).
 extern const char* const kOutcomeHeldBack;
-/// What was added to checks of a robot's health: the tolerance that was asked for, m.
+/// The column that was added to checks of a robot's health: the tolerance that was asked for, m.
 extern const char* const kCheckTolerance;
 
-/// Of a store that several servers share: who is there, by the starts of servers (`token`), and how
-/// cells are described. The newest description of a cell is the one that the record goes by.
+/// The tables of a store that several servers share: who is there, by the starts of servers
+/// (`token`), and how cells are described. The newest description of a cell is the one that the
+/// record goes by.
 extern const char* const kTablesOfServers;
 
 [[nodiscard]] std::string in_sqlite(std::string tables);

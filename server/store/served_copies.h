@@ -44,7 +44,7 @@ class ServedCopies {
   [[nodiscard]] std::string store() const;
 
  private:
-  /// Of the store's copies; empty: not known yet.
+  /// The folder of the store's copies; empty: not known yet.
   [[nodiscard]] std::string folder() const;
   [[nodiscard]] std::string folder(const std::string& cell) const;
 

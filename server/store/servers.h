@@ -11,11 +11,12 @@
 /// The servers of a record: who is there, and what each of them does.
 namespace trammel {
 
-/// How often a server says that it is there. One that was not heard of for three of them is gone.
+/// The period in which a server says that it is there. One that was not heard of for three periods
+/// is gone.
 constexpr std::chrono::seconds kHeartbeat{5};
 constexpr std::chrono::seconds kGoneAfter = 3 * kHeartbeat;
 
-/// What a server has of one cell.
+/// A server's state of one cell.
 struct CellAtServer {
   int version = 0;  ///< that it answers with; 0: none
   CellDescription files;
@@ -26,7 +27,7 @@ struct CellAtServer {
   bool operator==(const CellAtServer&) const = default;
 };
 
-/// What a server says of itself.
+/// A server's description of itself.
 struct ServerSelf {
   std::string server;  ///< its name
   std::string host;
@@ -36,7 +37,7 @@ struct ServerSelf {
   std::map<std::string, CellAtServer> cells = {};
   std::int64_t followed = 0;  ///< so many changes of the record it has taken up
 
-  /// Of this process.
+  /// The description of this process.
   [[nodiscard]] static ServerSelf here(std::string program, bool serves, bool trains);
 };
 

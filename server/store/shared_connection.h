@@ -36,13 +36,14 @@ class SharedConnection final : public StoreConnection {
   [[nodiscard]] Status run(const Job& job, Transaction::For what, std::size_t most);
   [[nodiscard]] Status told(const DatabaseError& error, bool lost);
 
-  /// Whether it is the store that served here before, of a schema that this program knows.
+  /// Checks that the database is the store that served here before, of a schema that this program
+  /// knows.
   [[nodiscard]] Status admit(Database& database);
   [[nodiscard]] Result<Connected> connect();
   /// One that nobody uses, or a new one.
   [[nodiscard]] Result<Connected> borrow(std::size_t most);
   void give_back(Connected connected);
-  /// Whether the word of a change came. Connects where needed: what changed before that is not
+  /// True if the word of a change came. Connects where needed: what changed before that is not
   /// told.
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
   /// Who else holds rows locked, for people; empty: not known.

@@ -20,7 +20,7 @@ int change(Database& database, const char* sql, const Values&... values) {
   return database.change(sql, {sql_value(values)...});
 }
 
-/// Whether the statement has a row.
+/// True if the statement has a row.
 template <typename... Values>
 [[nodiscard]] bool exists(Database& database, const char* sql, const Values&... values) {
   return prepare(database, sql, values...).next();

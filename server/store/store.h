@@ -52,11 +52,11 @@ enum class JobKind { kTrain, kDiagnose, kCheck };
 struct AskedTraining {
   std::string level = {}, bias = {};  ///< empty: as the cell file says
 };
-/// What the model in force does not explain of a batch.
+/// The request to find what the model in force does not explain of a batch.
 struct AskedDiagnosis {
   bool apply = false;  ///< train a model with the causes found
 };
-/// Whether the robot still is as the model in force has it.
+/// The request to check whether the robot still is as the model in force has it.
 struct AskedCheck {
   std::optional<double> tolerance = {};  ///< m; empty: as the cell file says
 };
@@ -65,7 +65,7 @@ using AskedJob = std::variant<AskedTraining, AskedDiagnosis, AskedCheck>;
 [[nodiscard]] inline JobKind kind_of(const AskedJob& asked) {
   return static_cast<JobKind>(asked.index());
 }
-/// Whether it is to make a model: a training, and a diagnosis that is applied.
+/// True if the job is to make a model: a training, and a diagnosis that is applied.
 [[nodiscard]] inline bool is_to_train(const AskedJob& asked) {
   const auto* diagnosis = std::get_if<AskedDiagnosis>(&asked);
   return kind_of(asked) == JobKind::kTrain || (diagnosis != nullptr && diagnosis->apply);
@@ -101,26 +101,26 @@ struct AcceptedJob : StoredJob {
   bool is_repeat = false;  ///< the batch was there before, and the job with it
 };
 
-/// What became of the claim on a job that runs here.
+/// The state of the claim on a job that runs here.
 struct ClaimState {
   bool is_held = false;  ///< false: the lease was over, and another server has taken the job
   std::optional<std::string> cancelled_by =
       {};  ///< who asked another server that it ends; empty: nobody
 };
 
-/// How far a record is: another number, another state of what it counts.
+/// The state of a record as numbers: another number, another state of what it counts.
 struct RecordCounts {
   std::int64_t changes = 0;       ///< see changes_made()
   std::int64_t descriptions = 0;  ///< see descriptions_made()
 };
 
-/// What came of a wish that a job ends.
+/// The outcome of a wish that a job ends.
 enum class CancelledJob {
   kEnded,  ///< it waited, or its server is gone: it is over
   kAsked   ///< the server that works on it hears of it
 };
 
-/// What a diagnosis or a check has beside its job.
+/// The texts that a diagnosis or a check has beside its job.
 struct StoredDiagnosis {
   std::string csv;        ///< the batch if it was sent with the request; else empty
   std::string findings;   ///< JSON; empty until found
@@ -156,7 +156,7 @@ struct StoredCheck {
   std::string findings;                ///< JSON
 };
 
-/// What a cell is served with, and how that was judged beside what was before.
+/// The version that a cell is served with, and how that was judged beside what was before.
 struct InForceRecord {
   int version = 0;
   std::int64_t since = 0;          ///< Unix time, s
@@ -166,9 +166,9 @@ struct InForceRecord {
   bool judged_when_made = false;
 };
 
-/// How much of each cell is kept; 0: everything. What goes is the oldest of what nothing needs:
-/// never the version in force, one that a rollback returns to, what these were trained on, or what
-/// a job takes that is not over.
+/// The amount of each cell that is kept; 0: everything. What goes is the oldest of what nothing
+/// needs: never the version in force, one that a rollback returns to, what these were trained on,
+/// or what a job takes that is not over.
 struct KeepRule {
   int models = 0;   ///< versions besides those
   int batches = 0;  ///< likewise
@@ -183,7 +183,7 @@ class StoreConnection;
 /// may later, kInternal where the file is damaged. Damage of one row is an error of what reads that
 /// row, and of nothing else.
 ///
-/// Of each cell the last three versions in force are kept as plain files beside the store, too
+/// The last three versions in force of each cell are kept as plain files beside the store, too
 /// (`<file>.models`), and taken where the store does not give them.
 class Store {
  public:
@@ -204,7 +204,7 @@ class Store {
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
   [[nodiscard]] RecordState record() const;
-  /// What the record of several servers is told from any other by; empty: it is a file, or not
+  /// The mark that tells the record of several servers from any other; empty: it is a file, or not
   /// known yet. Waits for nothing.
   [[nodiscard]] std::string shared_identity() const;
   /// As works_as() said.
@@ -223,23 +223,23 @@ class Store {
   /// returns the job. The same content under the same id again, from whomever, returns the job that
   /// the first one made. Refuses (kConflict) an id that the cell has with other content.
   [[nodiscard]] Result<AcceptedJob> add_batch(const StoredBatch& batch, const StoredJob& job);
-  /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for
-  /// something else. The functions that take a ChangeId record it in the transaction of the change
-  /// itself; where it is recorded already they change nothing and return what was made then. The
-  /// last 100,000 are kept.
+  /// The outcome of a change; empty: it has not been made. Refuses (kConflict) an id that stands
+  /// for something else. The functions that take a ChangeId record it in the transaction of the
+  /// change itself; where it is recorded already they change nothing and return what was made then.
+  /// The last 100,000 are kept.
   [[nodiscard]] Result<std::optional<ChangeOutcome>> outcome_of(const ChangeId& change_id) const;
   /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones,
   /// (kConflict) discarded ones. With `release` it may also train from batches in quarantine. They
   /// leave quarantine in the transaction that puts its model in force.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false,
                                           const ChangeId& change_id = {});
-  /// Whether a job made that version here; false: it was imported.
+  /// True if a job made that version here; false: it was imported.
   [[nodiscard]] Result<bool> was_made_by_job(const std::string& cell, int version) const;
   /// The batches of the job that made that version here, without those of before that it learned
   /// from beside them.
   [[nodiscard]] Result<std::set<std::string>> batches_of_version(const std::string& cell,
                                                                  int version) const;
-  /// Whether the job was added with `release`.
+  /// True if the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis or a check of the one batch that `job` names, or of `csv`. Refuses as
   /// add_job().
@@ -247,8 +247,8 @@ class Store {
                                                 const ChangeId& change_id = {});
   /// kNotFound: there is no such job, it is no diagnosis, or its findings were pruned.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
-  /// Of the cell, oldest first: those that ended since then (Unix time, s), the newest `most` (0:
-  /// all).
+  /// The checks of the cell, oldest first: those that ended since then (Unix time, s), the newest
+  /// `most` (0: all).
   [[nodiscard]] Result<std::vector<StoredCheck>> health_checks(const std::string& cell,
                                                                std::int64_t since,
                                                                std::size_t most) const;
@@ -257,12 +257,13 @@ class Store {
                                       const std::string& page);
   /// kNotFound also where its text was pruned.
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
-  /// The same without its text: cheap.
+  /// The batch without its text: cheap.
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell,
                                                  const std::string& id) const;
-  /// How many changes the audit trail has: another number, another state of what it tells of.
+  /// The number of changes in the audit trail: another number, another state of what it tells of.
   [[nodiscard]] Result<std::int64_t> changes_made() const;
-  /// The same with descriptions_made(), by one statement. Of a store that several servers share.
+  /// changes_made() with descriptions_made(), by one statement; for a store that several servers
+  /// share.
   [[nodiscard]] Result<RecordCounts> counts() const;
   /// The ids of the batches that later trainings of the cell may learn from: a model was made of
   /// them that was in force at some time, or whose outcome has no is_doubt().
@@ -286,7 +287,7 @@ class Store {
 
   /// Several servers share it.
   [[nodiscard]] bool is_shared() const;
-  /// How this server is called where it claims a job. Set before there are jobs.
+  /// Sets the name under which this server claims a job. To be set before there are jobs.
   void works_as(const std::string& server);
   /// Tells that this server still works on the job that it claimed. It waits for no disk and no
   /// standby: a lease that is lost with a host ends earlier.
@@ -304,7 +305,8 @@ class Store {
   /// All that are there, and those that went without a word during the last day, by name;
   /// `with_cells`: with what they serve. Of a store that one server has: none.
   [[nodiscard]] Result<std::vector<ServerInRecord>> servers(bool with_cells) const;
-  /// How many descriptions of cells there ever were: another number, another state of them.
+  /// The number of descriptions of cells that there ever were: another number, another state of
+  /// them.
   [[nodiscard]] Result<std::int64_t> descriptions_made() const;
   /// Compares how this server's files describe cells with the descriptions that the record goes by.
   /// A cell that has none gets this one. Another one is taken where more servers want it than have
@@ -319,7 +321,7 @@ class Store {
   /// The jobs that wait and that no server works on that is believed to live, nor on another one of
   /// their cell; with the cell of each. By one statement.
   [[nodiscard]] Result<std::map<std::int64_t, std::string>> jobs_to_take() const;
-  /// What was changed by changes that came after so many; see changes_made().
+  /// The cells that were changed by changes that came after so many; see changes_made().
   [[nodiscard]] Result<std::set<std::string>> cells_changed_after(std::int64_t changes) const;
   /// Returns when another server may have changed something, after `limit` at the latest, or when
   /// `stop` is requested. For one thread.
@@ -365,10 +367,10 @@ class Store {
   /// an unknown one. `judged`: how it did beside the one in force until now, for in_force_record()
   /// and the audit trail.
   ///
-  /// How rollback works: an activation remembers the one that it replaced. A rollback restores that
-  /// one with its own memory, so the next rollback goes further back: after 1, 2, 3 it gives 2,
-  /// then 1, then kNotFound. A new activation remembers the version that is in force at that
-  /// moment, even if a rollback put it there.
+  /// Rollback works as follows: an activation remembers the one that it replaced. A rollback
+  /// restores that one with its own memory, so the next rollback goes further back: after 1, 2, 3
+  /// it gives 2, then 1, then kNotFound. A new activation remembers the version that is in force at
+  /// that moment, even if a rollback put it there.
   [[nodiscard]] Status activate(const std::string& cell, int version,
                                 const ChangeId& change_id = {},
                                 const std::optional<JobOutcome>& judged = {});
@@ -384,11 +386,11 @@ class Store {
   /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<ReadModel> read(const std::string& cell, int version) const;
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
-  /// The same as it is stored, not checked. kNotFound also where it was pruned.
+  /// The model's text as it is stored, not checked. kNotFound also where it was pruned.
   [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
-  /// The same of every cell that has one, at one moment, by one statement.
+  /// Versions in force of every cell that has one, at one moment, by one statement.
   [[nodiscard]] Result<std::map<std::string, int>> versions_in_force() const;
   /// The versions to serve the cell with, the best first: the one in force, then as rollbacks
   /// restore them, then what only copies have. Those that came after what the store knows come

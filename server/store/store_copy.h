@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// What a store holds, and how to tell it from any other content.
+/// The content of a store, and how to tell it from any other content.
 struct StoreContent {
   struct Table {
     std::string name;
@@ -26,7 +26,7 @@ struct StoreContent {
 /// batch, model and row of the audit trail. Changes nothing. Refuses (kInternal) what is damaged.
 [[nodiscard]] Result<StoreContent> look_through_store(const std::string& place);
 
-/// What becomes of the store that was copied.
+/// The fate of the store that was copied.
 enum class SourceAfter {
   kMoved,  ///< its trail says where it went, and no server serves it any more
   kKept    ///< it stays as it is: the copy is one to try, or to keep

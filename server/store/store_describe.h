@@ -7,10 +7,11 @@
 #include "server/base/result.h"
 #include "server/robot/cell_description.h"
 
-/// How the servers of a record describe its cells, and by whose description it goes.
+/// The descriptions that the servers of a record have of its cells, and by whose description it
+/// goes.
 namespace trammel {
 
-/// How one server has a cell.
+/// A cell as one server has it.
 struct CellOfServer {
   std::string server, host;
   bool is_gone = false;

@@ -24,7 +24,8 @@ class StoreFile {
   /// where there is none, or none that can be opened. Refuses (kConflict) one that another process
   /// writes.
   [[nodiscard]] Status hold();
-  /// How the file is that is held: SQLite has just written it, or has just opened it.
+  /// Remembers the state of the file that is held: SQLite has just written it, or has just opened
+  /// it.
   void remember();
 
   enum class Finding {

@@ -22,7 +22,7 @@ struct RecordState {
       {};  ///< the servers' role can neither change nor delete it; empty: not known
 };
 
-/// What the disk lets a store do.
+/// The state of a store, as far as its disk lets it work.
 struct StoreState {
   std::optional<Error> why_not_written;  ///< set: every change is refused with it
   bool readable = true;  ///< false: only the copies of the models that were in force are there

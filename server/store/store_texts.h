@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/store/database/database.h"
 
-/// What of a store can be verified by its own hashes.
+/// The parts of a store that can be verified by its own hashes.
 namespace trammel {
 
 /// Every batch is what was accepted, and every model what was stored. Those that were pruned have

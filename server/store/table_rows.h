@@ -24,8 +24,8 @@ struct StoreTable {
   std::vector<StoreColumn> columns;
 };
 
-/// What a store is moved with, what others refer to first. Not who is there and works on what, not
-/// how cells are described, and not the end of the audit trail.
+/// The tables with which a store is moved, those that others refer to first. Not who is there and
+/// works on what, not how cells are described, and not the end of the audit trail.
 [[nodiscard]] const std::vector<StoreTable>& store_tables();
 
 /// NULL, or what the column holds.

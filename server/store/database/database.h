@@ -16,9 +16,9 @@
 
 #include "server/base/result.h"
 
-/// What the store asks of a database: one text of SQL for SQLite and for PostgreSQL, values bound
-/// to $1, $2..., rows, transactions, errors. Where the two differ it is said here and nowhere else:
-/// is_shared() and schema_text.h.
+/// The services that the store asks of a database: one text of SQL for SQLite and for PostgreSQL,
+/// values bound to $1, $2..., rows, transactions, errors. Where the two differ it is said here and
+/// nowhere else: is_shared() and schema_text.h.
 namespace trammel {
 
 /// A statement that failed. The text holds no bound value. It does not leave this room:

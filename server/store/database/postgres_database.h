@@ -32,7 +32,7 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] bool is_shared() const override { return true; }
   void take_long() override;
 
-  /// Whether a word came, within `limit`, of a channel that it listens to.
+  /// True if a word came, within `limit`, of a channel that it listens to.
   [[nodiscard]] bool hears(std::chrono::milliseconds limit);
 
   /// The connection is lost, or an answer did not come in time: nothing more comes through it.

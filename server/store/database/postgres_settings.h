@@ -9,15 +9,15 @@
 
 namespace trammel {
 
-/// What libpq is told for one host: its keywords and values.
+/// The settings that libpq is told for one host: its keywords and values.
 using PostgresSettings = std::vector<std::pair<std::string, std::string>>;
 
 /// One for each host that the URL names, in their order; the password stays where libpq looks for
 /// it. Refuses what libpq cannot read, without repeating it: it may hold a password.
 [[nodiscard]] Result<std::vector<PostgresSettings>> settings_of(const std::string& url);
 
-/// The same for each address of the host, so that libpq looks up no name; sockets stay as they are.
-/// `limit`: of the look-up. A host that only the environment or a service file names is still
+/// The settings for each address of the host, so that libpq looks up no name; sockets stay as they
+/// are. `limit`: of the look-up. A host that only the environment or a service file names is still
 /// looked up by libpq.
 [[nodiscard]] Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& host,
                                                                    std::chrono::milliseconds limit);

@@ -36,7 +36,7 @@ class SqliteDatabase final : public Database {
   SQLite::Database file_;
 };
 
-/// The same error for whoever knows no SQLite.
+/// The error of SQLite for whoever knows no SQLite.
 [[nodiscard]] DatabaseError error_of(const SQLite::Exception& error);
 
 /// Runs `work`; an exception of SQLite becomes a DatabaseError.

@@ -10,7 +10,7 @@
 #include "server/compensate/served_model.h"
 #include "server/tasks/accept/judging.h"
 
-/// Whether a new model takes the place of the one in force by itself.
+/// The decision whether a new model takes the place of the one in force by itself.
 ///
 /// The model: in a session s the tracker sees p = X_WB(s) (f(q) + e(q)) + noise, f the prediction
 /// in B and e the true error of the model at that pose. X_WB(s) is found for each model from the
@@ -54,7 +54,8 @@ struct GateQuestion {
   std::size_t first_new = 0;  ///< from this one on they came after the model in force was trained
 };
 
-/// What the two leave of the same judges, m rms; empty where they were not held against each other.
+/// The errors that the two leave at the same judges, m rms; empty where they were not held against
+/// each other.
 struct GateFigures {
   std::optional<double> before;  ///< of the one in force; of a first model, nominal
   std::optional<double> after;   ///< of the candidate
@@ -71,7 +72,8 @@ struct GateVerdict {
   HeldBack held_back = HeldBack::kNo;  ///< also where the judges found it not better
 };
 
-/// What no chance explains, however few the judges are: half as much again (rms of the same poses).
+/// True if `after` is worse by more than chance explains, however few the judges are: half as much
+/// again (rms of the same poses).
 [[nodiscard]] constexpr bool is_far_worse(double before, double after) {
   return after > 1.5 * before;
 }

@@ -21,7 +21,7 @@ struct DayGain {
   double share = 0;             ///< 1 - rms after / rms before
   double lower = 0, upper = 0;  ///< 95 % of `share`
 
-  /// Whether nothing speaks against the causes on another day.
+  /// True if nothing speaks against the causes on another day.
   [[nodiscard]] bool carries() const { return gain.rms_after <= kNoWorse * gain.rms_before; }
   static constexpr double kNoWorse = 1.01;  // equal models differ by as much
 };

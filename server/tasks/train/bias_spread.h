@@ -8,10 +8,10 @@
 
 namespace trammel {
 
-/// How many times as far a bias misses poses that it was not learned from as its covariance says;
-/// at least 1, and 1 of more than 200 observations. Hyperparameters that were found from few poses
-/// are taken for exact by every prediction, and fit these poses better than others. Fifths of the
-/// poses are left out by turns, the physics and the hyperparameters found without them (Stone
+/// The factor by which a bias misses poses that it was not learned from farther than its covariance
+/// says; at least 1, and 1 of more than 200 observations. Hyperparameters that were found from few
+/// poses are taken for exact by every prediction, and fit these poses better than others. Fifths of
+/// the poses are left out by turns, the physics and the hyperparameters found without them (Stone
 /// 1974).
 ///
 /// Model: what is missed of a coordinate is normal with the variance f² v + sigma², v what bias and

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// What became of what `before` said, by measurements after the repair: its error sources are
+/// The outcome of what `before` said, by measurements after the repair: its error sources are
 /// identified anew from all rows of `batch` (checked against `cell`), without a bias, and both
 /// models are held against each other at these poses. Refuses a cell of another robot, a batch
 /// without positions, tools and payloads that `before` was not trained with, and what train()
