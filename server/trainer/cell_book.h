@@ -60,7 +60,7 @@ class CellBook {
     const MutexLock lock(apart_mutex_);
     return apart_;
   }
-  /// Of those that are set apart.
+  /// True if this server answers for all cells that are set apart.
   [[nodiscard]] bool all_answer() const {
     const MutexLock lock(apart_mutex_);
     return std::all_of(apart_.begin(), apart_.end(),

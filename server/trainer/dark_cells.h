@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// What a start of this program would do to a cell.
+/// The state of a cell after a start of this program.
 struct CellAtStart {
   enum class State {
     kServed,

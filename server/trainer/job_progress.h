@@ -17,7 +17,7 @@ enum class JobStage { kQueued, kTraining, kStoring, kDone, kFailed };
 /// JobProgress::what of a job (kStoring) while its model is held against others.
 inline constexpr const char* kJudging = "judging";
 
-/// What a watcher sees of one job.
+/// The view that a watcher has of one job.
 struct JobProgress {
   std::int64_t job = 0;
   std::string cell;
@@ -32,12 +32,12 @@ struct JobProgress {
 /// As the store has it; `in_force` is left false.
 [[nodiscard]] JobProgress progress_of(const StoredJob& job);
 
-/// Of a job that somebody ended.
+/// The outcome of a job that somebody ended.
 [[nodiscard]] JobOutcome cancelled_outcome(const std::string& who);
-/// Of a job that ended with `error`.
+/// The outcome of a job that ended with `error`.
 [[nodiscard]] JobOutcome failed_outcome(const Error& error, JobVerdict verdict);
 
-/// How far the unfinished jobs are. Thread-safe, set_listener() excepted.
+/// The progress of the unfinished jobs. Thread-safe, set_listener() excepted.
 class ProgressBook {
  public:
   /// Called by whichever thread changes the job, without a lock.

@@ -51,13 +51,13 @@ class JobQueue {
   [[nodiscard]] std::string cancelled_by() const;
   /// Takes a job that waits out of the queue; false: it does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
-  /// The same for all of a cell.
+  /// Takes all jobs of a cell that wait here out of the queue.
   void remove_cell(const std::string& cell);
 
   /// Those that wait here, and the one whose turn has come.
   [[nodiscard]] std::set<std::int64_t> jobs() const;
   [[nodiscard]] std::size_t size() const;
-  /// How many of the cell's were asked for.
+  /// The number of the cell's jobs that were asked for.
   [[nodiscard]] std::size_t asked_for(const std::string& cell) const;
 
  private:

@@ -19,7 +19,7 @@ namespace trammel {
 
 constexpr int kMaxAttempts = 3;  // of one job whose computing, or the process, breaks off
 
-/// What is done for one job: it is taken from the store, computed (in a process of its own), and
+/// The work for one job: it is taken from the store, computed (in a process of its own), and
 /// the outcome is stored and reported. What the disk does not let be stored now waits for it:
 /// nothing is reported as over that the store does not have so. Of the queue's thread.
 class JobRunner {
@@ -43,7 +43,7 @@ class JobRunner {
   void lose_claim(std::int64_t job) { lost_ = job; }
 
  private:
-  /// How an attempt ended that made nothing.
+  /// The end of an attempt that made nothing.
   struct Failed {
     Error error;
     JobVerdict verdict = JobVerdict::kRefused;
@@ -55,13 +55,13 @@ class JobRunner {
 
   [[nodiscard]] Attempt attempt(std::int64_t id, const StopRequests& stop);
   [[nodiscard]] Attempt compute(const StoredJob& job, const StopRequests& stop);
-  /// What the job is computed from, but its batches.
+  /// The task from which the job is computed, but its batches.
   [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job) const;
   [[nodiscard]] std::optional<FleetPrior> fleet_prior_of(const StoredJob& job) const;
-  /// Whether the job came with its batch: somebody else's training was asked for, knowing the
+  /// True if the job came with its batch: somebody else's training was asked for, knowing the
   /// batch.
   [[nodiscard]] Result<bool> came_with_batch(const StoredJob& job) const;
-  /// Whether it learns from the batches of the job alone: somebody named them.
+  /// True if it learns from the batches of the job alone: somebody named them.
   [[nodiscard]] Result<bool> learns_alone(const StoredJob& job, bool came_with_batch) const;
   [[nodiscard]] Status give_batches(Computing& computing, const StoredJob& job,
                                     const std::vector<std::string>& earlier) const;

@@ -32,7 +32,7 @@ struct Candidate {
 /// Holds the candidate against others, wherever that is computed.
 using Judging = std::function<Result<GateVerdict>(const Opponents& opponents)>;
 
-/// What became of it.
+/// The fate of a candidate.
 struct Kept {
   int version = 0;
   bool in_force = false;
@@ -40,7 +40,7 @@ struct Kept {
   JobOutcome outcome;   ///< the same as data
 };
 
-/// What is wrong with the model that a cell is served with, or why it is served with none.
+/// The trouble with the model that a cell is served with, or why it is served with none.
 struct CellTrouble {
   enum class Kind {
     kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
@@ -66,7 +66,7 @@ class ModelHistory {
   /// cell, while no other of that cell can happen: it must not call back into what changes models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
-  /// What is given outlives it. It is where the registry's models come from.
+  /// The arguments outlive it. The registry's models come from it.
   ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry);
   ~ModelHistory();
   ModelHistory(const ModelHistory&) = delete;
@@ -77,19 +77,19 @@ class ModelHistory {
   /// Where it cannot be loaded, the last one that served before it is, and troubles() says so. One
   /// that does not fit the cell is not served, and nothing in its place.
   [[nodiscard]] Status announce_from_store(const std::string& cell);
-  /// The same for all cells; returns what is wrong, one sentence each.
+  /// Announces the versions of all cells; returns what is wrong, one sentence each.
   [[nodiscard]] std::vector<std::string> announce_all();
   /// Cells that are not served with the model they should be served with, one sentence each.
   [[nodiscard]] std::vector<std::string> troubles() const;
-  /// The same by cell.
+  /// The troubles by cell.
   [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
 
-  /// What the cells were lately asked for: a candidate that moves one of these poses by more than
-  /// the cell's step limit is put in force by a person only.
+  /// The poses that the cells were lately asked for: a candidate that moves one of these poses by
+  /// more than the cell's step limit is put in force by a person only.
   [[nodiscard]] RecentPoses& recent_poses() { return recent_poses_; }
 
-  /// Of a cell that is served here; refused when its robot or its tools are not the cell's any
-  /// more.
+  /// The model of a cell that is served here; refused when its robot or its tools are not the
+  /// cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell,
                                                           int version) const;
   /// Puts a stored version in force and publishes it. A version that is served already is not
@@ -122,9 +122,9 @@ class ModelHistory {
                                                     const std::string& text,
                                                     const char* what) const;
   [[nodiscard]] Mutex& changes_of(const std::string& cell);
-  /// Of a model that the store has put in force; the cell's lock is held.
+  /// Publishes a model that the store has put in force; the cell's lock is held.
   void put_in_force(ServedModelPtr model);
-  /// What the cell is to be served with.
+  /// The model that the cell is to be served with.
   [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
   /// Empty: there is none any more.
   void set_trouble(const std::string& cell, const std::optional<CellTrouble>& trouble);
@@ -138,7 +138,7 @@ class ModelHistory {
   /// The first of `before` that can be served: how many steps back it is, and the model.
   [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(
       const std::string& cell, const std::vector<int>& before) const;
-  /// What is to be said and stored of a candidate that was judged.
+  /// The decision about a candidate that was judged: what is to be said and stored of it.
   struct Judged {
     bool put_in_force = false, release = false;
     std::string message;
@@ -149,7 +149,7 @@ class ModelHistory {
   /// The cell's lock is held. `expected`: the version that the record had in force when it was
   /// judged.
   [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged, int expected);
-  /// What a candidate of the cell is held against; `present` null: none in force.
+  /// The opponents that a candidate of the cell is held against; `present` null: none in force.
   [[nodiscard]] Result<Opponents> opponents(const std::string& cell,
                                             const ServedModel* present) const;
   /// The last versions that served the cell before the one in force, as far as they can be read.

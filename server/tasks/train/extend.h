@@ -20,8 +20,8 @@ namespace trammel {
 /// The diagnosis' share of the progress where what it finds is applied; the rest is the training.
 inline constexpr double kDiagnosisShare = 0.6;
 
-/// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why
-/// not. The batch is not named: each door has a name of its own for it.
+/// Checks that the diagnosis found a cause that is accepted and unambiguous; else refuses, saying
+/// why not. The batch is not named: each door has a name of its own for it.
 [[nodiscard]] Status check_can_extend(const Diagnosis& diagnosis);
 
 /// The sources that the diagnosis adds to the list `own`.
@@ -56,7 +56,7 @@ struct Judges {
 /// single poses, and all of them judge.
 [[nodiscard]] Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out);
 
-/// What extending a cell's error sources by what a diagnosis found is worth: the same training
+/// The worth of extending a cell's error sources by what a diagnosis found: the same training
 /// without and with them.
 struct Extension {
   std::vector<std::string> sources;   ///< all that the extended model was trained with

@@ -10,7 +10,7 @@
 
 namespace trammel {
 
-/// What speaks against learning from a batch of which no model in force can judge: it was not read
+/// The reason against learning from a batch of which no model in force can judge: it was not read
 /// as it was meant (batch_doubt()), or something began in the middle of it (jump_within(); `text`
 /// is the pose, `row` its row). The command line, the library, Python and the daemon ask this
 /// before a model is trained from nothing, unless somebody has looked at the batch. `batch` is

@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// Of a training whose progress was answered with false.
+/// The failure of a training whose progress was answered with false.
 [[nodiscard]] inline Failure given_up() {
   return failure(ErrorCode::kBusy, "training given up on request");
 }

@@ -7,10 +7,10 @@
 
 namespace trammel {
 
-/// What identification would have made of a batch without some of its poses: to first order about
-/// what it found with all, by a downdate of the covariance, so without another search. Where the
-/// covariance is 0 nothing moves. Suspects and gauges are no observations here. Immutable,
-/// thread-safe.
+/// The result that identification would have had of a batch without some of its poses: to first
+/// order about what it found with all, by a downdate of the covariance, so without another search.
+/// Where the covariance is 0 nothing moves. Suspects and gauges are no observations here.
+/// Immutable, thread-safe.
 class LeftOut {
  public:
   LeftOut(const CalibrationResult& found, const MeasurementBatch& batch);

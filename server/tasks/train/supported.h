@@ -47,7 +47,7 @@ struct SupportQuestion {
   std::function<bool(const std::string& source)> may_be_dropped;
   std::function<bool(double share)> progress;  ///< false gives up
 };
-/// The same of any poses. Refuses what left_by refuses of all of them.
+/// supported_by() of any poses. Refuses what left_by refuses of all of them.
 [[nodiscard]] Result<Supported> supported_by(const SupportQuestion& question);
 
 /// `encoder_eccentricity:6 is left out: the poses held out do as well without it (z -0.40)`; empty

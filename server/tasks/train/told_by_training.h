@@ -29,9 +29,9 @@ struct ToldByTraining {
                                               const CheckedBatch& batch,
                                               const TrainOptions& options);
 
-/// What robots of the cell's type have in common, where the cell file says `prior: fleet` or
-/// somebody names twins; empty where neither is so. Refuses a cell that asks for twins where nobody
-/// names one.
+/// The prior that robots of the cell's type have in common, where the cell file says `prior: fleet`
+/// or somebody names twins; empty where neither is so. Refuses a cell that asks for twins where
+/// nobody names one.
 [[nodiscard]] Result<std::optional<FleetPrior>> prior_of_twins(
     const Cell& cell, const std::vector<FleetMember>& twins);
 

@@ -20,7 +20,7 @@ struct TrainOptions {
   /// `bias` names one.
   std::optional<CompensatedModel> from;
   std::vector<std::string> refit = {"base", "tool"};
-  /// What robots of this type have in common: the prior of the arm's parameters, but for those in
+  /// The prior of the arm's parameters that robots of this type have in common, but for those in
   /// which this robot is unlike its twins. Empty: the drawing alone.
   std::optional<FleetPrior> fleet = {};
   std::uint64_t seed = 1;

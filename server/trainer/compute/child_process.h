@@ -57,23 +57,24 @@ class ChildProcess {
 
   /// SIGKILL, and until it is gone; a second at most, should the kernel not let go of it.
   void kill();
-  /// How it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty while it
-  /// runs.
+  /// The way in which it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty
+  /// while it runs.
   [[nodiscard]] std::optional<std::string> ending();
 
-  /// What it has used until now, or until it ended.
+  /// The resources that it has used until now, or until it ended.
   struct Usage {
     double processor_time = 0;     ///< s
     std::int64_t peak_memory = 0;  ///< bytes, resident
   };
   [[nodiscard]] Usage usage();
-  /// Whether it wants the processor, or waits for the disk: else it does nothing by itself.
+  /// The state of the process: it wants the processor, or waits for the disk; else it does nothing
+  /// by itself.
   enum class State { kRuns, kWaitsForDisk, kStands };
   [[nodiscard]] State state() const;
 
  private:
   ChildProcess() = default;
-  /// Whether it is over, without waiting.
+  /// True if the process is over. Does not wait.
   bool reap();
 
   pid_t pid_ = -1;

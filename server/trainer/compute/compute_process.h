@@ -13,7 +13,7 @@
 
 namespace trammel {
 
-/// How a job learns that it is to end.
+/// The ways by which a job learns that it is to end.
 struct StopRequests {
   std::stop_token service;  ///< the service stops: the job goes on after the next start
   std::stop_token job;      ///< the job is cancelled
@@ -47,7 +47,7 @@ class ComputeProcess : public Computing {
   [[nodiscard]] Status send(const Frame& frame);
   /// The next message that is an answer; those before it go to `watch`.
   [[nodiscard]] Result<Frame> answer(const ComputeWatch& watch);
-  /// What is to be done with a message on the way.
+  /// Handles a message on the way.
   [[nodiscard]] Status heard(const Frame& frame, const ComputeWatch& watch);
   /// Waits until the channel is ready for `events` and looks after the process meanwhile.
   [[nodiscard]] Status wait(short events);
@@ -70,7 +70,7 @@ class ComputeProcess : public Computing {
   double time_at_last_tick_ = 0;  // s, of the processor
 };
 
-/// The same here where `options` names no program, else in a process of its own.
+/// Starts to compute: here where `options` names no program, else in a process of its own.
 [[nodiscard]] Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options,
                                                                  ComputeTask task,
                                                                  const StopRequests& stop);

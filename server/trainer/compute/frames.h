@@ -8,7 +8,8 @@
 
 #include "server/base/result.h"
 
-/// How the service and the process that computes for it talk: frames over a pair of sockets.
+/// The talk between the service and the process that computes for it: frames over a pair of
+/// sockets.
 namespace trammel {
 
 /// A small JSON object, and up to one long text: a batch, a model, a page.
@@ -17,7 +18,7 @@ struct Frame {
   std::string text;
 };
 
-/// What a frame may hold. A process that has lost its mind may send anything.
+/// The limits of a frame. A process that has lost its mind may send anything.
 struct FrameLimits {
   std::size_t head_bytes = std::size_t{4} << 20;
   std::size_t text_bytes = std::size_t{1} << 30;

@@ -38,14 +38,14 @@ class JobBatches {
 
   /// The first of those to work on.
   [[nodiscard]] Result<CheckedBatch> first() const;
-  /// The same without copies of rows that judge in older batches.
+  /// first() without copies of rows that judge in older batches.
   [[nodiscard]] Result<CheckedBatch> first_without_older_judges();
   /// All to work on together, and the earlier ones that still fit the cell, without such copies:
   /// sessions of one arm.
   [[nodiscard]] Result<CheckedBatch> to_learn_from();
   /// Those whose rows may judge what the job makes, oldest first.
   [[nodiscard]] const std::vector<JudgingSession>& judging_sessions();
-  /// The same with that of first() among them, at `own`.
+  /// Those sessions with that of first() among them, at `own`.
   struct SessionsOfDiagnosis {
     std::vector<JudgingSession> sessions;
     std::size_t own = 0;

@@ -3,13 +3,13 @@
 #include "server/trainer/compute/frames.h"
 #include "server/trainer/compute/task.h"
 
-/// What the service and the process that computes for it say to each other. The service sends the
+/// The messages between the service and the process that computes for it. The service sends the
 /// texts of a task, the task, its batches and `make`; then, as often as it likes, the texts of
 /// opponents and `judge`. Each of these two is answered by `made`, `verdict` or `error`; before
 /// that come `progress` and `found`.
 namespace trammel::message {
 
-/// What kind of message it is: the member `is`.
+/// The kind of a message: the member `is`.
 [[nodiscard]] std::string kind_of(const Frame& frame);
 
 /// The frames of a task, in order; all but its batches.
@@ -28,8 +28,8 @@ namespace trammel::message {
 
 // These throw nlohmann::json::exception where a message is not what it says it is.
 
-/// Of the texts `cell`, `robot` and `in_force` and the frame that ends them. Refuses a cell that
-/// cannot be read.
+/// The task of the texts `cell`, `robot` and `in_force` and the frame that ends them. Refuses a
+/// cell that cannot be read.
 struct TaskTexts {
   std::string cell, robot;
   std::optional<ModelText> in_force;
@@ -37,7 +37,7 @@ struct TaskTexts {
 [[nodiscard]] Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts);
 [[nodiscard]] ModelText to_model_text(const Frame& frame);
 [[nodiscard]] BatchText to_batch(const Frame& frame, bool& judges);
-/// Of the question; its texts came before.
+/// Reads the opponents of the question; its texts came before.
 void read_opponents(const Frame& frame, Opponents& opponents);
 struct Findings {
   std::string findings, page;

@@ -13,7 +13,7 @@
 #include "server/store/store.h"
 #include "server/tasks/accept/verdict.h"
 
-/// What one job computes from and what comes of it, as values that another process can be told.
+/// The input of one job and what comes of it, as values that another process can be told.
 namespace trammel {
 
 /// A batch as it was received.
@@ -42,22 +42,22 @@ struct ComputeTask {
   std::int64_t now = 0;  ///< Unix time, s: when the model is trained
 };
 
-/// What a job makes.
+/// The product of a job.
 struct Made {
   std::optional<CompensatedModel> model;
   std::string remarks;     ///< to go with the model's outcome: `; ` before each
   std::string quarantine;  ///< why nothing must be learned from the batch; empty: something was
-  /// Of a diagnosis that makes no model.
+  /// The message of a diagnosis that makes no model.
   std::string message = {};
   JobOutcome outcome = {};
-  /// What serialize() made of the model in another process that computed it; empty: it was this
-  /// one.
+  /// The text that serialize() made of the model in another process that computed it; empty: it was
+  /// this one.
   std::string model_text = {};
 };
 
-/// What a job says on its way.
+/// The reports of a job on its way.
 struct ComputeWatch {
-  /// What is being done and the share done of all in [0, 1]; false: give up.
+  /// The stage that is being worked on and the share done of all in [0, 1]; false: give up.
   std::function<bool(const std::string& stage, double share)> progress;
   /// The findings of a diagnosis (JSON) and their page (HTML). An error ends the job.
   std::function<Status(const std::string& findings, const std::string& page)> found;

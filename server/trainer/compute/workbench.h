@@ -38,12 +38,12 @@ class Workbench : public Computing {
   [[nodiscard]] Result<Made> extended(const CheckedBatch& batch,
                                       const std::vector<std::string>& own,
                                       const Diagnosis& diagnosis, const ComputeWatch& watch);
-  /// The same where no model is in force: extend(), as on files. Batches of models that were never
-  /// in force do not judge it.
+  /// extended() where no model is in force: extend(), as on files. Batches of models that were
+  /// never in force do not judge it.
   [[nodiscard]] Result<Made> first_extended(const CheckedBatch& batch, const Diagnosis& diagnosis,
                                             const TrainOptions& options);
-  /// Of what the job asks for: level and bias, and where it asks for nothing special what the model
-  /// in force has besides.
+  /// The options that the job asks for: level and bias, and where it asks for nothing special what
+  /// the model in force has besides.
   [[nodiscard]] TrainOptions train_options(const CheckedBatch& batch,
                                            const ComputeWatch& watch) const;
   [[nodiscard]] Made made(CompensatedModel model, std::string remarks,
