@@ -33,7 +33,7 @@ struct ToolChoice {
   std::string why_not;        ///< why targets of this tool cannot be corrected; empty: they can
 };
 
-/// What the targets of a tool are.
+/// The kind of a tool's targets.
 enum class ToolUse {
   kNone,
   kJoints,  ///< axes alone, and it does not matter which tool the program has

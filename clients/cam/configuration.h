@@ -28,7 +28,7 @@ class ArmOfProgram {
   [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said,
                                      const std::map<int, double>& external,
                                      const std::optional<JointVector>& previous) const;
-  /// Of all joints for X_BF those nearest to `from`. `on_a_line`: only of the posture of `from`,
+  /// The joints for X_BF that are nearest to `from`. `on_a_line`: only of the posture of `from`,
   /// which a line does not leave. Two postures that are equally near are not decided.
   [[nodiscard]] NominalJoints nearest(const Pose& X_BF, const std::map<int, double>& external,
                                       const JointVector& from, bool on_a_line) const;
@@ -49,7 +49,8 @@ class ArmOfProgram {
   };
   /// The arm on its rail, where the rail comes first.
   [[nodiscard]] std::optional<Rail> arm_on(double rail) const;
-  /// What `solve(arm, X_RF, previous)` finds for the turning axes, with the rail's value in front.
+  /// The joints that `solve(arm, X_RF, previous)` finds for the turning axes, with the rail's value
+  /// in front.
   template <typename Solve>
   [[nodiscard]] NominalJoints on_rail(const Pose& X_BF, const std::map<int, double>& external,
                                       const std::optional<JointVector>& previous,

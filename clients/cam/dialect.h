@@ -18,7 +18,7 @@ enum class Dialect { kRapid, kKrl, kFanuc, kInform, kUrScript, kCamRob, kRoboDk 
 [[nodiscard]] const char* motions_of(Dialect dialect);
 /// By the ending of a file's name, whatever its case; empty: none, or one that several kinds share.
 [[nodiscard]] std::optional<Dialect> dialect_of_file(const std::string& path);
-/// Whether a program of this dialect may have a tool or frame with this name of a row of --frames.
+/// True if a program of this dialect may have a tool or frame with this name of a row of --frames.
 [[nodiscard]] bool may_have_row(Dialect dialect, const std::string& name);
 /// All names that --format takes, for messages.
 [[nodiscard]] std::string dialect_names();

@@ -141,7 +141,8 @@ class StatesBefore {
     if (also_) also_(state);
   }
 
-  /// What an aside that comes in where `state` holds leads back with; empty: it does not go back.
+  /// The state with which an aside leads back that comes in where `state` holds; empty: it does not
+  /// go back.
   std::optional<State> made_by(std::size_t a, const State& state) {
     made_.resize(flow_.asides.size());
     for (const auto& [before, after] : made_[a]) {
@@ -169,7 +170,7 @@ class StatesBefore {
     return back;
   }
 
-  /// Whether `known` had to change so that it holds for `state`, too.
+  /// Makes `known` hold for `state`, too. True if it had to change.
   bool grow(std::optional<State>& known, const State& state) const {
     if (!known) {
       known = state;
@@ -190,7 +191,7 @@ class StatesBefore {
   std::vector<std::vector<std::pair<State, std::optional<State>>>> made_;  ///< by each aside
 };
 
-/// What holds before each statement, and at last behind all, where `entry` holds at the entries of
+/// The state before each statement, and at last behind all, where `entry` holds at the entries of
 /// the flow. `apply(step, state)` makes what holds behind a statement. `join(state, other, by)`
 /// makes of a state one that holds for both, where ways come together; `by` names the aside that
 /// one of them leads through, empty: none. What it makes must come to rest. `also(state)` adds what
@@ -203,7 +204,7 @@ template <typename State, typename Apply, typename Join>
   return StatesBefore<State, Apply, Join>(flow, apply, join, also).find(entry);
 }
 
-/// Of each statement, the motions that may be the last before it, as `moves(step)` numbers them;
+/// The motions that may be the last before each statement, as `moves(step)` numbers them;
 /// kNoMotion where none comes before, or what moved the arm is no motion. `moves` is empty for a
 /// statement that does not move the arm.
 constexpr std::size_t kNoMotion = static_cast<std::size_t>(-1);

@@ -8,8 +8,8 @@
 #include "clients/cam/program.h"
 #include "clients/cam/scan.h"
 
-/// How a reader keeps the places of what is written anew, for all dialects alike: numbers in their
-/// own digits, and texts that hold numbers.
+/// The way in which a reader keeps the places of what is written anew, for all dialects alike:
+/// numbers in their own digits, and texts that hold numbers.
 namespace trammel::cam {
 
 /// A number as a token writes it; empty: it is none.
@@ -58,7 +58,7 @@ class NewText {
 void keep_original(const std::string& text, std::size_t at, const std::string& begin,
                    std::string original, ProgramTarget& target);
 
-/// What is left, and why. Where a motion goes to it, that is number `move` of the program.
+/// Notes what is left, and why. Where a motion goes to it, that is number `move` of the program.
 void leave(Program& program, LeftAlone left, std::optional<std::size_t> move = {});
 /// A position that no motion goes to.
 void leave_unused(Program& program, const std::string& name, std::size_t file, int line,

@@ -7,7 +7,7 @@
 /// Numbers as programs write them: `-.384`, `+1800.`, `9E+09`.
 namespace trammel::cam {
 
-/// How a number is written, so that another value can be written the same way.
+/// The style of a number, so that another value can be written the same way.
 struct NumberStyle {
   int decimals = 0;            ///< digits behind the point (of the mantissa)
   bool plus = false;           ///< positive numbers carry a sign

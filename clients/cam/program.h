@@ -259,7 +259,7 @@ struct Program : StatedRobot {
   std::vector<std::string> notes;  ///< what could not be compared, a sentence each
   std::vector<Cut> cuts;
 
-  /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
+  /// True if any motion or target was seen in any of the files, be it one that is left as it is.
   [[nodiscard]] bool is_understood() const {
     return !(moves.empty() && targets.empty() && left.empty());
   }
@@ -293,7 +293,7 @@ constexpr const char* kRobotBase = "robot_base";
 /// `2.500 mm and 0.0000 deg apart`
 [[nodiscard]] std::string apart_text(const Pose& a, const Pose& b);
 
-/// The same place and turn as far as tools and frames are compared.
+/// True if both are the same place and turn, as far as tools and frames are compared.
 [[nodiscard]] bool same_place(const Pose& a, const Pose& b);
 /// Why a row of --frames cannot hold beside what the files say at a place, both seen from the same;
 /// empty: it can.
@@ -314,7 +314,8 @@ struct FramesRows {
 /// The number of a tool in the program's list, where it is put if no tool of that name, place and
 /// load is there.
 std::size_t add_once(Program& program, ProgramTool tool);
-/// The same of a frame: of that name, whatever its case, and pose.
+/// The number of a frame in the program's list, where it is put if no frame of that name, whatever
+/// its case, and pose is there.
 std::size_t add_once(Program& program, ProgramFrame frame);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);
@@ -324,10 +325,10 @@ void leave_targets_in(Program& program, const std::set<std::string>& files);
 /// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
 void leave_halves_of_arcs(Program& program);
 
-/// Of Yaskawa's external axes, in pulses: those that carry the robot, and behind them those that
-/// carry the part.
+/// The first of Yaskawa's external axes, in pulses: those that carry the robot, and behind them
+/// those that carry the part.
 constexpr int kFirstBaseAxis = 6, kFirstStationAxis = 12;
-/// Whether the robot stands elsewhere as soon as the axis is not at zero.
+/// True if the robot stands elsewhere as soon as the axis is not at zero.
 [[nodiscard]] bool carries_robot(const Program& program, int axis);
 /// An external axis as a person calls it: `external axis b`, `group 2, axis 1` (FANUC), `base axis
 /// 1` (Yaskawa).

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-/// How the bytes of a program fall into words, numbers, texts and signs, each with its place. One
-/// scanner serves all dialects. What differs between them is a Lexis.
+/// The scanner by which the bytes of a program fall into words, numbers, texts and signs, each with
+/// its place. One scanner serves all dialects. What differs between them is a Lexis.
 namespace trammel::cam {
 
 enum class TokenKind : unsigned char { kWord, kNumber, kText, kSign, kEnd };

@@ -9,7 +9,7 @@
 #include "server/robot/cell.h"
 #include "server/tasks/train/told_by_training.h"
 
-/// What the values of the library are made of.
+/// The parts that the values of the library are made of.
 namespace trammel::api {
 
 struct Cell::Inside {

@@ -156,7 +156,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     return unanswered(asked.last);
   }
 
-  /// Whether nobody of them is there any more.
+  /// True if none of them is there any more.
   [[nodiscard]] bool has_left(const std::set<std::string>& asked) const {
     const MutexLock lock(mutex_);
     return std::none_of(asked.begin(), asked.end(),

@@ -26,7 +26,7 @@ namespace trammel::client {
 [[nodiscard]] std::string make_name(const char* what);
 [[nodiscard]] std::string change_id(const ChangeOptions& options);
 [[nodiscard]] wire::Change to_wire(const ChangeOptions& options);
-/// The same options with every server as a place, and the address of this host that leads there.
+/// The options with every server as a place, and the address of this host that leads there.
 [[nodiscard]] Result<SessionOptions> completed(SessionOptions options);
 [[nodiscard]] Result<wire::ParticipantPtr> participant_of(const SessionOptions& options);
 
@@ -43,7 +43,7 @@ struct Endpoints {
   std::unique_ptr<Caller<Operation>> caller TRAMMEL_GUARDED_BY(mutex);
 };
 
-/// What a session is made of, and how its requests are sent. Members are destroyed from the last to
+/// The parts of a session, and how its requests are sent. Members are destroyed from the last to
 /// the first.
 struct Session::Participant {
   SessionOptions options;
@@ -153,7 +153,7 @@ struct Session::Participant {
   /// The servers that accepted a job of this number in this session, and have not told its end;
   /// without one all that are known.
   [[nodiscard]] std::set<std::string> may_have(std::int64_t number);
-  /// What `server`, or another one of its record, knows of the job.
+  /// The job as `server`, or another one of its record, knows it.
   [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number);
   [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number,
                                               const std::string& cell);

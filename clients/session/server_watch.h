@@ -58,7 +58,7 @@ class ServerWatch {
   [[nodiscard]] std::optional<KnownServer> wait_for_server(
       const std::string& cell, const std::string& avoid, Clock::time_point deadline,
       const std::function<bool(const KnownServer&)>& reachable);
-  /// The same without waiting, and never `avoid` nor one that does not serve the cell.
+  /// wait_for_server() without waiting, and never `avoid` nor one that does not serve the cell.
   [[nodiscard]] std::optional<KnownServer> another_server(
       const std::string& cell, const std::string& avoid,
       const std::function<bool(const KnownServer&)>& reachable);
@@ -68,8 +68,8 @@ class ServerWatch {
   /// Why no server is found, where the only ones that are there speak another contract than this
   /// program.
   [[nodiscard]] std::optional<Error> other_contract() const;
-  /// What the record of the server is told from any other by, also where it has left; empty: it has
-  /// one of its own.
+  /// The mark that tells the record of the server from any other, also where it has left; empty: it
+  /// has one of its own.
   [[nodiscard]] std::string record_of(const std::string& server) const;
   /// Lets the time pass.
   void wait_until(Clock::time_point time);
@@ -93,7 +93,7 @@ class ServerWatch {
  private:
   explicit ServerWatch(std::size_t named) : named_(named) {}
   void on_contract(const wire::SpokenContract* spoken, const std::string& participant);
-  /// Whether waiting for a server is in vain: those that are there speak another contract, and have
+  /// True if waiting for a server is in vain: those that are there speak another contract, and have
   /// been for a while.
   [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
   /// Waits until `found`, and gives up at `deadline` or when it is in vain.
@@ -107,14 +107,14 @@ class ServerWatch {
   [[nodiscard]] const KnownServer* choose(
       const std::string& cell, const std::string& avoid,
       const std::function<bool(const KnownServer&)>& reachable) const TRAMMEL_REQUIRES(mutex_);
-  /// Whether `chosen` serves the cell, or no named server does.
+  /// True if `chosen` serves the cell, or no named server does.
   [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const
       TRAMMEL_REQUIRES(mutex_);
-  /// How long ago the model was described so, by its server's clock alone: others may differ from
+  /// The time since the model was described so, by its server's clock alone: others may differ from
   /// it, or be set.
   [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const
       TRAMMEL_REQUIRES(mutex_);
-  /// Whether the models of every server are as many as it reports.
+  /// True if as many models of every server are known as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
   const std::size_t named_;

@@ -138,7 +138,7 @@ class Session {
 
   /// The servers that are there, by their last status. Waits up to the timeout for the first.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers();
-  /// The same once `holds` for them, or after `limit`.
+  /// servers() once `holds` for them, or after `limit`.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers_when(
       const std::function<bool(const std::vector<ServerStatus>&)>& holds,
       std::chrono::milliseconds limit);

@@ -45,7 +45,7 @@ struct ModelInfo {
   std::vector<std::string> budget = {};
 };
 
-/// How the arm comes to a pose; what is not known is neutral.
+/// The approach of the arm to a pose; what is not known is neutral.
 struct Approach {
   std::vector<int> directions = {};  ///< of each joint: -1, 0, +1; empty: not known
   std::optional<double> temperature_c = {};
@@ -102,8 +102,8 @@ struct JobStatus {
   double share = 0;
   int model_version = 0;
   bool in_force = false;
-  /// How it ended: `open in_force not_better undecided diagnosed nothing_applied quarantined
-  /// refused over_limit broken cancelled`.
+  /// The way in which it ended: `open in_force not_better undecided diagnosed nothing_applied
+  /// quarantined refused over_limit broken cancelled`.
   std::string verdict = "open";
   /// Held-out rms of what was in force, and of the new model; what that must not exceed; two
   /// standard uncertainties of the difference. Empty: not judged.

@@ -11,7 +11,7 @@
 #include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 
-/// What all programs of a FANUC controller share.
+/// The parts that all programs of a FANUC controller share.
 namespace trammel::cam::fanuc {
 
 /// PR[m] as far as the program sets it: by elements.
@@ -37,7 +37,7 @@ struct Told {
   int line = 0;
 };
 
-/// What all programs of a controller share.
+/// The parts that all programs of a controller share.
 struct Controller {
   std::map<std::string, Register> registers;
   std::map<std::string, Setting> settings;  ///< of UFRAME[n] and UTOOL[n]

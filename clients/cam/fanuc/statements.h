@@ -20,7 +20,7 @@ struct Part {
   int line = 1;
 };
 
-/// What stands between a line that is `head` and the next that begins with `/`.
+/// The part between a line that is `head` and the next that begins with `/`.
 [[nodiscard]] Part part_of(const std::string& text, std::string_view head);
 /// `/PROG  WELD1`, in capitals; of a file without it its own name.
 [[nodiscard]] std::string name_of_program(const SourceFile& source);
@@ -68,8 +68,8 @@ struct Motion {
 /// Empty: the statement is none.
 [[nodiscard]] std::optional<Motion> motion_of(const Statement& statement);
 
-/// What moves the targets behind a statement: `Track TAST[1] (line 4)`; empty where it ends. No
-/// value: the statement has nothing to do with it.
+/// The words for what moves the targets behind a statement: `Track TAST[1] (line 4)`; empty where
+/// it ends. No value: the statement has nothing to do with it.
 [[nodiscard]] std::optional<std::string> follows_behind(const Statement& statement);
 /// `MONITOR SAFE`, `ERROR_PROG=SAFE`; empty: it starts nothing beside the program.
 [[nodiscard]] std::string started_beside(const Statement& statement);

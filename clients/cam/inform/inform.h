@@ -14,7 +14,7 @@ namespace trammel::cam {
 
 namespace inform {
 
-/// What Yaskawa's TOOL.CND and UFRAME.CND say, by the names `TOOL[0]`, `USER[1]`: a tool
+/// The values of Yaskawa's TOOL.CND and UFRAME.CND, by the names `TOOL[0]`, `USER[1]`: a tool
 /// from the flange, a user frame from the robot's base. One without its six numbers is not there.
 [[nodiscard]] ListedValues conditions(const std::vector<SourceFile>& files);
 

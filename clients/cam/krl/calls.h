@@ -20,7 +20,7 @@ struct Routine {
 
 class Routines {
  public:
-  /// Of several with one name the first is meant.
+  /// Adds a routine. The first of several with one name is meant.
   void add(Routine routine);
   [[nodiscard]] Routine& last() { return all_.back(); }
   [[nodiscard]] const std::vector<Routine>& all() const { return all_; }

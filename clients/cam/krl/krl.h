@@ -16,7 +16,7 @@ namespace trammel::cam {
 /// `$machine.dat` says where the robot stands in $WORLD, and which robot it is.
 [[nodiscard]] Program read_krl(std::vector<SourceFile> files, const ReadOptions& options);
 
-/// What a KUKA's own `$machine.dat` and `$config.dat` say of its cell. Tools are seen from the
+/// The cell as a KUKA's own `$machine.dat` and `$config.dat` describe it. Tools are seen from the
 /// flange, bases from the robot's base.
 struct KukaData {
   StatedRobot stated;

@@ -38,7 +38,7 @@ class Settings {
   /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a
   /// spline, alone.
   void apply_with(std::size_t f, std::size_t k, State& state);
-  /// Whether lines set tool or base for more than one motion.
+  /// True if lines set tool or base for more than one motion.
   [[nodiscard]] bool by_hand() const { return sets_by_hand_; }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace trammel::cam::krl {
 
-/// What `$machine.dat` says of the robot goes to the program: where it stands, its lengths, axes
+/// Gives the program what `$machine.dat` says of the robot: where it stands, its lengths, axes
 /// and type. Tells the names what `$ROBROOT` stands for.
 void read_stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options,
                  Variables& names, Program& program);

@@ -9,7 +9,7 @@
 #include "clients/cam/krl/variables.h"
 #include "clients/cam/sites.h"
 
-/// What stands where the motions of a KRL program go.
+/// The targets where the motions of a KRL program go.
 namespace trammel::cam::krl {
 
 class Targets {
@@ -20,7 +20,7 @@ class Targets {
 
   /// A motion goes to what stands there.
   void add(const Assigned& at) { places_[{at.file, at.operands[0].begin}] = at; }
-  /// What else reads the targets that are written anew.
+  /// Notes what else reads the targets that are written anew.
   void note_readings(std::size_t f);
   [[nodiscard]] std::string describe(const Site& site, ProgramTarget& target) const;
   /// Positions of data lists that nothing moves to.

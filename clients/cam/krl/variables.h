@@ -42,7 +42,7 @@ struct Variable {
 [[nodiscard]] std::string root_of(const std::string& name);
 class Variables {
  public:
-  /// Of files and their lines, which may still grow.
+  /// The variables of files and their lines, which may still grow.
   Variables(const std::vector<SourceFile>& files, const std::vector<std::vector<Line>>& lines);
 
   /// A declaration or assignment: behind `DECL` and a type, or bare.
@@ -51,14 +51,15 @@ class Variables {
   void note_parameters(std::size_t f, std::size_t k, std::size_t at);
   /// A name that stands alone between brackets or commas of a call, which may set it.
   void note_handed_over(std::size_t f, std::size_t k, std::size_t at, const std::string& to);
-  /// What a file sets and does not declare is another one's, or the controller's.
+  /// Joins variables that a file sets and does not declare: they are another one's, or the
+  /// controller's.
   void join_globals();
   [[nodiscard]] std::string place(std::size_t f, std::size_t k) const;
   /// A name as a line spells it.
   [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const;
   /// The variable of a file's own data list, else of any.
   [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const;
-  /// Whether a file gives it a value, constant or not.
+  /// True if a file gives it a value, constant or not.
   [[nodiscard]] bool is_set(const std::string& name, std::size_t f) const;
   /// The only value of a name.
   [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;

@@ -53,7 +53,7 @@ struct JointValue {
   int decimals = 0;
 };
 
-/// What assignments have made of tools and work objects, by the part of them, `tframe.trans` as the
+/// The assignments that hold for tools and work objects, by the part of them, `tframe.trans` as the
 /// numbers of its fields; nullptr: on some ways another one.
 using Settings =
     std::map<const Declaration*, std::map<std::vector<std::size_t>, const Assignment*>>;
@@ -94,12 +94,12 @@ class Interpreter {
   /// Where a tool's load is found at run time (LoadId); empty: nowhere.
   [[nodiscard]] std::string load_found(const Declaration* tool) const;
 
-  /// Whether an assignment gives a tool or work object a constant, which holds until the next one.
+  /// True if an assignment gives a tool or work object a constant, which holds until the next one.
   [[nodiscard]] bool sets(const Assignment& assignment) const {
     return parts_.contains(&assignment);
   }
   void set(const Assignment& assignment, Settings& settings) const;
-  /// What holds for the expressions that are asked for next.
+  /// Sets what holds for the expressions that are asked for next.
   void assume(const Settings& settings) { now_ = &settings; }
 
   /// The value of an expression: its literal. Several where an index is not constant.
@@ -129,7 +129,7 @@ class Interpreter {
   void note_changes();
   void note_changes_by_tasks();
   void note_changes_by_name(std::size_t module, const Instruction& instruction);
-  /// Of one task, where there are several.
+  /// The declaration in one task, where there are several.
   [[nodiscard]] std::optional<Found> find_global(const std::string& name, std::size_t module) const;
   [[nodiscard]] static bool is_shared(const Declaration& declared);
   void note_twice(std::size_t module, const Declaration& one, const Declaration& other);

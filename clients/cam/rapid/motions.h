@@ -15,7 +15,7 @@ namespace trammel::cam::rapid {
 /// merely called alike, `MoveLOffset`, is a procedure of somebody's.
 [[nodiscard]] bool is_motion(const std::string& name);
 [[nodiscard]] bool is_search(const std::string& name);
-/// Whether the tool goes to the target on a line or an arc.
+/// True if the tool goes to the target on a line or an arc.
 [[nodiscard]] bool is_linear(const std::string& name);
 /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
 [[nodiscard]] bool is_arc(const std::string& name);

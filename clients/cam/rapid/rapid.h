@@ -14,8 +14,8 @@ namespace trammel::cam {
 /// module decides is left, with the reason. W of the controller is taken as the robot's base.
 [[nodiscard]] Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options);
 
-/// What modules declare, whether motions use it or not: tools, work objects and loads that are
-/// constant or persistent.
+/// The declarations of modules, whether motions use them or not: tools, work objects and loads that
+/// are constant or persistent.
 struct RapidData {
   struct Frame {
     ProgramFrame frame;  ///< seen from the controller's world

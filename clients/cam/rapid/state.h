@@ -13,7 +13,7 @@
 /// The settings that instructions and assignments of RAPID make for the motions behind them.
 namespace trammel::cam::rapid {
 
-/// Whether the controller goes to the configuration of a target, or stays as near as it can.
+/// Tells whether the controller goes to the configuration of a target, or stays as near as it can.
 enum class Confs { kOn, kOff, kUndecided };
 
 /// The settings where a motion begins.

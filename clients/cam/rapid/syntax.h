@@ -9,8 +9,8 @@
 
 #include "clients/cam/flow.h"
 
-/// What a RAPID module says, as far as targets need it. The whole language is not read: a statement
-/// that is not understood is passed over.
+/// The content of a RAPID module, as far as targets need it. The whole language is not read: a
+/// statement that is not understood is passed over.
 namespace trammel::cam::rapid {
 
 /// A text that takes a pointer where it is empty: most parts of a long program are numbers.

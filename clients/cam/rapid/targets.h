@@ -8,7 +8,7 @@
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/interpreter.h"
 
-/// What stands where the motions of a RAPID program go.
+/// The targets where the motions of a RAPID program go.
 namespace trammel::cam::rapid {
 
 /// A motion goes to this place with this tool in this frame.

@@ -18,9 +18,9 @@ class Tools {
   /// Adds what it finds to the tools and frames of `program`; frame 0 is wobj0.
   Tools(Interpreter& meaning, const ReadOptions& options, Program& program);
 
-  /// Of Program::tools, what an argument names.
+  /// The place in Program::tools of what an argument names.
   std::size_t tool_of(const Expression& argument, const Scope& scope);
-  /// Of Program::frames; nullptr: wobj0.
+  /// The place in Program::frames of what an argument names; nullptr: wobj0.
   std::size_t frame_of(const Expression* argument, const Scope& scope);
   /// The load that `GripLoad lPart;` sets beside the tool's own; 0: none.
   std::size_t load_set(std::size_t module, const Instruction& instruction);
@@ -50,8 +50,8 @@ class Tools {
   [[nodiscard]] Told<Data> aggregate(const Data& of, std::size_t parts) const;
   [[nodiscard]] Told<Pose> pose(const Data& of, int* rotation_decimals) const;
   [[nodiscard]] Told<bool> truth(const Data& of) const;
-  /// What an argument that names a tool or a work object stands for; an error where it is not in
-  /// the files.
+  /// The data for which an argument stands that names a tool or a work object; an error where it is
+  /// not in the files.
   [[nodiscard]] Told<Data> named(const Expression& argument, const Scope& scope) const;
   void read_tool(const Data& data, ProgramTool& tool) const;
   void read_frame(const Data& parts, ProgramFrame& frame) const;

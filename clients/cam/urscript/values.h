@@ -58,13 +58,13 @@ struct Assignment {
 [[nodiscard]] bool defines(const Token& token);
 /// `def`, `if`: it has an `end`.
 [[nodiscard]] bool opens(const Token& token);
-/// Of six in brackets.
+/// The numbers of a value that has six in brackets.
 [[nodiscard]] std::vector<double> numbers_in(const Value& value);
 
 class Values {
  public:
-  /// Of the tokens of a script, which is called `file` in reasons. Finds what its variables are set
-  /// to.
+  /// Reads the tokens of a script, which is called `file` in reasons. Finds what its variables are
+  /// set to.
   Values(const Tokens& tokens, std::string file);
 
   /// The value from a token on; `at` is set behind it.
@@ -73,7 +73,7 @@ class Values {
   /// `stored`: it was made before, when a variable may have been another one.
   [[nodiscard]] Told<Value> resolved(const Value& value, bool stored = false) const;
   [[nodiscard]] Told<Pose> pose_of_value(const Value& value, int depth, bool stored = false) const;
-  /// What holds for the expressions that are asked for next; nullptr: not known.
+  /// Sets what holds for the expressions that are asked for next; nullptr: not known.
   void assume(const Settings* settings) { now_ = settings; }
   [[nodiscard]] const std::map<std::string, Variable>& variables() const { return variables_; }
   /// Assignments to variables that are set in order, by the token behind them.

@@ -15,7 +15,8 @@ class App;
 /// one that the command line names is put into `chosen`.
 namespace trammel::cli {
 
-/// How much of its task a command did. For kPart it has printed what is missing on standard error.
+/// The part of its task that a command did. For kPart it has printed what is missing on standard
+/// error.
 enum class Extent { kAll, kPart };
 
 /// The commands of the command line. Commands that do all or nothing answer a Status.

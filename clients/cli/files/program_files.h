@@ -11,7 +11,7 @@
 /// were before.
 namespace trammel::cli {
 
-/// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
+/// True if the inputs are a robot program. Otherwise they are one table of targets (.csv).
 [[nodiscard]] bool is_program(const std::vector<std::string>& inputs, const std::string& format);
 
 /// `inputs`: files, folders (with all they hold of one dialect), or `-`. `format`: the dialect, or
@@ -22,19 +22,19 @@ namespace trammel::cli {
                                                       const std::string& format,
                                                       const std::string& task = "");
 
-/// What cam::read_program() makes of the files. `frames`: values of tools and frames that they
-/// leave open, or empty (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the robot's base,
-/// tools from the flange; or a controller's own list: FANUC's SYSFRAME.VA, Yaskawa's TOOL.CND or
-/// UFRAME.CND, as in a folder). Refuses a program without a single motion or target in any of them,
-/// a backup of several robots of which no task is taken, and rows of `frames` that nothing uses,
-/// unless their column `may_be_unused` says yes.
+/// The program that cam::read_program() makes of the files. `frames`: values of tools and frames
+/// that they leave open, or empty (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the
+/// robot's base, tools from the flange; or a controller's own list: FANUC's SYSFRAME.VA, Yaskawa's
+/// TOOL.CND or UFRAME.CND, as in a folder). Refuses a program without a single motion or target in
+/// any of them, a backup of several robots of which no task is taken, and rows of `frames` that
+/// nothing uses, unless their column `may_be_unused` says yes.
 [[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files,
                                                       cam::ReadOptions options,
                                                       const std::string& frames);
 
-/// Of a program that is marked as corrected: each file as it was before. Refuses a file whose
-/// original is not kept beside it, or is not the one that the mark names. `all`: also where no file
-/// is marked, as for a new correction.
+/// The originals of a program that is marked as corrected: each file as it was before. Refuses a
+/// file whose original is not kept beside it, or is not the one that the mark names. `all`: also
+/// where no file is marked, as for a new correction.
 [[nodiscard]] Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all);
 
 /// Where each file goes: `output` itself for a single file, else into the folder of that name.

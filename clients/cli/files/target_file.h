@@ -30,7 +30,7 @@ struct TargetFile {
                                                    const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 
-/// Whether every position is so near to the base that its numbers may be metres.
+/// True if every position is so near to the base that its numbers may be metres.
 [[nodiscard]] bool may_be_metres(const TargetFile& file);
 /// The refusal of such a file.
 [[nodiscard]] Error looks_like_metres(const TargetFile& file);

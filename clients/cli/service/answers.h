@@ -27,10 +27,10 @@ namespace trammel::cli {
 [[nodiscard]] Target from_wire(const client::TargetMm& wanted, const Chain& robot);
 [[nodiscard]] JointVector from_wire(const std::vector<double>& wire, const Chain& robot);
 
-/// How the arm comes to a pose, as far as that is known.
+/// The approach of the arm to a pose, as far as that is known.
 [[nodiscard]] client::Approach approach_of(const PoseContext& context);
 
-/// How the coordinates of a prediction's uncertainty hang together.
+/// The covariances between the coordinates of a prediction.
 struct JointUncertainty {
   double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
 };

@@ -17,7 +17,7 @@ class Validator;
 /// Options that several commands have.
 namespace trammel::cli {
 
-/// Whether to ask a service, and which.
+/// Tells whether to ask a service, and which.
 struct ServiceOptions {
   bool service = false;
   std::vector<std::string> hosts = {
@@ -31,7 +31,8 @@ struct ServiceOptions {
 };
 /// The options of commands that work on files or ask a service.
 void add_service_options(CLI::App& command, ServiceOptions& options);
-/// Of commands that only a service can carry out: `--service` may be said and changes nothing.
+/// The options of commands that only a service can carry out: `--service` may be said and changes
+/// nothing.
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
 /// Where servers are looked for: each host with its own port, or with every port; nowhere where
 /// only discovery servers were said. kUsage: a host that nobody knows.

@@ -15,7 +15,7 @@ namespace trammel::cli {
 /// million.
 [[nodiscard]] std::string residuals_csv(const MeasurementBatch& batch,
                                         const CompensatedModel::LevelErrors& errors);
-/// The same of rows that tell one number: a row each, errors of that number.
+/// A row for each row of the batch that tells one number: likewise, errors of that number.
 [[nodiscard]] std::string gauge_residuals_csv(const MeasurementBatch& batch,
                                               const CompensatedModel::GaugeErrors& errors);
 /// A sentence where what the calibrated model leaves of these poses is no noise; empty where it may

@@ -27,14 +27,14 @@ class TRAMMEL_API Cell {
   [[nodiscard]] std::string robot() const;
   /// Number of joints n.
   [[nodiscard]] std::size_t joints() const;
-  /// What the joints are called in files, n names: `q1_deg`, of a rail `q1_mm`.
+  /// Names of the joints in files, n of them: `q1_deg`, of a rail `q1_mm`.
   [[nodiscard]] std::vector<std::string> joint_columns() const;
   /// Ids of its tools.
   [[nodiscard]] std::vector<std::string> tools() const;
   /// Ids of its payloads.
   [[nodiscard]] std::vector<std::string> payloads() const;
 
-  /// What it is made of.
+  /// The parts that it is made of.
   struct Inside;
   /// For the library itself.
   explicit Cell(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
@@ -50,7 +50,7 @@ class TRAMMEL_API Batch {
  public:
   /// Reads a batch file: our CSV, or RoboDK's.
   [[nodiscard]] static Result<Batch> load(const std::string& path);
-  /// The same from a text; `name` becomes the batch's id and names it in errors.
+  /// load() from a text; `name` becomes the batch's id and names it in errors.
   [[nodiscard]] static Result<Batch> parse(const std::string& csv, const std::string& name);
 
   /// Its id.
@@ -59,11 +59,11 @@ class TRAMMEL_API Batch {
   [[nodiscard]] std::size_t size() const;
   /// Its text as it came.
   [[nodiscard]] std::string csv() const;
-  /// The same rows as a batch file of the plain kind: commas, decimal points, names in lower case,
+  /// Its rows as a batch file of the plain kind: commas, decimal points, names in lower case,
   /// no comments.
   [[nodiscard]] std::string table() const;
 
-  /// What it is made of.
+  /// The parts that it is made of.
   struct Inside;
   /// For the library itself.
   explicit Batch(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
@@ -121,7 +121,7 @@ struct Parameter {
   bool identified = false;  ///< whether the poses say more of it than was known before
 };
 
-/// What the training poses of a model were: what it promises is about these.
+/// The training poses of a model: what it promises is about these.
 struct Measured {
   std::string sentence;         ///< all of it in words; where it is not on record, that
   int poses = 0;                ///< 0: not on record, in models from before it was recorded
@@ -141,7 +141,7 @@ class TRAMMEL_API Model {
  public:
   /// Reads a model file. Refuses one whose hash does not fit its content.
   [[nodiscard]] static Result<Model> load(const std::string& path);
-  /// The same from its text, as a service exports it; `where` names it in errors.
+  /// load() from the model's text, as a service exports it; `where` names it in errors.
   [[nodiscard]] static Result<Model> parse(const std::string& text, const std::string& where);
   /// Writes the model file, whole or not at all.
   [[nodiscard]] Status save(const std::string& path) const;
@@ -160,12 +160,12 @@ class TRAMMEL_API Model {
   [[nodiscard]] std::vector<double> parameter_covariance() const;
   /// Errors on poses held out from training, else on the training poses.
   [[nodiscard]] Evaluation figures() const;
-  /// What its promise is about.
+  /// The training poses that its promise is about.
   [[nodiscard]] Measured measured() const;
   /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no
   /// training pose has a position.
   [[nodiscard]] std::string budget_json() const;
-  /// What a user of the model should know, the gravest first.
+  /// Notes that a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 
   /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a
@@ -173,7 +173,7 @@ class TRAMMEL_API Model {
   /// with a payload that no training pose had.
   [[nodiscard]] Result<std::vector<Prediction>> predict(std::span<const double> joints_deg,
                                                         const Context& context = {}) const;
-  /// What to command so that the tool lands on each target. A target that cannot be corrected says
+  /// The commands by which the tool lands on each target. A target that cannot be corrected says
   /// so in its status. Refuses targets that are none (wrong number of joints, no branch, no unit
   /// quaternion), and tools as predict() does.
   [[nodiscard]] Result<std::vector<CorrectedTarget>> correct(std::span<const Target> targets,
@@ -181,7 +181,7 @@ class TRAMMEL_API Model {
   /// Measured against predicted. Several batches are sessions of one arm.
   [[nodiscard]] Result<Evaluation> evaluate(std::span<const Batch> batches) const;
 
-  /// What it is made of.
+  /// The parts that it is made of.
   struct Inside;
   /// For the library itself.
   explicit Model(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
@@ -192,7 +192,7 @@ class TRAMMEL_API Model {
   std::shared_ptr<const Inside> inside_;
 };
 
-/// How to train.
+/// The options of a training.
 struct TrainOptions {
   std::optional<std::string>
       level;  ///< instead of the cell's error sources: `M0` to `M3`, `M2,gear_transmission:3`
@@ -212,30 +212,30 @@ struct TrainOptions {
 [[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
                                               const TrainOptions& options = {});
 
-/// How to diagnose.
+/// The options of a diagnosis.
 struct DiagnoseOptions {
   std::uint64_t seed = 1;  ///< of the bootstrap
   Progress progress;       ///< may be empty
 };
-/// What the cell's model lacks, as JSON: the text that `trammel diagnose --json` writes.
+/// The causes that the cell's model lacks, as JSON: the text that `trammel diagnose --json` writes.
 [[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell,
                                                        std::span<const Batch> batches,
                                                        const DiagnoseOptions& options = {});
 
-/// What extending a cell by what a diagnosis found is worth.
+/// The worth of extending a cell by what a diagnosis found.
 struct Extension {
   std::string findings;        ///< the diagnosis, as diagnose() writes it
   std::optional<Model> model;  ///< the extended model; empty where it is not to be applied
   std::vector<std::string> error_sources;  ///< of it, those that belong into the cell file
   std::string why_not;  ///< why nothing is applied, in the words of every door; empty: apply it
 };
-/// What `trammel diagnose --apply` does, without writing anything: some rows are set aside before
-/// the batch is looked at, the cell is extended by what is found, and the model is one to apply
-/// where a service would put it in force.
+/// Does what `trammel diagnose --apply` does, without writing anything: some rows are set aside
+/// before the batch is looked at, the cell is extended by what is found, and the model is one to
+/// apply where a service would put it in force.
 [[nodiscard]] TRAMMEL_API Result<Extension> extend(const Cell& cell, std::span<const Batch> batches,
                                                    const DiagnoseOptions& options = {});
 
-/// How to plan.
+/// The options of a plan.
 struct PlanOptions {
   std::size_t count = 0;          ///< number of poses
   std::uint64_t seed = 1;         ///< of the draw
@@ -251,7 +251,7 @@ struct Plan {
 /// Poses of the cell, inside its workspace and in sight of its tracker.
 [[nodiscard]] TRAMMEL_API Result<Plan> plan(const Cell& cell, const PlanOptions& options);
 
-/// How to simulate.
+/// The options of a simulation.
 struct SimulateOptions {
   std::uint64_t seed = 1;       ///< of the measuring noise
   bool positions_only = false;  ///< leave out orientations, as a single reflector does

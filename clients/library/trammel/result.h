@@ -5,7 +5,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-/// What may leave libtrammel.
+/// Marks what may leave libtrammel.
 #define TRAMMEL_API __attribute__((visibility("default")))
 
 /// Trammel for other programs. Nothing here throws. Lengths are mm and angles deg, as in files and

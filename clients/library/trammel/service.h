@@ -29,7 +29,7 @@ struct SessionOptions {
   std::string security = {};
 };
 
-/// What a call is about.
+/// The subject of a call.
 struct Asked {
   std::string cell;                     ///< name of the cell
   Context context;                      ///< what its arm carries, and how it comes there
@@ -125,7 +125,7 @@ class TRAMMEL_API Session {
                                            const std::string& batch_id = {},
                                            const std::string& csv = {},
                                            std::optional<double> tolerance_mm = {}) const;
-  /// What a diagnosis or a check that is done has found: JSON.
+  /// The findings of a diagnosis or a check that is done: JSON.
   [[nodiscard]] Result<std::string> findings(const std::string& cell, std::int64_t job) const;
   /// Waits until the job is done or failed, and tells `listener`, if any, how far it is.
   /// kUnreachable: `limit` is over. kNotFound: no server knows it.

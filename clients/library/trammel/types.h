@@ -8,7 +8,7 @@
 
 #include "trammel/result.h"
 
-/// What predictions and corrections are made of, from a file or from a service.
+/// The types that predictions and corrections are made of, from a file or from a service.
 namespace trammel::api {
 
 /// Where a frame is. `X_BT` is the tool T seen from the robot's base B.
@@ -18,7 +18,7 @@ struct Pose {
       1, 0, 0, 0};  ///< orientation: unit quaternion, Hamilton, active, scalar first
 };
 
-/// What holds for all poses of a call.
+/// The circumstances that hold for all poses of a call.
 struct Context {
   std::string tool;     ///< id in the cell file; empty: the cell's only one
   std::string payload;  ///< likewise
@@ -69,7 +69,7 @@ struct CorrectedTarget {
   std::string message;         ///< why it is not ok
 };
 
-/// What a user of a model should know, in the words of the command line and of the service.
+/// A note that a user of a model should know, in the words of the command line and of the service.
 struct Note {
   std::string code;      ///< for programs: `robot_not_confirmed`
   std::string severity;  ///< `info`; `warning`: figures mean less than they seem to; `stop`: a
