@@ -20,15 +20,15 @@
 /// with its fault if its header can be read.
 namespace trammel::wire {
 
-/// Whether the name can be a reply partition: not empty, and without the wildcards of partition
+/// True if the name can be a reply partition: not empty, and without the wildcards of partition
 /// names.
 [[nodiscard]] bool valid_partition(std::string_view name);
 
-/// What is wrong with a serialized sample (its encapsulation first); empty: nothing. One for each
+/// The fault of a serialized sample (its encapsulation first); empty: none. One for each
 /// request, reply and state of the IDL.
 template <typename Sample>
 [[nodiscard]] std::optional<Fault> find_fault(std::span<const unsigned char> sample);
-/// Of the beginning of any request.
+/// The fault of the beginning of any request.
 template <>
 [[nodiscard]] std::optional<Fault> find_fault<RequestHeader>(std::span<const unsigned char> sample);
 

@@ -26,9 +26,9 @@ struct Security {
 /// have expired or are not valid yet.
 [[nodiscard]] Result<Security> read_security(const std::string& folder);
 
-/// Whether a service may have these permissions: those of another role than `server` let it answer
-/// nothing, and the library would say so of one of its topics only. Permissions that are not from
-/// deploy/security/keys may be anything.
+/// Checks that a service may have these permissions: those of another role than `server` let it
+/// answer nothing, and the library would say so of one of its topics only. Permissions that are not
+/// from deploy/security/keys may be anything.
 [[nodiscard]] Status check_serves(const Security& security);
 
 /// The subject of the certificate that a participant has shown, as RFC 2253 writes it. `claimed`:

@@ -28,7 +28,8 @@
 #include "server/base/host_port.h"
 #include "server/base/result.h"
 
-/// How samples travel: one participant set-up and one set of QoS for the server and all clients.
+/// The way in which samples travel: one participant set-up and one set of QoS for the server and
+/// all clients.
 namespace trammel::wire {
 
 struct ParticipantOptions {
@@ -84,7 +85,7 @@ template <typename Operation>
   return make_topic(participant, topic_name(Operation::kName, "_Request"),
                     new SafeType<typename Operation::Request>(Operation::kMaxSample));
 }
-/// The same for the side that receives: its samples are Received. `unreadable` counts those that
+/// The topic for the side that receives: its samples are Received. `unreadable` counts those that
 /// are dropped.
 template <typename Operation>
 [[nodiscard]] Result<dds::Topic*> make_received_topic(

@@ -16,7 +16,7 @@
 
 namespace trammel {
 
-/// What a server among others has to tell them, and what it heard of them. Thread-safe.
+/// The news that a server among others has to tell them, and what it heard of them. Thread-safe.
 class Presence {
  public:
   /// From now on it has these cells, too.

@@ -61,7 +61,7 @@ class Trainer {
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
-  /// Whether it works on jobs.
+  /// True if the server works on jobs.
   [[nodiscard]] bool trains() const { return options_.trains; }
   /// Stays as it is until the end; the next call may give more cells.
   [[nodiscard]] const ServedCells& cells() const { return cells_.now(); }
@@ -70,8 +70,8 @@ class Trainer {
   [[nodiscard]] std::vector<std::string> add_cells(const ServedCells& more);
   /// From now on TrainerOptions::queue_capacity and TrainerOptions::keep are these. Thread-safe.
   void set_limits(int queue_capacity, const KeepRule& keep);
-  /// What is wrong now: with the store, with its disk, with the models of cells; one sentence each.
-  /// Never waits.
+  /// The troubles of now: with the store, with its disk, with the models of cells; one sentence
+  /// each. Never waits.
   [[nodiscard]] std::vector<std::string> troubles() const;
 
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it
@@ -83,8 +83,8 @@ class Trainer {
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id,
                                             const std::string& who = {});
-  /// Whether batches of a training that is asked for leave quarantine. They do when its model is
-  /// put in force, by itself or by a person, or when there are too few poses to judge it by; not
+  /// Tells whether batches of a training that is asked for leave quarantine. They do when its model
+  /// is put in force, by itself or by a person, or when there are too few poses to judge it by; not
   /// where it is judged and found not better.
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty:
@@ -112,7 +112,7 @@ class Trainer {
                                            const std::string& csv,
                                            std::optional<double> tolerance_mm,
                                            const ChangeId& id = {});
-  /// Of a job whose diagnosis or check is found; kBusy while it is not.
+  /// The findings of a job whose diagnosis or check is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Ends a job that waits or runs, here or on another server of the same store: its outcome is
   /// kCancelled, and nothing of it is stored but the findings that a diagnosis already had. The
@@ -150,30 +150,30 @@ class Trainer {
     return history_.load_for_service(cell, version);
   }
 
-  /// Of an unfinished job as it goes on, of a finished one from the store.
+  /// The progress of an unfinished job as it goes on, of a finished one from the store.
   [[nodiscard]] Result<JobProgress> progress(std::int64_t job) const;
   /// A job with what was asked for and when.
   struct DatedJob {
     StoredJob asked;
     JobProgress progress;
   };
-  /// Of one cell or (empty) of all, oldest first: those that wait or run, and the last ones that
-  /// ended.
+  /// The jobs of one cell or (empty) of all, oldest first: those that wait or run, and the last
+  /// ones that ended.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell) const;
   /// Those that wait or run, oldest first, as they go on. From memory.
   [[nodiscard]] std::vector<JobProgress> unfinished_jobs() const { return book_.unfinished(); }
-  /// What is wrong with the models that cells are served with; see ModelHistory.
+  /// The troubles with the models that cells are served with; see ModelHistory.
   [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
   /// Why this server may not answer for the cell though it has its files; empty: it may.
   [[nodiscard]] std::optional<std::string> why_apart(const std::string& cell) const {
     return cells_.why_apart(cell);
   }
-  /// What this server says of itself.
+  /// This server's description of itself.
   [[nodiscard]] ServerSelf self() const;
   /// The servers of the record, this one among them, as they were heard of last, without what they
   /// serve. From memory.
   [[nodiscard]] std::vector<ServerInRecord> servers_seen() const;
-  /// The same with what they serve, as the record has it now.
+  /// The servers of the record with what they serve, as the record has it now.
   [[nodiscard]] Result<std::vector<ServerInRecord>> servers() const;
   /// Waiting, without the one being trained.
   [[nodiscard]] int queued_jobs() const;
@@ -185,15 +185,15 @@ class Trainer {
   /// Loads models in the background, tries a store again that cannot be written, and tells of other
   /// troubles than `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
-  /// What the rule lets go of, one small change after the other.
+  /// Prunes what the rule lets go of, one small change after the other.
   void prune(const std::string& cell, const std::stop_token& stop);
-  /// Of a store that can be read only now.
+  /// Takes up a store that can be read only now.
   void take_up_late();
   /// Where several servers share the store: takes up what others changed, and keeps the claim on
   /// the job that runs.
   void follow(std::int64_t followed, const std::stop_token& stop);
-  /// What is in force since `followed` changes, of so many that were `made`; returns how many it
-  /// has taken up.
+  /// Takes up what is in force since `followed` changes, of so many that were `made`; returns how
+  /// many it has taken up.
   [[nodiscard]] std::int64_t follow_models(std::int64_t followed, std::int64_t made);
   /// Which jobs wait, run elsewhere or are over.
   void follow_jobs();
@@ -217,14 +217,14 @@ class Trainer {
   void tell_troubles(std::vector<std::string>& told);
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
-  /// Of a job as the store has it.
+  /// The progress of a job as the store has it.
   [[nodiscard]] JobProgress stored_progress(const StoredJob& job) const;
   /// The job that was queued under this id before; empty: none.
   [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
   void enqueue(const StoredJob& job, bool asked_for);
-  /// Whether somebody asked for the job; else it came with its batch.
+  /// True if somebody asked for the job; else it came with its batch.
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
-  /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
+  /// True if an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
   /// A version held against the one in force on what the cell measured; empty: there is nothing to
   /// hold it against.
@@ -233,7 +233,7 @@ class Trainer {
   /// Refuses what the verdict finds worse, or not to be told.
   [[nodiscard]] Status check_not_worse(const std::string& cell, int version,
                                        const GateVerdict& verdict) const;
-  /// Whether the stored batches may be trained from together.
+  /// Checks that the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored,
                                       const std::vector<std::string>& batch_ids,
                                       bool release) const;

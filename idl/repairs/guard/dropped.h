@@ -34,7 +34,7 @@ inline constexpr std::size_t kDroppedReasons = 18;
 /// For people: "statistics submessage".
 [[nodiscard]] const char* name_of(Dropped reason);
 
-/// How many packets were dropped for each reason. Thread-safe.
+/// The number of packets that were dropped for each reason. Thread-safe.
 class DropCounts {
  public:
   void add(Dropped reason) {

@@ -41,7 +41,7 @@ inline constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload
 inline constexpr std::uint32_t kBuiltIn =
     0xc0;  ///< in the last octet of an entity id: of discovery, no topic
 
-/// Whether an endpoint is one of those that DDS-Security adds and that say nothing in the clear:
+/// True if an endpoint is one of those that DDS-Security adds and that say nothing in the clear:
 /// not that of liveliness, which plants leave unprotected.
 inline constexpr bool is_of_security(std::uint32_t entity) {
   constexpr std::uint32_t kLiveliness = 0xff0200c2;
