@@ -214,8 +214,8 @@ class RowSearch {
     return Readmitted{std::move(found), std::move(kept)};
   }
 
-  /// Of rows that are too few to find all sources on some of them, those that base and tool alone
-  /// lead to: what is off by as much as a suspect beside all that the drawing leaves does not
+  /// The rows that base and tool alone lead to, where rows are too few to find all sources on some
+  /// of them: what is off by as much as a suspect beside all that the drawing leaves does not
   /// agree.
   [[nodiscard]] Rows led_to_by_frames(const MeasurementBatch& few) const {
     const std::vector<std::string> sources = frames();

@@ -19,8 +19,8 @@ MeasurementBatch with_zeros(MeasurementBatch batch, const JointVector& zeros) {
   return batch;
 }
 
-/// Of the first session that has one: each was measured in a world of its own. `positions` says
-/// what speaks against its positions.
+/// The doubt of the first session that has one: each was measured in a world of its own.
+/// `positions` says what speaks against its positions.
 template <typename Positions>
 std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell& cell,
                                        const Positions& positions) {

@@ -47,7 +47,7 @@ struct Sums {
   }
 };
 
-/// The same with the motions eliminated, over any sessions.
+/// Sums with the motions eliminated, over any sessions.
 struct Seen {
   MatrixXd own, shared;
   VectorXd gradient;

@@ -265,7 +265,7 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
   }
 }
 
-/// How three numbers tell an orientation, and what to call that.
+/// A way in which three numbers tell an orientation, and what to call that.
 struct Told {
   std::string name;
   std::array<int, 3> axes;   ///< of the turns, each about the axis as turned so far
@@ -325,7 +325,7 @@ const std::vector<Told>& ways_to_tell() {
   return all;
 }
 
-/// What to write where three numbers were meant `way`.
+/// The orientation columns to write where three numbers were meant `way`.
 std::string remedy_of(const Told& way, bool in_radians) {
   if (way.columns.empty()) return "write the orientation as a quaternion: qw, qx, qy, qz";
   const char* unit = in_radians ? "rad" : "deg";

@@ -40,7 +40,7 @@ const Drawing* drawing_of(const std::string& name) {
   return nullptr;
 }
 
-/// What is farther off its drawing than a robot may be.
+/// The numbers that are farther off their drawing than a robot may be.
 struct OffDrawing {
   std::string numbers;
   bool zeros_alone = true;

@@ -333,7 +333,7 @@ class DdsService::Running {
     }
   }
 
-  /// What did not reach the service, as far as it is due by then.
+  /// Tells what did not reach the service, as far as it is due by then.
   void tell_refused(Clock::time_point now) {
     if (!packets_) return;  // the start has failed
     if (const auto dropped = packets_->due(now)) packet_listener_("packets_dropped", *dropped);

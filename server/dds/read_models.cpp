@@ -32,7 +32,7 @@ Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches)
   return reply;
 }
 
-/// What the store has of a cell's checks, and of how its model in force was judged.
+/// The record that the store has of a cell's checks, and of how its model in force was judged.
 Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry,
                              const std::string& cell, std::int64_t since, std::size_t most) {
   const auto checks = TRY(store.health_checks(cell, std::max<std::int64_t>(since, 0), most));

@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-/// What a training of each kind is not told.
+/// Refuses what a training of each kind is not told.
 Status check_training(const wire::TrainRequest& request) {
   if (request.kind() == wire::TRAIN_BATCHES) {
     if (request.csv().empty()) return {};

@@ -33,7 +33,7 @@ namespace {
 constexpr std::size_t kFewestPoses =
     12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
 
-/// Of a batch of several sessions.
+/// A batch of several sessions, with where its instruments stood.
 struct Placed {
   CalibrationResult calibration;  ///< its sessions: where the instrument of each stood
   std::vector<Change> changes;    ///< of the arm between them
@@ -83,7 +83,7 @@ Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatc
       });
 }
 
-/// What stands for an instrument that was set up anew.
+/// The cause that stands for an instrument that was set up anew.
 const CauseRecord& set_up_anew() {
   const std::vector<const CauseRecord*> all = all_causes();
   const auto found = std::find_if(all.begin(), all.end(), [](const CauseRecord* cause) {
@@ -93,7 +93,7 @@ const CauseRecord& set_up_anew() {
   return **found;
 }
 
-/// Whether the search has no cause that acts as the change does: it looks for what begins at a pose
+/// True if the search has no cause that acts as the change does: it looks for what begins at a pose
 /// and stays.
 bool is_beside_the_search(const Change& change) {
   return is_of_one_session(change) || change.rate > 0;
@@ -234,7 +234,7 @@ bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, co
   return true;
 }
 
-/// What changed on the arm between two sessions, and on what that rests.
+/// Tells what changed on the arm between two sessions, and on what that rests.
 void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
   const CalibrationResult& by = placed.calibration;
   diagnosis.between_sessions = session_changes(
@@ -243,7 +243,7 @@ void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
     diagnosis.limits.push_back(std::move(*order));
 }
 
-/// What changed and is no finding: what the search has no cause for, or did not name.
+/// The changes that are no findings: what the search has no cause for, or did not name.
 std::string told_of_sessions(const Diagnosis& diagnosis) {
   std::string text;
   for (const SessionChange& change : diagnosis.between_sessions) {
@@ -257,8 +257,8 @@ std::string told_of_sessions(const Diagnosis& diagnosis) {
   return text;
 }
 
-/// What began in the middle of the batch, where nothing known explains it: too large for the
-/// search, whose effects are held against what is left.
+/// The sentence about what began in the middle of the batch, where nothing known explains it: too
+/// large for the search, whose effects are held against what is left.
 std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                          const Diagnosis& diagnosis) {
   if (diagnosis.verdict != Verdict::kUnknown) return "";
@@ -270,7 +270,7 @@ std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedB
       in_words(*jump));
 }
 
-/// What was done to which files.
+/// Tells what was done to which files.
 void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed,
                      Diagnosis& diagnosis) {
   diagnosis.batch_hash = batch.hash();

@@ -29,9 +29,9 @@ constexpr Index kTargets = 64;  // at once: the matrices pass through the cache 
 constexpr double kPassedOver = 1e-3;
 constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
 
-// What few points leave unexplained of any pose, of the noise variance: what they say of the
-// columns is then off by no more of a posterior variance than R A⁻¹ Rᵀ of their errors, which is
-// below it.
+// The share of the noise variance that few points leave unexplained of any pose: what they say of
+// the columns is then off by no more of a posterior variance than R A⁻¹ Rᵀ of their errors, which
+// is below it.
 constexpr double kUnexplained = 1e-4;
 constexpr Index kWorthFew = 3;  // few points pay where they are less than one in so many
 

@@ -25,7 +25,7 @@ constexpr double kKneeSpread = 0.7;       // in logs: from half to twice the har
 constexpr double kPowerSpread = 0.4;      // in logs: from 1.1 to 2.4
 constexpr double kHarmonicsSpread = 1.0;  // they are not searched
 
-/// How the spectrum of a joint is told.
+/// The two numbers that tell the spectrum of a joint.
 struct Spectrum {
   double knee, power;
 };

@@ -36,12 +36,12 @@ constexpr Index kMostServedPoints =
 constexpr double kFewTell = 0.02;  // of the variance: what few points may leave out
 constexpr Index kLeftOutPoints = 128;  // of the points, that near ones are tried at
 constexpr Index kAsked = 64;  // joint vectors between the points, that few points are tried at
-// What few points may be too small by beside the places that were tried: measured 0.2 % of a
-// standard deviation, and 1e-5 of the noise variance.
+// The shares by which few points may be too small beside the places that were tried: measured 0.2 %
+// of a standard deviation, and 1e-5 of the noise variance.
 constexpr double kFewSlack = 1.004;
 constexpr double kFewSlackOfNoise = 1e-4;
-// Of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to single
-// precision (6e-8) makes of t.
+// A share of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to
+// single precision (6e-8) makes of t.
 constexpr double kRounded = 3.5e-7;
 constexpr double kMostRounding = 1e-3;  // of the variance of a measurement
 

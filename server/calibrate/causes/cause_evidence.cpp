@@ -56,7 +56,8 @@ LinearEquations of_columns(const LinearEquations& all, const std::vector<Index>&
   return some;
 }
 
-/// Of each kind: how much more precise, as a variance, the stated sigmas are than the weights.
+/// The factor of each kind by which the stated sigmas are more precise, as a variance, than the
+/// weights.
 Eigen::Vector2d of_stated_sigmas(const CalibrationProblem& problem, const Weights& weights) {
   Eigen::Vector2d stated = Eigen::Vector2d::Zero(), beside = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < problem.batch.measurements.size(); ++i) {

@@ -16,7 +16,7 @@ bool has(const PhysicalModel& model, const std::string& source) {
                      [&](const ErrorSourcePtr& one) { return one->name() == source; });
 }
 
-/// Of each parameter of `model` its place in `all`, which has the same sources and more; -1: not
+/// The place of each parameter of `model` in `all`, which has the same sources and more; -1: not
 /// there.
 std::vector<Eigen::Index> places_in(const PhysicalModel& all, const PhysicalModel& model) {
   std::vector<Eigen::Index> places;
@@ -104,7 +104,7 @@ BudgetNumber mass_of(const ModelParts& parts, const std::string& id) {
   return mass;
 }
 
-/// What the newer arm does otherwise because it carries something else than the older one.
+/// Adds what the newer arm does otherwise because it carries something else than the older one.
 void add_load(const ModelParts& before, const ModelParts& now, PredictedDifference& predicted) {
   const PhysicalModel as_before = with_load_of(now.physics, before.physics);
   Eigen::Matrix3Xd load(3, std::ssize(predicted.poses));

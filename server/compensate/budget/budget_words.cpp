@@ -41,7 +41,7 @@ std::optional<BudgetNumber> turn_of(const BudgetLine& line) {
 
 bool stands_out(const BudgetLine& line) { return !line.action.empty(); }
 
-/// What stands behind the name, in brackets.
+/// The details behind the name, in brackets.
 std::string detail(const BudgetLine& line) {
   std::vector<std::string> parts;
   if (line.value) parts.push_back(value_in_words(line));

@@ -21,8 +21,8 @@ constexpr double kMatched = 1e-7;     // m
 constexpr double kLaterJoint =
     1e-6;  // of two equal candidates the later joint counts as being on its drawing
 
-/// What the measurements told of the parameters that were identified, F x F in units of `sizes`:
-/// the inverse of the covariance without what the priors said.
+/// The information of the measurements about the parameters that were identified, F x F in units of
+/// `sizes`: the inverse of the covariance without what the priors said.
 struct Told {
   std::vector<Eigen::Index> free;  // places among the model's P
   Eigen::MatrixXd information;

@@ -76,7 +76,7 @@ void add_values(const Datum& datum, const std::vector<Parameter>& parameters, Bu
   }
 }
 
-/// Whether a value is there at all, and far beyond what is usual; then what to do.
+/// Judges whether a value is there at all, and far beyond what is usual; then says what to do.
 void judge(const Datum& datum, BudgetItem& item) {
   BudgetLine& line = item.line;
   const std::optional<double> usual = usual_value(item, datum.model);
@@ -224,14 +224,14 @@ BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
   if (asked.has_bias)
     view.lines.push_back(sized(named(LineKind::kLearned, "what is learned beyond the physics"),
                                seen(asked.effects.learned), total));
-  // What stands out leads.
+  // Lines that stand out lead.
   std::stable_sort(view.lines.begin(), view.lines.end(),
                    [](const BudgetLine& one, const BudgetLine& other) {
                      return one.action.empty() == other.action.empty() ? one.share > other.share
                                                                        : other.action.empty();
                    });
-  // What frames do is out of every vector, so that their small remainder counts with what acts
-  // together.
+  // The effect of frames is out of every vector, so that their small remainder counts with what
+  // acts together.
   Eigen::Matrix3Xd together = asked.effects.together;
   for (std::size_t k = 0; k < asked.items.size(); ++k)
     if (!frames && is_frame(asked.items[k].line.kind)) together += asked.effects.lines[k];
@@ -248,7 +248,8 @@ std::vector<PoseContext> contexts_of(const MeasurementBatch& positions) {
   return contexts;
 }
 
-/// What `positions` leave by the drawing and by the physics; where nothing is learned, that is all.
+/// The residuals of `positions` by the drawing and by the physics; where nothing is learned, that
+/// is all.
 LeftAt left_by(const PhysicalModel& physics, const MeasurementBatch& positions) {
   const auto n = std::ssize(positions.measurements);
   LeftAt left{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
@@ -329,7 +330,7 @@ std::vector<BudgetLine> between_sessions(const PhysicalModel& model,
   return lines;
 }
 
-/// What is told beside the parameters.
+/// The facts that are told beside the parameters.
 struct ToldBeside {
   bool has_bias = false;
   Since since = {};

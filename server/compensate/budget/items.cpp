@@ -22,8 +22,8 @@ Symbol symbol_of(const std::string& parameter) {
   return {parameter.substr(0, digit), std::stoi(parameter.substr(digit)) - 1};
 }
 
-/// What a parameter of the links is part of: the zero of its joint, or the lengths or the angles of
-/// its link.
+/// The line that a parameter of the links is part of: the zero of its joint, or the lengths or the
+/// angles of its link.
 BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
   const auto [letters, joint] = symbol_of(parameter);
   const bool slides = robot.joint(joint).type == JointType::kPrismatic;

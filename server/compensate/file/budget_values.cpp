@@ -14,7 +14,7 @@ BudgetNumber number_of_line(const Json& json) {
           json.at("unit").get<std::string>()};
 }
 
-/// What a view does not change.
+/// The members of a line that a view does not change.
 Json json_of(const BudgetLine& line) {
   Json json = {{"line", line.line},
                {"kind", to_string(line.kind)},

@@ -50,7 +50,7 @@ const char* word_of(wire::TargetStatus status) {
   return kWords.at(static_cast<std::size_t>(status));
 }
 
-/// What all records begin with.
+/// The beginning of all records.
 template <typename Request, typename Reply>
 std::string beginning(const char* operation, const Request& request, const Reply& reply,
                       std::int64_t at_unix_s) {

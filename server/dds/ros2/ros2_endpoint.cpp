@@ -59,8 +59,8 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
     post(to, std::move(reply), bytes);
   }
 
-  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can
-  /// be told.
+  /// A reply that has no room is dropped: so many refusals wait only where nodes ask faster than
+  /// they can be told.
   void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
     {
       const MutexLock lock(mutex_);

@@ -111,7 +111,7 @@ wire::Target target_of(const CorrectTargets_& message, std::size_t i, const Chai
   return target;
 }
 
-/// What both questions begin with.
+/// The beginning of both questions.
 template <typename Request, typename Message>
 std::unique_ptr<wire::Received<Request>> begun(const wire::ReceivedMessage<Message>& message) {
   auto request = std::make_unique<wire::Received<Request>>();
@@ -128,7 +128,7 @@ std::unique_ptr<wire::Received<Request>> begun(const wire::ReceivedMessage<Messa
   return request;
 }
 
-/// What both answers begin with.
+/// The beginning of both answers.
 template <typename Message, typename Reply>
 Message begun(const Reply& reply) {
   Message message;

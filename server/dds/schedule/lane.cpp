@@ -90,7 +90,7 @@ std::optional<Turns::Portion> Lane::next(Turns::Which which) {
 
 void Lane::work(const std::stop_token& stop, Turns::Which which) {
   ::pthread_setname_np(::pthread_self(), "requests");
-  // Of this thread alone, as Linux has it.
+  // The priority of this thread alone, as Linux has it.
   if (nice_ != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), nice_);
   while (!stop.stop_requested()) {
     if (step(which)) continue;

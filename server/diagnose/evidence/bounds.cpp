@@ -50,8 +50,8 @@ VectorXd nearest_within(const OwnEstimate& own, const VectorXd& bounds) {
   return x;
 }
 
-/// What an effect of the cause changes with. `joints`: 1-based, whose numbers are beyond their
-/// bounds.
+/// The circumstances with which an effect of the cause changes. `joints`: 1-based, whose numbers
+/// are beyond their bounds.
 std::vector<std::string> circumstances_of(const CauseRecord& record,
                                           const std::vector<int>& joints) {
   if (record.gives_way) return {"torque"};
@@ -64,8 +64,8 @@ std::vector<std::string> circumstances_of(const CauseRecord& record,
   return on;
 }
 
-/// Of a number that is a joint's: `early3`. That of the cause where it has one, 0 where neither
-/// has.
+/// The joint of a number that is a joint's: `early3`. That of the cause where it has one, 0 where
+/// neither has.
 int joint_of(const Parameter& parameter, const Cause& cause) {
   if (cause.joint >= 0) return cause.joint + 1;
   const std::size_t end = parameter.name.find_last_not_of("0123456789") + 1;

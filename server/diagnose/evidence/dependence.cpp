@@ -138,8 +138,8 @@ double p_value_in_tail(const MatrixXd& a, const MatrixXd& b, double observed, do
   return std::max(kLeastPValue, share * std::exp(std::min(0.0, beyond)));
 }
 
-/// Of two centred distance matrices: the share of permutations that are as large, or its tail where
-/// too few are.
+/// The p-value of two centred distance matrices: the share of permutations that are as large, or
+/// its tail where too few are.
 double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Index> order(static_cast<std::size_t>(a.rows()));
@@ -181,7 +181,7 @@ struct Question {
   MatrixXd distances;
 };
 
-/// What the residual may depend on, a row a pose.
+/// The circumstances that the residual may depend on, a row a pose.
 struct Circumstances {
   MatrixXd q;       ///< rad or m
   MatrixXd torque;  ///< of gravity, over the largest of each joint

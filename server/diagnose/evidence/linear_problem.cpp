@@ -76,7 +76,7 @@ void add_at_zero(PhysicalModel& model, const ErrorSourcePtr& source,
     if (!parameters[k].is_place) model.values(first + static_cast<Index>(k)) = 0;
 }
 
-/// What was measured less `X_WT`: 3 numbers (m), or 6 with the rotation (rad).
+/// The measured pose less `X_WT`: 3 numbers (m), or 6 with the rotation (rad).
 VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
   VectorXd distance(m.R_WT ? 6 : 3);
   distance.head<3>() = m.p_W - X_WT.translation();
@@ -184,8 +184,8 @@ void LinearProblem::differentiate(const Extended& extended) {
   }
 }
 
-/// How far `pose` is measured from `X_WT`, and the standard deviations that its measurement is said
-/// to have.
+/// Sets how far `pose` is measured from `X_WT`, and the standard deviations that its measurement is
+/// said to have.
 void LinearProblem::measure(Index pose, const Pose& X_WT) {
   const Measurement& m = batch_->measurements[static_cast<std::size_t>(pose)];
   const Tracker& tracker = model_.cell->tracker;

@@ -23,7 +23,7 @@ constexpr double kStraight =
 constexpr double kSettled =
     0.05;  // standard deviations, of all parameters together: a step that changes no result
 
-/// How far each parameter stands from its prior, in units of it.
+/// The distance of each parameter from its prior, in units of it.
 VectorXd from_prior(const PriorModel& at) {
   VectorXd distance(at.model.values.size());
   for (Index k = 0; k < distance.size(); ++k) {
@@ -59,7 +59,8 @@ VectorXd step_to_bounds(const NormalEquation& equation, const std::vector<bool>&
   return left.llt().solve(rest);
 }
 
-/// How far each parameter is above its lower bound, in units of its prior and with a minus sign.
+/// The distance of each parameter above its lower bound, in units of its prior and with a minus
+/// sign.
 VectorXd room_of(const PriorModel& at) {
   VectorXd room(at.model.values.size());
   for (Index i = 0; i < room.size(); ++i) {
@@ -95,7 +96,7 @@ NormalEquation normal_equation(const MatrixXd& columns) {
   return {std::move(information), std::move(inverse), {}};
 }
 
-/// What pulls where the model stands: `left` (R, whitened) of the data and, of the model's own
+/// The pull where the model stands: `left` (R, whitened) of the data and, of the model's own
 /// parameters, their priors. The anonymous functions stand at `functions` times their columns.
 VectorXd pull(const MatrixXd& columns, const VectorXd& left, const PriorModel& at,
               const VectorXd& functions) {
@@ -106,7 +107,7 @@ VectorXd pull(const MatrixXd& columns, const VectorXd& left, const PriorModel& a
   return right;
 }
 
-/// Whether the model's own `step` changes no result.
+/// True if the model's own `step` changes no result.
 bool is_settled(const NormalEquation& equation, const VectorXd& step) {
   const Index P = step.size();
   return step.dot(equation.information.topLeftCorner(P, P) * step) < kSettled * kSettled;

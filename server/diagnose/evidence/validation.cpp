@@ -33,7 +33,7 @@ double chi_square_3(double chance) {
   return high;
 }
 
-/// How far rows that nothing was learned from are from a model.
+/// The distance from a model of rows that nothing was learned from.
 struct Judged {
   Eigen::Matrix3Xd error_B;  ///< m
   VectorXd distance;  ///< squared error over the expected one: chi-square of three if the row fits

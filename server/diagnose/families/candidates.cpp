@@ -54,7 +54,7 @@ double heaviest(const Cell& cell) {
   return mass;
 }
 
-/// What `batch` would have to record for a cause of `joint` (-1: of no single one) to show; empty
+/// The records that `batch` would need for a cause of `joint` (-1: of no single one) to show; empty
 /// where it does.
 std::string lacking(const ContextNeeds& needs, const Cell& cell, const MeasurementBatch& batch,
                     int joint) {
@@ -112,12 +112,12 @@ std::string spelled(const CauseRecord& record, int joint) {
   return to_string(cause_at(record, joint));
 }
 
-/// The same of one that acts at all poses.
+/// The spelling of a cause that acts at all poses.
 std::string always_acting(const CauseRecord& record, int joint) {
   return spelled(record, joint) + (record.lasting == Lasting::kFromAPose ? "@1" : "");
 }
 
-/// Whether it is looked for by the derivative of an error source of its own.
+/// True if the cause is looked for by the derivative of an error source of its own.
 bool has_own_columns(const CauseRecord& record) {
   return record.search == SearchFamily::kColumns || record.search == SearchFamily::kPlay ||
          record.search == SearchFamily::kStep;
@@ -234,7 +234,7 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
   std::vector<std::string> sources;
   for_each_cause(cell.robot, [&](const CauseRecord& record, int joint) {
     if (!has_own_columns(record)) return;
-    // What is driven past another joint is so from the third joint on, past the one before.
+    // A joint is driven past another one from the third joint on, past the one before.
     if (record.takes_numbers && joint >= 0 && joint < 2) return;
     const std::string lacks = lacking(record.needs, cell, batch, joint);
     const std::string spec = always_acting(record, joint);

@@ -115,7 +115,7 @@ class AttitudeFamily final : public FixedFamily {
   std::vector<std::string> depends_on() const override { return {kAttitude}; }
 };
 
-/// How far the tool moves along each of its axes where gravity has a part along each of them: nine
+/// The motion of the tool along each of its axes where gravity has a part along each of them: nine
 /// columns.
 MatrixXd sags(const LinearProblem& problem) {
   const PhysicalModel& model = problem.model();

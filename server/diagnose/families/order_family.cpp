@@ -109,7 +109,8 @@ class OrderFamily final : public Family {
   struct Waves {
     MatrixXd sine, cosine;
   };
-  /// Of orders a step apart each comes from the one before, by turning it.
+  /// The waves of `orders`. Where orders are a step apart each comes from the one before, by
+  /// turning it.
   Waves waves_of(const VectorXd& orders) const {
     Waves waves{MatrixXd(q_.size(), orders.size()), MatrixXd(q_.size(), orders.size())};
     for (Index k = 0; k < orders.size(); ++k) {
@@ -126,7 +127,7 @@ class OrderFamily final : public Family {
     return waves;
   }
 
-  /// What a wave says of itself, 2 x 2: the prior's share and its own square.
+  /// The information of a wave about itself, 2 x 2: the prior's share and its own square.
   struct Information {
     double ss = kPriorShare, cc = kPriorShare, sc = 0;
     [[nodiscard]] double determinant() const { return ss * cc - sc * sc; }

@@ -212,7 +212,8 @@ class AnonymousFamily final : public SmoothFamily {
     const Index count = x.size() == 1 ? kFunctionsOfOne : kFunctionsOfEach;
     functions_ = sines(x[0], count);
     if (x.size() == 2) functions_ = products(functions_, sines(x[1], count));
-    // What is the same at all poses depends on nothing: a shifted base is no function of a joint.
+    // A part that is the same at all poses depends on nothing: a shifted base is no function of a
+    // joint.
     functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
     for (const double length_scale : {0.2, 0.45, 1.0}) {
       MatrixXd deviation = deviations(count, length_scale).transpose();

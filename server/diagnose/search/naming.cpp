@@ -34,7 +34,7 @@ VectorXd fitted(const Background& background, const MatrixXd& columns, const Vec
   return columns * information.llt().solve(columns.transpose() * background.project(data));
 }
 
-/// Whether `rival`, as the record of `own` has it, means `other`: of the same joint where it is of
+/// True if `rival`, as the record of `own` has it, means `other`: of the same joint where it is of
 /// one, and the number that it names. `or_whole`: the cause as a whole counts for its number.
 bool means(const causes::Rival& rival, const Cause& own, const Cause& other, bool or_whole) {
   if (other.cause != rival.cause) return false;
@@ -52,7 +52,7 @@ bool has_rival(const Cause& own, const Cause& other, std::initializer_list<Liken
   });
 }
 
-/// Whether two numbers of this cause are two causes.
+/// True if two numbers of this cause are two causes.
 bool numbers_are_causes(const CauseRecord& record) {
   return record.numbers == causes::Numbers::kApart || record.numbers == causes::Numbers::kOneAJoint;
 }
@@ -162,12 +162,12 @@ class Doubt {
     }
     return sum;
   }
-  /// Whether the cause at `f` explains the data as well. `frequency`: as above.
+  /// True if the cause at `f` explains the data as well. `frequency`: as above.
   [[nodiscard]] bool is_rival(std::size_t f, double frequency) const;
 
  private:
   [[nodiscard]] Cause cause() const { return families_[place_]->cause(seen_.best[place_]); }
-  /// What explains nothing of the data cannot win their repetitions.
+  /// A cause that explains nothing of the data cannot win their repetitions.
   [[nodiscard]] bool contends(std::size_t f) const {
     return seen_.score[f] > thresholds::kNamingContender * seen_.score[place_];
   }
@@ -216,7 +216,7 @@ bool Doubt::is_rival(std::size_t f, double frequency) const {
   return !decided && (related || wins);
 }
 
-/// Whether the cause at `f`, which makes so much of the effect's strength, does the same to the
+/// True if the cause at `f`, which makes so much of the effect's strength, does the same to the
 /// poses and explains the data nearly as well.
 bool Doubt::is_as_good(std::size_t f, double made) const {
   const Best& best = seen_.best[place_];

@@ -72,15 +72,15 @@ class Search {
   }
   /// Puts a cause of the list in the place of all that has no name; false where none explains it.
   [[nodiscard]] bool name_functions();
-  /// Whether so much was found since the forms were chosen that they may be others.
+  /// True if so much was found since the forms were chosen that they may be others.
   [[nodiscard]] bool is_time_for_forms();
   /// Asks of every finding again what it is, all others in place: while they were missing another
   /// cause may have looked more like it.
   [[nodiscard]] Status reconsider();
   /// Poses that were out while a cause was missing, and fit now that it is there, come back.
   void take_back_outliers();
-  /// What has the shape of a cause and a sign that it cannot have becomes a dependence that has no
-  /// name.
+  /// Turns what has the shape of a cause and a sign that it cannot have into a dependence that has
+  /// no name.
   [[nodiscard]] Status open_wrong_signs();
   [[nodiscard]] SearchResult take();
 
@@ -214,7 +214,7 @@ bool Search::is_closed(const Cause& cause) const {
   });
 }
 
-/// Whether an anonymous function explains more than any named cause, and more than a few of them
+/// True if an anonymous function explains more than any named cause, and more than a few of them
 /// together.
 bool Search::is_function(const Standing& standing, const Choice& choice, std::size_t best,
                          std::optional<std::size_t> named) const {
@@ -253,7 +253,7 @@ double Search::named_path_score(const Standing& standing, const Admitted& open) 
   return total;
 }
 
-/// Whether poses held out are predicted better where every fold chooses its cause by itself.
+/// True if poses held out are predicted better where every fold chooses its cause by itself.
 bool Search::holds_in_folds(const Standing& standing, const Choice& choice,
                             std::size_t place) const {
   const std::vector<double>& score = choice.seen.score;
@@ -506,7 +506,7 @@ void Search::take_back_outliers() {
   }
 }
 
-/// Whether the pose, which was out, fits where it is learned from as well; then it is one of the
+/// True if the pose, which was out, fits where it is learned from as well; then it is one of the
 /// batch again. A pose that stands alone is where something is largest that is missing, and nothing
 /// else says where it should be.
 bool Search::fits_beside_the_others(const Measurement& pose) {
@@ -547,7 +547,7 @@ Status Search::open_wrong_signs() {
   return {};
 }
 
-/// Whether `one`, which is in the model, is another cause by its sign; then it is among what has no
+/// True if `one`, which is in the model, is another cause by its sign; then it is among what has no
 /// name. Where only a part of it is, it may be something unknown.
 bool Search::open_wrong_sign(Accepted& one) {
   if (record_of(one.cause).search == causes::SearchFamily::kPlay) {
@@ -568,8 +568,8 @@ bool Search::open_wrong_sign(Accepted& one) {
   return false;
 }
 
-/// Whether `one`, which was put away for its sign, is there now that all else is known: with a name
-/// or without.
+/// Asks whether `one`, which was put away for its sign, is there now that all else is known: with a
+/// name or without.
 Status Search::ask_again_for(const Accepted& one) {
   if (!add_to(result_.after, one.in_model)) return {};  // another form of it is in the model
   refine_all();
@@ -587,19 +587,19 @@ Status Search::ask_again_for(const Accepted& one) {
   return {};
 }
 
-/// Of a joint's play, beside all the rest.
+/// The sign of a joint's play, beside all the rest.
 PlaySign Search::play_of(const Accepted& one) const {
   const Together now(result_);
   return sign_of_play(now.problem, one.in_model, one.cause.joint, now.change, now.covariance);
 }
 
-/// Of the numbers of any other cause.
+/// The sign of the numbers of any other cause.
 WrongSign Search::sign_of(const Accepted& one) const {
   const Together now(result_);
   return wrong_sign_of(now.problem, one.in_model, one.cause, now.change, now.covariance);
 }
 
-/// What `one` does to the poses becomes a function that has no name.
+/// Turns what `one` does to the poses into a function that has no name.
 void Search::make_unnamed(const Accepted& one, const std::vector<std::string>& depends_on) {
   const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
   const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
@@ -612,13 +612,13 @@ void Search::make_unnamed(const Accepted& one, const std::vector<std::string>& d
 SearchResult Search::take() {
   const bool extended = std::any_of(result_.accepted.begin(), result_.accepted.end(),
                                     [](const Accepted& one) { return !one.is_outlier(); });
-  // What was tried and dropped leaves no trace.
+  // Causes that were tried and dropped leave no trace.
   if (!extended) {
     result_.after = result_.before;
     result_.reformed.clear();
     refine_all();
   }
-  // Of the pose itself nothing was learned, and by now all else is known.
+  // Nothing was learned of the pose itself, and by now all else is known.
   for (Accepted& one : result_.accepted) {
     const auto pose = place_in(result_.all, one.pose.row);
     if (one.is_outlier() && pose != result_.all.measurements.end())

@@ -21,7 +21,7 @@ constexpr double kLeastTime = 1e-6;  // s
 constexpr double kChoice =
     1.5;  // nat: what choosing one of five courses is worth; a step has its places instead
 constexpr int kRounds = 2;  // of motion and course by turns
-/// Of warming up, in shares of the batch's time; with the last one it goes on steadily.
+/// The lags of warming up, in shares of the batch's time; with the last one it goes on steadily.
 constexpr double kLags[] = {0.1, 0.2, 0.4, 0.8, 100};
 
 bool is_step(const Cause& cause) {
@@ -50,7 +50,7 @@ MatrixXd gone_all_the_way(const Family& family, const Best& best, const LinearPr
   return columns;
 }
 
-/// How far `effect` has gone at each pose, where `motion` is all the way.
+/// The part of the way that `effect` has gone at each pose, where `motion` is all the way.
 VectorXd course_of(const LinearProblem& problem, const VectorXd& motion, const VectorXd& effect) {
   VectorXd course = VectorXd::Zero(problem.rows());
   for (Index i = 0; i < problem.poses(); ++i) {
@@ -63,7 +63,7 @@ VectorXd course_of(const LinearProblem& problem, const VectorXd& motion, const V
   return course;
 }
 
-/// How far something has gone at each pose.
+/// The part of the way that something has gone at each pose.
 struct Course {
   VectorXd way;  // N
   bool of_temperature = false;

@@ -83,7 +83,7 @@ bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause) {
 
 namespace {
 
-/// Whether every pose was approached from one and the same side of `joint`.
+/// True if every pose was approached from one and the same side of `joint`.
 bool has_one_side(const MeasurementBatch& recorded, int joint) {
   const auto& rows = recorded.measurements;
   const auto side = [joint](const Measurement& m) {
@@ -107,13 +107,13 @@ bool has_one_temperature(const MeasurementBatch& recorded) {
          *high->context.temperature - *low->context.temperature < thresholds::kSameTemperature;
 }
 
-/// Whether what a cause of `joint` depends on was recorded, and never changed.
+/// True if what a cause of `joint` depends on was recorded, and never changed.
 bool is_constant(const ContextNeeds& needs, const MeasurementBatch& recorded, int joint) {
   return (needs.direction && joint >= 0 && has_one_side(recorded, joint)) ||
          (needs.temperature && has_one_temperature(recorded));
 }
 
-/// Whether `model` identifies what takes the effect over: one number, or all of a cause.
+/// True if `model` identifies what takes the effect over: one number, or all of a cause.
 bool is_free(const PhysicalModel& model, const Cause& cause) {
   const std::vector<Parameter> own = model.parameters();
   if (!cause.parameter.empty())

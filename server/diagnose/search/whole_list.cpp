@@ -36,7 +36,7 @@ std::vector<Cause> causes_to_try(const SearchResult& result, bool of_joints) {
   return all;
 }
 
-/// Whether positions leave more than noise.
+/// True if positions leave more than noise.
 bool leaves_much(const SearchResult& result) {
   const LinearProblem problem(result.after.model, result.batch, result.after.priors, {});
   return problem.noise() > thresholds::kLeavesMuch * problem.instrument();

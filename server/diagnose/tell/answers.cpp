@@ -84,14 +84,14 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
   const Index count = numbers.size() - P;
-  // Of it, what the model's own parameters cannot do.
+  // Only the part of it counts that the model's own parameters cannot do.
   const VectorXd function = all.columns().rightCols(count) * numbers.tail(count);
   unexplained.rms = problem.position_rms(Background(problem.nuisance()).project(function));
   return unexplained;
 }
 
-/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last
-/// what none explains.
+/// The error that is left after the nominal chain, the cell's own sources and each finding in turn;
+/// at last what none explains.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
                                         const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
@@ -130,7 +130,7 @@ bool is_sure(const Finding& finding) {
 
 bool is_outlier(const Finding& finding) { return finding.source.empty(); }
 
-/// Whether it is a pose that is out, or may be part of something unknown that is larger.
+/// True if the finding is a pose that is out, or may be part of something unknown that is larger.
 bool is_less_than_what_is_left(const Finding& finding, const Unexplained& left) {
   const auto& rivals = finding.could_also_be;
   return is_outlier(finding) || (finding.effect_rms < left.rms &&

@@ -15,7 +15,7 @@ using Eigen::Index;
 
 constexpr int kFewestRepeated = 12;  // degrees of freedom: a standard deviation is known to a fifth
 
-/// Of one axis: noise that repeats vouch for beyond what is stated.
+/// The noise of one axis that repeats vouch for beyond what is stated.
 double beyond_stated(double repeated, double stated, int freedom) {
   if (repeated > thresholds::kRepeatsVouch * stated) return 0;
   return freedom < kFewestRepeated
@@ -41,7 +41,7 @@ bool are_warm_unseen(const MeasurementBatch& rows) {
                      [](const Measurement& m) { return !m.context.temperature; });
 }
 
-/// Whether a session begins with that pose.
+/// True if a session begins with that pose.
 bool begins_a_session(const MeasurementBatch& rows, const std::string& pose_id) {
   const auto& all = rows.measurements;
   for (std::size_t i = 1; i < all.size(); ++i)
@@ -49,7 +49,7 @@ bool begins_a_session(const MeasurementBatch& rows, const std::string& pose_id) 
   return false;
 }
 
-/// Whether the finding may have begun with a session.
+/// True if the finding may have begun with a session.
 bool may_begin_with_session(const Finding& finding, const MeasurementBatch& rows) {
   return begins_a_session(rows, finding.cause.pose_id) ||
          std::any_of(
