@@ -180,7 +180,7 @@ class Choosing {
           cell_.payloads.empty() ? "the cell has no payloads" : "none of the cell's payloads");
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
     const std::string why = load_difference(tool, known->first, known->second);
-    // What is carried for a part of the program concerns that part.
+    // A load that is carried for a part of the program concerns that part.
     if (tool.carries.empty())
       refuse(tool, why);
     else

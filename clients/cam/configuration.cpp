@@ -26,8 +26,8 @@ constexpr double kAsNear =
 // off by less is of the branch that was meant. Controllers do not ask for more.
 constexpr double kNextQuarter = kPi / 4;
 
-/// How a controller weighs the joints is not published. Ways that differ by less than kAsNear are
-/// decided where their sums and their longest joints say the same.
+/// The way in which a controller weighs the joints is not published. Ways that differ by less than
+/// kAsNear are decided where their sums and their longest joints say the same.
 bool is_nearer(const JointVector& way, const JointVector& other) {
   if (other.norm() - way.norm() > kSameJoints + kAsNear * way.norm()) return true;
   return other.lpNorm<1>() - way.lpNorm<1>() > kSameJoints &&
@@ -91,7 +91,7 @@ double elbow_height(const Chain& arm, const JointVector& q) {
   return X.translation().z();
 }
 
-/// Whether a positive joint 5 turns the tool downward where joint 4 is at zero and the arm at its
+/// True if a positive joint 5 turns the tool downward where joint 4 is at zero and the arm at its
 /// zero.
 bool positive_5_bends_down(const Chain& arm) {
   JointVector q = JointVector::Zero(arm.size());

@@ -41,7 +41,7 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
   return q;
 }
 
-/// Of degrees.
+/// The axes in the target's own units; `axes`: degrees.
 std::vector<double> axes_of(const ProgramTarget& target, std::vector<double> axes) {
   if (target.coordinates == Coordinates::kJointRadians) {
     for (double& axis : axes) axis = from_deg(axis);
@@ -263,7 +263,8 @@ class Correcting {
     return std::move(result_);
   }
 
-  /// What is left as it stands moves all the same where it is made of a target that is corrected.
+  /// Tells of what is left as it stands and moves all the same where it is made of a target that is
+  /// corrected.
   void tell_readings() {
     if (program_.readings.empty()) return;
     std::set<std::pair<std::size_t, std::size_t>> written;

@@ -184,7 +184,7 @@ class Order {
     add(s, routine == routines_.end() ? s + 1 : blocks_[routine->second].head + 1);
   }
 
-  // What comes in between.
+  // Asides that come in between.
 
   [[nodiscard]] std::vector<Aside> asides() const {
     std::vector<Aside> all;

@@ -172,8 +172,8 @@ class Finding {
     return from;
   }
 
-  /// What the target does not say follows from the motion before in this file, wherever the targets
-  /// stand.
+  /// Finds the joints of a target. A configuration that it does not say follows from the motion
+  /// before in this file, wherever the targets stand.
   void by_configuration(std::size_t t, std::size_t file) {
     std::optional<JointVector>& previous = last_[file];
     if (!done_[t] && !previous) note_beginning(t);
@@ -253,7 +253,7 @@ class Finding {
            kSameJoints;
   }
 
-  /// Whether there is a pose whose joints are to be found; joints are taken as they stand.
+  /// True if there is a pose whose joints are to be found; joints are taken as they stand.
   bool prepare(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     const ToolChoice& choice = found_.tools[target.tool];
@@ -287,7 +287,7 @@ class Finding {
     return false;
   }
 
-  /// Of a pose that is prepared.
+  /// The flange of a pose that is prepared.
   [[nodiscard]] Pose flange_of(std::size_t t) const {
     const ProgramTarget& target = program_.targets[t];
     const Pose X_BT =

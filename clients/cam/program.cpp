@@ -29,7 +29,7 @@ double near_turn(double angle, double like) {
   return angle + 360 * std::round((like - angle) / 360);
 }
 
-/// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg
+/// The nearer to `like` of the two ways to write a rotation. Where the middle angle is ±90 deg
 /// only a sum of the others is given: the first stays.
 Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
   Eigen::Vector3d one = to_deg(1.0) * zyx_angles(R);
@@ -175,7 +175,7 @@ void remove_targets(Program& program, const std::vector<bool>& leave) {
   }
 }
 
-/// Whether one of the motions [first, end) of an arc is left.
+/// True if one of the motions [first, end) of an arc is left.
 bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::size_t first,
                  std::size_t end) {
   return std::any_of(

@@ -36,7 +36,7 @@ class Scanner {
            (c == '$' && lexis_.dollar_is_letter) || static_cast<unsigned char>(c) >= 0x80;
   }
 
-  /// Whether there is anything left.
+  /// True if there is anything left.
   bool skip_blanks() {
     for (; at_ < text_.size(); ++at_) {
       const char c = text_[at_];

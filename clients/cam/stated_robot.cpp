@@ -47,7 +47,7 @@ std::optional<Chain> arm_of(const Chain& robot) {
   return arm ? std::optional<Chain>(std::move(*arm)) : std::nullopt;
 }
 
-/// Of the robot file; empty: such an arm has no such number.
+/// The number by the robot file; empty: such an arm has no such number.
 std::optional<double> number_of(ArmNumber number, const Chain& robot) {
   const std::optional<Chain> arm = arm_of(robot);
   if (!arm) return std::nullopt;

@@ -42,7 +42,7 @@ constexpr api::ErrorCode same_code(trammel::ErrorCode code) {
   return api::ErrorCode::kInternal;
 }
 
-/// Whether a code of the library, cast to ours, is the one of the same name.
+/// True if each code of the library, cast to ours, is the one of the same name.
 constexpr bool casts_keep_names() {
   for (int k = 0; k <= static_cast<int>(trammel::ErrorCode::kInternal); ++k)
     if (same_code(static_cast<trammel::ErrorCode>(k)) != static_cast<api::ErrorCode>(k))

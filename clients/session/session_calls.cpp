@@ -1,4 +1,4 @@
-// What a session asks for, and how it follows a job.
+// The requests of a session, and how it follows a job.
 #include <algorithm>
 #include <functional>
 #include <optional>

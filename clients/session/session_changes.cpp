@@ -1,4 +1,4 @@
-// What a session asks a server to change: batches, trainings, what is in force.
+// The changes that a session asks of a server: batches, trainings, what is in force.
 #include <algorithm>
 
 #include "clients/session/participant.h"

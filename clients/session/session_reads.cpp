@@ -1,4 +1,4 @@
-// What a session reads of servers: batches, jobs, models, what was found.
+// The data that a session reads of servers: batches, jobs, models, what was found.
 #include <algorithm>
 #include <functional>
 
@@ -7,7 +7,7 @@
 namespace trammel::client {
 namespace {
 
-/// Whether two servers tell of one job: they have one record.
+/// True if two servers tell of one job: they have one record.
 bool is_same(const wire::Job& a, const wire::Job& b) {
   return a.number() == b.number() && a.cell() == b.cell() && a.kind() == b.kind() &&
          a.created_unix_s() == b.created_unix_s() && a.batch_ids() == b.batch_ids();

@@ -17,16 +17,16 @@
 // show. A pose that costs more than c_i is cheaper as one with m_i free numbers of its own: a
 // single bad pose, chosen among n.
 //
-// Whether an alternative *explains* the batch is asked of its inliers' chi^2, not of its rank among
-// alternatives; among those that explain it the lowest score wins, and whatever comes within kDoubt
-// of it could be it as well. Simple stories come first: one cause; then one cause while the tracker
-// stands elsewhere, as it does whenever it was set up again; then one cause that begins in the
-// middle of the batch.
+// An alternative *explains* the batch by its inliers' chi^2, not by its rank among alternatives;
+// among those that explain it the lowest score wins, and whatever comes within kDoubt of it could
+// be it as well. Simple stories come first: one cause; then one cause while the tracker stands
+// elsewhere, as it does whenever it was set up again; then one cause that begins in the middle of
+// the batch.
 //
-// What is identifiable: a turned base is a slipped joint 1 (both turn about its axis), a shifted
-// tool is the last link; the payload shows through compliance only and is no alternative where the
-// model has none. A tool that is turned about its own point shows in the orientations alone; a
-// model that never saw one says nothing of them.
+// The limits of what is identifiable: a turned base is a slipped joint 1 (both turn about its
+// axis), a shifted tool is the last link; the payload shows through compliance only and is no
+// alternative where the model has none. A tool that is turned about its own point shows in the
+// orientations alone; a model that never saw one says nothing of them.
 #include "server/diagnose/triage.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ constexpr std::size_t kFewestPoses = 8;
 constexpr double kDoubt = 10;  // of scores: odds of e^5
 constexpr int kStepGrid = 12;  // places of a batch at which something may have begun, then refined
 
-/// What has been tried, the best first.
+/// The alternatives that have been tried, the best first.
 struct Tried {
   Alternative alternative;
   Fit fit;
@@ -122,8 +122,8 @@ class Judge {
     return comparison_.batch().measurements[static_cast<std::size_t>(pose)].pose_id;
   }
 
-  /// What the best alternative is to be held against: where the tracker stands elsewhere too, that
-  /// alone.
+  /// The fit that the best alternative is to be held against: where the tracker stands elsewhere
+  /// too, that alone.
   [[nodiscard]] Fit without_the_cause(const Tried& none, const Alternative& best) const;
   [[nodiscard]] Triage told(const Tried& none) const;
   [[nodiscard]] std::string sentence(const Triage& triage) const;
@@ -185,7 +185,7 @@ std::string what_happened(const Cause& cause) {
   return fmt::format(fmt::runtime(record.whole_batch->sentence), cause.joint + 1);
 }
 
-/// Of positions and, where they were judged, of orientations.
+/// The error of positions and, where they were judged, of orientations.
 std::string how_much(const Triage& triage) {
   const std::string mm = fmt::format("{:.3g} mm", to_mm(triage.effect_rms));
   if (triage.effect_rotation_rms == 0) return mm + " rms";
@@ -215,7 +215,7 @@ std::string Judge::sentence(const Triage& triage) const {
   std::string text =
       triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
   text += what_happened(triage.cause);
-  // How far poses lie apart as two set-ups see them says nothing of the robot.
+  // The distance between poses as two set-ups see them says nothing of the robot.
   const bool set_up_anew =
       triage.cause.pose_id.empty() && batch_triage::moves_base(record_of(triage.cause));
   if (!set_up_anew) text += fmt::format(" ({})", how_much(triage));

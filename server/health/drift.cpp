@@ -25,7 +25,7 @@ double misfit_at(const DriftSeen& seen, double variance) {
 
 double length_of(const DriftSeen& seen) { return static_cast<double>(seen.until - seen.from); }
 
-/// How many independent checks these are worth.
+/// The number of independent checks that these are worth.
 double independent(const std::vector<DriftSeen>& checks) {
   double sum = 0;
   for (const DriftSeen& a : checks) {

@@ -69,12 +69,12 @@ Told Controller::setting(const std::string& name) {
   if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
   const std::string why = fmt::format(
       "{} comes from {}, whose value is not constant in the program", name, shown(set->from));
-  // What no file says of a register a row may say.
+  // A row of --frames may say what no file says of a register.
   const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
   return {{}, why, !open, ""};
 }
 
-/// Of the controller's system variables.
+/// A value of the controller's system variables.
 Told Controller::by_system(const std::string& name) {
   const ListedValue* listed = system.take(name);
   if (listed == nullptr)

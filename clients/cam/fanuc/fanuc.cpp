@@ -32,7 +32,7 @@ using fanuc::Statement;
 constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "W", "P", "R"};
 constexpr std::array<const char*, 6> kJoints = {"J1", "J2", "J3", "J4", "J5", "J6"};
 
-/// What UFRAME_NUM and UTOOL_NUM select: a number; empty: not set; else why it is not known.
+/// The selection of UFRAME_NUM and UTOOL_NUM: a number; empty: not set; else why it is not known.
 struct Selected {
   std::string frame, tool;
   std::string beside;  ///< a program that may select another one at any time, as the statement that
@@ -76,7 +76,7 @@ class File {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t statements() const { return statements_.size(); }
 
-  /// What a statement does to the order, when all files are read. A call on a condition makes a
+  /// The effect of a statement on the order, when all files are read. A call on a condition makes a
   /// block.
   [[nodiscard]] std::vector<Step> steps_of(std::size_t s) {
     const Statement& statement = statements_[s];
@@ -191,7 +191,7 @@ class File {
     std::string& number = frame ? selected.frame : selected.tool;
     number = !set.perhaps || number == now ? now : kDecided;
   }
-  /// What is selected where a program beside may select another one.
+  /// The selection where a program beside may select another one.
   static std::string with(const std::string& selected, const std::string& beside) {
     return beside.empty() || !is_number(selected) ? selected : beside + " may select another one";
   }
@@ -274,8 +274,8 @@ class File {
     tool.why_not = why;
     return add_once(program_, std::move(tool));
   }
-  /// Of a point with its own number, beside what is selected where a motion goes to it; empty: they
-  /// agree.
+  /// The reason against a point with its own number, beside what is selected where a motion goes to
+  /// it; empty: they agree.
   static std::string why_not_there(const char* own, const char* word,
                                    const std::string& number_text, const std::string& selected) {
     if (number_text.empty()) return fmt::format("the point does not say its {}", own);

@@ -117,7 +117,7 @@ std::optional<double> speed_in(const Tokens& tokens) {
   return speed;
 }
 
-/// What a word behind a motion does to where it goes; empty: nothing.
+/// The effect of a word behind a motion on where it goes; empty: none.
 std::string moved_by(const Token& word) {
   static const std::set<std::string_view> kDisplace = {"Offset",      "OFFSET",  "Tool_Offset",
                                                        "TOOL_OFFSET", "VOFFSET", "INC"},

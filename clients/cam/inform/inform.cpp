@@ -18,7 +18,7 @@ using inform::Motion;
 using inform::Position;
 using inform::Statement;
 
-/// What moves the robot beside where motions say.
+/// The instructions that move the robot beside where motions say.
 struct Displaced {
   std::string shifted;  ///< where a SFTON stands that holds; empty: none does
   std::string sensed;   ///< what a sensor or a soft axis does, as `COMARCON (drill.jbi line 7)`;
@@ -59,7 +59,7 @@ class Job {
   }
   static std::string frame_of_call(const std::string& job) { return "JOB:" + job; }
 
-  /// Of all jobs.
+  /// Takes the settings of all jobs.
   void take_settings(const std::map<std::string, std::string>& set) { set_ = &set; }
   /// `SFTON`, `SFTOF`; `COMARCON`, `COMARCOF` of the seam's sensor, and their like.
   void shift(const Statement& statement, Displaced& displaced) const {

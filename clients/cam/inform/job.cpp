@@ -35,7 +35,7 @@ bool names_position(std::string_view text) {
   return text.size() > letter + 1 && text[letter] == 'C' && is_digit(text[letter + 1]);
 }
 
-/// What stands behind the position in a motion; `BP001` is a variable.
+/// True if the token stands behind the position in a motion; `BP001` is a variable.
 bool is_external(const Token& token) {
   return token.is_word() && token.text.size() > 2 &&
          (token.text[0] == 'B' || token.text[0] == 'E') &&

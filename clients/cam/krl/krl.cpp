@@ -171,7 +171,7 @@ class Reader {
     return std::uint64_t{1} << std::min<std::size_t>(interrupt, 63);
   }
 
-  /// What interrupts that are declared make of a state before a line.
+  /// Makes of a state before a line what declared interrupts make of it.
   void come_in(State& state, int depth) {
     if (inside_interrupt_ || state.armed == 0) return;
     for (bool more = true; more;) {
@@ -249,7 +249,7 @@ class Reader {
     }
   }
 
-  /// What a line sets, and what it calls.
+  /// Applies what a line sets, and what it calls.
   void set(std::size_t f, std::size_t k, State& state, int depth) {
     const Tokens& tokens = lines_[f][k].tokens;
     settings_.set(f, k, state);

@@ -115,7 +115,7 @@ void Targets::note_rest(const Value& value, ProgramTarget& target) {
   }
 }
 
-/// What else reads the targets that are written anew.
+/// Notes what else reads the targets that are written anew.
 void Targets::note_readings(std::size_t f) {
   if (targets_.empty()) {
     for (const auto& [key, variable] : names_.all()) {

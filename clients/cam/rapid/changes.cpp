@@ -7,7 +7,7 @@
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
-// What changes at run time.
+// Data that change at run time.
 namespace trammel::cam::rapid {
 
 namespace {

@@ -340,7 +340,7 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
         return std::vector<Data>{{*argument, scope.caller, declared.type, nullptr}};
       }
       if (const std::string why = changed(&declared); !why.empty()) return because(why);
-      // What a declaration says is looked up where it stands.
+      // The value of a declaration is looked up where it stands.
       const Scope* where = declared.routine >= 0 ? &scope : own_.at({found->module, -1});
       if (set_in_order_.contains(&declared)) {
         const Told<const Expression*> now = as_set(declared);

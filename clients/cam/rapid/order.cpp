@@ -62,8 +62,8 @@ class Order {
   }
 
  private:
-  /// What a call may mean whose routine is named at run time: a routine that nothing calls by its
-  /// name.
+  /// The routines that a call may mean which names its routine at run time: those that nothing
+  /// calls by name.
   std::vector<Step> late_routines() const {
     std::set<std::pair<std::size_t, int>>
         by_name;  // and those that call so: one that calls itself has no beginning

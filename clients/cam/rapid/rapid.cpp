@@ -82,7 +82,7 @@ class Reader {
   }
 
  private:
-  /// What other tasks of the controller set.
+  /// The persistents that other tasks of the controller set.
   static std::map<std::string, std::string> set_by(const std::vector<SourceFile>& beside) {
     if (beside.empty()) return {};
     std::vector<Module> modules;

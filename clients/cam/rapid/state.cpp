@@ -113,7 +113,7 @@ std::size_t Setting::known_settings(Settings settings) {
   return known->second;
 }
 
-/// What holds on both ways; nullptr where they differ.
+/// The settings that hold on both ways; nullptr where they differ.
 Settings Setting::on_both_ways(const Settings& one, const Settings& other) {
   Settings both;
   for (const Settings* settings : {&one, &other}) {

@@ -32,7 +32,7 @@ Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>&
                                 const Data* place, ProgramTarget& target) const {
   const Told<TargetValue> value = meaning_.target_of(*data.node, *data.scope);
   if (!value) return because(value.error());
-  // The same bytes reached through different callers must mean the same.
+  // Bytes that are reached through different callers must mean the same.
   for (const Use* use : uses) {
     if (use->data.node == data.node && use->data.scope == data.scope) continue;
     const Told<TargetValue> other = meaning_.target_of(*use->data.node, *use->data.scope);

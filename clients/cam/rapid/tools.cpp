@@ -24,8 +24,8 @@ bool is_same(const std::optional<StatedLoad>& a, const std::optional<StatedLoad>
   return a.has_value() == b.has_value() && (!a || (a->mass == b->mass && a->p_F == b->p_F));
 }
 
-/// What the flange bears: a gripped load, whose centre is given in the tool, and the tool's own
-/// where it is stated.
+/// The load that the flange bears: a gripped load, whose centre is given in the tool, and the
+/// tool's own where it is stated.
 StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own,
                     const std::optional<Pose>& X_FT) {
   StatedLoad all = gripped;
@@ -128,8 +128,8 @@ Told<bool> Tools::truth(const Data& of) const {
   return data->front().node->name == "true";
 }
 
-/// What an argument that names a tool or a work object stands for; an error where it is not in the
-/// files.
+/// The data for which an argument stands that names a tool or a work object; an error where it is
+/// not in the files.
 Told<Data> Tools::named(const Expression& argument, const Scope& scope) const {
   const Told<std::vector<Data>> data = meaning_.data_of(argument, scope);
   if (!data) return because(data.error());

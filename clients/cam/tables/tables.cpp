@@ -123,7 +123,7 @@ class Tables {
     }
   }
 
-  /// Whether the row holds a pose. A row that does not is left as it is: a header, a remark.
+  /// True if the row holds a pose. A row that does not is left as it is: a header, a remark.
   bool read_row(std::size_t f, const Row& row, const Columns& columns) {
     ProgramTarget target;
     for (const std::size_t column : columns.at) {

@@ -52,7 +52,7 @@ const std::array<Superposed, kSuperposed>& superposed() {
   return kAll;
 }
 
-/// What is set when a motion comes.
+/// The settings when a motion comes.
 struct State {
   std::size_t tool = 0, load = 0;             ///< load 0: not said
   std::array<int, kSuperposed> superposed{};  ///< the line that begins each; 0: it does not hold
@@ -177,7 +177,7 @@ class Script {
       state.load = loads.add({"set_payload", std::nullopt, "set_payload: " + why});
   }
 
-  /// What else reads a target that is written anew: `b = hole`, `if hole[2] > 0.5:`.
+  /// Notes what else reads a target that is written anew: `b = hole`, `if hole[2] > 0.5:`.
   void note_reading(std::size_t at) {
     if (!tokens_[at].is_word()) return;
     const auto variable = values_of_.variables().find(std::string(tokens_[at].text));

@@ -196,7 +196,7 @@ struct CorrectArguments : ApplyArguments {
   }
 };
 
-/// What is said of programs alone.
+/// Refuses options that are of programs alone.
 Status check_table_usage(const CorrectArguments& arguments) {
   const std::pair<bool, const char*> of_programs[] = {
       {!arguments.report.empty(), "--report"},

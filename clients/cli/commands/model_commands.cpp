@@ -171,8 +171,8 @@ struct EvaluateArguments {
   std::vector<std::string> batches;
 };
 
-/// What the sessions of a batch stand on for a model, for people; empty where nothing had to be
-/// found.
+/// The note on what the sessions of a batch stand on for a model, for people; empty where nothing
+/// had to be found.
 std::string located_text(const InWorld& world) {
   if (world.located.empty()) return "";
   return fmt::format(

@@ -126,7 +126,7 @@ bool is_checked(const ordered_json& cell) {
   return cell.contains("verdict") && cell["verdict"].is_string();
 }
 
-/// What a server that answers does besides, as far as it says so.
+/// The part that a server that answers plays besides, as far as it says so.
 ordered_json part_of(const std::string& server, const std::vector<ordered_json>& answers) {
   ordered_json part = {{"serves", true}, {"trains", nullptr}, {"reachable", true}};
   for (const ordered_json& answer : answers)

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 /// ABB's system parameters.
 const std::set<std::string> kParameters = {"moc.cfg"};
-/// What speaks of tools, frames or loads and is not read.
+/// A file that speaks of tools, frames or loads and is not read.
 struct NotRead {
   cam::Dialect dialect;
   const char* ending;    ///< in lower case

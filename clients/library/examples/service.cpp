@@ -1,4 +1,4 @@
-// What does a running service say of its cells? service PORT DOMAIN
+// Shows what a running service says of its cells: service PORT DOMAIN
 #include "trammel/service.h"
 
 #include <cstdio>

@@ -215,7 +215,7 @@ bool announces(Reader list, Bytes source) {
   }
 }
 
-/// Of a binary property of the handshake, which fits.
+/// True if a binary property of the handshake, which fits, proves no other source.
 bool proves_no_other(Reader property, Bytes source) {
   constexpr std::string_view kAnnouncement = "c.pdata";
   Reader ahead = property;

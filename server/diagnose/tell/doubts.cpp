@@ -22,9 +22,9 @@ bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }
 
-/// What describes several of its kind better than one by one, where there are too many of them at
-/// its joint to be believed or where that stands beside them: a map of the joint's angle for the
-/// orders of a gear.
+/// The causes that describe several of its kind better than one by one, where there are too many of
+/// them at its joint to be believed or where that stands beside them: a map of the joint's angle
+/// for the orders of a gear.
 std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Cause>& found) {
   const auto at_joint = [&](std::string_view name) {
     return std::count_if(found.begin(), found.end(), [&](const Cause& other) {
@@ -41,11 +41,11 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
-/// Whether more is left than is stated, and not so much that it is unknown: a name may be a part of
+/// True if more is left than is stated, and not so much that it is unknown: a name may be a part of
 /// that.
 bool is_a_little_more(const Beside& beside) { return beside.larger && !beside.more_than_noise; }
 
-/// Whether a cause of one joint has so many numbers that it fits a part of much else.
+/// True if a cause of one joint has so many numbers that it fits a part of much else.
 bool is_flexible(const Cause& cause, const Evidence& evidence) {
   const CauseRecord& record = record_of(cause);
   return record.scope == causes::Scope::kJoint && record.search == causes::SearchFamily::kColumns &&
@@ -56,7 +56,7 @@ bool begins_at_a_pose(const Cause& cause) {
   return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose;
 }
 
-/// Whether the cause begins at more than one pose.
+/// True if the cause begins at more than one pose.
 bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
   return begins_at_a_pose(cause) &&
          std::count_if(found.begin(), found.end(), [&](const Cause& other) {
@@ -70,7 +70,7 @@ bool goes_with_time(const Unexplained& unexplained) {
                      [](const auto& one) { return one == "time" || one == "temperature"; });
 }
 
-/// Whether lengths that go with the temperature may be the instrument's own: its scale moves the
+/// True if lengths that go with the temperature may be the instrument's own: its scale moves the
 /// base as well, about the instrument, so that something else is there that moves in the course of
 /// the batch.
 bool may_be_scale(const Cause& cause, const Beside& beside) {
@@ -90,7 +90,7 @@ void add_going_with_time(std::vector<Cause>& rivals) {
   }
 }
 
-/// What a cause that was found by a surrogate may be instead. It is never sure.
+/// Adds what a cause that was found by a surrogate may be instead. It is never sure.
 void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   const ContextNeeds& needs = record_of(cause).needs;
   if (needs.direction) return add(rivals, unknown_cause(cause.joint));
@@ -98,7 +98,7 @@ void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
-/// What pulls at the joints as a payload does.
+/// Adds what pulls at the joints as a payload does.
 void add_what_weighs(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
     if (record->acts.on == causes::ActsOn::kLoad && record->search == causes::SearchFamily::kNone)
@@ -169,7 +169,7 @@ struct Doubts {
   [[nodiscard]] std::vector<Cause> could_also_be(const Cause& cause,
                                                  const std::vector<Cause>& rivals,
                                                  const Beside& beside) const;
-  /// What to do about the last of them; empty where there is none.
+  /// The action about the last of them; empty where there is none.
   [[nodiscard]] std::string action(const Cause& cause, const Surrogates& surrogates) const;
 };
 

@@ -11,7 +11,7 @@ namespace trammel::cause_search {
 
 namespace {
 
-/// Whether the cause acts at every pose alike, by the angles of the joints alone, as a tilt does.
+/// True if the cause acts at every pose alike, by the angles of the joints alone, as a tilt does.
 bool acts_by_angles(const CauseRecord& record) {
   const ContextNeeds& needs = record.needs;
   return record.lasting == causes::Lasting::kAlways && !needs.time && !needs.temperature &&

@@ -39,7 +39,7 @@ Estimate in_units(const Parameter& parameter, double value, double stddev) {
           parameter.scale * kExpanded * stddev};
 }
 
-/// Of a sine and a cosine: their common amplitude and what it is uncertain by.
+/// The common amplitude of a sine and a cosine, and what it is uncertain by.
 Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value,
                       const Eigen::Matrix2d& covariance) {
   const double amplitude = value.norm();
@@ -49,8 +49,8 @@ Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value,
           1e6 * kExpanded * std::sqrt(slope.dot(covariance * slope))};
 }
 
-/// What a map makes of a joint's angle between the two poses that it moves farthest apart.
-/// `values`: a sine and a cosine of every harmonic, rad.
+/// The change that a map makes of a joint's angle between the two poses that it moves farthest
+/// apart. `values`: a sine and a cosine of every harmonic, rad.
 Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd& values,
                          const MatrixXd& covariance) {
   const auto functions = [&](double q) {
@@ -123,7 +123,7 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   return estimates;
 }
 
-/// Whether other numbers of its source than the one that a cause is named by are there as well.
+/// True if other numbers of its source than the one that a cause is named by are there as well.
 /// That one is estimated with the others at zero, which then would be wrong.
 bool others_speak(const LinearProblem& problem, const Accepted& one, const Estimated& estimated) {
   if (one.cause.parameter.empty()) return false;
@@ -176,7 +176,7 @@ class Findings {
  private:
   [[nodiscard]] Finding outlier(const Accepted& one) const;
   [[nodiscard]] bool is_beyond_others(const Accepted& one) const;
-  /// Whether the pose may be where something is large that the simulation lacks.
+  /// True if the pose may be where something is large that the simulation lacks.
   [[nodiscard]] bool may_show_what_lacks(const Accepted& one) const;
   [[nodiscard]] Finding cause(const Accepted& one) const;
   /// As it is told: by one number only where that is alone.
@@ -186,11 +186,11 @@ class Findings {
   [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one,
                                                           const VectorXd& effect,
                                                           const Background& rest) const;
-  /// Whether the poses of every second block, and the others, show `one` by themselves. `effect`:
+  /// True if the poses of every second block, and the others, show `one` by themselves. `effect`:
   /// what it does, with the columns `others` free.
   [[nodiscard]] bool is_in_both_halves(const Accepted& one, const VectorXd& effect,
                                        const std::vector<Index>& others) const;
-  /// Whether `one`, which does `effect` and always acts, did so more at some times or temperatures
+  /// True if `one`, which does `effect` and always acts, did so more at some times or temperatures
   /// than at others.
   [[nodiscard]] bool changes_size(const Accepted& one, const VectorXd& effect) const;
   /// The family of `one`; null where it does not begin at a pose.
@@ -274,7 +274,7 @@ bool Findings::may_show_what_lacks(const Accepted& one) const {
                                      one.pose.distance < thresholds::kFarOut * beside_.left);
 }
 
-/// Whether the pose lies beyond all others in some way, where nothing says what the arm does.
+/// True if the pose lies beyond all others in some way, where nothing says what the arm does.
 bool Findings::is_beyond_others(const Accepted& one) const {
   const auto& all = all_.measurements;
   const auto out = std::find_if(all.begin(), all.end(),

@@ -22,7 +22,8 @@ double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / le
 /// Standard deviation of the logarithm of what is left over what is stated, by chance alone.
 double by_chance(const LeftOver& left) { return 1 / std::sqrt(2 * left.freedom); }
 
-/// How many standard uncertainties, of sigma and of chance, what is left is beyond what is stated.
+/// The number of standard uncertainties, of sigma and of chance, by which what is left is beyond
+/// what is stated.
 double deviations(const LeftOver& left) {
   return std::log(ratio_of(left)) / std::hypot(thresholds::kSigmaKnownTo, by_chance(left));
 }
@@ -31,9 +32,9 @@ LeftOver left_of(const LinearProblem::Spread& spread) {
   return {spread.noise, spread.stated, spread.freedom};
 }
 
-/// What the model leaves in position with its numbers within their bounds. A spread is what no
-/// number explains wherever it would have to stand: a gearbox that lifts its load explains away
-/// what then is left.
+/// The rest that the model leaves in position with its numbers within their bounds. A spread is
+/// what no number explains wherever it would have to stand: a gearbox that lifts its load explains
+/// away what then is left.
 LeftOver left_within_bounds(const LinearProblem& served) {
   LeftOver left = left_of(served.position_spread());
   double square = 0;
@@ -44,8 +45,8 @@ LeftOver left_within_bounds(const LinearProblem& served) {
   return left;
 }
 
-/// Of positions: what has no name is told by itself, and the model cannot be held to what it leaves
-/// without that.
+/// The rest in positions: what has no name is told by itself, and the model cannot be held to what
+/// it leaves without that.
 LeftOver left_in_position(const Explained& explained) {
   return explained.found.unnamed.empty() ? left_within_bounds(explained.served)
                                          : left_of(explained.after.position_spread());
@@ -94,12 +95,12 @@ std::string with_what_was_not_recorded(const Surrogates& unrecorded) {
   return all.empty() ? "" : fmt::format(", with {},", fmt::join(all, " and "));
 }
 
-/// Whether repeated poses scatter by more than they vouch for.
+/// True if repeated poses scatter by more than they vouch for.
 bool scatter_beyond_noise(const RepeatStatistics& repeats) {
   return repeats.sigma_factor > thresholds::kRepeatsVouch;
 }
 
-/// What would show more, given what repeated poses say.
+/// The action that would show more, given what repeated poses say.
 std::string what_shows_more(const PreparedBatch& prepared) {
   if (prepared.repeats.degrees_of_freedom == 0)
     return "measure some poses repeatedly, which tells a noisy measurement from something that the "
@@ -138,7 +139,7 @@ double rms_beyond(const LeftOver& left) {
   return std::sqrt(3 * std::max(0.0, left.left * left.left - left.stated * left.stated));
 }
 
-/// What repeated poses show that is no noise.
+/// Tells what repeated poses show that is no noise.
 void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   const RepeatStatistics& repeats = prepared.repeats;
   if (!scatter_beyond_noise(repeats)) return;
@@ -159,7 +160,7 @@ void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   unexplained = {true, {}, rms_beyond(scatter), chance_of_noise(scatter), as_sentence(hint)};
 }
 
-/// Whether some joint came to the poses from one side only, as far as anybody recorded.
+/// True if some joint came to the poses from one side only, as far as anybody recorded.
 bool has_unseen_side(const MeasurementBatch& recorded) {
   const auto& rows = recorded.measurements;
   const auto comes_from = [&](std::size_t joint, int side) {

@@ -76,7 +76,7 @@ Doubted doubted(const LinearProblem& problem, const std::vector<Member>& members
   return all;
 }
 
-/// The same causes among the families of poses that are measured afterwards.
+/// The causes of `members` among the families of poses that are measured afterwards.
 std::vector<Member> afterwards(const std::vector<Member>& members,
                                const std::vector<FamilyPtr>& families) {
   std::vector<Member> later;
@@ -125,7 +125,7 @@ struct Candidate {
 };
 using Candidates = std::vector<Candidate>;
 
-/// What could be measured next.
+/// The poses that could be measured next.
 class Measuring {
  public:
   /// `columns`: how many the members and the model's parameters have together.
@@ -307,7 +307,7 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
                         finding->could_also_be.end());
   next.stddev_now = std::sqrt(now.variance());
   next.stddev_expected = std::sqrt(with(now, chosen).variance());
-  // What no pose tells apart needs something else, as the finding's action says.
+  // Causes that no pose tells apart need something else, as the finding's action says.
   if (next.stddev_expected > thresholds::kWorthMeasuring * next.stddev_now) return {};
   for (const Candidate& one : chosen) next.q.push_back(one.q);
   next.stddev_random = stddev_with_random(*pool, chosen.size(), now, options.seed);

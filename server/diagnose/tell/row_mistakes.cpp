@@ -25,7 +25,7 @@ std::string listed(std::vector<std::string> ids) {
                      more > 0 ? fmt::format(" and {} more", more) : "");
 }
 
-/// What single poses would fit as.
+/// The other readings that single poses would fit.
 class Misread {
  public:
   explicit Misread(const Explained& explained)
@@ -38,7 +38,7 @@ class Misread {
     std::erase(out_, nullptr);
   }
 
-  /// What is wrong with that pose, for people; empty where nothing that is known.
+  /// The mistake of that pose, for people; empty where it has none that is known.
   [[nodiscard]] std::string reason(const SuspectedPose& pose) {
     const Measurement* m = measured_at(pose);
     if (m == nullptr) return "";
@@ -63,7 +63,7 @@ class Misread {
   [[nodiscard]] double distance(const Measurement& m, const PoseContext& context) const {
     return (m.p_W - model_.pose_W(context).translation()).norm();
   }
-  /// Whether `m` fits that context, and its own far worse.
+  /// True if `m` fits that context, and its own far worse.
   [[nodiscard]] bool fits(const Measurement& m, const PoseContext& context) const {
     const double other = distance(m, context);
     return other < thresholds::kFitsOtherwise * noise_ &&
@@ -177,7 +177,7 @@ class Sides {
     const VectorXd rest = data_ - play_;
     left_ = rest - beside.columns() * beside.estimate(rest);
   }
-  /// Of the play at a pose, as it stands: its square, and how much of what is there lies along it.
+  /// The play at a pose, as it stands: its square, and how much of what is there lies along it.
   [[nodiscard]] std::pair<double, double> of_pose(Index i) const {
     const auto play = play_.segment(problem_.first_row(i), problem_.row_count(i));
     const auto left = left_.segment(problem_.first_row(i), problem_.row_count(i));
@@ -199,7 +199,7 @@ class Sides {
   VectorXd data_, play_, left_;
 };
 
-/// Whether the tool of `m` was found where tool `other` is, though the cell has them apart.
+/// True if the tool of `m` was found where tool `other` is, though the cell has them apart.
 bool are_one(const Explained& explained, const Measurement& m, const std::string& other) {
   const auto apart = [&](const PhysicalModel& model) {
     PoseContext context = m.context;

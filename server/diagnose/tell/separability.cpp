@@ -43,7 +43,7 @@ Average average_of(const LinearProblem& problem, const MatrixXd& columns,
   return average;
 }
 
-/// How much of one family's effect, on average, another makes as well: a correlation.
+/// The share of one family's effect that, on average, another makes as well: a correlation.
 double imitation(const Average& own, const Average& other) {
   const MatrixXd shared = transposed_product(other.columns, own.projected);
   return std::sqrt(std::clamp((other.inverse * shared).squaredNorm() / own.strength, 0.0, 1.0));

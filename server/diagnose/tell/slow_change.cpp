@@ -67,7 +67,8 @@ VectorXd explained_from(const LinearProblem& problem, const VectorXd& always,
   return explained;
 }
 
-/// How far the mover went, as its function has it: rad of a joint's zero, m of anything else.
+/// The distance that the mover went, as its function has it: rad of a joint's zero, m of anything
+/// else.
 double size_of(const LinearProblem& problem, const Mover& mover, const VectorXd& effect) {
   if (mover.joint < 0) return problem.positions(effect).colwise().norm().maxCoeff();
   double low = 0;
@@ -153,7 +154,7 @@ std::vector<Index> steps_along(const LinearProblem& problem, const VectorXd& alw
   const bool is_better = gain(smooth_leaves, left) > static_cast<double>(steps.size()) * price;
   if (steps.size() > kMostSteps || !is_better) return {};
   std::sort(steps.begin(), steps.end());
-  // What began so near to the first pose always was so.
+  // A change that began so near to the first pose was always there.
   std::erase_if(steps, [&](Index at) {
     return static_cast<double>(at) < thresholds::kAtOnce * static_cast<double>(problem.poses());
   });

@@ -182,7 +182,7 @@ std::string bad_poses_said(const std::vector<const Finding*>& findings) {
                                              "tell why: measure it and its neighbours again");
 }
 
-/// What the error is before and after all that goes into the model; empty where that is nothing.
+/// The error before and after all that goes into the model; empty where that is nothing.
 std::string gain_said(const Diagnosis& d, const Told& all) {
   if (all.sure.empty() && all.parts.empty()) return "";
   if (!(d.after.rms < d.before.rms)) return "";
@@ -190,7 +190,7 @@ std::string gain_said(const Diagnosis& d, const Told& all) {
                      1e6 * d.before.rms, 1e6 * d.after.rms);
 }
 
-/// What is done about the largest finding.
+/// The advice about the largest finding.
 std::string advice_said(const Diagnosis& d) {
   const auto first = std::find_if(d.findings.begin(), d.findings.end(),
                                   [](const Finding& finding) { return !is_single_pose(finding); });

@@ -108,8 +108,8 @@ void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd&
   }
 }
 
-/// Of all parameters in units of their scales: the model's own as calibration left them, those set
-/// free hardly any.
+/// The prior precision of all parameters in units of their scales: the model's own as calibration
+/// left them, those set free hardly any.
 Eigen::MatrixXd Comparison::prior_precision(const Alternative& alternative,
                                             const Eigen::VectorXd& scale) const {
   constexpr double kRounding = 1e-10;  // a covariance may be flat: what is known for certain
