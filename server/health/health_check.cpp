@@ -14,7 +14,7 @@ namespace trammel {
 
 namespace {
 
-/// What cannot even be begun.
+/// The result of a check that cannot even be begun.
 HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options,
                     const std::string& why) {
   HealthCheck check;

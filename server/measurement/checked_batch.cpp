@@ -147,7 +147,7 @@ void append(MeasurementBatch& all, const MeasurementBatch& next) {
   all.source_text += next.source_text;
 }
 
-/// What the file leaves out of passive joints, in all poses that it tells of.
+/// Completes what the file leaves out of passive joints, in all poses that it tells of.
 void complete_passive_joints(const Chain& robot, MeasurementBatch& batch) {
   std::vector<PoseContext*> poses;
   for (Measurement& m : batch.measurements) {

@@ -223,8 +223,8 @@ bool Look::is_much_better(const Tried& tried) const {
              kMuchBetter * given_->quality * std::min(as_given, spread_of(tried.table.p_W));
 }
 
-/// Of readings that fit the positions as well, orientations decide, then where the base stands,
-/// then the catalogue.
+/// Keeps the best of readings that fit the positions as well: orientations decide, then where the
+/// base stands, then the catalogue.
 void Look::keep_best(std::vector<Tried> tried) {
   const auto keep = [&tried](const auto& figure, double ratio, double slack, double limit) {
     std::vector<double> all;
@@ -351,7 +351,7 @@ Error Look::of_reading() const {
                   mm(given), best.reading->name, mm(std::max(best.fit.off, best.fit.quality)));
   std::vector<std::string> others;
   for (std::size_t k = 1; k < found_.size(); ++k) {
-    // Of rows, the others are the same with a few rows more.
+    // Other readings of rows are the same with a few rows more.
     if (!best.reading->of_rows) others.push_back(found_[k].reading->name);
   }
   if (!others.empty()) {

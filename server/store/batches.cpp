@@ -14,8 +14,8 @@
 namespace trammel {
 namespace {
 
-/// Of the cell $1, see Store::batches_learned_from(). Without a reference to the row, so that it
-/// is read once.
+/// The batches of the cell $1, see Store::batches_learned_from(). Without a reference to the row,
+/// so that it is read once.
 const std::string& learned_batches() {
   static const std::string batches = fmt::format(
       "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job LEFT JOIN "

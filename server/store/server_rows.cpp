@@ -44,8 +44,9 @@ std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
   return cells;
 }
 
-/// What starts before this one on the same host worked on waits for nobody: they are no more.
-/// Should one live all the same, it stores nothing of a job that another one has taken meanwhile.
+/// Ends the leases of starts before this one on the same host: they are no more, and their jobs
+/// wait for nobody. Should one live all the same, it stores nothing of a job that another one has
+/// taken meanwhile.
 void end_leases_of_starts_before(Database& database, const std::string& token,
                                  const ServerSelf& self) {
   const int ended = change(database,

@@ -9,7 +9,8 @@
 namespace trammel {
 namespace {
 
-/// Of both: cell, name, hash, text. A file of the first schema has them, too.
+/// The columns of batches, as of models: cell, name, hash, text. A file of the first schema has
+/// them, too.
 const StoreTable& batches() {
   using Kind = StoreColumn::Kind;
   static const StoreTable table{"batches",

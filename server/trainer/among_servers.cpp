@@ -1,4 +1,4 @@
-// What a trainer does where several servers share its store: it follows what others change, keeps
+// The work of a trainer where several servers share its store: it follows what others change, keeps
 // its claims, and says that it is there.
 #include <pthread.h>
 

@@ -1,4 +1,5 @@
-// What people decide of a cell: which version is in force, and which batches may be learned from.
+// The decisions of people about a cell: which version is in force, and which batches may be learned
+// from.
 #include <set>
 #include <utility>
 
@@ -70,7 +71,7 @@ Status Trainer::check_not_worse(const std::string& cell, int version,
     return {};
   const auto made_here = TRY(store_.was_made_by_job(cell, version));
   // The job that made it has said already that it could not be judged: whoever asks for it knows.
-  // What few judges find worse by far is so all the same.
+  // A version that few judges find worse by far is so all the same.
   const bool far_worse = has_figures && is_far_worse(*figures.before, *figures.after);
   if (made_here && !far_worse && (verdict.undecided || !has_figures)) return {};
   const char* how = has_figures ? "worse than" : "not known to be as good as";

@@ -63,7 +63,7 @@ bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
   return !stop.stop_requested();
 }
 
-/// What the checks of the cell that are done saw of its arm's drift, oldest first.
+/// The drift of the cell's arm that its finished checks saw, oldest first.
 Result<std::vector<DriftSeen>> earlier_checks(const Store& store, const std::string& cell) {
   const auto jobs = TRY(store.recent_jobs(cell, kMostEarlierJobs));
   std::vector<DriftSeen> earlier;

@@ -21,7 +21,8 @@ Status check_own(const Store& store, const StoredJob& job, const std::set<std::s
   return {};
 }
 
-/// Of `stored`; see judging_sources(). `own`: judge also where they are in quarantine.
+/// The newest judges of `stored`; see judging_sources(). `own`: judge also where they are in
+/// quarantine.
 std::vector<BatchSource> newest_judges(const std::vector<StoredBatch>& stored,
                                        const std::set<std::string>& may_judge,
                                        const std::set<std::string>& own) {

@@ -291,7 +291,8 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
-    // Of the record, since what it has in force may be a version that cannot be loaded here.
+    // The version of the record, since what it has in force may be a version that cannot be loaded
+    // here.
     const auto recorded = TRY(store_.version_in_force(cell));
     if (store_.is_shared())
       static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
@@ -321,7 +322,7 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int expected) {
   const std::string& cell = candidate.job.cell;
   ChangeId decided;
-  // Of a store with one server the cell's lock says the same.
+  // In a store with one server the cell's lock says the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
   const auto version = TRY(store_.add_model(cell, {candidate.model, candidate.text},
                                             candidate.job.id, judged.put_in_force, judged.message,

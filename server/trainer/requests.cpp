@@ -1,4 +1,4 @@
-// What is asked of a trainer: batches, trainings, diagnoses and checks are taken in as jobs, and
+// The requests to a trainer: batches, trainings, diagnoses and checks are taken in as jobs, and
 // jobs are ended.
 #include <algorithm>
 #include <set>

@@ -124,7 +124,8 @@ Result<std::vector<std::string>> Trainer::start() {
     }
   });
   if (store_.is_shared()) {
-    // What was taken up before is looked at once more: it may have changed meanwhile.
+    // Cells and jobs that were taken up before are looked at once more: they may have changed
+    // meanwhile.
     follower_ = std::jthread([this](const std::stop_token& stop) { follow(0, stop); });
     heartbeat_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
   }
@@ -149,7 +150,7 @@ void Trainer::prune(const std::string& cell, const std::stop_token& stop) {
     const MutexLock lock(keep_mutex_);
     keep = keep_;
   }
-  // What the store refuses now is pruned after the next job.
+  // Texts that the store refuses to prune now are pruned after the next job.
   while (!stop.stop_requested() && store_.prune_one(cell, keep).value_or(false)) {
   }
 }

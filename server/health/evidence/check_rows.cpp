@@ -147,7 +147,7 @@ double rotation_shown(const ModelParts& parts) {
          std::sqrt(3.0);
 }
 
-/// How much two poses share of what the model leaves over.
+/// The share of what the model leaves over that two poses have in common.
 double shared(const PoseContext& one, const PoseContext& other, const JointVector& range) {
   double square = 0;
   for (Index j = 0; j < range.size(); ++j) {
@@ -164,7 +164,7 @@ struct RowDeviations {
   Eigen::MatrixXd J;  ///< R x P: by the parameters, as far as they count
 };
 
-/// Of the position of pose i, in B.
+/// Sets the deviations of the position of pose i, in B.
 void add_position(const ErrorPrediction& prediction, const Measurement& m, double sigma,
                   const Eigen::MatrixXd& covariance, Index first, RowDeviations& rows) {
   const double noise = std::max(m.sigma.value_or(sigma), sigma);
@@ -207,9 +207,9 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
   return 0.5 * (S + S.transpose());
 }
 
-/// What the model leaves over as an error of each joint's own angle by any function of it, all
-/// joints alike and together as large as what is left over: R x R. Gears that the model does not
-/// know look like that, and not alike in all axes.
+/// The covariance of what the model leaves over as an error of each joint's own angle by any
+/// function of it, all joints alike and together as large as what is left over: R x R. Gears that
+/// the model does not know look like that, and not alike in all axes.
 Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations,
                                const CauseEffects& effects, const JointVector& range) {
   const Index R = rows.residual.size();

@@ -23,7 +23,7 @@ double normal(SeededRandom& random) {
   return radius * std::cos(2 * kPi * random.uniform(0, 1));
 }
 
-/// How much larger than usual one pose's errors are, mean square 1.
+/// The factor by which one pose's errors are larger than usual, mean square 1.
 double disturbance(int freedom, SeededRandom& random) {
   if (freedom <= 2) return 1;
   double square = 0;

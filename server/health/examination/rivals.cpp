@@ -1,4 +1,4 @@
-// What explains the poses as well as what was named does.
+// The rivals that explain the poses as well as what was named does.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -50,8 +50,8 @@ std::vector<bool> Examination::credible(const std::vector<double>& scores) const
 
 void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests,
                               const std::vector<double>& scores, SeenChange& change) const {
-  // What a cause explains whatever it costs: one with more numbers may be the true one all the
-  // same.
+  // The evidence that a cause explains, whatever it costs: one with more numbers may be the true
+  // one all the same.
   const auto explained = [&](std::size_t h) { return scores[h] + price(tests.freedom(h)); };
   const std::vector<bool> likely = credible(scores);
   for (std::size_t h = 0; h < questions_.causes; ++h) {

@@ -1,4 +1,4 @@
-// How large a change that was seen is, over the working poses or at the check's.
+// The size of a change that was seen, over the working poses or at the check's.
 #include <algorithm>
 
 #include "server/health/examination/examination.h"

@@ -55,7 +55,7 @@ std::string seen_in_words(const HealthCheck& check) {
   return text;
 }
 
-/// What would decide between what was named and what stands beside it.
+/// The measurement that would decide between what was named and what stands beside it.
 std::string what_tells_more(const Doubt& doubt, const HealthCheck& check) {
   const auto is_open = [&](const SingleCause& rival) {
     return !is_zero(rival) || std::find(doubt.in_tool.begin(), doubt.in_tool.end(), rival.joint) ==

@@ -10,7 +10,7 @@ namespace trammel {
 
 namespace {
 
-/// Whether a model of one serves the other: the kinematics count, names and priors do not.
+/// True if a model of one serves the other: the kinematics count, names and priors do not.
 bool same_robot(const Chain& a, const Chain& b) {
   if (a.size() != b.size() || a.transmission() != b.transmission() || a.drive() != b.drive())
     return false;

@@ -22,7 +22,7 @@ constexpr int kFewestOutside =
     10;                          // judges beyond the ranges of the model in force, to gain by them
 constexpr double kUnclear = -1;  // z: a loss that is smaller may be chance
 
-/// What models leave of the same rows, all sessions one after the other.
+/// The errors that models leave at the same rows, all sessions one after the other.
 struct Rows {
   Eigen::Matrix3Xd position, rotation;       // m, rad
   Eigen::VectorXd expected, expected_truth;  // m
@@ -85,8 +85,8 @@ bool not_worse(const PairedGain& gain, double accept_ratio) {
          (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
 }
 
-/// Of orientations, beside positions that gain: beyond chance, or by half. What is left of a turn
-/// is never held to be less than the instrument's own `sigma` an axis.
+/// True if orientations are worse beside positions that gain: beyond chance, or by half. What is
+/// left of a turn is never held to be less than the instrument's own `sigma` an axis.
 bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
   if (turns.poses == 0) return false;
   const double before = std::max(turns.rms_before, std::sqrt(3.0) * sigma);
@@ -95,7 +95,7 @@ bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
          (beyond_chance && turns.rms_after > accept_ratio * before);
 }
 
-/// How many different poses these rows are.
+/// The number of different poses among these rows.
 int distinct(const std::vector<const Measurement*>& judges, const Columns& among) {
   std::vector<JointVector> poses;
   for (const Eigen::Index i : among) {
@@ -246,7 +246,8 @@ class Duel {
                        to_mm(gain.rms_after));
   }
 
-  /// Of a candidate that predicts what the one in force does: it may know one tool more.
+  /// The verdict on a candidate that predicts what the one in force does: it may know one tool
+  /// more.
   [[nodiscard]] GateVerdict of_the_same() const {
     const std::string same = fmt::format("it predicts what {} predicts, within {:.4f} mm",
                                          name_of(present_), to_mm(apart()));
@@ -262,7 +263,7 @@ class Duel {
     return gain.rms_after > limit ? stays(text, figures) : yes(text, figures);
   }
 
-  /// Of a candidate that differs in where the base stands at most.
+  /// The verdict on a candidate that differs in where the base stands at most.
   [[nodiscard]] GateVerdict of_the_base(const std::string& same) const {
     MeasurementBatch newest = sessions_.back().judges;
     std::erase_if(newest.measurements, [&](const Measurement& m) {
@@ -329,8 +330,8 @@ class Duel {
                        to_deg(turns.rms_before));
   }
 
-  /// What was served once and is better than the candidate on the same poses; empty where nothing
-  /// is. Sets the limit that it is.
+  /// The model that was served once and is better than the candidate on the same poses; empty where
+  /// none is. Sets the limit that it is.
   [[nodiscard]] std::string better_before(GateFigures& figures) const {
     for (const ServedModel& other : served_before_) {
       const PairedGain gain =
@@ -406,8 +407,8 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   return yes(text, figures);
 }
 
-/// How many times farther off than expected the median judge of the session is; not a number where
-/// it knows none.
+/// The factor by which the median judge of the session is farther off than expected; not a number
+/// where it knows none.
 double misfit(const CompensatedModel& model, const JudgingSession& session) {
   const LocatedErrors errors = located_errors(model, session);
   std::vector<double> squares;
@@ -457,8 +458,8 @@ JudgingSession without(const std::set<std::string>& names, JudgingSession sessio
   return session;
 }
 
-/// What was measured since the arm changed for the last time, by either model: rows before it do
-/// not judge, and none that were measured with a reflector that sat elsewhere.
+/// The sessions that were measured since the arm changed for the last time, by either model: rows
+/// before it do not judge, and none that were measured with a reflector that sat elsewhere.
 std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
   std::set<std::string> before = before_last_change(question.candidate);
   std::set<std::string> apart = measured_apart(question.candidate);

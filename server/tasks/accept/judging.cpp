@@ -197,7 +197,7 @@ CheckedBatch without_older_judges(const CheckedBatch& batch,
 
 namespace {
 
-/// Of one set-up of the instrument.
+/// The errors of one set-up of the instrument.
 LocatedErrors errors_of_one(const CompensatedModel& model, const JudgingSession& session,
                             JudgedLevel level) {
   const auto N = static_cast<Eigen::Index>(session.judges.measurements.size());

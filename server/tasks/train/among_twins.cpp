@@ -74,7 +74,7 @@ std::vector<std::vector<std::string>> forms_of(const std::vector<std::string>& s
   return all;
 }
 
-/// Of the forms the one under which the data are most likely.
+/// The calibration by the form under which the data are most likely.
 Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell,
                                      const std::vector<std::string>& sources,
                                      const MeasurementBatch& batch,
@@ -91,8 +91,9 @@ Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell,
   return std::move(*best);
 }
 
-/// What the poses by themselves found, drawn towards the twins: linear, so that a prior that is far
-/// off shows in full. Where it was fitted anew, its misfit would be taken for noise.
+/// The parameters that the poses by themselves found, drawn towards the twins: linear, so that a
+/// prior that is far off shows in full. Where it was fitted anew, its misfit would be taken for
+/// noise.
 struct Drawn {
   std::vector<IdentifiedParameter> parameters;
   Eigen::MatrixXd covariance;

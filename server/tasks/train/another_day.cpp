@@ -97,8 +97,8 @@ Vector3 seen_standing(const PhysicalModel& model, const Measurement& m) {
   return X_moved.inverse() * m.p_W;
 }
 
-/// What a model leaves of a block, wherever the instrument stands. Fewer numbers than errors:
-/// brought to the size that rows have which nothing was fitted to.
+/// The errors that a model leaves of a block, wherever the instrument stands. Fewer numbers than
+/// errors: brought to the size that rows have which nothing was fitted to.
 Result<Matrix3Xd> left_of(const PhysicalModel& model, const MeasurementBatch& block) {
   const auto n = static_cast<Index>(block.measurements.size());
   Matrix3Xd measured(3, n);

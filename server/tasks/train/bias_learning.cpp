@@ -27,8 +27,8 @@ double domain_limit(const BiasModel& bias) {
   return share(place);
 }
 
-/// What a bias is learned from: what the physics of `parts` leaves over of `batch`, described as
-/// far as `kernel` asks.
+/// The data that a bias is learned from: what the physics of `parts` leaves over of `batch`,
+/// described as far as `kernel` asks.
 BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBatch& batch,
                        bool described) {
   BiasProblem problem = leftover(parts.physics, batch);
@@ -38,8 +38,8 @@ BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBa
   return problem;
 }
 
-/// Of the orientations of `batch`, if all were measured: residual rotation vectors in B and sigma
-/// in rad, at the poses of `problem`.
+/// The problem of the orientations of `batch`, if all were measured: residual rotation vectors in B
+/// and sigma in rad, at the poses of `problem`.
 std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics,
                                             const MeasurementBatch& batch,
                                             const BiasProblem& problem) {
@@ -105,8 +105,8 @@ void forget_bias(CompensatedModel::Parts& parts) {
   parts.bias_spread = 1;
 }
 
-/// What does not fit the others is not learned: a smooth function would spread it over its
-/// neighbours.
+/// The batch without suspects. Rows that do not fit the others are not learned: a smooth function
+/// would spread them over their neighbours.
 MeasurementBatch without_suspects(const CompensatedModel::Parts& parts, MeasurementBatch batch) {
   std::erase_if(batch.measurements, [&](const Measurement& m) {
     return std::any_of(parts.suspects.begin(), parts.suspects.end(), [&](const SuspectPose& pose) {
@@ -121,7 +121,7 @@ struct Learned {
   std::optional<BiasModel> bias;  ///< empty: none is worth it
 };
 
-/// Of the kernel in `options`.
+/// The bias of the kernel in `options`.
 Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch,
                              const LeftOut& left_out, const BiasOptions& options) {
   if (options.kernel == kAutoBias) {
@@ -135,7 +135,8 @@ Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBa
   return Learned{std::move(problem), std::move(fitted)};
 }
 
-/// What came before a pose is long, and few sources ask for it.
+/// The context without what came before the pose, where no source asks for it: it is long, and few
+/// sources do.
 PoseContext without_what_nobody_asks(PoseContext context, const PhysicalModel& physics) {
   const auto asked = [&](bool ContextNeeds::*need) {
     return std::any_of(physics.sources.begin(), physics.sources.end(),

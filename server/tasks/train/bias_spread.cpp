@@ -19,8 +19,8 @@ constexpr double kLargestLog = 2.3;   // f 10: beyond it the bias is wrong, not 
 constexpr int kThirds = 40;           // of that interval that the search narrows down
 constexpr double kNothing = 1e-4;     // of log f
 
-/// Of the poses left out: squares of what is missed, and what is said of them. All m², sums of
-/// three coordinates.
+/// The errors at the poses left out: squares of what is missed, and what is said of them. All m²,
+/// sums of three coordinates.
 struct Missed {
   std::vector<double> square, uncertain, instrument;
 };
@@ -33,7 +33,7 @@ std::vector<BiasFeatures> at(const std::vector<BiasFeatures>& all, const std::ve
   return some;
 }
 
-/// What is uncertain of a pose left out: the bias, what it takes for noise beyond the instrument's,
+/// The uncertainty of a pose left out: the bias, what it takes for noise beyond the instrument's,
 /// and the parameters as far as it does not know them (`identified`, m² of a coordinate).
 double uncertain(const BiasPrediction& bias, double instrument, double identified) {
   const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();

@@ -21,8 +21,8 @@ constexpr double kLeastRange = 0.02;    // rad or m; over less a slope is noise
 constexpr Index kLeastAsked = 5;
 constexpr Index kLeastRest = 10;
 
-/// What poses left out miss by beyond what is claimed of them, sum of squares of one coordinate,
-/// m²; empty where the rest does not tell.
+/// The surplus by which poses left out miss beyond what is claimed of them, sum of squares of one
+/// coordinate, m²; empty where the rest does not tell.
 using Surplus = std::function<std::optional<double>(
     const LeftOut::Without& anew, const std::vector<Index>& asked, const std::vector<Index>& rest)>;
 
@@ -40,7 +40,8 @@ std::optional<double> surplus_of_physics(const LeftOut::Without& anew,
          anew.variance.sum();
 }
 
-/// What its blocks do not tell of poses out of its range, with the hyperparameters as they are.
+/// The surplus that the bias's blocks do not tell of poses out of its range, with the
+/// hyperparameters as they are.
 std::optional<double> surplus_of_blocks(const BiasState& state, const LeftOut::Without& anew,
                                         const std::vector<Index>& asked,
                                         const std::vector<Index>& rest) {

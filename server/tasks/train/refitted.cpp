@@ -96,7 +96,7 @@ CalibrationResult known_of(const CompensatedModel::Parts& parts) {
   return known;
 }
 
-/// What the bias says at each pose, seen from the arm's base as it really stands (A), and with what
+/// The bias at each pose, seen from the arm's base as it really stands (A), and with what
 /// sigma a measurement is met there that it has been taken off.
 struct BiasAt {
   std::vector<Vector3> shift_A;
@@ -141,7 +141,7 @@ MeasurementBatch without_bias(MeasurementBatch poses, const BiasAt& bias, const 
   return poses;
 }
 
-/// Whether the poses are missed by more than their sigmas, `fitted` parameters being theirs, let
+/// True if the poses are missed by more than their sigmas, `fitted` parameters being theirs, let
 /// chance miss them.
 bool is_beyond_chance(const PhysicalModel& model, const MeasurementBatch& poses,
                       std::size_t fitted) {

@@ -12,7 +12,7 @@ namespace trammel {
 
 namespace {
 
-/// What began in the middle of the batch, beside all that the model has.
+/// The jump in the middle of the batch, beside all that the model has.
 std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatch& batch) {
   auto cell = std::make_shared<Cell>(*model.parts().physics.cell);
   cell->model.error_sources.clear();

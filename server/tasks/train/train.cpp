@@ -39,7 +39,7 @@ BatchSplit prepared(const CheckedBatch& batch, double sigma) {
   return {merge_repeats(batch.training(), sigma).batch, batch.held_out()};
 }
 
-/// What is asked for: the sources to identify, or those to keep while the data choose the others.
+/// The request: the sources to identify, or those to keep while the data choose the others.
 struct Asked {
   std::vector<std::string> sources;
   bool chosen_by_data = false;
@@ -71,7 +71,7 @@ Result<std::vector<std::string>> sources_of(const std::shared_ptr<const Cell>& c
   return std::move(chosen.sources);
 }
 
-/// What to take the arm's temperature for where a request does not say it.
+/// Records what to take the arm's temperature for where a request does not say it.
 void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
   std::vector<double> known;
   for (const Measurement& m : trained.measurements) {
@@ -226,8 +226,8 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
   });
 }
 
-/// The same without rows that fit none of the arms on which the others agree. They leave `batch`,
-/// and are suspects.
+/// `plain` identified anew without rows that fit none of the arms on which the others agree. They
+/// leave `batch`, and are suspects.
 Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
                                               MeasurementBatch& batch,
                                               const std::shared_ptr<const Cell>& cell,

@@ -60,7 +60,7 @@ Result<Pair> pipe_of_words() {
   return pair;
 }
 
-/// What the child gets and what it does not.
+/// The plan of what the child gets and what it does not.
 class SpawnPlan {
  public:
   SpawnPlan(int channel, int words) {
@@ -121,7 +121,7 @@ std::string first_line_of(const std::string& path) {
   return line;
 }
 
-/// Of VmHWM in /proc/PID/status; 0 where there is none.
+/// Bytes of VmHWM in /proc/PID/status; 0 where there is none.
 std::int64_t peak_memory_of(pid_t pid) {
   std::ifstream in(fmt::format("/proc/{}/status", pid));
   for (std::string line; std::getline(in, line);) {

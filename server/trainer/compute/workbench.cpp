@@ -53,7 +53,7 @@ bool has_unknown_tools(const CompensatedModel& model, const MeasurementBatch& ba
   return known_rows(model, batch).measurements.size() < batch.measurements.size();
 }
 
-/// Whether `after` is better than `before` beyond chance, on those judges of the sessions that both
+/// True if `after` is better than `before` beyond chance, on those judges of the sessions that both
 /// know.
 bool is_better_on(const std::vector<JudgingSession>& sessions, const CompensatedModel& before,
                   const CompensatedModel& after) {
@@ -94,7 +94,7 @@ Made nothing_carried(const DayGain& day) {
   return made;
 }
 
-/// What is said of an extended model beside its verdict. `judged_less`: pose ids that did not
+/// The remarks on an extended model beside its verdict. `judged_less`: pose ids that did not
 /// judge.
 std::string remarks_of(const std::vector<std::string>& judged_less,
                        const std::vector<Unsupported>& left_out,
@@ -199,11 +199,11 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
 }
 
 Result<Made> Workbench::diagnosed(const AskedDiagnosis& asked, const ComputeWatch& watch) {
-  // What is to judge an extended model must not have been looked at.
+  // Rows that are to judge an extended model must not have been looked at.
   const auto batch = TRY(asked.apply ? batches_.first_without_older_judges() : batches_.first());
   const auto present = TRY(in_force());
   if (asked.apply && task_.batch_ids.empty() && present) {
-    // What was sent with the question goes through the same door as what is submitted.
+    // A batch that was sent with the question goes through the same door as one that is submitted.
     const Triage triaged = triage(present->model, batch);
     if (!triaged.learn) return nothing_applied(triaged.sentence, *present);
   }
