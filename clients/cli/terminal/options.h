@@ -17,7 +17,7 @@ class Validator;
 /// Options that several commands have.
 namespace trammel::cli {
 
-/// Tells whether to ask a service, and which.
+/// The options that say whether to ask a service, and which.
 struct ServiceOptions {
   bool service = false;
   std::vector<std::string> hosts = {

@@ -165,7 +165,7 @@ class TRAMMEL_API Model {
   /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no
   /// training pose has a position.
   [[nodiscard]] std::string budget_json() const;
-  /// Notes that a user of the model should know, the gravest first.
+  /// The notes that a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 
   /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a
