@@ -23,7 +23,7 @@ namespace trammel::cam {
 
 /// Number `value` of a target is written anew where it stands, in the style that it has there.
 void keep(Span place, std::size_t value, const NumberStyle& style, ProgramTarget& target);
-/// The same; the target has the number. False: the token is none.
+/// The number of a token likewise: it becomes the target's next one. False: the token is none.
 [[nodiscard]] bool keep(const Token& token, ProgramTarget& target);
 /// The first `count` of them. Returns why not; empty: it did.
 [[nodiscard]] std::string keep(const std::vector<Token>& numbers, std::size_t count,

@@ -56,7 +56,7 @@ class Session {
   [[nodiscard]] Result<Answer<PredictedError>> predict_error(
       const CallContext& context, const std::vector<std::vector<double>>& joints_rad,
       const ShareListener& progress = {});
-  /// The same, with what is known of how the arm comes there.
+  /// predict_error() with what is known of how the arm comes there.
   [[nodiscard]] Result<Answer<PredictedError>> predict_error_at(
       const CallContext& context, const std::vector<CommandedJoints>& poses,
       const ShareListener& progress = {});

@@ -21,7 +21,7 @@ namespace trammel {
 /// The text with everything that is not plain spelled out, as JSON spells it: `\u001b`, `\u009b`; a
 /// byte that is no UTF-8 as `\xff`. Plain text stays as it is.
 [[nodiscard]] std::string shown(std::string_view text);
-/// The same, but tabs and line feeds stay.
+/// shown(), but tabs and line feeds stay.
 [[nodiscard]] std::string shown_lines(std::string_view text);
 /// shown(), cut after `most_bytes`.
 [[nodiscard]] std::string shown_short(std::string_view text, std::size_t most_bytes = 40);

@@ -58,7 +58,7 @@ class ModelRegistry {
 
   /// Replaces the model of its cell. Readers that hold the previous one keep it.
   void publish(ServedModelPtr model);
-  /// The same, of a model that is loaded when it is asked for.
+  /// publish() of a model that is loaded when it is asked for.
   void announce(const std::string& cell, int version);
   /// A model that whoever holds it last does not free itself.
   [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const {

@@ -12,8 +12,8 @@ namespace trammel {
 /// A store that is only looked at, also while services use it: a file, or a database by its URL.
 /// Leaves nothing behind. Refuses what is no store. Throws DatabaseError.
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_read(const std::string& place);
-/// The same, to change what the services know nothing of. Of a file the caller holds the lock of
-/// who writes it.
+/// A store to change in what the services know nothing of: a file, of which the caller holds the
+/// lock of who writes it, or a database by its URL. Refuses and throws as open_to_read().
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_write(const std::string& place);
 /// The failure of a store that cannot be read.
 [[nodiscard]] Failure unreadable(const DatabaseError& error, const std::string& place);
