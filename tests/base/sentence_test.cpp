@@ -102,10 +102,11 @@ TEST(Sentence, OfWhatTheCellDoesNotTake) {
   m.context.q = JointVector::Zero(6);
   m.context.q(2) = 4.21;
   batch.measurements = {m};
-  EXPECT_EQ(said(check_against_cell(batch, *cell)),
-            "batch lt-07 row 12: joint 3 is 241.215 deg, limit 70 deg; is the joint told in this "
-            "unit, and with the sign and the zero of the robot file? Else the limit in that file is "
-            "another one");
+  EXPECT_EQ(
+      said(check_against_cell(batch, *cell)),
+      "batch lt-07 row 12: joint 3 is 241.215 deg, limit 70 deg; is the joint told in this "
+      "unit, and with the sign and the zero of the robot file? Else the limit in that file is "
+      "another one");
   batch.measurements[0].context.q(2) = 0;
   batch.measurements[0].context.tool = "saw";
   EXPECT_EQ(said(check_against_cell(batch, *cell)),
