@@ -20,8 +20,9 @@ inline constexpr std::uint16_t kDiscoveryPort =
     11811;  ///< of a discovery server, where none is said
 inline constexpr std::size_t kMostDiscoveryServers = 8;
 
-/// From `host` or `host:port`, the host a name or an IPv4 address: a name becomes its first
-/// address. `port`: where none is said. kUsage: it is neither, or nobody knows the name.
+/// Parses `host` or `host:port`. The host is a name or an IPv4 address; a name becomes its first
+/// address. `port` is used where the text gives none. kUsage: the text has neither form, or the
+/// name does not resolve.
 [[nodiscard]] Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port);
 
 /// Several hosts at once; one without a port is at each of `ports`.
@@ -32,8 +33,8 @@ inline constexpr std::size_t kMostDiscoveryServers = 8;
 
 /// The IPv4 addresses of this host's interfaces that are up and have a link now.
 [[nodiscard]] std::vector<std::string> own_addresses();
-/// The IPv4 address of this host by which it reaches `address`, as the routes are now. Sends
-/// nothing. kUnreachable: there is no route.
+/// The IPv4 address of this host from which it now routes to `address`. Sends nothing.
+/// kUnreachable: there is no route.
 [[nodiscard]] Result<std::string> own_address_towards(const std::string& address);
 
 }  // namespace trammel

@@ -28,7 +28,8 @@ struct JsonLimits {
                                        const JsonLimits& limits = {});
 
 /// The members of the JSON object `json`. Each value is the part of the text that holds it. Refuses
-/// a text beyond the limits, one that is no object, and a key that comes twice or holds an escape.
+/// a text beyond the limits, a text that is not an object, and a key that is repeated or holds an
+/// escape.
 [[nodiscard]] Result<std::map<std::string, std::string_view>> json_members(
     std::string_view json, const std::string& where, const JsonLimits& limits = {});
 

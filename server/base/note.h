@@ -30,7 +30,7 @@ struct Note {
   return "";
 }
 
-/// The gravest first; those of one severity in the order in which they stand.
+/// Sorts by severity, the gravest first; notes of one severity keep their order.
 [[nodiscard]] inline std::vector<Note> gravest_first(std::vector<Note> notes) {
   std::stable_sort(notes.begin(), notes.end(),
                    [](const Note& a, const Note& b) { return a.severity > b.severity; });

@@ -6,14 +6,14 @@
 
 namespace trammel {
 
-/// Where a file is written before it gets its name: `NAME.1234.part` beside NAME, 1234 being this
-/// process.
+/// The temporary path at which `file` is written before it gets its name: `NAME.1234.part` beside
+/// NAME, where 1234 is this process.
 [[nodiscard]] std::filesystem::path part_beside(const std::filesystem::path& file);
 /// The half-written files in a folder that processes have left which are gone, by name.
 [[nodiscard]] std::vector<std::filesystem::path> leftover_parts(
     const std::filesystem::path& folder);
-/// Removes those of `file` that nobody has written to for a minute: the processes of other hosts
-/// and containers that share the folder cannot be seen.
+/// Removes the part files of `file` that nobody has written to for a minute. It goes by age,
+/// because processes of other hosts and containers that share the folder cannot be seen.
 void remove_leftover_parts(const std::filesystem::path& file);
 
 }  // namespace trammel

@@ -70,7 +70,7 @@ bool all_of_characters(std::string_view text, const Allowed& allowed) {
   return true;
 }
 
-/// With what is not `allowed` spelled out.
+/// `text` with every character that is not `allowed` spelled out.
 template <typename Allowed>
 std::string spelled_out(std::string_view text, const Allowed& allowed) {
   std::string out;

@@ -5,15 +5,16 @@
 #include <string_view>
 
 /// The characters that names, ids and messages may hold. Whoever reads a name from outside checks
-/// it here; whoever shows a foreign text to people shows it by shown().
+/// it here; code that shows a foreign text to people passes it through shown().
 namespace trammel {
 
 /// True if the bytes are UTF-8 (RFC 3629) without NUL.
 [[nodiscard]] bool is_utf8(std::string_view text);
-/// True if the text is UTF-8 without control characters: C0, DEL, C1, line and paragraph
-/// separators, marks that change the direction of writing. Nor has it characters that nobody sees,
-/// by which two texts that look the same differ (zero width, fillers, tags, selectors of variants),
-/// nor code points that are no characters. A terminal or a log shows it as it is.
+/// True if the text is UTF-8 and a terminal or a log shows it as it is. It must not contain control
+/// characters (C0, DEL, C1), line or paragraph separators, or marks that change the direction of
+/// writing. Invisible characters (zero width, fillers, tags, variant selectors) are excluded, since
+/// two texts that differ only in them look alike. Code points that are not characters are excluded
+/// as well.
 [[nodiscard]] bool is_plain(std::string_view text);
 /// True if the text is UTF-8 without control characters but tabs and line ends: the text of a file.
 [[nodiscard]] bool is_plain_lines(std::string_view text);

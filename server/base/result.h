@@ -31,16 +31,16 @@ enum class ErrorCode {
 /// Members that are not known are empty.
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
-  std::string message;  ///< one clause that says what, with value and limit: `joint 3 is 241.2 deg,
-                        ///< limit 70.0`
-  std::string file;     ///< path or id of what was read: a file, a batch, a model
+  std::string message;  ///< one clause with the fault, the value and the limit: `joint 3 is 241.2
+                        ///< deg, limit 70.0`
+  std::string file;     ///< path or id of the input: a file, a batch, a model
   std::optional<long> row;      ///< line of the file, counted from 1 with its header
   std::string field;            ///< column, key (`tools: spindle: xyz_mm`) or option
   std::optional<double> value;  ///< as read, in the unit of the field
   std::optional<double> limit;  ///< the limit that was broken, in the same unit
   std::string text;             ///< the value as read, where it is a word
-  std::string next;             ///< what to do about it, as one clause
-  std::vector<Error> also;      ///< what else is wrong, found in the same reading
+  std::string next;             ///< the next step for the user, as one clause
+  std::vector<Error> also;      ///< other errors found in the same reading
 };
 
 /// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0;

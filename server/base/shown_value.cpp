@@ -18,7 +18,7 @@ constexpr int kMostDigits = 5;  // in front of the point that still read as a nu
 
 constexpr double kSmallestPlain = 1e-7;  // of an uncertainty that is written without a power of ten
 
-/// Units that begin with an angle, and what people read instead.
+/// Units that begin with an angle, and the units that people read instead.
 struct Angular {
   std::string_view unit, read;
   double scale;  // degrees of the angle, and the rest

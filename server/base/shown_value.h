@@ -10,7 +10,7 @@ struct ShownValue {
 };
 [[nodiscard]] ShownValue show_with_uncertainty(double value, double expanded);
 
-/// In what unit people read a number that is computed in `unit`: angles in degrees.
+/// The unit in which people read a number that is computed in `unit`: angles in degrees.
 struct Reading {
   double scale = 1;  ///< times the number
   std::string unit;

@@ -63,7 +63,7 @@ std::int64_t written_at(const std::string& path) {
 
 namespace {
 
-/// Empty if all of it was written, else the reason.
+/// Writes all of `text`; returns the reason of a failure, or an empty text.
 std::string write_all(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out << text;
@@ -97,7 +97,7 @@ void remove_parts(const std::vector<FileView>& files) {
   }
 }
 
-/// Says what to do about a file that cannot be written.
+/// The advice for a file that cannot be written.
 std::string other_place(const std::string& path) {
   std::error_code error;
   const fs::path folder = fs::path(path).parent_path();

@@ -19,7 +19,7 @@ constexpr int kMostEntries = 20'000;
 constexpr int kMostAliases = 100;
 constexpr double kLargestNumber = 1e12;
 
-/// Counts what the parser meets and stops it at the limits.
+/// Counts the nodes that the parser meets and stops it at the limits.
 class Counter final : public YAML::EventHandler {
  public:
   explicit Counter(const std::string& where) : where_(where) {}
@@ -67,7 +67,7 @@ std::string below(const std::string& path, const std::string& key) {
   return path.empty() ? key : path + ": " + key;
 }
 
-/// The error `expected a number`, with what was found instead.
+/// The error `expected a number`, with the value that was found instead.
 Failure expected(const char* what, const YAML::Node& found) {
   if (!found.IsScalar() || found.Scalar().empty()) return refused("expected {}", what);
   return refused("'{}', expected {}", found.Scalar(), what).with_text(found.Scalar());

@@ -10,8 +10,9 @@
 
 #include "server/base/result.h"
 
-/// Reads YAML that people write. Unknown keys are refused, texts with control characters too. Every
-/// error says file, key and what was expected. Included only by readers (`*_file.cpp`) and config/.
+/// Reads YAML that people write. Refuses unknown keys and texts with control characters. Every
+/// error names the file, the key and the expected value. Only readers (`*_file.cpp`) and config/
+/// include this header.
 namespace trammel {
 
 /// Thrown by YamlMap, caught by read_yaml(); never leaves a reader.
@@ -19,7 +20,7 @@ struct YamlRefusal {
   Error error;
 };
 
-/// A mapping in a file, with the path of keys that led to it.
+/// A mapping in a file, and the path of keys to it.
 class YamlMap {
  public:
   YamlMap(YAML::Node node, std::string file);
@@ -74,8 +75,8 @@ class YamlMap {
 };
 
 /// Refuses a text that is not UTF-8, and one that is too large to be written by hand (kTooLarge):
-/// over a megabyte, 20 levels of nesting, 20,000 entries or 100 aliases. Reads it once and keeps
-/// nothing. Throws what the parser throws.
+/// over a megabyte, 20 levels of nesting, 20,000 entries or 100 aliases. Reads the text once and
+/// keeps nothing. Throws the exceptions of the parser.
 [[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
 
 /// Line of the text, counted from 1; empty if the parser does not know it.

@@ -24,14 +24,14 @@ constexpr double kAsked =
 constexpr double kKept =
     0.55;  // share of the rows that are fitted: with two bad ones in five, some are spared
 constexpr double kAgreeing = 0.6;       // share that must agree at the end
-constexpr double kMuchLess = 0.25;      // of what was left
+constexpr double kMuchLess = 0.25;      // share of the earlier misfit
 constexpr double kEquations = 1.5;      // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
 constexpr std::size_t kPlacing = 4,
                       kPlacingTool = 3;  // rows that place the base, and so many more for each tool
 constexpr int kDraws =
-    300;  // of seven rows of which two in five are bad all are good in 1 of 36 draws
+    300;  // with two of five rows bad, all of seven drawn rows are good in 1 of 36 draws
 constexpr double kNear = 3e-3, kNearTurn = 5e-3;  // m, rad: by so much an arm is off its drawing
 
 MeasurementBatch only(const MeasurementBatch& batch, const Rows& rows) {
@@ -54,7 +54,7 @@ Rows drawn(std::size_t count, std::size_t most) {
   return rows;
 }
 
-/// m, what one axis is said to be uncertain by.
+/// The stated uncertainty of one axis, m.
 double stated_sigma(const MeasurementBatch& batch, const Cell& cell) {
   std::vector<double> all;
   for (const Measurement& m : batch.measurements) all.push_back(position_sigma(m, cell));
@@ -69,7 +69,7 @@ class RowSearch {
             const MeasurementBatch& batch)
       : cell_(cell), sources_(sources), batch_(batch), sigma_(stated_sigma(batch, *cell)) {}
 
-  /// The rows that agree; all of them where no others can be told.
+  /// The rows that agree; all rows where the search cannot separate bad ones.
   [[nodiscard]] Rows agreeing(const Result<CalibrationResult>& plain) const {
     const Rows all = all_rows(batch_.measurements.size());
     const double before = plain ? left(*plain) : kNoModelError;
@@ -101,7 +101,7 @@ class RowSearch {
     return found ? std::optional(std::move(*found)) : std::nullopt;
   }
 
-  /// Base and tool, as far as they are to be found.
+  /// The sources of base and tool that the model identifies.
   [[nodiscard]] std::vector<std::string> frames() const {
     std::vector<std::string> names;
     for (const causes::Part part : {causes::Part::kBase, causes::Part::kTool})
@@ -135,7 +135,7 @@ class RowSearch {
     return best;
   }
 
-  /// So many that they place base and tools.
+  /// Random rows, just enough to place base and tools.
   [[nodiscard]] Rows some_of(std::size_t count, std::mt19937_64& random) const {
     Rows rows = all_rows(count);
     const std::size_t wanted = std::min(count, rows_that_place());
@@ -146,7 +146,7 @@ class RowSearch {
     return rows;
   }
 
-  /// The misfit of each row of `rows`, relative to what a good row may have.
+  /// The misfit of each row of `rows`, relative to the largest misfit of a good row.
   [[nodiscard]] Eigen::VectorXd farness(const CalibrationResult& found,
                                         const MeasurementBatch& rows) const {
     return farness_of(rows, residuals_of(found.model, rows, found.model.values),
@@ -199,7 +199,7 @@ class RowSearch {
     CalibrationResult found;
     Rows rows;
   };
-  /// All rows that fit as well as those that were kept, and what is found of `sources` on them.
+  /// All rows that fit as well as the kept ones, and the values of `sources` identified on them.
   [[nodiscard]] std::optional<Readmitted> readmitted(
       CalibrationResult found, const std::vector<std::string>& sources) const {
     Rows kept;
@@ -214,9 +214,9 @@ class RowSearch {
     return Readmitted{std::move(found), std::move(kept)};
   }
 
-  /// The rows that base and tool alone lead to, where rows are too few to find all sources on some
-  /// of them: what is off by as much as a suspect beside all that the drawing leaves does not
-  /// agree.
+  /// The rows that fit a model of base and tool alone, for batches with too few rows to identify
+  /// all sources on a part of them. A row disagrees if its misfit is that of a suspect, beyond the
+  /// errors that a drawing leaves.
   [[nodiscard]] Rows led_to_by_frames(const MeasurementBatch& few) const {
     const std::vector<std::string> sources = frames();
     std::optional<CalibrationResult> found = concentrated(few, fitted(sources, few), sources);
@@ -245,7 +245,8 @@ std::shared_ptr<const Cell> anywhere(const Cell& cell) {
   return other;
 }
 
-/// Each session by itself: where its instrument stood, and what it measured of the arm as it was.
+/// The agreeing rows of each session, with the instrument placed by that session alone and the arm
+/// as it was then.
 Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell,
                           const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   const std::shared_ptr<const Cell> placed = anywhere(*cell);

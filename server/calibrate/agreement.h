@@ -15,16 +15,17 @@ struct Agreement {
   MeasurementBatch others;    ///< rows that this arm does not lead to, at most two in five
 };
 
-/// The rows of `batch` on which `sources` should be identified alone; empty where that is all of
-/// them. `plain` was identified on all: where it leaves no more than 3 times the stated sigma,
-/// nothing is asked. Else least trimmed squares (Rousseeuw 1984) by concentration steps (Rousseeuw
-/// and Van Driessen 1999), from all rows and from base and tool alone; where no fit on all rows
-/// leads anywhere, from the few drawn rows that most others are near to. Then rows come back that
-/// fit as well as those that were kept. There are bad rows only if the others are left with a
-/// quarter of what was left: a model that lacks something leaves nearly as much at any rows. Where
-/// the rows are too few for all sources, as some distances are, those are bad that base and tool
-/// alone do not lead to, by far. Of several sessions each is asked by itself, with a base of its
-/// own: what differs between them is a change.
+/// The rows of `batch` on which `sources` should be identified; empty means all rows. `plain` was
+/// identified on all rows: if it leaves no more than 3 times the stated sigma, there is no search.
+/// Otherwise the search is least trimmed squares (Rousseeuw 1984) by concentration steps (Rousseeuw
+/// and Van Driessen 1999). It starts from all rows, and from base and tool alone. If no fit on all
+/// rows succeeds, it starts from the small random set of rows that fits the most other rows.
+/// Afterwards all rows return that fit as well as the kept ones. The search calls rows bad only if
+/// the misfit of the others falls to a quarter: a model that lacks a cause leaves nearly the same
+/// misfit at any rows. A batch may have too few rows for all sources, as some batches of distances
+/// have. Then the bad rows are the ones that base and tool alone miss by far. With several
+/// sessions, each session is searched by itself with a base of its own, since a difference between
+/// sessions is a change.
 [[nodiscard]] std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell,
                                                     const std::vector<std::string>& sources,
                                                     const MeasurementBatch& batch,

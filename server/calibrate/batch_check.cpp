@@ -13,14 +13,14 @@ namespace trammel {
 
 namespace {
 
-/// The batch as a robot has its joints whose zeros are where the positions say.
+/// The batch with its joints corrected by the zeros that the positions suggest.
 MeasurementBatch with_zeros(MeasurementBatch batch, const JointVector& zeros) {
   for (Measurement& m : batch.measurements) m.context.q += zeros;
   return batch;
 }
 
-/// The doubt of the first session that has one: each was measured in a world of its own.
-/// `positions` says what speaks against its positions.
+/// The doubt of the first session that has one, since each session has its own world frame.
+/// `positions` judges the positions of one session.
 template <typename Positions>
 std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell& cell,
                                        const Positions& positions) {
@@ -34,7 +34,8 @@ std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell
   return std::nullopt;
 }
 
-/// Positions that are the drawing's, of which a model in force would say that its arm has changed.
+/// The doubt that positions were computed from the drawing. A model in force would take them for a
+/// change of its arm.
 std::optional<Error> computed_doubt(double off_drawing, const MeasurementBatch& batch,
                                     const Cell& cell) {
   if (off_drawing < 0) return std::nullopt;

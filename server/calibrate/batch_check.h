@@ -7,15 +7,15 @@
 
 namespace trammel {
 
-/// The reasons against learning from `batch` (checked against `cell`), of positions and
-/// orientations: a mistake of reading (look_at_readings(), orientation_doubt()) or another tool,
-/// with the figure of what would fit; and against its distances and touches (gauge_doubt()).
-/// Whoever looks at a batch before anything is learned asks this.
+/// The reason not to learn from `batch` (checked against `cell`), if there is one. Positions and
+/// orientations may have been misread (look_at_readings(), orientation_doubt()) or belong to
+/// another tool; the error then states the interpretation that fits. Distances and touches are
+/// judged by gauge_doubt(). Every check of a batch before learning calls this.
 [[nodiscard]] std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell);
 
-/// batch_doubt() without doubts about the tool, for a batch of which a model in force can judge
-/// that better. It doubts also positions that were computed from the drawing, which such a model
-/// would take for a change of its arm.
+/// batch_doubt() without doubts about the tool, for a batch whose tool a model in force can judge
+/// better. It also doubts positions that were computed from the drawing, since such a model would
+/// take them for a change of its arm.
 [[nodiscard]] std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 /// Refuses a batch with a batch_doubt().

@@ -30,12 +30,12 @@ constexpr double kInsteadOfScales =
     3;                            // the same where it makes scales of the sessions superfluous
 constexpr double kOfMetal = 0.2;  // of the prior scale: 4 um per m and K
 constexpr std::size_t kSessionsOfWarmth =
-    3;  // of two, another scale of the instrument does the same
+    3;  // with two sessions, a scale of the instrument explains the same
 constexpr double kStretched =
     10;  // nat: so much more likely must the data be with scales of the sessions,
 constexpr double kStretchedOfSession = 3;  // and so much more for each of them
 constexpr double kPerhapsStretched =
-    0.25;                       // of that price, by what scales alone would explain: worth a trial
+    0.25;  // share of that price; if scales alone would gain more, a trial is worthwhile
 constexpr double kZeroed = 10;  // the same with zero errors of the instruments
 constexpr double kZeroedOfInstrument = 3;
 
@@ -84,8 +84,8 @@ double price_of_scales(std::size_t sessions) {
   return kStretched + kStretchedOfSession * static_cast<double>(sessions - 1);
 }
 
-/// True if the residuals of a session grow with the distance from its middle. The parameters have
-/// taken a part of that, so it is only a reason to look.
+/// True if the residuals of a session grow with the distance from its middle. It only justifies a
+/// trial, since the parameters have absorbed a part of that growth.
 bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& located) {
   const Tracker& tracker = found.model.cell->tracker;
   const MeasurementBatch here =
@@ -112,7 +112,7 @@ bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& l
   return gain > kPerhapsStretched * price_of_scales(S);
 }
 
-/// identify(), and once more with a scale for each session where the data ask for it.
+/// Calls identify(), and repeats it with a scale for each session if the data ask for scales.
 Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& problem,
                                                  const CalibrateOptions& options) {
   Result<CalibrationResult> rigid = identify(problem, options);
@@ -125,8 +125,8 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
 }
 
-/// Anchors by the nominal arm; where known ones tell where the base is, base and anchors by all
-/// gauges together. Their priors are centred there.
+/// Places the anchors by the nominal arm. If known anchors determine the base, all gauges together
+/// place base and anchors. The priors are centred there.
 Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch,
                          const CalibrateOptions& options) {
   if (!has_gauges(batch)) return {};
@@ -156,7 +156,7 @@ Result<CalibrationResult> calibrate_placed(CalibrationProblem problem,
   return identify_with_sessions(problem, options);
 }
 
-/// From a base that stands where the model has it.
+/// Calibrates from a start at the model's base.
 Result<CalibrationResult> calibrate_from(CalibrationProblem placed,
                                          const CalibrateOptions& options) {
   if (has_unknown_frame(*placed.model.cell)) {
@@ -166,9 +166,9 @@ Result<CalibrationResult> calibrate_from(CalibrationProblem placed,
   return calibrate_placed(std::move(placed), options);
 }
 
-/// Beside a tool that is known, positions at one place would fit a base that is turned anyhow: its
-/// turn shows only in what the real tool is off the drawn one. So both are found from all sides,
-/// and the base is taken.
+/// Finds how the base is turned with the tool set free, and keeps the base alone. With a known
+/// tool, positions at one place fit any turn of the base: only the difference between the real tool
+/// and the drawn one shows the turn.
 Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch,
                          const CalibrateOptions& options) {
   PhysicalModel frames = TRY(make_physical_model(
@@ -186,7 +186,7 @@ Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch,
   return {};
 }
 
-/// The most likely of those that begin at each of the places where the base may stand.
+/// The most likely of the results that start from each likely base.
 Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem,
                                             const CalibrateOptions& options) {
   std::vector<Pose> bases = likely_bases(problem.model, problem.batch);
@@ -218,7 +218,7 @@ MeasurementBatch moved_there(const CalibrationProblem& problem,
                           : moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
 }
 
-/// `found` was identified on what `sessions` had moved.
+/// Composes into `found` the motions by which `sessions` had moved the batch before.
 CalibrationResult told_of(CalibrationResult found, const std::vector<SessionSetting>& sessions) {
   for (std::size_t s = 0; s < sessions.size(); ++s)
     found.sessions[s].set_into_W(found.sessions[s].into_W() * sessions[s].into_W());
@@ -244,8 +244,8 @@ Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem,
   });
 }
 
-/// The session with the most poses, whatever their order; of equal ones that whose name sorts
-/// first.
+/// The session with the most poses, in any order of sessions. Of equal ones it is the first by
+/// name.
 std::size_t largest_session(const MeasurementBatch& batch) {
   const std::vector<SessionSetting> settings = settings_of(batch);
   const auto largest =
@@ -266,8 +266,8 @@ MeasurementBatch exchanged(MeasurementBatch batch, std::size_t session) {
   return batch;
 }
 
-/// `found` was told in the lengths of another session: once more in those of the newest, everything
-/// as it stands.
+/// Identifies again in the lengths of the newest session, from the values of `found`, which is in
+/// the lengths of another session.
 Result<CalibrationResult> calibrate_in_newest_lengths(const CalibrationResult& found,
                                                       const CalibrationProblem& problem,
                                                       const CalibrateOptions& options) {
@@ -289,7 +289,7 @@ Result<CalibrationResult> calibrate_in_newest_lengths(const CalibrationResult& f
   });
 }
 
-/// Calibrated in the world of that session; told in that of the newest.
+/// Calibrates in the world of that session and expresses the result in the world of the newest.
 Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationProblem& problem,
                                        const CalibrateOptions& options) {
   CalibrationProblem there = problem;
@@ -308,8 +308,8 @@ Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationPro
              : std::move(found);
 }
 
-/// True if nothing that is to be found depends on which world it is told in, as the drift of an
-/// instrument does.
+/// True if no parameter depends on the choice of the world frame, as the drift of an instrument
+/// would.
 bool is_of_the_robot(const PhysicalModel& model) {
   return std::all_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
     return source->cause().scope != causes::Scope::kSession &&
@@ -326,8 +326,8 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem,
         .in("batch " + problem.batch.id)
         .beyond(0, 1);
   TRY(check_gauges(problem.model, problem.batch));
-  // Nobody says where the base stands: it is found by the session that tells most, not by the few
-  // poses of the newest.
+  // No file states the base. The session with the most poses finds it, since the newest may have
+  // few.
   if (has_sessions(problem.batch) && !problem.model.cell->X_WB && is_of_the_robot(problem.model))
     return calibrate_by(largest_session(problem.batch), problem, options);
   return calibrate_there(problem, options).map([&](CalibrationResult found) {
@@ -362,7 +362,7 @@ Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
                                       const CalibrateOptions& options) {
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
   std::map<std::string, std::string>
-      found;  // sources that were searched for, with what the first form found
+      found;  // sources with searched values, and the values that the first form found
   for (std::vector<std::string>& candidate : candidates) {
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;
@@ -391,8 +391,8 @@ std::vector<std::vector<std::string>> with_added(const CalibrationResult& withou
   return candidates;
 }
 
-/// The causes that the data may add: what shows them is asked for in any form, and the cell does
-/// not say them.
+/// The causes that the data may add to `specs`. A cause needs the one beside which it is added, the
+/// files must not state it, and the batch must be able to show it.
 std::vector<const CauseRecord*> may_be_added(const Cell& cell,
                                              const std::vector<std::string>& specs,
                                              const MeasurementBatch& batch) {
@@ -413,8 +413,8 @@ std::vector<const CauseRecord*> may_be_added(const Cell& cell,
 
 namespace {
 
-/// True if the effect of the temperature is as large as in arms of metal, and of their sign:
-/// less is wear that went with the seasons, or an instrument.
+/// True if the effect of the temperature has the size and the sign that metal arms have. A smaller
+/// effect is wear that went with the seasons, or an instrument.
 bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   if (!added.needs.temperature) return true;
   Eigen::Index first = 0;
@@ -426,8 +426,8 @@ bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
   return false;
 }
 
-/// True if the data ask for what was added. Where it stands for what scales of the sessions explain
-/// otherwise it needs no more than to be likelier, the scales at their price.
+/// True if the data justify the added cause. If scales of the sessions are the alternative
+/// explanation, the cause only has to be likelier than the scales at their price.
 bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& with) {
   if (!are_stretched(without.sessions) || are_stretched(with.sessions))
     return with.log_evidence > without.log_evidence + kWeighed;
@@ -472,7 +472,7 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
   if (!has_gauges(batch) || zeros_asked) return exact;
   std::vector<std::string> with_zeros = sources;
   with_zeros.emplace_back(kInstrumentZero);
-  // Values that are far too long fit nothing without a zero.
+  // Without a zero, a model fits no values that are far too long.
   Result<CalibrationResult> zeroed = exact ? calibrate_zeroed(*exact, batch, options)
                                            : calibrate_weighed(cell, with_zeros, batch, options);
   if (!zeroed || !exact) return zeroed ? zeroed : exact;

@@ -12,8 +12,9 @@
 /// The question to a calibration, and its result.
 namespace trammel {
 
-/// If the joints belong to the positions, identification leaves less than the larger of these: m
-/// rms, and a share of how far the positions spread. A nominal robot is off by a few mm.
+/// If the joints belong to the positions, identification leaves less than the larger of two limits:
+/// this one (m rms), and a share of the spread of the positions. A nominal robot is off by a few
+/// mm.
 inline constexpr double kNoModelError = 0.025;
 inline constexpr double kNoModelShare = 0.05;
 
@@ -28,8 +29,8 @@ struct CalibrationProblem {
 struct CalibrateOptions {
   int max_iterations = 100;
   std::vector<bool> held;    ///< a flag for each parameter that stays as it is; empty: none
-  bool weigh_links = false;  ///< `compliance` may add `self_weight` where no link mass is told and
-                             ///< the data ask for it
+  bool weigh_links = false;  ///< the data may add `self_weight` to `compliance` if the files have
+                             ///< no link masses
   bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has
                        ///< little influence
 };
@@ -46,7 +47,7 @@ struct IdentifiedParameter {
   Parameter parameter;
   double value = 0;         ///< SI
   double stddev = 0;        ///< SI, of the posterior
-  bool identified = false;  ///< whether less than half of the prior standard deviation is left
+  bool identified = false;  ///< true if less than half of the prior standard deviation is left
 };
 
 struct CalibrationResult {
@@ -63,17 +64,17 @@ struct CalibrationResult {
       0;  ///< nat: the same with the parameters integrated over their priors (Laplace)
   double rms =
       0;  ///< m, Euclidean residual of the training positions; of gauges alone: of their values
-  double discrepancy = 0;  ///< m per axis: what the model leaves beyond the measurement's sigma
+  double discrepancy = 0;  ///< m per axis: the model's error beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
   double discrepancy_of_pose =
-      0;  ///< m per axis: what all positions at one joint vector share of it
-  /// m per axis: what each of so many positions at one joint vector is weighed with beside its own
-  /// sigma: together as one pose, as far as they share the arm's error.
+      0;  ///< m per axis: the part of it that all positions at one joint vector share
+  /// m per axis: the discrepancy with which each of `together` positions at one joint vector is
+  /// weighted, beside its own sigma. As far as these share the arm's error, they weigh as one pose.
   [[nodiscard]] double discrepancy_of_one(int together) const;
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  /// The sessions of a batch of several: what belongs to each, the newest last. aligned() moves its
+  /// The settings of the sessions of a batch, the newest last. aligned() uses them to move the
   /// measurements into the world of the model. Empty: one session.
   std::vector<SessionSetting> sessions;
   std::vector<double>

@@ -11,18 +11,19 @@ namespace trammel {
 /// A kind of change: a cause that begins at a pose; its columns among those of all kinds.
 struct ChangeKind {
   const CauseRecord* cause = nullptr;
-  std::string spelling, behind;  ///< up to the pose at which it begins, and behind it
+  std::string spelling, behind;  ///< the parts of the source before and behind the index of its
+                                 ///< first pose
   int joint = -1;                ///< 0-based; -1: of the arm
   Eigen::Index first = 0, count = 0;
 
-  /// The source that begins at the pose with that index.
+  /// The source that begins at the pose with index `index`.
   [[nodiscard]] std::string from(int index) const {
     return fmt::format("{}@{}{}", spelling, index + 1, behind);
   }
 };
 
 enum class ChangesOf {
-  kArm,               ///< what changes on the arm
+  kArm,               ///< a change on the arm
   kArmAndInstrument,  ///< and a tracker that is moved
 };
 

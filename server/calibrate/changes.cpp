@@ -135,7 +135,7 @@ class ChangeSearch {
     const ChangeKind* kind = nullptr;
     std::size_t session = 0;
     double gain = 0, evidence = 0;
-    bool alone = false;  // it held in that session only
+    bool alone = false;  // true: the change lasted for that session only
   };
 
   struct Wandering {
@@ -154,8 +154,9 @@ class ChangeSearch {
                        first_of(one.session + 1));
   }
 
-  /// Adds a change of one session only: a reflector that sat elsewhere that day. In the first
-  /// session that is a change at the second one, in the newest it is how the tool sits today.
+  /// Adds a change that lasted for one session only, such as a reflector that sat elsewhere that
+  /// day. In the first session it appears as a change at the second one. In the newest session it
+  /// is the present place of the tool.
   void add_alone(std::size_t session, double inflation, std::vector<Scored>& all) const {
     if (session + 1 >= sessions_.size()) return;
     Seen seen;
@@ -168,8 +169,8 @@ class ChangeSearch {
     }
   }
 
-  /// The one number that a random walk from session to session explains best, where that is beyond
-  /// chance.
+  /// The number for which a random walk from session to session gains most evidence, if the gain is
+  /// beyond chance.
   [[nodiscard]] Wandering most_wandering(double inflation) const {
     Wandering best;
     if (sessions_.size() < kFewestToWander) return best;
@@ -181,8 +182,8 @@ class ChangeSearch {
     if (best.kind != nullptr && chance_of(1, best.gain, kinds_.kinds().size()) > kChance) return {};
     return best;
   }
-  /// Steps z of unit variance times the rate, summed up: the evidence of the rate is that of a
-  /// Gaussian prior.
+  /// Models the parameter as summed steps: rate times z, each z of unit variance. The evidence of a
+  /// rate is that of a Gaussian prior.
   [[nodiscard]] Wandering wandering_of(const ChangeKind& kind, double inflation) const {
     const auto S = static_cast<Index>(sessions_.size());
     const auto P = static_cast<Index>(own_.size());
@@ -304,8 +305,8 @@ class ChangeSearch {
     return {&kind, session, gained, gained - static_cast<double>(kind.count) * std::log(rows)};
   }
 
-  /// The factor by which gains exceed those of white noise: the mean over single numbers
-  /// between halves of the poses. A session whose noise is in question tells nothing of that.
+  /// The factor by which gains exceed those of white noise: the mean gain of single numbers between
+  /// halves of the poses. A session whose noise is in question is left out.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;
     for (std::size_t j = 0; j < joints_; ++j) {

@@ -11,7 +11,7 @@ namespace trammel {
 
 /// A cause that began between two sessions and lasts since.
 struct Change {
-  std::string source;       ///< as a list of error sources has it: `joint_slip:3@121`
+  std::string source;       ///< in the spelling of a list of error sources: `joint_slip:3@121`
   std::size_t session = 0;  ///< from which on, its place in CalibrationResult::sessions
   double gain = 0;          ///< twice the log likelihood that it adds, everything else refitted
   double p_value =
@@ -29,20 +29,20 @@ struct Change {
   }
 };
 
-/// The change that the sessions speak for most: a joint that lost its zero, another tool, another
-/// load, from a session on; empty where none is beyond chance. `found` was identified on `batch`,
-/// whose sessions each have a base of their own. Every candidate is held against the residuals with
-/// everything else free (a score test), so nothing is fitted again. What the model leaves over is
-/// no white noise: it makes differences between sessions of other poses, too. How much is measured
-/// by the same candidates between halves of each session's poses, where nothing can have changed,
-/// and taken off. Of four sessions and more it is also asked whether the zero of a joint wanders;
-/// that is taken where it explains more than any single change.
+/// The most strongly supported change from a session on: a joint that lost its zero, another tool,
+/// or another load. Empty if no change is beyond chance. `found` was identified on `batch`, whose
+/// sessions each have a base of their own. Each candidate is tested against the residuals with all
+/// other parameters free (a score test), so nothing is fitted again. The model error is not white
+/// noise, so it also makes differences between sessions with different poses. The same candidates
+/// between halves of each session's poses, where nothing can have changed, measure its size, which
+/// is then subtracted. With four or more sessions, a wandering joint zero is a candidate as well.
+/// It is chosen if it explains more than every single change.
 [[nodiscard]] std::optional<Change> strongest_change(const CalibrationResult& found,
                                                      const MeasurementBatch& batch);
 
-/// A change, with no session taken to be noisier than the others: what looks like a noisy session
-/// may be a change. Empty where none is noisier. It is only a proposal, since a session that is
-/// noisy looks like a change as well.
+/// The strongest change if no session is assumed noisier than the others, since an apparently noisy
+/// session may be a change. Empty if no session is noisier. The result is a proposal only, because
+/// a noisy session also looks like a change.
 [[nodiscard]] std::optional<Change> change_instead_of_noise(const CalibrationResult& found,
                                                             const MeasurementBatch& batch);
 

@@ -11,8 +11,8 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostChanges = 12;
-// Nat, beside Schwarz's price of what it adds: so much more likely must a change make the data than
-// a noisy session.
+// Nat, beside Schwarz's price of the added parameters: a change is chosen only if it makes the data
+// so much more likely than a noisy session does.
 constexpr double kInsteadOfNoise = 10;
 
 /// The sources of the model as they are: each in the form and with the orders that were found.
@@ -40,7 +40,7 @@ bool is_better(const CalibrationResult& with, const CalibrationResult& without,
                const Proposal& proposal) {
   double price = 0;
   if (proposal.instead_of_noise) {
-    double rows = 0;  // that show it
+    double rows = 0;  // the number of rows that show it
     const std::size_t end =
         is_of_one_session(proposal.change) ? proposal.change.session + 1 : with.sessions.size();
     for (std::size_t s = proposal.change.session; s < end; ++s)

@@ -25,25 +25,25 @@ namespace {
 constexpr double kChance = 1e-7;  // of a false jump in a batch
 constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
 constexpr double kBeforeSlow =
-    13.8;  // twice the log likelihood, 1000 to 1: ahead of what grows slowly
+    13.8;  // twice the log likelihood ratio for 1000 to 1, against slow growth
 constexpr std::size_t kMostDerivatives = 2'000'000;  // poses times parameters: 100 MB of equations
 constexpr std::size_t kFewestPoses = 40;             // to look at
 constexpr std::size_t kFewestBeyond = 6;             // poses before a jump, and from it on
 constexpr double kLeastSeen =
     1;  // information of a candidate, prior units: below it the poses do not show it
 constexpr double kUsuallyLeft =
-    1e-3;  // m, of a model: where it leaves more, what jumped may be as much larger
+    1e-3;  // m, model error: where it is larger, a jump may be larger by the same ratio
 constexpr double kLittle = 1e-6;   // of the poses' information: a prior that hardly shrinks a size
-constexpr double kWholeBatch = 1;  // of its length: lags of what grows slowly
+constexpr double kWholeBatch = 1;  // share of the batch's length: lags of slow growth
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
-constexpr Index kWaves = 16;  // half waves over the batch, of which a wandering course is made
+constexpr Index kWaves = 16;  // half waves over the batch, the terms of a wandering course
 constexpr double kRoughness[] = {
     1, 2};  // power of the wave number that its amplitudes fall by: a walk, and smoother
 constexpr double kBeforeWandering =
     4.6;  // nat, 100 to 1: ahead of the likeliest course of that kind
 
-/// The equations of one pose, in units of sigma: residual, derivatives by what is free (P) and by
-/// the kinds (K).
+/// The equations of one pose, in units of sigma: residual, derivatives by the free parameters (P)
+/// and by the kinds (K).
 struct PoseEquations {
   const Measurement* measurement;
   VectorXd residual;
@@ -95,7 +95,8 @@ class JumpSearch {
     const std::vector<Scored> seen = all_scored(inflation_by_halves());
     const auto first = strongest_of(seen);
     if (first == seen.end()) return std::nullopt;
-    // A jump makes the halves differ, too: it is no sign that the rest is not white.
+    // A jump also makes the halves differ, so it is removed before the halves are tested for white
+    // noise.
     const double inflation = without(*first).inflation_by_halves();
     const std::vector<Scored> all = all_scored(inflation);
     const auto best = strongest_of(all);
@@ -139,14 +140,14 @@ class JumpSearch {
     });
   }
 
-  /// By how much what is free still moves.
+  /// Finds how far the free parameters still are from the minimum.
   void settle() {
     VectorXd gradient = VectorXd::Zero(factor_.rows());
     for (const PoseEquations& pose : poses_) gradient.noalias() += pose.free * pose.residual;
     at_rest_ = factor_.solve(gradient);
   }
 
-  /// The search on these poses without what the jump did.
+  /// The search on these poses after subtracting the effect of the jump.
   [[nodiscard]] JumpSearch without(const Scored& jump) const {
     JumpSearch rest = *this;
     for (std::size_t i = jump.at; i < rest.poses_.size(); ++i) {
@@ -260,8 +261,8 @@ class JumpSearch {
            std::log(static_cast<double>(poses_.size()));
   }
 
-  /// Nat, of the kind as something that wanders: half waves over the batch, whose amplitudes are
-  /// likely by a power of the wave number and a scale that the data choose.
+  /// Nat: the evidence that the kind wanders, as half waves over the batch. The amplitudes fall by
+  /// a power of the wave number, and have a scale; the data choose both.
   [[nodiscard]] double evidence_of_wandering(const ChangeKind& kind, double inflation) const {
     const Index n = static_cast<Index>(poses_.size()), count = kind.count, all = kWaves * count;
     MatrixXd own = MatrixXd::Zero(all, all), shared = MatrixXd::Zero(all, unknowns());
@@ -360,7 +361,7 @@ class JumpSearch {
   const double prior_;  // information of a prior, 1 where the model leaves no more than usual
   std::vector<PoseEquations> poses_;
   Eigen::LLT<MatrixXd> factor_;
-  VectorXd at_rest_;  // P: by how much what is free still moves
+  VectorXd at_rest_;  // P: how far the free parameters still are from the minimum
 };
 
 /// The poses of each tool and payload.

@@ -35,7 +35,8 @@ constexpr double kFarRow = 5;  // times the median of all poses: a row of anothe
 constexpr double kTellingSpread =
     20;  // spread over residual: the base's direction is then known to 3 degrees
 constexpr double kBadPosition = 6;  // times the median residual: a pose that is wrong as a whole
-constexpr double kMostBadPositions = 0.1;  // of all: more are no outliers, and none is left out
+constexpr double kMostBadPositions = 0.1;  // share of all positions: more are no outliers, and none
+                                           // is left out
 // Numbers of poses.
 constexpr std::size_t kFewestOriented =
     3;  // of a tool: two orientations agree with too many readings
@@ -58,8 +59,8 @@ struct Reading {
   Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
   bool by_order =
       true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
-  std::string remedy;        ///< what to write in the file; empty: nothing that holds for certain
-  Quaternions or_else = {};  ///< what each pose may be instead; empty: nothing
+  std::string remedy;        ///< the change to make in the file; empty if none is certain
+  Quaternions or_else = {};  ///< alternative orientations of each pose; empty: none
 
   [[nodiscard]] const Quaternions& second() const { return or_else.empty() ? q_FT : or_else; }
 };
@@ -82,7 +83,7 @@ std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about) {
   return all;
 }
 
-/// Angle of every pose from `about`, by that of two readings which brings it nearer.
+/// Angle of every pose from `about`, by the nearer of two readings.
 std::vector<double> nearer(const Quaternions& one, const Quaternions& other,
                            const Quaternion& about) {
   std::vector<double> all = angles(one, about);
@@ -91,8 +92,8 @@ std::vector<double> nearer(const Quaternions& one, const Quaternions& other,
   return all;
 }
 
-/// The rotation that most poses have in common, each by the nearer of two readings. First the best
-/// of those of single poses, then the mean of the poses near it.
+/// The rotation that most poses have in common, each pose by its nearer reading. First the best
+/// candidate among single poses, then the mean of the poses near it.
 Quaternion common(const Quaternions& one, const Quaternions& other) {
   const std::size_t n = one.size();
   const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
@@ -165,7 +166,7 @@ Result<BaseAndTool> located(const Positions& positions, const std::optional<Pose
   return BaseAndTool{X_WB, *X_FT};
 }
 
-/// The base as the positions tell it; `belong`: true if they are of these joints.
+/// The base by the positions; `belong` is true if the positions belong to these joints.
 struct Located {
   std::optional<Turned> turned;
   bool belong = true;
@@ -265,12 +266,12 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
   }
 }
 
-/// A way in which three numbers tell an orientation, and what to call that.
+/// A convention in which three numbers give an orientation, and its name.
 struct Told {
   std::string name;
   std::array<int, 3> axes;   ///< of the turns, each about the axis as turned so far
   bool from_behind = false;  ///< the last number is of the first turn
-  std::string columns = {};  ///< what to name them in a file; empty: no names are read so
+  std::string columns = {};  ///< the column names of this convention in a file; empty: it has none
   bool is_vector = false;    ///< a rotation vector, which has no turns
 
   [[nodiscard]] Quaternion from(const Vector3& rad) const {
@@ -345,9 +346,9 @@ Oriented some_of(const Oriented& group, std::size_t count) {
   return some;
 }
 
-/// Adds the same three numbers as radians, in another order of turns, or as a rotation vector. The
-/// file may have told them in each way; of the wrong way the numbers fit nothing. Of turns only
-/// the orientation is left, and two triples of numbers that it may have been.
+/// Adds readings of the same three numbers as radians, in another order of turns, or as a rotation
+/// vector. The file may have used any of these conventions; read by a wrong one, the numbers fit
+/// nothing. From turns only the orientation is left, and it has two possible triples of numbers.
 void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
   const std::vector<Told>& ways = ways_to_tell();
   const Oriented few = some_of(group, kRowsOfFirstLook);
@@ -427,7 +428,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
 
 /// The fit of one way of reading, alone or together with the numbers as given.
 struct Judged {
-  Quaternion q_FT = Quaternion::Identity();  ///< what the poses have in common
+  Quaternion q_FT = Quaternion::Identity();  ///< the rotation that the poses have in common
   std::vector<double> off;  ///< rad, of each pose: from the cell's tool, or from q_FT
   double scatter = 0;       ///< rad rms about q_FT
   double offset = 0;        ///< rad, of q_FT from the cell's tool; 0 where that is unknown
@@ -504,7 +505,7 @@ class Question {
       if (two_orders_ == 0 || both.fit < of_both_.fit) two_orders_ = k, of_both_ = both;
     }
   }
-  /// Rows far from what the others have in common.
+  /// Rows far from the common rotation of the others.
   std::vector<std::size_t> far_rows() const {
     const std::vector<double> off = angles(all_.front().q_FT, given_.q_FT);
     const double limit = std::max(kMostOff, kFarRow * median(off));
@@ -622,7 +623,7 @@ Oriented without(const Oriented& group, const std::vector<bool>& bad) {
   return kept;
 }
 
-/// The base's rotation from the orientations themselves, where nothing else tells it.
+/// The base's rotation by the orientations alone, if nothing else determines it.
 std::optional<Quaternion> by_orientations(const Oriented& group) {
   std::vector<Pose> X_WT;
   for (const Measurement* m : group.rows) X_WT.push_back(make_pose(*m->R_WT, m->p_W));
@@ -631,7 +632,7 @@ std::optional<Quaternion> by_orientations(const Oriented& group) {
   return Quaternion(found->X_WB.linear());
 }
 
-/// True if the positions fit a base at `X_WB`, but for what a model of a robot may leave.
+/// True if the positions fit a base at `X_WB` within the model error of a robot.
 bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented& group) {
   const Positions positions = positions_of(group);
   Eigen::Matrix3Xd p_F(3, positions.p_W.cols());

@@ -48,7 +48,7 @@ Status check_has_all(const PhysicalModel& model, const Cell& cell) {
   return {};
 }
 
-/// Where each parameter of `before` is among those of `after`, the same source in another cell.
+/// The index, in `after`, of each parameter of `before`, the same source in another cell.
 std::vector<Index> places(const ErrorSource& before, const Cell& cell_before,
                           const ErrorSource& after, const Cell& cell_after) {
   std::vector<Index> place(before.parameters().size());
@@ -83,8 +83,8 @@ Result<std::string> named_source(PhysicalModel& model, const std::string& name,
   return full_name;
 }
 
-/// A flag for each parameter: whether it is of a source in `names` and, of tools and payloads, of
-/// one that `batch` has.
+/// A flag for each parameter. It is set for parameters of sources in `names`; tools and payloads
+/// must also be in `batch`.
 std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<std::string>& names,
                                 const MeasurementBatch& batch) {
   std::set<std::string> tools, payloads;
@@ -207,8 +207,8 @@ struct Anew {
   std::vector<bool> parameters;      ///< a flag each
 };
 
-/// Finds the sources in `only`, adds those that the model has not, and puts their parameters at the
-/// priors. `refit` learns the places and prior variances.
+/// Frees the sources in `only`, adds those that the model lacks, and sets their parameters to the
+/// priors. `refit` gets the indices and prior variances.
 Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::string>& only,
                         Refit& refit) {
   Anew anew;

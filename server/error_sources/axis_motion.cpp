@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The frame in which an axis stands still, in W, and the rotations that turn it.
+/// The frame in which an axis is at rest, in W, and the rotations that turn it.
 struct Seat {
   struct Turn {
     int row;
@@ -37,7 +37,7 @@ Seat seat_of(const ArmState& state, int joint) {
   return seat;
 }
 
-/// Everything beyond the axis moves by as much, and with it the tool.
+/// Shifts an axis. Everything beyond it, the tool included, moves by the same vector.
 void shift_axis(int joint, const AxisMotion& rates, const Vector3& along, ArmState& state,
                 StateJacobian* jacobian, int first_column) {
   const Seat seat = seat_of(state, joint);

@@ -15,12 +15,12 @@ constexpr double kRadial = 0.02;  // mm, prior of a first harmonic: bearings of 
 constexpr double kAxial = 0.01;   // mm
 constexpr double kTilt = 5e-5;    // rad
 
-/// An axis that wobbles in its bearing: what turns with joint J is shifted across (radial) and
-/// along (axial) the axis, and tilted, by the joint's angle, as seen from the link before. Shift
-/// and tilt across the axis are a complex number, x + iy in the frame of the link before: a sum of
-/// c_m exp(i m q). m = 0 is a shift of the link before, m = 1 one of the link that follows: both
-/// are geometry. What is left of the harmonics 1 to 3 is m = -1, 2, -2, 3 and -3, and the axial
-/// shift, whose constant is geometry, too. None of it is an error of the joint's angle.
+/// An axis that wobbles in its bearing. The joint's angle shifts everything beyond joint J across
+/// (radial) and along (axial) the axis, and tilts it, as seen from the link before. Shift and tilt
+/// across the axis are complex numbers x + iy in the frame of the link before, each a sum of c_m
+/// exp(i m q). The terms m = 0 (a shift of the link before) and m = 1 (a shift of the link that
+/// follows) are geometry. The harmonics 1 to 3 therefore keep m = -1, 2, -2, 3 and -3, and the
+/// axial shift without its constant. None of these is an error of the joint's angle.
 class AxisWobble final : public ErrorSource {
  public:
   explicit AxisWobble(const SourceSpec& spec) : name_(spec.text), joint_(spec.joint) {

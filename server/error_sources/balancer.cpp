@@ -11,10 +11,10 @@ constexpr int kHarmonics = 6;
 constexpr double kTorquePerLength =
     100;  // Nm/m^4: of a balancer's first harmonic, over the fourth power of the reach
 
-/// A spring, a gas spring or a counterweight that holds a joint: a torque that is a function of the
-/// joint's angle alone, as a Fourier series. It shows through the joint's compliance. Its constant
-/// part is the joint's zero. Its first harmonic is that of a link's weight as long as the joint's
-/// axis stays level.
+/// A spring, a gas spring or a counterweight that holds a joint. Its torque is a function of the
+/// joint's angle alone, written as a Fourier series. The torque shows through the joint's
+/// compliance. Its constant part is the joint's zero. Its first harmonic equals a link's weight as
+/// long as the joint's axis stays level.
 class Balancer final : public ErrorSource {
  public:
   Balancer(const SourceSpec& spec, const Chain& chain) : name_(spec.text), joint_(spec.joint) {

@@ -8,10 +8,10 @@ namespace {
 
 constexpr double kTilt = 1e-9;  // rad/Nmm: prior; a robot on a steel plate
 
-/// Pedestal and anchors give way: B turns about its own x and y axes, about its origin, in
-/// proportion to the moment of all weights about that origin. A weight that does not turn with the
-/// first joint belongs to the base's position. What turns with it as one piece loads no gearbox,
-/// but shows here as far as the foot is not the same about both axes.
+/// Pedestal and anchors deflect: B turns about its own x and y axes, at its origin, in proportion
+/// to the moment of all weights about that origin. A weight that does not turn with the first joint
+/// belongs to the base's position. A weight that turns with the first joint as one piece loads no
+/// gearbox. It shows here if the foot's compliance differs between the two axes.
 class BaseYielding final : public ErrorSource {
  public:
   explicit BaseYielding(const Chain& chain) {

@@ -18,11 +18,11 @@ struct Range {
   double lower = 0, upper = 0;
 };
 
-/// A cable or hose package that two joints wind up together, as joints 4 and 6 of a wrist: it pulls
-/// by the sum s of their angles, so its energy is U(s), and both joints feel the same torque
-/// -U'(s). They give way to it through their gearboxes' compliances. The torque is a polynomial of
-/// s over what the joints' limits allow, in Chebyshev's form; beyond the limits it stays. Its
-/// constant part is the zeros of the two joints.
+/// A cable or hose package that two joints wind up together, such as joints 4 and 6 of a wrist. It
+/// pulls by the sum s of their angles, so its energy is U(s), and both joints feel the torque
+/// -U'(s). Their gearboxes deflect under it. The torque is a Chebyshev polynomial of s over the
+/// range that the joints' limits allow, and constant beyond it. Its constant part is the zeros of
+/// the two joints.
 class CablePull final : public ErrorSource {
  public:
   CablePull(const SourceSpec& spec, int other, const Chain& chain)

@@ -100,7 +100,7 @@ const CauseRecord& cause_correcting(causes::Part part) {
 
 namespace {
 
-/// Collects what is missing in one record.
+/// Collects the fields that one record lacks.
 class Missing {
  public:
   explicit Missing(const CauseRecord& record) : record_(record) {}

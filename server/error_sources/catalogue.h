@@ -6,11 +6,11 @@
 
 #include "server/error_sources/cause.h"
 
-/// The known causes: the shipped ones (shipped_causes.h) and those that a program adds.
+/// The known causes: the shipped ones (shipped_causes.h) and the ones that a program adds.
 /// Thread-safe.
 namespace trammel {
 
-/// All of them, in the order in which diagnosis looks for them.
+/// All causes, in the order in which diagnosis looks for them.
 [[nodiscard]] std::vector<const CauseRecord*> all_causes();
 
 /// The cause that `spelling` names. It may be the spelling of the cause, of one of its forms, or of
@@ -24,7 +24,7 @@ namespace trammel {
 /// The first cause of that search family. It is a bug if there is none.
 [[nodiscard]] const CauseRecord& first_searched_by(causes::SearchFamily family);
 
-/// The first record that stands for that. It is a bug if there is none.
+/// The first record that stands for `what`. A missing record is a bug.
 [[nodiscard]] const CauseRecord& cause_that_stands_for(causes::StandsFor what);
 
 /// The cause whose parameters correct that part of the nominal cell. It is a bug if there is none.
@@ -35,8 +35,7 @@ namespace trammel {
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);
 
 /// Registers a cause after the shipped ones, until this object is destroyed. `record` must outlive
-/// everything that is made in that time. No other cause may have its spelling or that of one of its
-/// forms.
+/// everything that is made in that time. The spellings of the cause and of its forms must be new.
 class AddedCause {
  public:
   explicit AddedCause(const CauseRecord& record);

@@ -8,9 +8,9 @@
 
 #include "server/base/result.h"
 
-/// The description of a physical cause of error: everything that calibration, diagnosis, planning,
-/// training and the pages need to know of it, except its effect on the arm. Each record stands
-/// beside its physics, in the file of the cause.
+/// The description of a physical cause of error: all that calibration, diagnosis, planning,
+/// training and the pages need, except its effect on the arm. Each record stands beside its
+/// physics, in the file of the cause.
 namespace trammel {
 
 class ErrorSource;
@@ -44,10 +44,10 @@ namespace causes {
 
 /// The part of the cell that the cause belongs to.
 enum class Scope {
-  kArm,      ///< of the whole arm
-  kJoint,    ///< of one joint, or of the link that follows it: its spelling ends in `:joint`
-  kCell,     ///< of the rest of the cell file: base, tools and payloads
-  kPose,     ///< of single poses
+  kArm,    ///< of the whole arm
+  kJoint,  ///< the cause acts on one joint, or on the link behind it: its spelling ends in `:joint`
+  kCell,   ///< of the rest of the cell file: base, tools and payloads
+  kPose,   ///< of single poses
   kSession,  ///< of the measurement: position and clock of the instrument
 };
 
@@ -55,7 +55,7 @@ enum class Scope {
 enum class Lasting {
   kAlways,        ///< belongs into the cell file
   kFromAPose,     ///< begins at a pose of a batch: its spelling ends in `@row`
-  kOfTheSession,  ///< of one batch, and all of it
+  kOfTheSession,  ///< the cause acts on one batch, and on all of it
 };
 
 /// Which part of the nominal cell its parameters correct.
@@ -95,12 +95,12 @@ enum class Summary { kNone, kOrderAndAmplitude, kAmplitude, kPeakToPeak };
 /// The way in which another cause resembles this one.
 enum class Likeness {
   kFromTheFirstPose,  ///< the other is this one, begun before the first pose
-  kSpecialCase,       ///< the other is a special case of this one
+  kSpecialCase,       ///< the other is a special case of this cause
   kSimplerCase,       ///< a special case; preferred if it explains nearly as much
   kDoubtfulCase,      ///< a special case; if neither is clearly better, neither is certain
-  kWhereConstant,  ///< the other has the same effect if the quantity that this one depends on never
-                   ///< changes
-  kImitator,       ///< an unrelated cause that looks like this one at some poses
+  kWhereConstant,     ///< the effects are equal if the quantity on which this cause depends never
+                      ///< changes
+  kImitator,          ///< an unrelated cause that looks like this one at some poses
 };
 struct Rival {
   std::string_view cause;
@@ -110,8 +110,8 @@ struct Rival {
   double surprise = 0;  ///< nat: penalty on this cause while the model has no source of the rival
 };
 
-/// The measurement by which a cause can be told from its rivals. Of the remedies of two causes, the
-/// one with the lower rank is named.
+/// The measurement that distinguishes a cause from its rivals. Of the remedies of two causes,
+/// messages name the one with the lower rank.
 struct Remedy {
   int rank = 0;
   std::string_view text;
@@ -138,8 +138,8 @@ struct Figure {
 /// The report if a step happened before the first pose of a new batch.
 struct WholeBatch {
   std::string_view sentence;  ///< for people; `{}` for the joint
-  bool harmful = false;  ///< a model must not learn from such a batch: it would learn an error that
-                         ///< is not the robot's
+  bool harmful = false;  ///< true: a model must not learn from such a batch, since it would learn
+                         ///< an error of the measurement
 };
 
 /// Marks a cause whose effect is shown as an example.
@@ -148,11 +148,12 @@ struct Example {
   int joint = -1;  ///< 0-based; -1: any
 };
 
-/// Marks a cause that training adds by itself where the measurements make it much more likely,
-/// beside another one.
+/// Marks a cause that training adds by itself, beside another one, if the measurements become much
+/// more likely.
 struct AddedByData {
   std::string_view beside;  ///< the cause that shows it; it must be among the error sources
-  bool (*is_known)(const Cell& cell);  ///< whether the cell's files say it; if so it is not added
+  bool (*is_known)(const Cell& cell);  ///< true if the cell's files state the effect; then the
+                                       ///< cause is not added
   std::string_view note;               ///< for people, where a model has it
 };
 
@@ -185,7 +186,7 @@ struct CauseRecord {
   std::vector<causes::Form> forms;  ///< the usual one first; none: no error source describes it
   std::vector<causes::Rival> rivals;
   causes::Remedy told_apart_by;
-  std::string_view shown_by;  ///< what must be recorded to show it
+  std::string_view shown_by;  ///< the quantity that a batch must record to show the cause
   std::string_view action;    ///< for the shop floor
   std::vector<causes::Figure>
       figures;  ///< of its findings: those of the summary, then its parameters

@@ -11,9 +11,9 @@ namespace {
 constexpr int kMaxEquilibriumSteps = 50;
 constexpr double kEquilibriumStep = 1e-13;  // rad
 
-/// Every gearbox deflects in proportion to the gravity torque on it, and takes along what bars
-/// couple to it. A weight acts at its centre of gravity (the physical wrench). There are three
-/// forms of eq. (3.6), dx = J C Jᵀ F. They differ by the square of the deflection: 50 um at a
+/// Every gearbox deflects in proportion to the gravity torque on it, and bars pass the deflection
+/// on to coupled joints. A weight acts at its centre of gravity (the physical wrench). Eq. (3.6),
+/// dx = J C Jᵀ F, has three forms. They differ by the square of the deflection: 50 um at a
 /// deflection of 6 mrad.
 class Compliance : public ErrorSource {
  public:
@@ -103,8 +103,9 @@ class ComplianceEquilibrium final : public Compliance {
       if (moved < kEquilibriumStep) break;
     }
     if (jacobian == nullptr) return;
-    // For the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T
-    // the torque's derivative in the loaded posture, B the bars.
+    // The deflection of the gears obeys dg = C tau + C T (dq + ds), where dq = B dg. Hence (I - C
+    // T_q B) dg = tau dC + C T_s ds. T is the torque's derivative in the loaded posture, and B are
+    // the bars.
     const ArmKinematics loaded(state);
     const JointArray torque = loaded.gravity_torque();
     const JointStateMatrix T = loaded.gravity_torque_jacobian();

@@ -1,7 +1,7 @@
 #include "server/error_sources/shipped_causes.h"
 
-/// The record of an arm that is no longer the one that the model in force describes. No error
-/// source describes it.
+/// The record for an arm that the model in force no longer describes. No error source belongs to
+/// it.
 namespace trammel {
 
 const CauseRecord& causes::drift() {

@@ -26,13 +26,13 @@ struct Parameter {
   bool is_place = false;  ///< says where an effect is (the order of an oscillation), not how large
 };
 
-/// One physical cause of error: its parameters and what they do to the arm. Immutable; thread-safe.
+/// One physical cause of error: its parameters and their effect on the arm. Immutable; thread-safe.
 class ErrorSource {
  public:
   virtual ~ErrorSource() = default;
   /// The record of its cause.
   [[nodiscard]] virtual const CauseRecord& cause() const = 0;
-  /// As spelled in a cell file: the cause, then `:joint` where it concerns one.
+  /// The spelling in a cell file: the cause, then `:joint` if it belongs to one joint.
   [[nodiscard]] virtual std::string name() const = 0;
   [[nodiscard]] virtual const std::vector<Parameter>& parameters() const = 0;
   [[nodiscard]] const ContextNeeds& needs() const { return cause().needs; }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMassOfReach =
     60;  // kg/m^3: a robot's moving mass over the cube of its reach, as makers list them
-constexpr double kSpreadUnknown = 1;  // of the expected moment, where no masses are told
+constexpr double kSpreadUnknown = 1;  // share of the expected moment, where no masses are stated
 constexpr double kSpreadTold = 0.3;   // the same where they are
 constexpr double kLeastLever = 0.05;  // m: a link's weight may be that far beside its axis
 

@@ -10,9 +10,9 @@ struct ExpectedWeights {
   JointArray spread;    ///< n, kg m: standard deviation of either number of a link
 };
 
-/// The weights of an arm of that shape whose mass is spread evenly along its links. Without told
-/// masses: as heavy as robots of its reach are, and as uncertain. With them: nothing more, give or
-/// take a third.
+/// The weights of an arm of that shape whose mass is spread evenly along its links. Without stated
+/// masses they are as heavy, and as uncertain, as those of robots of the same reach. With stated
+/// masses they are zero, with an uncertainty of a third.
 [[nodiscard]] ExpectedWeights expected_weights(const Chain& chain);
 
 }  // namespace trammel

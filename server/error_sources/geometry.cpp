@@ -50,8 +50,8 @@ class Geometry final : public ErrorSource {
   }
 
  private:
-  /// A zero belongs to its gear and is counted as the axis turns: joints that bars couple go with
-  /// it.
+  /// Adds to a joint's zero. The zero belongs to the gear and is counted as the axis turns, so
+  /// joints that bars couple move as well.
   static void add_to_zero(int joint, double value, ArmState& state, StateJacobian* jacobian,
                           int column) {
     const double sign = state.chain->joint(joint).sign;

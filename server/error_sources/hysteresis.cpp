@@ -12,11 +12,11 @@ constexpr double kWay = 0.02;        // rad: of friction before it slips
 constexpr double kWaySpread = 0.01;
 constexpr double kShortestWay = 1e-3;
 
-/// Friction in a gear holds the joint back, by as much as it was moved to get there: delta q = -h m
-/// / sqrt(m^2 + w^2), m = q - q_before. Long moves end in `backlash`, a step by the side alone;
-/// moves shorter than w leave less. The pose before is all that it remembers. h is not negative:
-/// friction never takes a joint farther than it was sent. Where nobody knows that pose there is no
-/// hysteresis, which is its mean over both sides.
+/// Friction in a gear holds the joint back, by an amount that depends on the move to the pose:
+/// delta q = -h m / sqrt(m^2 + w^2), m = q - q_before. For long moves this tends to `backlash`, a
+/// step that depends on the direction alone; moves shorter than w cause less. The joint remembers
+/// only the pose before. h is not negative: friction never takes a joint farther than commanded.
+/// Where the pose before is unknown, the effect is set to 0, its mean over both directions.
 class Hysteresis final : public ErrorSource {
  public:
   explicit Hysteresis(const SourceSpec& spec)

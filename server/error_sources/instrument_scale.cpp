@@ -10,12 +10,12 @@ namespace {
 constexpr double kReferenceTemperature = 20;  // degrees Celsius
 constexpr double kPartsPerMillion = 1e6;
 
-/// The instrument tells distances from itself too long: by a share of the distance, by a share that
-/// grows with the distance (its bend), and by one that grows with the temperature of the air: what
-/// it sees stands at p + e (p - p_0), e = scale + bend r + warm (T - 20), r = |p - p_0|. It is no
-/// error of the arm: nothing that is served has it. A scale alone is the same as an arm with all
-/// lengths longer that stands elsewhere: it is told by known lengths only, so by link geometry that
-/// is not among the error sources. Its bend and its temperature are its own.
+/// The instrument measures distances too long: by a constant share, by a share that grows with the
+/// distance (bend), and by a share that grows with the air temperature. A point at p appears at p +
+/// e (p - p_0), where e = scale + bend r + warm (T - 20) and r = |p - p_0|. The cause is not an
+/// error of the arm, so it does not act on requests. A pure scale equals an arm that is longer in
+/// all lengths and stands elsewhere. Only known lengths determine it: link geometry that is not
+/// among the error sources. Bend and temperature have no such imitator.
 class InstrumentScale final : public ErrorSource {
  public:
   explicit InstrumentScale(const Vector3& p_W) : p_W_(p_W) {}

@@ -7,7 +7,7 @@ namespace trammel {
 namespace {
 
 constexpr double kTypical =
-    2;  // mm, as of a base; where one is unknown its prior is widened as that of a base is
+    2;  // mm, as for a base; the prior of an unknown one is widened as that of a base is
 
 const CauseRecord& record() {
   static const CauseRecord of_instruments = {

@@ -17,9 +17,10 @@ inline constexpr std::string_view kInstrumentZero = "instrument_zero";
 [[nodiscard]] bool is_of_instruments(std::string_view spec);
 [[nodiscard]] bool is_of_instruments(const ErrorSource& source);
 
-/// `anchors`: `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) of each anchor whose place the cell file does
-/// not say, which is 0 until it is found. `instrument_zero`: `zero[ID]` (m) of each whose zero it
-/// does not say. Refuses what is neither.
+/// Makes one of two sources. `anchors` has `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) for each anchor
+/// whose place the cell file leaves open; they are 0 until they are identified. `instrument_zero`
+/// has `zero[ID]` (m) for each instrument whose zero the file leaves open. Refuses any other
+/// spelling.
 [[nodiscard]] Result<ErrorSourcePtr> make_instrument_source(const std::string& spec,
                                                             const Cell& cell);
 

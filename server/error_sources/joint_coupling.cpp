@@ -16,12 +16,11 @@ constexpr double kRatio =
 constexpr double kAmplitude =
     2e-4;  // rad, prior of a first harmonic: a tenth of a mm on a bar of half a metre
 
-/// A joint that is driven past another one: delta q = k u + f(u) + g(q + u) + h(q - u), u the other
-/// joint's angle, f, g and h short Fourier series. A belt or a shaft that runs around the other's
-/// axis makes k and f. A motor that stands before the other joint makes g, a parallelogram whose
-/// bars are not as drawn h, or the other way round: which of the two is the angle of motor or bars
-/// depends on how the controller counts. What depends on q alone is an angle error map, the
-/// constant is the joint's zero.
+/// The error of a joint that depends on another joint's angle u: delta q = k u + f(u) + g(q + u) +
+/// h(q - u), where f, g and h are short Fourier series. A belt or a shaft that runs around the
+/// other's axis makes k and f. A motor in front of the other joint makes g, and a parallelogram
+/// with wrong bar lengths makes h. Depending on how the controller counts the angles, g and h swap.
+/// Terms of q alone belong to an angle error map, and the constant is the joint's zero.
 class JointCoupling final : public JointError {
  public:
   JointCoupling(const SourceSpec& spec, int other)

@@ -5,8 +5,8 @@ namespace trammel {
 
 namespace {
 
-/// Every length of the arm grows with the temperature of its links, which follow the recorded one
-/// with a lag. What `thermal_growth` is where they follow at once.
+/// Every length of the arm grows with the temperature of its links, which follows the recorded
+/// temperature with a lag. Without a lag the cause is `thermal_growth`.
 class LaggedGrowth final : public ErrorSource {
  public:
   const CauseRecord& cause() const override { return causes::lagged_growth(); }

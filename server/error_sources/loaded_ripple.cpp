@@ -7,13 +7,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPrior = 5e-11;  // rad/Nmm: a twentieth of what a gearbox gives way
+constexpr double kPrior = 5e-11;  // rad/Nmm: a twentieth of a gearbox's compliance
 
-/// Teeth whose stiffness is not the same all the way around: the gearbox gives way to the torque on
-/// it by tau / k(q), and k(q) oscillates `order` times a turn of the joint, so delta q = tau (s
-/// sin(order q) + c cos(order q)). The ripple is as large as the torque and turns over with its
-/// sign. What is there without torque is `gear_transmission`, and the mean of 1/k is the joint's
-/// compliance.
+/// Teeth whose stiffness changes around the gear: the gearbox deflects under the torque by tau /
+/// k(q), where k(q) oscillates `order` times a turn of the joint. So delta q = tau (s sin(order q)
+/// + c cos(order q)). The ripple is proportional to the torque and changes sign with it. A ripple
+/// without torque is `gear_transmission`, and the mean of 1/k is the joint's compliance.
 class LoadedRipple final : public ErrorSource {
  public:
   LoadedRipple(const SourceSpec& spec, double range) : name_(spec.text), joint_(spec.joint) {

@@ -134,7 +134,7 @@ constexpr std::size_t kMostSources = 500;
 constexpr std::size_t kMostSpecBytes = 1000;
 constexpr std::size_t kMostParameters = 1300;  // their covariance has the square of it
 
-/// Refuses too many sources and spellings that are too long, before anything is made of them.
+/// Refuses too many sources and spellings that are too long, before any source is made.
 Status check_counts(const std::vector<std::string>& specs) {
   if (specs.size() > kMostSources)
     return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources)

@@ -50,7 +50,7 @@ class RackPitch final : public ErrorSource {
           fmt::format("{}{}", joint_ + 1, spec.at.size() > 1 ? fmt::format("_{}", k + 1) : "");
       const double pitch = from_mm(spec.at[k]);
       const double spread =
-          0.25 * pitch * pitch / travel;  // a quarter of what this travel resolves
+          0.25 * pitch * pitch / travel;  // a quarter of the bend that this travel resolves
       parameters_.push_back({"pitch" + which, "mm", to_mm(1), pitch, spread, pitch / 2, true});
       for (const char* wave : {"rack_sin", "rack_cos"})
         parameters_.push_back(length_parameter(wave + which, kPriorMm));
@@ -87,11 +87,11 @@ class RackPitch final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// A rail that is not straight: the carriage stands beside the line by smooth functions x(s) and
-/// y(s) of its place, and turns as the rail does there: about y by x'(s), about x by -y'(s). It
-/// rolls about the rail by w(s). All are sums of Chebyshev polynomials over the rail's limits.
-/// Constant and straight parts of x and y are where the rail lies, and the constant of the roll is
-/// how the arm stands on it: base and geometry.
+/// A rail that is not straight. The carriage deviates from the line by smooth functions x(s) and
+/// y(s) of its position, and turns with the rail: about y by x'(s), about x by -y'(s). It rolls
+/// about the rail by w(s). All three are sums of Chebyshev polynomials over the rail's limits.
+/// Constant and straight parts of x and y belong to the place of the rail, and the constant of the
+/// roll to the mounting of the arm: base and geometry have these.
 class RailStraightness final : public ErrorSource {
  public:
   RailStraightness(const SourceSpec& spec, const Joint& joint)

@@ -27,10 +27,10 @@ bool is_felt(const Cell& cell, int i) {
   return std::abs(axis.dot(cell.gravity_W)) < kVertical;
 }
 
-/// The weight of the links, told by no data sheet. Joint j feels z_j . (sum over i >= j of b_i) x
-/// g, b_i the first moment of all that link i carries as one piece. Of b_i the part along its own
-/// axis belongs to the link before, so two numbers a link are left: they are all that torques show.
-/// The poses show torques through compliances alone.
+/// The weight of the links, without a data sheet. Joint j feels the torque z_j . (sum over i >= j
+/// of b_i) x g, where b_i is the first moment of everything that link i carries as one piece. The
+/// part of b_i along its own axis belongs to the link before. So each link keeps two numbers, which
+/// are all that torques show. The poses show torques through compliances only.
 class LinkWeights final : public ErrorSource {
  public:
   explicit LinkWeights(const Cell& cell) {

@@ -2,8 +2,8 @@
 
 #include "server/error_sources/cause.h"
 
-/// One line a cause, in the order in which diagnosis looks for them; causes of a joint that follow
-/// one another are looked for joint by joint.
+/// One line per cause, in the order in which diagnosis looks for them. Consecutive causes of a
+/// joint are looked for joint by joint.
 #define TRAMMEL_SHIPPED_CAUSES(CAUSE) \
   CAUSE(base)                         \
   CAUSE(geometry)                     \

@@ -13,8 +13,8 @@ namespace trammel {
 /// where `cell` carries anything. All other specs stand for themselves.
 [[nodiscard]] std::vector<std::string> alternatives(const std::string& spec, const Cell& cell);
 
-/// The source that `spec` names for this cell, in its usual form: a cause, `:joint` (1-based) where
-/// it concerns one, and `@numbers` joined by `+` where more must be said
+/// Makes the source that `spec` names for this cell, in its usual form. A spelling is a cause, then
+/// `:joint` (1-based) if it belongs to one joint, then `@numbers` joined by `+` if it has numbers
 /// (`gear_transmission:3@48+97`, `tracker_moved@120`). Refuses an unknown name, joint or number. A
 /// former name is read as the present one.
 [[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
@@ -27,14 +27,14 @@ namespace trammel {
 /// loaded posture last.
 [[nodiscard]] bool acts_before(const ErrorSource& one, const ErrorSource& other);
 
-/// Spellings of everything that an error source describes, a cause with several forms by each of
-/// them, in the order in which they act.
+/// Spellings of all causes that an error source describes, in the order in which they act. A cause
+/// with several forms appears once for each form.
 [[nodiscard]] std::vector<std::string> known_causes();
 
 /// Expands a level into source names: `M0`..`M3`, a list, or a level and more:
 /// `M2,gear_transmission:3`.
 [[nodiscard]] Result<std::vector<std::string>> parse_level(const std::string& level);
-/// Its inverse: what parse_level() reads as these sources; `M0` where there are none.
+/// The inverse of parse_level(): the level that names these sources; `M0` for none.
 [[nodiscard]] std::string level_of(const std::vector<std::string>& sources);
 /// The sources of level M3, which a bias is told of in any case.
 [[nodiscard]] std::vector<std::string> standard_sources();
@@ -43,12 +43,12 @@ namespace trammel {
 /// `compliance_linear`; joints and what begins at a pose apart.
 [[nodiscard]] bool are_forms_of_one(const std::string& source, const std::string& other);
 
-/// `source` as `list` has it: by its cause where that is listed and `source` is one of its forms;
-/// else as it is.
+/// `source` in the spelling of `list`: the cause's name if `list` has it and `source` is one of its
+/// forms; otherwise unchanged.
 [[nodiscard]] std::string as_listed(const std::string& source,
                                     const std::vector<std::string>& list);
 
-/// True if one of these sources corrects that part of the nominal cell.
+/// True if one of these sources corrects `part` of the nominal cell.
 [[nodiscard]] bool corrects(const std::vector<std::string>& sources, causes::Part part);
 
 /// For people: `gear ripple in joint 3` for `gear_transmission:3@48`, `link geometry (d6)` for

@@ -52,9 +52,9 @@ class Tool final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// From a pose on, a tool sits elsewhere on the flange: it was changed, or knocked. `tool` is its
-/// name; empty: any. With a third number only up to that pose: the tool, or the reflector on it,
-/// was put back, and no request is served so.
+/// From a pose on, a tool sits elsewhere on the flange, because it was changed or knocked. `tool`
+/// is its name; empty: any tool. With a third number the change ends at that pose, when the tool,
+/// or the reflector on it, was put back; then it does not act on requests.
 class ToolChanged final : public ErrorSource {
  public:
   ToolChanged(const SourceSpec& spec, std::string tool)

@@ -16,7 +16,7 @@ struct Warming {
   double by_lag = 0;  ///< K/s, its derivative by the time constant
 };
 /// The warmth of a part with the time constant `lag` (s). Where the history of the temperature is
-/// unknown it is as warm as the thermometer says; empty without a temperature.
+/// unknown, the part is as warm as the thermometer. Empty without a temperature.
 [[nodiscard]] std::optional<Warming> warming_at(const PoseContext& context, double lag);
 
 }  // namespace trammel

@@ -14,7 +14,7 @@ class AlignedMatrix {
   AlignedMatrix(Eigen::Index rows, Eigen::Index cols);
 
   [[nodiscard]] AlignedMatrix copy() const;
-  /// Gives back the memory of the columns from `col` on; what they hold is undefined afterwards.
+  /// Frees the memory of the columns from `col` on; their contents are undefined afterwards.
   void forget_columns_from(Eigen::Index col);
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
   [[nodiscard]] Eigen::Index cols() const { return cols_; }

@@ -7,7 +7,7 @@ namespace trammel {
 namespace {
 
 constexpr double kSufficientDecrease =
-    1e-4;  // of what the slope promises: Nocedal & Wright, section 3.1
+    1e-4;  // share of the decrease that the slope predicts: Nocedal & Wright, section 3.1
 constexpr double kLeastCurvature =
     1e-10;  // cosine of step and change of gradient: below it is rounding
 constexpr double kLeastDecrease =

@@ -27,7 +27,7 @@ struct BfgsResult {
   Eigen::MatrixXd inverse_hessian;  ///< the approximation at x
   int evaluations = 0;
   bool defined =
-      false;  ///< false: the function is not defined at the start, and nothing else is set
+      false;  ///< false: the function is undefined at the start, and no other member is set
   bool converged = false;  ///< the tolerance was met within the evaluations allowed
 };
 

@@ -18,8 +18,8 @@ class InverseRoot {
   /// Row i: i + 1 entries.
   [[nodiscard]] Eigen::Map<const Eigen::VectorXd> row(Eigen::Index i) const;
 
-  /// Adds a point with this covariance with the others and this variance; returns the new last row.
-  /// Empty, and nothing changed, where M would no longer be positive definite.
+  /// Adds a point, given its variance and its covariance with the others; returns the new last row.
+  /// Empty, without any change, if M would no longer be positive definite.
   [[nodiscard]] std::optional<Eigen::VectorXd> append(const Eigen::VectorXd& covariance,
                                                       double variance);
 

@@ -5,11 +5,11 @@
 /// The functions of one build: the inner loops of learning and of diagnosis, on raw column-major
 /// arrays.
 ///
-/// Each instruction set has a build of its own, one source file in `builds/` that includes the
-/// loops behind a target pragma. No build may use Eigen or a standard template. Their inline
-/// functions have external linkage: the linker would keep one copy for the whole program, perhaps
-/// the AVX-512 one, and the program would die on an older processor. Raw pointers and an unnamed
-/// namespace make that impossible.
+/// Each instruction set has a build of its own: one source file in `builds/` that includes the
+/// loops behind a target pragma. No build may use Eigen or a standard template, because their
+/// inline functions have external linkage. The linker would keep one copy for the whole program,
+/// perhaps the AVX-512 one, and the program would die on an older processor. Raw pointers and an
+/// unnamed namespace prevent that.
 namespace trammel {
 
 /// Covariance as a function of h = r²/2, r the scaled distance.

@@ -13,8 +13,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr Index kPanel =
-    32;  // columns of a triangle that are computed together, what lies beyond it included
+constexpr Index kPanel = 32;  // columns of a triangle that are computed together, including the
+                              // entries outside the triangle
 
 }  // namespace
 

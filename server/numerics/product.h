@@ -18,8 +18,8 @@ namespace trammel {
 [[nodiscard]] Eigen::MatrixXd times_lower_transposed(const Eigen::MatrixXd& a,
                                                      const Eigen::MatrixXd& l);
 
-/// L⁻¹, lower triangular with zeros above, of a symmetric m = L Lᵀ, of which the lower triangle is
-/// read. Empty where m is not positive definite.
+/// L⁻¹, lower triangular with zeros above, of a symmetric m = L Lᵀ. Reads the lower triangle of m
+/// only. Empty where m is not positive definite.
 [[nodiscard]] std::optional<Eigen::MatrixXd> inverse_factor(const Eigen::MatrixXd& m);
 
 }  // namespace trammel

@@ -7,9 +7,9 @@
 
 namespace trammel {
 
-/// The commanded joints of a six-axis arm whose links stand at `theta` (rad): each turned to the
-/// value nearest to `near` (zero when absent) that its limits allow; where they allow none, the
-/// nearest of all.
+/// The commanded joints of a six-axis arm whose links stand at `theta` (rad). Each joint takes the
+/// turn nearest to `near` (zero when absent) among those that its limits allow. If the limits allow
+/// none, it takes the nearest of all turns.
 [[nodiscard]] JointVector joints_of_angles(const Chain& chain, const std::array<double, 6>& theta,
                                            const std::optional<JointVector>& near);
 

@@ -7,7 +7,7 @@
 #include "server/robot/chain.h"
 #include "server/robot/pose.h"
 
-/// The state of the arm at one pose, and the derivative of the tool pose by every number of that
+/// The state of the arm at one pose, and the derivative of the tool pose by each number of the
 /// state.
 namespace trammel {
 
@@ -18,9 +18,9 @@ struct Payload {
 
 constexpr double kGravity = 9.80665;  // m/s^2
 
-/// kg m, of each link: first moment of everything that it carries as one piece, about its joint's
-/// axis. Along x of the link, and along z x x, z the joint's axis. Without columns: nothing but the
-/// payload and the links' told masses.
+/// kg m, one column per link: the first moment, about the joint's axis, of everything that the link
+/// carries as one piece. Row 0 is along x of the link, row 1 along z x x, where z is the joint's
+/// axis. No columns: only the payload and the stated masses of the links have weight.
 using FirstMoments = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxJoints>;
 
 /// The state that the error sources change, one after the other: nominal at first, the real arm at
@@ -98,8 +98,8 @@ class StateJacobian {
   /// Records that the parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per
   /// unit.
   void add_to_joint(int joint, int column, double rate);
-  /// Records that every change of the state so far also changes the numbers in `rows`, by
-  /// `by_state` (one row for each of `rows`, one column for each of StateRows).
+  /// Records that all changes of the state so far also change the numbers in `rows`. `by_state` is
+  /// the derivative (one row for each of `rows`, one column for each of StateRows).
   void pass_on(std::vector<int> rows, Eigen::MatrixXd by_state);
   /// Records that every change of the state so far also moves `joint` (as ArmState::add_to_joint),
   /// by `by_state`.
@@ -138,16 +138,16 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: torque of all weights on the gear of each joint, Nm (for a prismatic joint the force along
-  /// it, N), and of the springs. It is the moment about the joint's axis, less what bars take over
-  /// (Chain::bars). The weights are the payload's and, if the robot file gives them, the links',
-  /// each at its centre of gravity (the physical wrench), and those that the links' first moments
-  /// stand for, which push no prismatic joint. Eq. (3.6) without C and the outer J.
+  /// n: the torque on the gear of each joint, Nm, from all weights and springs (for a prismatic
+  /// joint the force along it, N). It is the moment about the joint's axis, less the part that bars
+  /// take over (Chain::bars). The weights are the payload and, if the robot file gives them, the
+  /// links, each at its centre of gravity (the physical wrench). The links' first moments add their
+  /// weights, which push no prismatic joint. Eq. (3.6) without C and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
-  /// Moment of all weights about the origin of B, Nm in W. Of first moments without what lies along
-  /// the first axis.
+  /// Moment of all weights about the origin of B, Nm in W. First moments contribute all but their
+  /// part along the first axis.
   [[nodiscard]] Vector3 base_moment() const;
   /// Derivative of base_moment().
   [[nodiscard]] StateMatrix<3> base_moment_jacobian() const;
@@ -184,7 +184,7 @@ class ArmKinematics {
     Vector3 moment, x, y;
   };
   using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
-  /// One column per link row: the velocity in W of `point`, fixed to what is downstream of the
+  /// One column per link row: the velocity in W of `point`, a point fixed to the parts beyond that
   /// link.
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
   /// One column per link row: the rotation of everything downstream of the link.

@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-/// Branches (conf) that would reach a target, at the end of the message that says why its own does
-/// not: `joint 5 would be at 121.3 deg, limit 120; conf 1, 3 or 7 would reach it`. On the wire and
-/// in files they stand nowhere else, so this form is written and read here alone.
+/// The hint that ends the message of an unreachable target: it lists the branches (conf) that would
+/// reach the target. `joint 5 would be at 121.3 deg, limit 120; conf 1, 3 or 7 would reach it`. The
+/// wire and files carry the branches only in this form, so it is written and read here alone.
 namespace trammel {
 
 /// A message taken apart. Without branches `before` is all of it.

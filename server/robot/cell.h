@@ -29,15 +29,15 @@ inline constexpr std::string_view kAutoSources = "auto";
 /// `geometry`, `gear_transmission:3`.
 struct ModelSpec {
   std::vector<std::string> error_sources = {"base", "geometry", "compliance"};
-  /// Set where the cell file says `auto`: what it names beside it. A training keeps these, adds
-  /// what the measurements ask for, and does not keep to error_sources, which are these or, where
-  /// there are none, the usual ones.
+  /// The sources that the cell file names beside `auto`; set only where it says `auto`. A training
+  /// keeps these and adds the sources that the measurements ask for. It then ignores error_sources,
+  /// which holds these or, if there are none, the usual ones.
   std::optional<std::vector<std::string>> beside_auto;
   std::string bias = "se";
 };
 
-/// Which of a cell's batches a training by the service takes: those that it was trained from
-/// before, and its own.
+/// The rule by which a training by the service takes batches: its own, and some or all of those
+/// from which the cell was trained before.
 struct SessionRule {
   enum class Kind { kAll, kLast, kDays };
   Kind kind = Kind::kAll;

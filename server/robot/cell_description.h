@@ -6,9 +6,9 @@
 
 namespace trammel {
 
-/// The marks that tell two descriptions of a cell apart: hashes of what its two files say that
-/// decides numbers. The order of keys, how a number is spelled, comments, where the robot file lies
-/// and what is written for people only do not count.
+/// Marks by which two descriptions of a cell are compared: hashes of the contents of its two files,
+/// as far as they decide numbers. Not counted are the order of keys, the spelling of numbers,
+/// comments, the path of the robot file, and texts for people only.
 struct CellDescription {
   std::string cell, robot;  ///< 32 hex digits each
   bool operator==(const CellDescription&) const = default;

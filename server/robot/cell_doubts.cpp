@@ -8,9 +8,11 @@ namespace trammel {
 
 namespace {
 
-const double kUpright = std::cos(from_deg(1));  // of a base that stands as installers set it
+const double kUpright = std::cos(from_deg(1));  // a base within 1 degree of upright counts as
+                                                // installed upright
 const double kTilted = std::cos(from_deg(5));
-constexpr double kShort = 2e-3;  // m: what numbers in metres look like where mm belong
+constexpr double kShort = 2e-3;  // m: an offset shorter than this looks like metres written where
+                                 // mm belong
 constexpr double kParallel = 1e-3;
 
 void doubt_gravity(const Cell& cell, std::vector<CellDoubt>& doubts) {

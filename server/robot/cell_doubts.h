@@ -14,15 +14,15 @@ struct CellDoubt {
   bool of_robot_file = false;  ///< else of the cell file
 };
 
-/// Joints (0-based) whose axis is parallel to the next one, and whose row of the robot file is no
-/// Hayati row: the model has no number for the tilt of the one axis against the other, and d of one
-/// is not told from d of the other.
+/// Joints (0-based) whose axis is parallel to the next one, but whose row in the robot file is not
+/// a Hayati row. For such a pair the model has no number for the tilt between the two axes, and it
+/// cannot separate the two values of d.
 [[nodiscard]] std::vector<int> rows_without_hayati(const Chain& robot);
 
-/// The doubts about the files before any measurement: gravity that points up over an upright
-/// base; a quaternion that would put the base upright in the order x, y, z, w; a tool, a payload's
-/// centre or a base that is less than 2 mm away, as numbers in metres are; two consecutive parallel
-/// axes without `hayati: true`, whose d nobody can tell apart (Hayati, 1983).
+/// The doubts about the files before any measurement. They are: gravity that points up over an
+/// upright base; a quaternion that would put the base upright in the order x, y, z, w; a tool, a
+/// payload's centre or a base closer than 2 mm, as if given in metres; two consecutive parallel
+/// axes without `hayati: true`, whose two values of d cannot be separated (Hayati, 1983).
 [[nodiscard]] std::vector<CellDoubt> doubts_of(const Cell& cell);
 
 }  // namespace trammel

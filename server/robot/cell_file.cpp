@@ -261,7 +261,7 @@ bool says_auto(const YamlMap& model) {
   }
 }
 
-/// The measurements choose the sources beside those that are named, and the bias.
+/// Lets the measurements choose the bias and the sources beside the named ones.
 void leave_to_data(std::vector<std::string> named, ModelSpec& spec) {
   if (!named.empty()) spec.error_sources = named;
   spec.beside_auto = std::move(named);
@@ -336,8 +336,8 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
   });
 }
 
-/// An axis that carries the robot is one of its joints, so that there is one thing to say of the
-/// others.
+/// Reads the axes that carry neither robot nor part. An axis that carries the robot is one of its
+/// joints.
 std::vector<std::string> read_idle_axes(const YamlMap& axes) {
   std::vector<std::string> names = axes.keys();
   for (const std::string& name : names) {

@@ -13,10 +13,10 @@ namespace trammel {
 struct CellRules {
   std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
   bool fleet_prior =
-      false;  ///< robots of its type that were trained before say what to expect of it
+      false;  ///< false: no prior is taken from robots of this type that were trained before
   bool controller_compensates =
       false;  ///< the controller corrects errors of its own; batches were measured so
-  /// External axes that carry neither robot nor part, by the names that programs have for them.
+  /// External axes that carry neither the robot nor the part, by their names in robot programs.
   std::vector<std::string> idle_axes = {};
 };
 /// As the cell file says; nothing is demanded of a cell without one.

@@ -45,7 +45,8 @@ struct Joint {
   std::optional<double> max_speed;  ///< rad/s (m/s)
 };
 
-/// Who lets a joint follow another one: server/robot/README.md says what that means for gears.
+/// The part that makes a joint follow another one; server/robot/README.md explains the effect on
+/// the gears.
 enum class CouplingKind {
   kController,  ///< the controller's way of counting; the arm is serial, each gear sits between two
                 ///< links
@@ -69,8 +70,9 @@ struct Coupling {
 class Chain {
  public:
   Chain() = default;
-  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit (but 0 to 0: a passive
-  /// joint, passive_joint.h), a coupling of a joint that does not exist or with itself.
+  /// Refuses a chain without joints or with more than kMaxJoints, an empty or reversed limit
+  /// (except 0 to 0, a passive joint, see passive_joint.h), and a coupling with a missing joint or
+  /// with itself.
   [[nodiscard]] static Result<Chain> make(std::string name, std::vector<Joint> joints,
                                           std::vector<Coupling> couplings = {});
 
@@ -82,8 +84,8 @@ class Chain {
   [[nodiscard]] const Eigen::MatrixXd& transmission() const { return transmission_; }
   /// n x n: d(kinematic joint value)/d(gear angle): signs, and what bars couple.
   [[nodiscard]] const Eigen::MatrixXd& drive() const { return drive_; }
-  /// n x n: drive() of gears that are counted as their axes turn. What a gear gives way moves the
-  /// joints by it; its transpose makes the torques on the gears of those about the axes.
+  /// n x n: drive() for gears that are counted as their axes turn. It maps the deflections of the
+  /// gears to the joints; its transpose maps torques about the axes to torques on the gears.
   [[nodiscard]] const Eigen::MatrixXd& bars() const { return bars_; }
   /// True if bars couple joints: else bars() is the identity.
   [[nodiscard]] bool has_bars() const { return has_bars_; }

@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// Where the flange of a nominal chain is, and how it moves.
+/// The pose of the flange of a nominal chain, and its velocities.
 struct FlangeMotion {
   Pose X_BF;
   /// 6 x n: as Chain::jacobian() of the flange's origin.

@@ -23,8 +23,9 @@ struct Anchor {
       Vector3::UnitZ();  ///< unit vector: normal of the plane, away from its body; axis of the ring
   double radius = 0;     ///< m, of sphere or ring
   std::optional<double> sigma;  ///< m, of one value of this instrument
-  std::optional<double> zero;   ///< m: what it tells too much; empty: it is looked for
-  bool zero_open = false;  ///< it is unknown for certain; else the data decide whether there is one
+  std::optional<double> zero;   ///< m: the offset of the readings; empty: calibration identifies it
+  bool zero_open = false;  ///< true: the zero is certainly unknown; false: the data decide whether
+                           ///< there is one
 };
 /// By their ids.
 using Anchors = std::map<std::string, Anchor>;

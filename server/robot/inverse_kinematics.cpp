@@ -181,9 +181,9 @@ std::optional<std::array<double, 6>> branch(const Chain& chain, const Pose& X_BF
   const double cosine =
       (p.x() * p.x() + p.y() * p.y() - upper * upper - fore * fore) / (2 * upper * fore);
   if (std::abs(cosine) > 1) return std::nullopt;
-  // There are two elbows. The sign of the sine tells in which one the wrist lies in front of the
-  // lower arm. It depends on the orientation of frame 1 and on the side of axis 1 on which the arm
-  // works.
+  // There are two elbows. The sign of this sine selects the one with the wrist in front of the
+  // lower arm. The sign depends on the orientation of frame 1 and on the side of axis 1 on which
+  // the arm works.
   const double forward =
       (R_B1.transpose() * Vector3(std::cos(theta[0]), std::sin(theta[0]), 0)).x() *
       (std::sin(link(0).alpha) < 0 ? 1.0 : -1.0);

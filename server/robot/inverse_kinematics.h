@@ -28,8 +28,7 @@ struct InverseResult {
 [[nodiscard]] InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF,
                                                const JointVector& seed);
 
-/// The status of joints that bring the flange to where it is wanted: kOk, kJointLimit or
-/// kSingular, as above.
+/// Judges joints that bring the flange to its target: kOk, kJointLimit or kSingular, as above.
 [[nodiscard]] InverseResult judged_joints(const Chain& chain, const JointVector& q, int iterations);
 
 /// True when the chain is an elbow arm with a spherical wrist (axes 2 and 3 parallel, axes 4, 5, 6

@@ -13,7 +13,7 @@ namespace trammel {
 namespace {
 
 constexpr double kTolerance = 1e-9;  // m; of a sine or cosine
-constexpr double kReach = 1e-9;  // by how much a cosine may exceed 1 at the edge of the workspace
+constexpr double kReach = 1e-9;  // a cosine may exceed 1 by this much at the edge of the workspace
 
 Matrix3 about_x(double angle) {
   return Eigen::AngleAxisd(angle, Vector3::UnitX()).toRotationMatrix();

@@ -4,8 +4,8 @@
 
 #include "server/robot/chain.h"
 
-/// Arms whose axes 2, 3 and 4 are parallel and whose wrist axes do not meet, as Universal Robots
-/// builds them: their inverse kinematics has a closed form too.
+/// Closed-form inverse kinematics of arms as Universal Robots builds them: axes 2, 3 and 4 are
+/// parallel, and the wrist axes do not meet.
 namespace trammel {
 
 [[nodiscard]] bool has_offset_wrist(const Chain& chain);

@@ -22,14 +22,14 @@ struct PoseContext {
   std::vector<int>
       direction;  ///< approach side of each joint's gear, -1, 0, +1; empty: not recorded
   std::optional<JointVector>
-      before;  ///< joints of the pose that the robot came from, size n; where that is known
+      before;  ///< the previous joint vector, size n; empty where it is unknown
   std::vector<double>
       lagged;  ///< degrees Celsius, as bodies feel it that follow by kHeatLags; empty: unknown
   std::string tool;     ///< id in the cell file
   std::string payload;  ///< id in the cell file
   int index = 0;        ///< position in its batch, for effects that begin at a pose
-  bool served = false;  ///< of a request, not measured: later than every pose of the batch, and
-                        ///< without its tracker
+  bool served = false;  ///< true for a request: it is later than every pose of the batch and has no
+                        ///< tracker
 
   /// True from the pose with index `first` on, and for every served pose.
   [[nodiscard]] bool from(int first) const { return served || index >= first; }

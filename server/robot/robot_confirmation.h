@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// That the robot file of a cell was compared with its controller, as the cell file says it under
-/// `robot_confirmed`.
+/// The record, under `robot_confirmed` in the cell file, that the robot file was compared with the
+/// controller.
 struct RobotConfirmation {
   std::string robot_sha256;  ///< of the robot file that was compared; another text is another robot
   int poses = 0;             ///< that the controller showed
@@ -18,7 +18,7 @@ struct RobotConfirmation {
   std::string day;             ///< 2026-11-26
 };
 
-/// The confirmation in the cell file; empty where it says nothing, or where the robot file changed
+/// The confirmation in the cell file. Empty if the file has none, or if the robot file has changed
 /// since.
 [[nodiscard]] std::optional<RobotConfirmation> confirmation_of(const Cell& cell);
 

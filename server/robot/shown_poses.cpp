@@ -11,7 +11,8 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kFewest = 3;             // poses
-constexpr double kPositionSlack = 0.02e-3;     // m, beside rounding: what controllers compute with
+constexpr double kPositionSlack = 0.02e-3;     // m, beside rounding: the precision with which
+                                               // controllers compute
 const double kRotationSlack = from_deg(0.02);  // rad
 constexpr double kCoarsest = 0.5e-3;           // m: joints that are rounded to more show nothing
 const double kMoved =
@@ -55,7 +56,7 @@ Rounding rounding(const Chain& robot, const ShownPoses& shown) {
   return rounding;
 }
 
-/// The frame in which poses are shown, and the tool that they are of.
+/// The frame in which poses are shown, and the tool to which they belong.
 struct Frames {
   std::string name;
   Pose X_SB = Pose::Identity();  // S: the frame in which the controller shows them
@@ -75,9 +76,10 @@ std::vector<Frames> known_frames(const Cell& cell) {
   return all;
 }
 
-/// The distance of one arm from what is shown.
+/// The misfit between one arm and the shown poses.
 struct Distance {
-  double worst = 0;  // of what the rounding allows; up to 1 it explains all
+  double worst = 0;  // largest misfit over the misfit that rounding allows; up to 1 the arm
+                     // explains all poses
   double position_rms = 0, position_max = 0, rotation_rms = 0, rotation_max = 0, position_limit = 0;
 };
 
@@ -88,7 +90,7 @@ class Comparison {
     for (std::size_t i = 0; i < shown.q.size(); ++i) limits_.push_back(limits_at(robot, i));
   }
 
-  /// The residuals of `robot`, in units of what the rounding allows: positions, then rotations.
+  /// The residuals of `robot`, in units of the rounding: positions, then rotations.
   [[nodiscard]] Eigen::VectorXd residuals(const Chain& robot, const Frames& frames,
                                           const std::vector<Matrix3>* R) const {
     const auto n = static_cast<Eigen::Index>(shown_.q.size());
@@ -139,7 +141,7 @@ class Comparison {
   std::vector<std::pair<double, double>> limits_;
 };
 
-/// One way to take what is shown, and how far the robot is from it.
+/// One interpretation of the shown poses, and the robot's misfit under it.
 struct Reading {
   Frames frames;
   const ShownPoses::Orientations* orientations = nullptr;
@@ -240,7 +242,8 @@ Chain changed(const Chain& robot, const std::vector<FileNumber>& numbers,
   return Chain::make(robot.name(), std::move(joints), robot.couplings()).value_or(robot);
 }
 
-/// Gauss-Newton over the numbers; of those that the poses do not tell apart, the shortest change.
+/// Gauss-Newton over the numbers. Among changes that the poses do not distinguish it takes the
+/// shortest.
 Eigen::VectorXd fitted(const Chain& robot, const std::vector<FileNumber>& numbers,
                        const Reading& reading, const Comparison& comparison) {
   constexpr int kSteps = 12;

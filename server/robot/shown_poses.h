@@ -35,18 +35,19 @@ struct RobotComparison {
   int poses = 0;
   double position_rms = 0, position_max = 0;  ///< m, between shown and computed
   double rotation_rms = 0, rotation_max = 0;  ///< rad; 0 where no orientation is shown
-  double position_limit = 0;  ///< m: what the rounding of what is shown explains, at the worst pose
+  double position_limit = 0;  ///< m: the largest error that rounding of the shown numbers explains,
+                              ///< at the worst pose
   std::string shown_as;  ///< `the flange in the robot's base`, `tool spindle in the cell's base`
   std::string angles;    ///< how the orientation was read
-  std::vector<std::string>
-      could_be;  ///< what would make the file's arm the controller's, the likeliest first
+  std::vector<std::string> could_be;  ///< changes that would turn the file's arm into the
+                                      ///< controller's, the likeliest first
 };
 [[nodiscard]] const char* to_text(RobotComparison::Verdict verdict);
 
-/// Compares. The poses may be shown of the flange or of a tool of the cell, in the robot's base or
-/// in the cell's. Where none of these fits but a base and a tool of the controller's own would, it
-/// cannot tell: they hide the first and the last length. Refuses fewer than 3 poses and another
-/// number of joints than the robot's.
+/// Compares. The poses may belong to the flange or to a tool of the cell, in the robot's base or in
+/// the cell's. If only a base and a tool of the controller's own would fit, the comparison cannot
+/// tell, since these hide errors of the first and the last length. Refuses fewer than 3 poses, and
+/// a number of joints other than the robot's.
 [[nodiscard]] Result<RobotComparison> compare_robot(const Cell& cell, const ShownPoses& shown);
 
 }  // namespace trammel

@@ -4,8 +4,8 @@
 
 #include "server/robot/chain.h"
 
-/// The wrist of an arm near the pose where its last but one axis lets two others become parallel:
-/// there the flange cannot turn about every direction, and small turns need large motions of the
+/// The wrist of an arm near the pose at which its last but one axis makes two others parallel.
+/// There the flange cannot turn about every direction, and small turns need large motions of the
 /// joints.
 namespace trammel {
 
@@ -13,13 +13,13 @@ struct WristOpening {
   double angle =
       0;  ///< rad, in [-pi/2, pi/2]; 0 where the two axes are parallel. Its sign tells the branch
   JointVector by_joint;  ///< derivative of `angle` by each commanded joint
-  JointVector idle;      ///< unit vector: where `angle` is 0, this motion of the joints leaves the
-                         ///< flange where it is
+  JointVector idle;  ///< unit vector: at `angle` = 0 this motion of the joints leaves the flange at
+                     ///< rest
 };
 
-/// Empty where the wrist is open wider than `widest` (rad), for an arm that has not six turning
-/// joints whose axes 4 and 5, 5 and 6 meet or cross at right angles (rails aside), and where other
-/// joints are singular at the same time.
+/// Empty where the wrist is open wider than `widest` (rad), and where other joints are singular at
+/// the same time. Empty also for an arm, rails aside, that has not six turning joints whose axes 4
+/// and 5, and 5 and 6, meet or cross at right angles.
 [[nodiscard]] std::optional<WristOpening> wrist_opening(const Chain& chain, const JointVector& q,
                                                         double widest);
 

@@ -10,18 +10,19 @@ struct TriedCause {
   std::vector<std::string> sources;  ///< as they are spelled: `joint_map:2`
   double held_out_before =
       0;                      ///< m, rms of positions that were left out, with the causes before it
-  double held_out_after = 0;  ///< m, the same with this cause
-  double gain = 0;     ///< nat: how much likelier the batch is with it, beside those taken before
-  double freedom = 0;  ///< how many of its numbers the batch tells
+  double held_out_after = 0;  ///< m, held-out error with this cause
+  double gain = 0;     ///< nat: the rise of the log likelihood by this cause, beside the ones taken
+                       ///< before
+  double freedom = 0;  ///< the number of its parameters that the batch determines
   bool taken = false;
   std::string why;  ///< for people, one clause
 
-  /// The poses do not show it; how far blocks are missed with it was not asked.
+  /// The poses do not show the cause; the held-out error with it was not computed.
   [[nodiscard]] bool not_shown() const { return !taken && held_out_after == held_out_before; }
 };
 
-/// The causes that a training with `error_sources: auto` tried, in their order: loads and what
-/// gives way under them, then the largest gain first.
+/// The causes that a training with `error_sources: auto` tried, in the order of the trials: first
+/// loads with the compliances that they act on, then by falling gain.
 struct CauseChoice {
   double held_out = 0;  ///< m, with all that was taken
   std::vector<TriedCause> tried;

@@ -123,8 +123,8 @@ void CauseEvidence::weigh_all() {
   }
 }
 
-/// The noise under which the groups that are free leave what they are expected to leave (MacKay
-/// 1992).
+/// Sets the noise at which the residuals are as large as expected with the free groups fitted
+/// (MacKay 1992).
 void CauseEvidence::learn_precision() {
   const auto P = static_cast<Index>(free_.size());
   std::array<LinearEquations, 2> kinds;

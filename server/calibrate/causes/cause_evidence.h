@@ -14,10 +14,10 @@ struct ColumnGroup {
   Eigen::Index count = 0;
 };
 
-/// The evidence that groups of parameters make a batch likelier, one after the other, about the
-/// present values of a model (README.md). Each parameter is normal about its present value, with
-/// standard deviation 1 in units of its scale. The noise is what the groups that are free leave, no
-/// less than the stated sigmas. First order throughout.
+/// The evidence that groups of parameters add to a batch, one group after the other, linearised at
+/// the present values of a model (README.md). Each parameter has a normal prior about its present
+/// value, with standard deviation 1 in units of its scale. The noise is estimated from the
+/// residuals with the free groups fitted, and is at least the stated sigmas.
 class CauseEvidence {
  public:
   /// `blocks`: the rows of the batch, a part each. `present`: the groups that are free to begin
@@ -27,8 +27,8 @@ class CauseEvidence {
                 const std::vector<ColumnGroup>& present);
 
   struct Gain {
-    double nat = 0;      ///< how much likelier the batch is with the group free, too
-    double freedom = 0;  ///< how many of its numbers the batch tells
+    double nat = 0;      ///< the rise of the log evidence when this group is free, too
+    double freedom = 0;  ///< the number of its parameters that the batch determines
   };
   /// Beside the groups that are free.
   [[nodiscard]] Gain gain_of(const ColumnGroup& group) const;
@@ -53,7 +53,7 @@ class CauseEvidence {
   Eigen::Vector2d precision_ = Eigen::Vector2d::Ones();  // of each kind: times 1/sigma²
   Eigen::Vector2d most_precision_ = Eigen::Vector2d::Ones();
   std::vector<Eigen::Index> free_;
-  // Curvature and slope of all columns, with those that are free integrated out.
+  // Curvature and slope of all columns, with the free ones integrated out.
   Eigen::MatrixXd curvature_;
   Eigen::VectorXd downhill_;
 };

@@ -42,8 +42,8 @@ std::vector<std::string> always_identified(const Cell& cell, const std::vector<s
   return with_unknown_tool(std::move(specs), cell);
 }
 
-/// The cause that makes this one show, if it is a load on what gives way: neither is linear without
-/// the other.
+/// The compliance that a load needs in order to show; null for other causes. Neither of the two is
+/// linear without the other.
 const CauseRecord* gives_way_under(const CauseRecord& record) {
   if (!record.added_by_data) return nullptr;
   const CauseRecord& beside = cause_spelled(record.added_by_data->beside);
@@ -140,7 +140,7 @@ class CauseSearch {
     base_ = std::move(*loaded);
   }
 
-  /// Adds the cause to the table; whether it is taken.
+  /// Adds the cause to the table; returns true if it is taken.
   bool judged(TriedCause tried) {
     const bool shown = tried.gain > worth_;
     tried.taken = shown && tried.held_out_after < tried.held_out_before;
@@ -193,7 +193,7 @@ class CauseSearch {
     candidates_.push_back({named, (*source)->name()});
   }
 
-  /// The largest gain first, each beside those that were taken before it.
+  /// Tries the remaining causes by falling gain, each beside those taken before it.
   void try_others() {
     std::vector<ColumnGroup> present;
     for (const ErrorSourcePtr& source : base_.model.sources)
@@ -229,7 +229,7 @@ class CauseSearch {
             present};
   }
 
-  /// m: how far blocks are missed that are left out, by the sources that were identified.
+  /// m: the error at blocks left out, with the sources of `found`.
   [[nodiscard]] double missed(const CalibrationResult& found) const {
     const ColumnGroup all{0, found.model.values.size()};
     return in_space(mean_sigma(found, batch_), evidence_of(found, found.model, {all}).left_out());

@@ -10,7 +10,7 @@
 namespace trammel {
 
 struct ChosenCauses {
-  std::vector<std::string> sources;  ///< to identify: those kept, and those taken
+  std::vector<std::string> sources;  ///< the sources to identify: those kept, and those taken
   CauseChoice choice;
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kClearlyBetter = 0.5;  // of the misfit
 constexpr double kTurnUntold =
-    0.2;  // of the spread of the nominal points: a turn that follows what does not fit
+    0.2;  // share of the spread of the nominal points; a larger misfit would decide the turn
 
 }  // namespace
 
@@ -93,7 +93,8 @@ Status locate_tool_at(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& m
   return {};
 }
 
-/// Both at once. Where the orientations turn about too few axes, the positions still tell the base.
+/// Locates base and tool together. If the orientations turn about too few axes, the positions alone
+/// determine the base.
 Result<BaseAndTool> locate_both(const ToolPoses& poses) {
   Result<BaseAndTool> found = poses.full()
                                   ? locate_base_and_tool(poses.oriented_X_WT, poses.oriented_X_BF)
@@ -106,7 +107,7 @@ Result<BaseAndTool> locate_both(const ToolPoses& poses) {
   return found;
 }
 
-/// m: what is left of the positions where the base is moved to fit them, with the tool there.
+/// m: rms residual of the positions with the tool at `X_FT` and the base fitted to them.
 double misfit(const ToolPoses& poses, const Pose& X_FT) {
   const Eigen::Matrix3Xd p_W = poses.p_W();
   Eigen::Matrix3Xd p_B(3, p_W.cols());
@@ -120,9 +121,9 @@ double misfit(const ToolPoses& poses, const Pose& X_FT) {
   return std::sqrt(square / static_cast<double>(p_W.cols()));
 }
 
-/// The tool from a base that the cell knows, and that is to be identified: the instrument may stand
-/// elsewhere by more than a tool that is found there can make up for. Then both are found at once,
-/// of which the tool is taken.
+/// Locates the tool for a base that the cell knows and that is to be identified. The instrument may
+/// be displaced by more than a tool could absorb. Then base and tool are located together, and the
+/// tool is kept.
 Status locate_tool_near(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
   const Status located = locate_tool_at(poses, X_FT, model);
   const Result<BaseAndTool> both = locate_both(poses);
@@ -182,8 +183,8 @@ Eigen::Matrix3Xd measured_points(const MeasurementBatch& batch) {
   return p_W;
 }
 
-/// The motion that takes `nominal` onto `measured`; a shift where what does not fit is as large as
-/// the points' spread.
+/// The motion that takes `nominal` onto `measured`. It is a pure shift where the misfit is as large
+/// as the spread of the points.
 Result<Pose> motion_between(const Eigen::Matrix3Xd& measured, const Eigen::Matrix3Xd& nominal) {
   Result<Pose> motion = fit_transform(measured, nominal);
   if (!motion ||

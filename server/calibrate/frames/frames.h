@@ -16,25 +16,26 @@ namespace trammel {
 /// them into the model. Refuses a batch that does not determine them.
 [[nodiscard]] Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch);
 
-/// Where the base may stand, as a start: the model's X_WB first. Positions at one place hardly tell
-/// how it is turned; then it is turned about that place, too, to all sides. Of a cell that says its
-/// base: X_WB alone.
+/// Starting values for the base, the model's X_WB first. Positions at one place hardly determine
+/// its turn; then the list has turns about that place to all sides. If the cell states its base,
+/// the list is X_WB alone.
 [[nodiscard]] std::vector<Pose> likely_bases(const PhysicalModel& model,
                                              const MeasurementBatch& batch);
-/// The turn that positions at one place do not tell of an unknown base, in words; empty where they
-/// tell it.
+/// Names the turn of an unknown base that positions at one place do not determine. Empty if they
+/// determine it.
 [[nodiscard]] std::string untold_turn(const Cell& cell, const MeasurementBatch& batch);
-/// Names of the numbers that say how the base is turned.
+/// The six values by which a frame's source moves the frame by `X`: x y z, then angles about z, y,
+/// x. The angle about y stays below 90 degrees.
 [[nodiscard]] std::vector<std::string> turn_of_base();
 
 /// The six values with which the source of a frame moves it by `X`: x y z, then angles about z, y,
 /// x, that about y below 90 degrees.
 [[nodiscard]] Vector6 motion_values(const Pose& X);
 
-/// Puts the model's `base` source where localisation of the nominal chain by singular values has
-/// it, eqs. (3.8)-(3.10): identification starts there, and the priors are centred there. With too
-/// few points the base stays nominal; where the nominal points are too near each other to tell a
-/// turn, it is only shifted.
+/// Sets the model's `base` source by localisation of the nominal chain with singular values, eqs.
+/// (3.8)-(3.10). Identification starts there, and the priors are centred there. With too few points
+/// the base stays nominal. If the nominal points are too close together for a turn, the base is
+/// only shifted.
 void localise_base(PhysicalModel& model, const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -13,7 +13,8 @@ constexpr double kLeastTurning = 1e-4;  // rad²: the nominal chain is itself so
 constexpr int kMostAlternations =
     10000;                          // nearly flat valleys take thousands; each costs microseconds
 constexpr double kLastStep = 1e-9;  // m
-constexpr double kOnePoint = 1e-7;  // m: positions that are told to be the same, not measured to be
+constexpr double kOnePoint = 1e-7;  // m: positions this close are one stated point, not measured
+                                    // ones
 
 /// The point t with R_i t ~ difference_i for all poses: the mean of R_iᵀ difference_i.
 Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
@@ -101,9 +102,9 @@ Matrix3 mean_rotation(const std::vector<Pose>& X_BF) {
   return mean_R / static_cast<double>(X_BF.size());
 }
 
-/// The tool point and the base's translation, given the base's rotation in `found`. Where the
-/// flange turns about one axis only, a shift along it is left open: it stays at its smallest.
-/// Returns the step of the tool point, m.
+/// Solves for the tool point and the base's translation, with the base's rotation from `found`. If
+/// the flange turns about one axis only, a shift along it is undetermined and stays at its
+/// smallest. Returns the step of the tool point, m.
 double solve_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF,
                    const Matrix3& mean_R, BaseAndTool& found) {
   const Matrix3 R_WB = found.X_WB.linear();

@@ -21,9 +21,9 @@ struct BaseAndTool {
                                                        const std::vector<Pose>& X_BF);
 
 /// X_WB and the tool point p_FT from positions alone; the tool's rotation stays identity.
-/// Alternates fit_transform() with a linear solve for the point until the step is below 1e-9 m.
-/// Where the flange turns about one axis only, the shift of the point along it stays as small as
-/// possible. Refuses fewer than 6 poses, and a flange that does not turn.
+/// Alternates fit_transform() with a linear solve for the point until the step is below 1e-9 m. If
+/// the flange turns about one axis only, the shift of the point along that axis is undetermined and
+/// stays as small as possible. Refuses fewer than 6 poses, and a flange that does not turn.
 [[nodiscard]] Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W,
                                                              const std::vector<Pose>& X_BF);
 

@@ -10,7 +10,7 @@ namespace trammel {
 
 namespace {
 
-/// Where the flange was by the arm of before, and what was measured of one tool.
+/// The flange poses by the former arm, and the measurements with one tool.
 struct FlangeAndPoints {
   std::vector<Pose> X_BF, oriented_X_BF, oriented_X_WT;
   std::vector<Vector3> points;

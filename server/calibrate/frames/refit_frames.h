@@ -5,10 +5,11 @@
 
 namespace trammel {
 
-/// Writes into `model` where base and tools of `batch` are, found with the arm of `before` and all
-/// its errors: a refit starts there. `base`, `tool`: which of them are anew; `model` has their
-/// sources, at the priors. Refuses poses that do not determine them: a base needs three positions
-/// that are not on one line, or an orientation. With an unknown tool as well, the flange must turn.
+/// Places base and tools of `batch` in `model` as the start of a refit, using the arm of `before`
+/// with all its errors. `base` and `tool` say which of the frames are new; `model` has their
+/// sources at the priors. Refuses poses that do not determine the frames: a base needs three
+/// positions that are not on one line, or an orientation. If a tool is unknown as well, the flange
+/// must turn.
 [[nodiscard]] Status locate_refitted_frames(const PhysicalModel& before,
                                             const MeasurementBatch& batch, bool base, bool tool,
                                             PhysicalModel& model);

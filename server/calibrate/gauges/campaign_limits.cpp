@@ -78,7 +78,8 @@ std::string untold_sentence(int untold) {
   }
 }
 
-/// The motions of the base: instead of the combinations that say the same number by number.
+/// Reports undetermined motions of the base in words, in place of the equivalent combinations of
+/// parameters.
 void add_untold_base(const MeasurementBatch& batch, CalibrationResult& found) {
   const int untold = untold_motions(found.model, batch);
   if (untold == 0) return;
@@ -88,7 +89,7 @@ void add_untold_base(const MeasurementBatch& batch, CalibrationResult& found) {
     for (const Parameter& parameter : source->parameters())
       base.parameters.push_back(parameter.name);
   }
-  if (base.parameters.empty()) return;  // it is where the cell file has it by definition
+  if (base.parameters.empty()) return;  // by definition the base is where the cell file has it
   std::erase_if(found.unidentifiable, [&](const UnidentifiableCombination& one) {
     return std::all_of(one.parameters.begin(), one.parameters.end(), [&](const std::string& name) {
       return is_of_base_or_instruments(name, found.model);
@@ -163,7 +164,7 @@ std::string size_text(const CalibrationResult& found, const PlacedAnchor& anchor
 void add_short_strokes(const MeasurementBatch& batch, CalibrationResult& found) {
   if (has_positions(batch)) return;
   const auto strokes = strokes_of(batch);
-  // Instruments of different lengths together tell what none does alone.
+  // Instruments of different lengths together determine a size that no single one determines.
   double shortest = std::numeric_limits<double>::infinity(), longest = 0;
   for (const auto& [id, stroke] : strokes) {
     shortest = std::min(shortest, stroke.shortest);

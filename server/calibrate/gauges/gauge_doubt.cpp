@@ -22,10 +22,10 @@ using CellPtr = std::shared_ptr<const Cell>;
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 constexpr double kFarRow = 0.1;  // m: no drawing is so far off at a single row
-constexpr double kAsked =
-    3;  // times the stated sigma, of touches: what is left where a reading is asked for
-constexpr double kMuchBetter =
-    0.2;  // of what is left as given, beside how the values spread: surely meant so
+constexpr double kAsked = 3;     // times the stated sigma, for touches: a larger misfit starts the
+                              // search for another reading
+constexpr double kMuchBetter = 0.2;  // share of the misfit as given, relative to the spread of the
+                                     // values; below it the other reading was surely meant
 
 /// The rows of one kind, their values times `factor`.
 MeasurementBatch read_as(MeasurementBatch batch, Gauge::Kind kind, double factor) {
@@ -43,8 +43,8 @@ double median_size(const Eigen::VectorXd& values) {
   return *middle;
 }
 
-/// m, by what each distance is off that of the arm as drawn, its base where they put it; empty
-/// where it leads to none.
+/// m: the deviation of each distance from that of the arm as drawn, with the base fitted to the
+/// distances. Empty if they determine no base.
 std::optional<Eigen::VectorXd> off_drawing(const CellPtr& cell, const MeasurementBatch& distances) {
   const auto found =
       calibrate(cell, {std::string(cause_correcting(causes::Part::kBase).spelling)}, distances, {});
@@ -52,7 +52,7 @@ std::optional<Eigen::VectorXd> off_drawing(const CellPtr& cell, const Measuremen
   return residuals_of(found->model, distances, found->model.values).gauge;
 }
 
-/// Distances that are in another unit than the others, by what each is `off`.
+/// Doubts rows whose distance is in another unit than the others, by their deviations `off`.
 std::optional<Error> doubt_of_rows(const MeasurementBatch& distances, const Eigen::VectorXd& off) {
   for (const UnitOfLength& unit : kUnitsOfLength) {
     std::vector<int> rows;
@@ -118,7 +118,7 @@ std::vector<TouchReading> touch_readings() {
   return all;
 }
 
-/// m, what the arm that the touches show leaves of one of them.
+/// m: the residual of a touch under the arm that the touches identify.
 double left_of_touches(const CellPtr& cell, const MeasurementBatch& touches) {
   const auto found =
       calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), touches, {});

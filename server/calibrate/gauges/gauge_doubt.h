@@ -7,11 +7,11 @@
 
 namespace trammel {
 
-/// Reasons not to learn from the distances and touches of `batch` (checked against `cell`):
-/// they are in another unit, all of them or some rows, or touches count the other way. Distances
-/// are asked of the arm as drawn, which is some mm off where they are metres; touches, which are
-/// mm, of the arm that they themselves show. Empty where they follow the joints, or where no other
-/// reading fits much better.
+/// The reason not to learn from the distances and touches of `batch` (checked against `cell`), if
+/// there is one: all or some rows are in another unit, or touches have the opposite sign. Distances
+/// are metres long, so they are compared with the arm as drawn, which is off by a few mm. Touches
+/// are millimetres, so they are compared with the arm that they themselves identify. Empty if they
+/// follow the joints, or if no other reading fits much better.
 [[nodiscard]] std::optional<Error> gauge_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 }  // namespace trammel

@@ -16,9 +16,10 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kFewest = 4;  // values that tell the three numbers of a place, and one beside
-constexpr double kLeastBeside =
-    1e-2;  // m rms: tool points nearer to one line do not tell what is around it
+constexpr std::size_t kFewest = 4;     // values for the three coordinates of an anchor, and one to
+                                       // check them
+constexpr double kLeastBeside = 1e-2;  // m rms: tool points closer to one line than this do not
+                                       // determine the other two directions
 constexpr int kRefinements = 50;
 constexpr double kLastStep = 1e-9;  // m
 
@@ -135,10 +136,10 @@ Vector3 place_of(const Lengths& of, const Spread& spread) {
   return best.p_W;
 }
 
-/// m: a touch of that little from the middle of what is touched is a touch of the point itself.
+/// m: touches whose mean is this small touch the anchor point itself.
 constexpr double kAtThePoint = 1e-3;
 
-/// True if the tool's point stands at one and the same anchor in all rows, wherever that is.
+/// True if the tool point is at one anchor in all rows, wherever that anchor is.
 bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batch) {
   return !batch.measurements.empty() &&
          std::all_of(
@@ -152,7 +153,7 @@ bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batc
              });
 }
 
-/// Says what tells an unknown tool in place of gauges.
+/// Names the measurement that determines an unknown tool in place of gauges.
 std::string way_to_the_tool(const PhysicalModel& model, const MeasurementBatch& batch) {
   constexpr const char* kHow =
       "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and "

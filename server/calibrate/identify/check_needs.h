@@ -5,8 +5,8 @@
 
 namespace trammel {
 
-/// Refuses a source that needs what no pose has: a time, a temperature, an approach direction, a
-/// velocity, a payload.
+/// Refuses a source that needs a quantity no pose has: a time, a temperature, an approach
+/// direction, a velocity, a payload.
 [[nodiscard]] Status check_needs(const CalibrationProblem& problem);
 
 }  // namespace trammel

@@ -26,8 +26,8 @@ constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step lea
 constexpr double kMostDamping = 1e9;
 constexpr double kNoDamping = 1e-6;
 
-// Where the poses show only the product of numbers, damped steps follow a bent valley for a
-// hundred steps, and all that falls is how well the priors like it.
+// Where the poses determine only a product of numbers, damped steps follow a bent valley for a
+// hundred steps. Only the prior's part of the cost still falls then, by less than this.
 constexpr double kIdleFall = 0.05;  // nat a step
 constexpr double kFirstIdleShare =
     1e-3;  // of the cost, as long as residuals only serve to find the discrepancy
@@ -66,7 +66,8 @@ class Normals {
     for (SessionBlock& block : at_.sessions)
       block.cross = Eigen::MatrixXd::Zero(kOfSession, at.gradient.size());
   }
-  /// Where the next pose of that session writes its residuals and their derivatives.
+  /// Begins the next pose, which belongs to that session, and points at the rows for its residuals
+  /// and derivatives.
   void begin(int session) {
     if (session != session_ || filled_ + 6 > residuals_.size()) add_filled();
     session_ = session;

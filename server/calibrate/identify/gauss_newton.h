@@ -19,7 +19,7 @@ struct Expansion {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information;  ///< P x P, second derivative without that of the priors
   std::vector<SessionBlock> sessions =
-      {};  ///< of several: of all but the newest, in whose world all stand
+      {};  ///< of several sessions: the settings of all but the newest, which is the world frame
 };
 
 /// About `x`; `robust`: with Huber's loss on every pose.
@@ -33,8 +33,7 @@ struct Minimum {
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;
-  std::vector<Similarity> moved =
-      {};  ///< of several sessions: what moves the measurements of each into W
+  std::vector<Similarity> moved = {};  ///< of several sessions: the motion that takes each into W
 };
 
 /// True if Huber's loss is used: not before the discrepancy is known, since nothing can be called
@@ -48,9 +47,9 @@ struct Minimum {
                                                 const CalibrateOptions& options,
                                                 const Eigen::VectorXd& start);
 
-/// Steps of the parameters and, of a batch of several sessions, of what belongs to each, damped
-/// where a full one leads uphill. The information is that of the parameters with the sessions
-/// eliminated. Refuses where nothing leads downhill and it is not the minimum.
+/// Steps of the parameters and, for a batch of several sessions, of the sessions' own unknowns,
+/// damped where a full step leads uphill. The information is that of the parameters, with the
+/// sessions eliminated. Refuses if no step leads downhill away from the minimum.
 [[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem,
                                             const ScaledParameters& s, const Weights& weights,
                                             const CalibrateOptions& options,

@@ -19,7 +19,7 @@ struct Information {
 /// units).
 struct UnidentifiableCombination {
   double singular_value = 0;
-  std::vector<std::string> parameters;  ///< those with a large part in it, largest first
+  std::vector<std::string> parameters;  ///< parameters with a large part in it, largest first
   std::string sentence;                 ///< for people
 };
 

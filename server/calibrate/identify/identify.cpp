@@ -22,8 +22,8 @@ constexpr int kMostReweightings =
     12;  // three or four are enough; more only where outliers come and go
 constexpr double kIdentifiedShare =
     0.5;  // of the prior's standard deviation: the data say more than the prior did
-constexpr double kFewFitted =
-    0.05;  // of the equations: who decided them changes no discrepancy by more
+constexpr double kFewFitted = 0.05;  // share of the equations; below it, the split of the
+                                     // parameters hardly changes the discrepancies
 
 /// (N + 1)^-1 = Lᵀ L, N the information: L, lower triangular.
 Eigen::MatrixXd root_of_posterior(const Eigen::MatrixXd& information) {
@@ -37,7 +37,7 @@ double freedom_of(const Eigen::MatrixXd& information) {
   return static_cast<double>(information.rows()) - root_of_posterior(information).squaredNorm();
 }
 
-/// The number of them that measurements with the information `part` of it decide.
+/// The number of parameters that a part of the measurements decides, given its information `part`.
 double freedom_of(const Eigen::MatrixXd& part, const Eigen::MatrixXd& information) {
   const Eigen::MatrixXd root = root_of_posterior(information);
   return (root * part).cwiseProduct(root).sum();
@@ -57,8 +57,8 @@ double rms_of_most(Eigen::VectorXd square) {
   return std::sqrt(square.head(most).mean());
 }
 
-/// Refuses joints and positions that are not of one robot: `rms` (m), what identification leaves,
-/// is then a good part of the way that the tool went.
+/// Refuses joints and positions of different robots. Then `rms` (m), the residual of the
+/// identification, is a large part of the tool's path.
 Status check_positions_belong(const MeasurementBatch& batch, double rms) {
   Vector3 mean = Vector3::Zero();
   for (const Measurement& m : batch.measurements)
@@ -129,8 +129,8 @@ void add_observability(const Information& seen, std::size_t poses, CalibrationRe
   result.condition_number = seen.singular_values(seen.singular_values.size() - 1) / least;
 }
 
-/// Adds covariance, rank and what is not identifiable: from the information that `poses` poses give
-/// of the parameters that are not held. Those that are held are exact.
+/// Adds covariance, rank and unidentifiable directions, from the information that `poses` poses
+/// give about the free parameters. Held parameters are exact.
 void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s, std::size_t poses,
                    CalibrationResult& result) {
   const Information seen = decomposed(information);
@@ -161,7 +161,7 @@ void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s
   }
 }
 
-/// The parameters that were found, what they leave over, and under which weights.
+/// Identified parameters, their residuals, and the weights of the fit.
 struct Identified {
   Minimum minimum;
   Residuals residuals;
@@ -205,9 +205,10 @@ Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const Sc
   return sum;
 }
 
-/// The number of parameters fitted to either kind at the minimum under `weights`. Few parameters
-/// beside many equations, and several sessions, are shared out by number; else positions may have
-/// decided most of them, and are fitted much closer than orientations.
+/// The number of parameters that each kind of residual decides at the minimum under `weights`. With
+/// few parameters beside many equations, or with several sessions, the parameters are split by the
+/// number of equations. Otherwise positions may have decided most of them, and are fitted much
+/// closer than orientations.
 Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
                bool robust, const Minimum& at) {
   double turns = 0, equations = 0;
@@ -234,8 +235,8 @@ double fitted_to_means(const CalibrationProblem& problem, const ScaledParameters
   return freedom_of(means, now.minimum.information) + freedom_of_sessions(problem);
 }
 
-/// Gives each session the noise that it has beyond the others, and the residuals the sigmas that
-/// follow. False where that has changed.
+/// Sets the excess noise of each session and the new sigmas of the residuals. Returns false if
+/// nothing changed.
 bool estimate_own_noise(Identified& now, const Freedom& freedom, const MeasurementBatch& given,
                         MeasurementBatch& batch, const Tracker& tracker) {
   std::vector<SessionSetting> sessions = now.sessions;
@@ -281,8 +282,8 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
     now.weights = estimated_weights(now.residuals, freedom, before, is_robust(options, before));
     if (same_noise && are_settled(now.weights, before, tracker)) break;
   }
-  // The last step is short, but not beside numbers of which only a product is seen: there the
-  // derivatives change.
+  // The last step is short in general, but long beside parameters that show only as a product:
+  // there the derivatives change.
   if (now.sessions.empty() && s.scale.size() > 0)
     now.minimum.information =
         expand(problem, s, now.weights, is_robust(options, now.weights), now.minimum.x).information;

@@ -6,8 +6,8 @@
 namespace trammel {
 
 /// The most probable parameters under `weights`, from `start` (P, in units of the priors). Takes
-/// full Gauss-Newton steps where they lead downhill, else the guarded steps of Ceres. Refuses where
-/// the solver fails.
+/// full Gauss-Newton steps while they lead downhill, otherwise the guarded steps of Ceres. Refuses
+/// if the solver fails.
 [[nodiscard]] Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParameters& s,
                                        const Weights& weights, const CalibrateOptions& options,
                                        const Eigen::VectorXd& start);

@@ -13,7 +13,7 @@ namespace {
 constexpr double kDamping = 1e-9;  // of the trace
 constexpr int kRefinement = 100;   // of a step of the search: finer orders change no residual
 
-/// An order, and what a sine and a cosine of it explain of the residuals.
+/// An order, and the part of the residuals that its sine and cosine explain.
 struct FoundOrder {
   double order = 0;  // cycles a turn of the joint
   double gain = 0;   // weighted sum of squares explained

@@ -9,8 +9,8 @@
 /// Finds the orders of periodic sources where nobody gave them.
 namespace trammel {
 
-/// Finds the orders one source after the other, the strongest first, each by a periodogram of what
-/// the model leaves over. The values in the model become start and centre of the priors; amplitudes
+/// Finds the orders one source after the other, the strongest first, each by a periodogram of the
+/// model's residuals. The found values become starting values and centres of the priors; amplitudes
 /// stay free.
 [[nodiscard]] Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options);
 

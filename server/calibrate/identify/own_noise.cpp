@@ -10,11 +10,11 @@ namespace {
 constexpr double kMedianOfChiSquare = 2.366;  // of 3 degrees of freedom
 constexpr double kSpreadOfMedian = 1.124;     // relative, times 1 / sqrt(n): of that median
 constexpr double kBeyondChance = 4;           // standard deviations
-constexpr std::size_t kFewestPoses = 8;       // that tell how noisy a session is
+constexpr std::size_t kFewestPoses = 8;       // needed to estimate the noise of a session
 constexpr double kSettled = 0.02;             // relative
 
-/// The middle value; of two in the middle the lower one, so that of two sessions the quieter one is
-/// the usual one.
+/// The middle value. Of two middle values it is the lower one, so that the quieter of two sessions
+/// is the usual one.
 double lower_median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -47,7 +47,7 @@ std::vector<double> beyond_others(const SquaresBySession& squares, double share)
     if (squares.ratio[s].size() < kFewestPoses) continue;
     level[s] = lower_median(squares.ratio[s]) / (kMedianOfChiSquare * share);
     all.insert(all.end(), squares.ratio[s].size(),
-               level[s]);  // a large session tells more of what is usual
+               level[s]);  // a large session has more weight in the usual level
   }
   if (all.empty()) return beyond;
   const double usual = lower_median(all);

@@ -3,13 +3,13 @@
 #include "server/calibrate/identify/weighting.h"
 #include "server/calibrate/sessions/session_setting.h"
 
-/// Sessions that were measured with more noise than the others, so that they count for less.
+/// Sessions with more measurement noise than the others, which therefore get less weight.
 namespace trammel {
 
-/// Sets own_noise of each session. The median of its squared residuals, in units of what the rest
-/// of the sessions suggests, tells how noisy it is; bad poses do not matter to it. A session is as
-/// noisy as the others unless it is more so than chance would make it. `r` are the residuals of
-/// `batch`, to which so many parameters were fitted.
+/// Sets own_noise of each session. The estimate is the median of the session's squared residuals,
+/// relative to the level that the other sessions suggest; bad poses hardly change a median. A
+/// session gets excess noise only if the excess is beyond chance. `r` are the residuals of `batch`,
+/// and `freedom` counts the parameters fitted to them.
 void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights,
                    const MeasurementBatch& batch, std::vector<SessionSetting>& sessions);
 

@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// The F parameters of a model that are to be found, and the priors under which they are; solvers
-/// see them in units of the priors. Those that are held have no part in it, however many they are.
+/// The F free parameters of a model and their priors. Solvers see the parameters in units of the
+/// priors. Held parameters are left out, so their number costs nothing.
 struct ScaledParameters {
   std::vector<Parameter> parameters;
   Eigen::VectorXd scale;           ///< F, SI: standard deviations of the priors
@@ -20,14 +20,14 @@ struct ScaledParameters {
 
   /// Bounds in units of scale; -infinity where there is none.
   [[nodiscard]] Eigen::VectorXd lower() const;
-  /// P, SI: the model's values with those that are to be found at `x` (F, in units of scale).
+  /// P, SI: the model's values with the free ones set to `x` (F, in units of scale).
   [[nodiscard]] Eigen::VectorXd values_at(const Eigen::Ref<const Eigen::VectorXd>& x) const;
 };
 
-/// The priors are centred at the model's values. They are wide for a frame that the cell calls
-/// unknown, which was found with a chain that was still wrong, for what is unknown of the
-/// instruments, and for a base beside `held` parameters, which was just located. `held`: a flag for
-/// each parameter, or empty.
+/// The priors are centred at the model's values. They are wide for three kinds of parameters: a
+/// frame that the cell calls unknown, since it was located with an uncorrected chain; unknowns of
+/// the instruments; and a base beside `held` parameters, since it was just located. `held` has a
+/// flag for each parameter, or is empty.
 [[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model,
                                                  const std::vector<bool>& held);
 

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// One measurement: its residual in units of sigma, as a function of the F parameters that are to
-/// be found, in units of their scale. Keeps references to its arguments.
+/// The residual of one measurement in units of sigma, as a function of the F free parameters in
+/// units of their scale. Keeps references to its arguments.
 class WeightedPose {
  public:
   /// `row`: its place in the batch that the weights are of.

@@ -88,7 +88,7 @@ WeightedSquares turns_of(const Residuals& r) {
   return turns;
 }
 
-/// Positions at one joint vector: their mean, and how far each is from it.
+/// Positions at one joint vector: their mean, and their deviations from it.
 struct SeenTogether {
   Vector3 mean = Vector3::Zero();
   double variance = 0;  // m², of one of them as stated
@@ -107,8 +107,8 @@ SeenTogether seen_together(const Residuals& r, const std::vector<Eigen::Index>& 
   return seen;
 }
 
-/// m per axis: what the means of positions at one joint vector are off by beyond their sigmas, no
-/// more than each of them is with the `discrepancy`. 0 where none are together.
+/// m per axis: the error of the means of positions at one joint vector beyond their sigmas, at most
+/// `discrepancy`. 0 if no joint vector has several positions.
 double shared_by_poses(const Residuals& r, const Freedom& freedom, double discrepancy,
                        const Weights& before, bool drop_suspects) {
   if (r.together.empty()) return 0;
@@ -126,8 +126,8 @@ double shared_by_poses(const Residuals& r, const Freedom& freedom, double discre
                   surplus(means, means.axes * std::max(kLeastShare, 1 - freedom.means / axes)));
 }
 
-/// Nat, of positions that share an error at one joint vector (compound symmetry): of their mean,
-/// and of what sets them apart.
+/// Nat, for positions that share an error at one joint vector (compound symmetry): the log
+/// likelihood of their mean and of their deviations from it.
 double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Index>& columns,
                                const Weights& weights) {
   const SeenTogether seen = seen_together(r, columns);

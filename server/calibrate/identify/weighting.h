@@ -13,25 +13,26 @@ struct Weights {
   double discrepancy = 0;           ///< m per axis
   double discrepancy_rotation = 0;  ///< rad per axis
   bool estimated = false;           ///< false: not yet, the measurement's sigma counts alone
-  double of_pose = 0;  ///< m per axis: what positions at one joint vector share of the discrepancy
+  double of_pose = 0;  ///< m per axis: the part of the discrepancy that positions at one joint
+                       ///< vector share
 
   std::vector<int> together = {};  ///< of each row of the batch: counted_together()
 
-  /// m per axis: what `m`, that `row` of the batch, is weighed with beside its own sigma. A gauge
-  /// that is told against another pose has twice the variance; positions at one joint vector weigh
-  /// together as one pose as far as they share the error.
+  /// m per axis: the discrepancy with which `m`, row `row` of the batch, is weighted beside its own
+  /// sigma. A gauge that is read against another pose has twice the variance. Positions at one
+  /// joint vector weigh as one pose, as far as they share the error.
   [[nodiscard]] double beside(const Measurement& m, std::size_t row) const;
 };
 /// Those under which `found` was found, for the rows of `batch`.
 [[nodiscard]] Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch);
 
 /// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's
-/// own, else the tracker's.
+/// own if it has one, otherwise the tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
 /// Standard deviation of one axis of the measured orientation, rad: likewise.
 [[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
-/// At how many poses the model's own error enters: 1, or 2 of a gauge that is told against another
+/// The number of poses whose model error enters: 1, or 2 for a gauge that is read against another
 /// pose.
 [[nodiscard]] double gauged_poses(const Measurement& m);
 
@@ -45,8 +46,8 @@ struct Residuals {
       gauges;             ///< which measurement each is of; empty gauges: all have positions
   Eigen::VectorXd gauge;  ///< G, m
   Eigen::VectorXd sigma_gauge, poses_of_gauge;  ///< G: standard deviations; gauged_poses()
-  /// Columns of `position` that stand at one joint vector; empty where none are together, or nobody
-  /// asked (columns_together()).
+  /// Groups of columns of `position` at one joint vector. Empty if there are no groups, or if
+  /// columns_together() was not called.
   std::vector<std::vector<Eigen::Index>> together;
 
   /// m: rms of the Euclidean residuals of the positions; where there are none, of the gauges.
@@ -61,16 +62,16 @@ struct Residuals {
 [[nodiscard]] std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch,
                                                                       const Residuals& r);
 
-/// The number of parameters that were fitted to the residuals of either kind: what each kind
-/// decides, not the priors.
+/// The number of parameters that each kind of residual decides, not counting what the priors
+/// decide.
 struct Freedom {
   double positions = 0;  ///< and gauges
   double turns = 0;
   double means = 0;  ///< to the means of the positions at one joint vector
 };
 
-/// The discrepancies under which the residuals are as large as expected after these parameters were
-/// fitted to them. `drop_suspects`: positions that are suspects under `before` do not count.
+/// The discrepancies under which the residuals have their expected size after these parameters were
+/// fitted. `drop_suspects`: leaves out positions that are suspects under `before`.
 [[nodiscard]] Weights estimated_weights(const Residuals& r, const Freedom& freedom,
                                         const Weights& before, bool drop_suspects);
 /// True if measurements of `tracker` have nearly the same sigmas under both.

@@ -36,8 +36,8 @@ Status check_robot(const Chain& robot, const ArcList& arcs) {
   return {};
 }
 
-/// Refuses an arc of a joint that slides, and one that slides while arcs are drawn: no arc shows
-/// where its axis is.
+/// Refuses an arc of a prismatic joint, and a prismatic joint that moves while arcs are drawn: no
+/// arc shows its axis.
 Status check_slides(const Chain& robot, const ArcList& arcs) {
   for (const ArcPoint& point : arcs.points) {
     for (int j = 0; j < robot.size(); ++j) {
@@ -153,9 +153,9 @@ Status check_size(const std::vector<const ArcPoint*>& points, const ArcList& arc
       .beyond(points.size(), least);
 }
 
-/// Refuses an arc during which a held joint moves. Joints before the turning one must be where they
-/// were for the joint's other arcs, too: another reflector may be read with the joints beyond it
-/// elsewhere.
+/// Refuses an arc during which a held joint moves. Joints before the turning one must also keep
+/// their place for all arcs of that joint. Joints beyond it may differ between arcs with different
+/// reflectors.
 Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& group,
                   const ArcList& arcs) {
   const int turning = points.front()->joint;

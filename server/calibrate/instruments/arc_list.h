@@ -23,10 +23,10 @@ struct ArcList {
   std::vector<ArcPoint> points;
 };
 
-/// Reads `joint,q_deg,x_mm,y_mm,z_mm`: number of the joint from 1, its angle, the reflector in W.
-/// Optional: `reflector`, and `q1_deg` ... `qn_deg`, where the other joints are held; without these
-/// columns they are at zero. Refuses a missing column, what is no number, a joint that the robot
-/// has not, and postures with another number of joints.
+/// Reads `joint,q_deg,x_mm,y_mm,z_mm`: the joint's number from 1, its angle, and the reflector in
+/// W. Optional columns are `reflector`, and `q1_deg` ... `qn_deg` with the angles of the held
+/// joints; without them these joints are at zero. Refuses a missing column, a value that is not a
+/// number, a joint that the robot does not have, and postures with a wrong number of joints.
 [[nodiscard]] Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where,
                                              const Chain& robot);
 [[nodiscard]] Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot);
@@ -38,10 +38,10 @@ struct JointArcs {
   std::vector<std::vector<const ArcPoint*>> arcs;
 };
 
-/// An entry for each joint; one that slides has no arcs. Refuses joints that follow another, whose
-/// axis moves; a turning joint without arc; arcs of a sliding one, and one that is not at the same
-/// place throughout; an arc of fewer than 3 points, or 5 where sigma is not stated; held joints
-/// that move.
+/// An entry for each joint; a prismatic joint has no arcs. Refuses joints that follow another
+/// joint, since their axis moves. Refuses a turning joint without arcs, arcs of a prismatic joint,
+/// a prismatic joint that moves, an arc with fewer than 3 points (5 where sigma is not stated), and
+/// held joints that move.
 [[nodiscard]] Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot,
                                                              const ArcList& arcs,
                                                              bool sigma_stated);

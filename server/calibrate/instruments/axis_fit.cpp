@@ -37,8 +37,8 @@ Matrix3 scatter_of(const JointArcs& group) {
   return scatter;
 }
 
-/// The common centre across the axis, by |p|^2 = 2 x u + 2 y v + w with one centre (u, v) and one w
-/// an arc; nothing where the points do not tell it.
+/// The common centre across the axis. It solves |p|^2 = 2 x u + 2 y v + w with one centre (u, v)
+/// and one w per arc. Empty if the points do not determine it.
 std::optional<Vector3> rough_centre(const JointArcs& group, const Eigen::Matrix<double, 3, 2>& uv) {
   const auto arcs = static_cast<Eigen::Index>(group.arcs.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(points_of(group)), 2 + arcs);
@@ -213,8 +213,8 @@ Disagreement disagreement(const AxisFit& fit, const JointArcs& group, int sense)
 AxisFit reversed(const AxisFit& fit) {
   AxisFit turned = fit;
   turned.n = -fit.n;
-  // The columns of across(-n) differ from those of across(n): the covariance of the changes turns
-  // with them.
+  // The columns of across(-n) differ from those of across(n), so the covariance of the changes
+  // turns with them.
   const Eigen::Matrix2d change = across(turned.n).transpose() * across(fit.n);
   Eigen::MatrixXd basis =
       Eigen::MatrixXd::Identity(fit.normal_inverse.rows(), fit.normal_inverse.cols());

@@ -68,7 +68,7 @@ struct Fits {
   std::vector<int> joints;  ///< of each axis
   std::vector<AxisFit> axes;
   std::vector<double> variance;  ///< m^2, of one coordinate
-  std::vector<double> widening;  ///< of a covariance whose variance was itself estimated
+  std::vector<double> widening;  ///< factors for covariances whose variance was itself estimated
 };
 
 /// One a joint; of a joint that slides none.
@@ -178,7 +178,7 @@ Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& li
   return Chain::make(robot.name(), std::move(joints), robot.couplings());
 }
 
-/// Variance of one coordinate from the residuals, as far as it is above what was stated.
+/// The variance of one coordinate by the residuals, as far as it exceeds the stated one.
 void add_variance(const AxisFit& fit, double stated_sigma, Fits& fits) {
   const double seen = fit.freedom > 0 ? fit.cost / fit.freedom : 0;
   const double stated = stated_sigma * stated_sigma;
@@ -254,7 +254,7 @@ Status add_links(const ArcList& arcs, const std::vector<JointArcs>& groups, cons
   return {};
 }
 
-/// Where the joints that slide stood, and what is said of them.
+/// Adds the positions of the prismatic joints, and the notes about them.
 void add_slides(const Chain& robot, const ArcList& arcs, Fits& fits, CirclePointResult& result) {
   fits.held = JointVector::Zero(robot.size());
   for (int j = 0; j < robot.size(); ++j) {

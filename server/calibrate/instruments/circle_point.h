@@ -59,24 +59,23 @@ struct CirclePointResult {
   std::vector<MeasuredParameter> parameters;
   Eigen::MatrixXd
       covariance;  ///< of the deviations in the order of `parameters`, SI; zero where not measured
-  std::vector<Note> notes;  ///< rows that arcs do not show, and rows that are told in another form
-  Chain robot;              ///< the nominal robot with what was measured
+  std::vector<Note> notes;  ///< rows that arcs do not determine, and rows in a changed form
+  Chain robot;              ///< the nominal robot with the measured rows
   Pose X_WB =
       Pose::Identity();  ///< base on axis 1: z0 is measured, height and azimuth are conventional
 };
 
-/// Fits the arcs and works out the links. Each arc is fitted in space by least squares on the
-/// distances from its plane and its circle (normal, axis, radius together); postures that joints
-/// are held at are undone with the axes already found; the links follow from row to row: common
-/// normal, eq. (3.3), or, in a Hayati row, the point where the next axis meets the plane across the
-/// present one, eq. (3.4). Uncertainties are those of the fits carried through by first
-/// derivatives; where sigma comes from few residuals they are as wide as Student's t makes them.
-/// Not measured: d1 and q1 (nothing marks the base but axis 1), the last link (nothing marks the
-/// flange), and the row of a joint that slides, which is passed over: along a SCARA's last axis, on
-/// a rail before the arm, or behind it. A row with parallel axes is told as a Hayati row, whatever
-/// the robot file has. Refuses: what sorted_by_joint() and turning_joints() refuse; points that lie
-/// on a line; turned angles that differ from commanded ones by more than 1 degree; links more than
-/// 100 mm or 10 degrees from nominal.
+/// Fits the arcs and derives the links. Each arc is fitted in space by least squares on the
+/// distances from its plane and its circle (normal, axis and radius together). The held postures of
+/// other joints are undone with the axes already found. The links follow row by row: by the common
+/// normal, eq. (3.3), or, in a Hayati row, by the point where the next axis meets the plane across
+/// the present one, eq. (3.4). Uncertainties come from the fits by first derivatives; a sigma from
+/// few residuals is widened by Student's t. Some rows are not measured: d1 and q1 (only axis 1
+/// marks the base), the last link (nothing marks the flange), and the row of a prismatic joint,
+/// whether along a SCARA's last axis, on a rail before the arm, or behind it. A row with parallel
+/// axes becomes a Hayati row, whatever the robot file has. Refuses the same as sorted_by_joint()
+/// and turning_joints(). Refuses points that lie on a line, turned angles that differ from the
+/// commanded ones by more than 1 degree, and links more than 100 mm or 10 degrees from nominal.
 [[nodiscard]] Result<CirclePointResult> analyse_circle_points(const Chain& robot,
                                                               const ArcList& arcs,
                                                               const CirclePointOptions& options);

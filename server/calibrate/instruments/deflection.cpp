@@ -19,7 +19,7 @@ constexpr double kSeen =
     3;  // standard deviations: a bend at the link's end that would have been seen
 constexpr double kLeastPivot = 1e-9;  // of the largest: parameters below it are not separated
 constexpr std::size_t kFewestLoads =
-    4;  // of which some can be held out, with the least and the largest to train
+    4;  // enough to hold some out, while the least and the largest load stay in the training
 constexpr std::size_t kHeldOut =
     3;  // every third load is held out: Table 4.7 has the second and fifth of six
 
@@ -47,8 +47,8 @@ double beam_slope(const DeflectionElement& element, const Moments& load, double 
 Eigen::Vector2d along(const DeflectionElement& element) {
   return {std::cos(element.theta), std::sin(element.theta)};
 }
-/// Where a point at `r` goes per radian that its joint gives way, downward for a link that points
-/// outward.
+/// The motion of a point at `r` per radian of the joint's deflection, downward for a link that
+/// points outward.
 Eigen::Vector2d swung(const Eigen::Vector2d& r) { return {r.y(), -r.x()}; }
 
 /// The columns of the linear model; where each element's begin.
@@ -291,7 +291,7 @@ DeflectionFit fit_of(const Solved& solved, std::size_t e, const DeflectionData& 
   return fit;
 }
 
-/// The beam term's tests and what they let one say.
+/// Tests the beam term and draws the conclusion.
 void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
                 double largest_load, double sigma, ElementResult& result) {
   const int column = solved.layout.elements[e].flexibility;
@@ -329,8 +329,8 @@ void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
   }
 }
 
-/// Elements whose reflectors stand at several distances, so that they may show a beam; checks those
-/// asked for a load bias.
+/// Elements that may show a beam, since their reflectors stand at several distances. Checks the
+/// elements for which a load bias was requested.
 Result<std::set<int>> beams_of(const DeflectionData& data, const Split& split,
                                const std::set<int>& load_biases) {
   std::map<int, std::set<double>> distances;

@@ -8,15 +8,15 @@
 #include "server/base/result.h"
 #include "server/calibrate/instruments/deflection_list.h"
 
-/// Stiffness by direct deflection, source section 4.2: weights hung from the flange bend the arm in
-/// its vertical plane; reflectors along its elements (a joint and the link behind it) show how much
-/// each joint gives way and whether the link bends too.
+/// Stiffness by direct deflection, source section 4.2. Weights hung from the flange bend the arm in
+/// its vertical plane. Reflectors along its elements (a joint and the link behind it) show the
+/// deflection of each joint, and whether the link bends as well.
 namespace trammel {
 
 struct DeflectionOptions {
   double sigma = 13e-6;  ///< m, of one coordinate, where the file has none
-  /// Readings are against the ground, so that what elements further in do is part of them; all are
-  /// solved together. Else each element's readings are already free of the others'.
+  /// true: readings are against the ground and include the motion of inner elements, so all
+  /// elements are solved together; false: each element's readings are free of the others' motion.
   bool chained = false;
   std::vector<int> load_bias = {};  ///< elements whose foot moves with the load: the B of eq. (4.4)
   std::vector<double> validation_loads =
@@ -65,14 +65,14 @@ struct DeflectionResult {
   double rms_rigid = 0;  ///< m, of model 2
 };
 
-/// Fits eqs. (4.2) to (4.6): weighted linear least squares, for C, 1/EI, A and B enter linearly.
-/// The load L makes, at the link's far end, the force w = L cos(theta) across it and the moment M =
-/// L lever, and M_R = M + w length at the joint. A beam is claimed where its term is positive, its
-/// F test gives p < 0.01 and AIC agrees; a link is called rigid where a bend of three sigma at its
-/// end would have been seen; else the data cannot tell. Uncertainties are scaled by the residuals
-/// where these exceed the stated sigma. Refuses: fewer than two training loads, or too few
-/// readings; parameters that the readings do not separate; a validation load or an element that is
-/// not in the data.
+/// Fits eqs. (4.2) to (4.6) by weighted linear least squares, since C, 1/EI, A and B enter
+/// linearly. At the link's far end the load L makes the force w = L cos(theta) across the link and
+/// the moment M = L lever; at the joint the moment is M_R = M + w length. The link is called a beam
+/// if its term is positive, its F test gives p < 0.01 and AIC agrees. It is called rigid if a bend
+/// of three sigma at its end would have been seen. Otherwise the data cannot tell. Where the
+/// residuals exceed the stated sigma, they scale the uncertainties. Refuses fewer than two training
+/// loads, too few readings, parameters that the readings do not separate, and a validation load or
+/// an element that is not in the data.
 [[nodiscard]] Result<DeflectionResult> fit_deflection(const DeflectionData& data,
                                                       const DeflectionOptions& options);
 

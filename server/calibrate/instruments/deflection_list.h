@@ -36,10 +36,10 @@ struct DeflectionData {
   std::vector<DeflectionReading> readings;
 };
 
-/// Reads `element,load_n,x_mm,dx_mm,dz_mm,theta_deg,length_mm,lever_mm` with, where recorded,
-/// `sigma_mm` and `set` (train, validation). Refuses, naming file, row, value and limit: a missing
-/// column, numbers that are none, an element whose angle, length or lever changes, a sigma or
-/// length that is not positive.
+/// Reads `element,load_n,x_mm,dx_mm,dz_mm,theta_deg,length_mm,lever_mm` with optional `sigma_mm`
+/// and `set` (train, validation). Refuses a missing column, a value that is not a number, an
+/// element whose angle, length or lever changes, and a sigma or length that is not positive. The
+/// error names file, row, value and limit.
 [[nodiscard]] Result<DeflectionData> parse_deflection_csv(const std::string& text,
                                                           const std::string& where);
 [[nodiscard]] Result<DeflectionData> read_deflection_csv(const std::string& path);

@@ -19,7 +19,7 @@ double near(double angle, double nominal) {
   return nominal + std::remainder(angle - nominal, 2 * kPi);
 }
 
-/// The row that leads from a frame to the next axis `line`, seen in that frame.
+/// The row that leads from a frame to the next axis `line`, which is given in that frame.
 Result<LinkGeometry> row_to(const AxisLine& line, const Joint& nominal, int joint,
                             const std::string& robot) {
   LinkGeometry link = nominal.link;

@@ -17,22 +17,23 @@ struct AxisLine {
 
 /// True if the joint slides.
 [[nodiscard]] bool slides(const Chain& robot, int joint);
-/// The first and the last joint that turn. What stands before or behind them no arc shows.
+/// The first and the last joint that turn. No arc shows the parts before the first or behind the
+/// last.
 struct TurningJoints {
   int first = 0, last = 0;
 };
-/// Refuses a robot without any, and a joint that slides between turning ones in another line than
-/// the next axis: arcs do not tell how it leads from the one axis to the other.
+/// Refuses a robot without turning joints. Refuses a prismatic joint between turning ones unless it
+/// slides along the next axis: arcs do not show how it leads from one axis to the other.
 [[nodiscard]] Result<TurningJoints> turning_joints(const Chain& robot);
 
-/// The robot with a Hayati row wherever an axis is parallel to the next one and both are
-/// measured; what such a row had as d stands in the row behind it. `notes`: which rows those are.
+/// The robot with a Hayati row wherever an axis is parallel to the next one and both are measured.
+/// The d of such a row moves into the row behind it. `notes` lists these rows.
 [[nodiscard]] Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
                                              std::vector<Note>& notes);
 
-/// Axes as measured at the postures of `groups` -> with the joints before them at zero, in their
-/// kinematic sense. A joint that slides along the next axis has that axis; else the line of a joint
-/// that slides is none.
+/// Transforms axes measured at the postures of `groups` to joints before them at zero, in their
+/// kinematic sense. A prismatic joint along the next axis gets that axis; other prismatic joints
+/// get no line.
 [[nodiscard]] std::vector<AxisLine> at_zero(const Chain& robot,
                                             const std::vector<JointArcs>& groups,
                                             const std::vector<AxisLine>& measured);
@@ -42,10 +43,10 @@ struct Links {
   Pose X_WB = Pose::Identity();
 };
 
-/// The DH procedure on axes at zero, source section 4.1.1 and Figure 4.1: the links that come
-/// nearest to those of the nominal `robot`. `held`: of each joint, where it slides: the place at
-/// which it stood, m; else 0. Links that no arc shows are the nominal ones. Refuses parallel axes
-/// in a row that is not a Hayati one.
+/// The DH procedure on axes at zero, source section 4.1.1 and Figure 4.1: the links nearest to
+/// those of the nominal `robot`. `held` has, for each prismatic joint, its position during the
+/// arcs, m; for other joints 0. Links that no arc shows stay nominal. Refuses parallel axes in a
+/// row that is not a Hayati row.
 [[nodiscard]] Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines,
                                      const JointVector& held);
 

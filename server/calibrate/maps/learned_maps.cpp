@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSameAngle = 1e-4;  // rad: nearer ones tell nothing of finer harmonics
-constexpr int kFewestHarmonics = 4;  // of a joint without a map: that it has none is learned
+constexpr int kFewestHarmonics = 4;  // for a joint without a map: enough to learn that it has none
 constexpr int kMostOfAll =
     580;  // harmonics of all joints: what a model has room for, and a calibration time
 constexpr double kNoLoss = 0.5;      // nat: by which fewer harmonics may be less likely
@@ -29,7 +29,7 @@ struct Pass {
 };
 constexpr Pass kPasses[] = {{48, 50}, {kMostHarmonics, 30}};
 
-/// As many harmonics as there are different angles for, in the range that they have.
+/// The number of harmonics that the different angles in their range can determine.
 int most_harmonics(const Chain& robot, const MeasurementBatch& batch, int joint) {
   std::vector<double> angles;
   for (const Measurement& m : batch.measurements)
@@ -42,7 +42,7 @@ int most_harmonics(const Chain& robot, const MeasurementBatch& batch, int joint)
   return std::clamp(static_cast<int>(std::min(told, 1e4)), kFewestHarmonics, kMostHarmonics);
 }
 
-/// Where the maps of these joints are among the parameters, joint by joint.
+/// The columns of the maps of these joints among the parameters, joint by joint.
 std::vector<MapColumns> columns_of(const PhysicalModel& model,
                                    const std::map<int, std::string>& spelling) {
   std::vector<MapColumns> maps;
@@ -147,7 +147,7 @@ class MapSearch {
   }
 
  private:
-  /// With that many harmonics of each map, at most; those that were there before keep their values.
+  /// Limits each map to `most` harmonics; harmonics that remain keep their values.
   void set_harmonics(int most) {
     PhysicalModel& model = problem_.model;
     std::map<int, VectorXd> before;

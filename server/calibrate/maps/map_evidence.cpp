@@ -38,7 +38,7 @@ VectorXd spreads(std::size_t maps) {
   return spread;
 }
 
-/// The share of a map's variance that each harmonic has, and how the log of that share changes with
+/// The share of each harmonic in a map's variance, and the derivatives of the log of that share by
 /// log knee and log power.
 struct Shares {
   VectorXd share, by_knee, by_power;
@@ -67,7 +67,7 @@ Shares shares_of(const MapColumns& map, const VectorXd& logs, Index first) {
 struct MapEvidence::Solved {
   VectorXd root;             // S: prior standard deviations in units of the scales
   MatrixXd inverse;          // (L Lᵀ)⁻¹
-  VectorXd change;           // in those units
+  VectorXd change;           // in units of the prior
   VectorXd before;           // from_prior_ in them
   std::array<double, 2> at;  // the factor of each kind
   double cost = 0;           // without the priors of the logarithms

@@ -35,9 +35,9 @@ class MapEvidence {
     Eigen::MatrixXd covariance;
   };
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& logs) const;
-  /// The spectrum of the map with that number, with as many harmonics as it has columns for.
+  /// The spectrum of map number `map`, with one harmonic for each of its pairs of columns.
   [[nodiscard]] MapSpectrum spectrum(const Eigen::VectorXd& logs, std::size_t map) const;
-  /// By what the sigmas of each kind are to be multiplied.
+  /// The factors for the sigmas of each kind.
   [[nodiscard]] std::array<double, 2> noise(const Eigen::VectorXd& logs) const;
 
  private:

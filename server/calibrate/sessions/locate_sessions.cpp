@@ -32,8 +32,7 @@ Result<Pose> base_by_orientations(const PhysicalModel& model, const MeasurementB
   return make_pose(R_WB, (p_W - R_WB * p_B) / count);
 }
 
-/// X_WB of the session; tools of `model` that are unknown are found with it and taken into its
-/// cell.
+/// X_WB of the session. Unknown tools of `model` are located with it and put into the model's cell.
 Result<Pose> base_of(PhysicalModel& model, const MeasurementBatch& session) {
   PhysicalModel here = model;
   const Status located = locate_unknown_frames(here, session);
@@ -57,7 +56,7 @@ Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model,
   anywhere.cell = std::move(cell);
   const std::vector<MeasurementBatch> sessions = by_session(batch);
   std::vector<SessionSetting> settings = settings_of(batch);
-  // The largest first: it tells best where a tool is that the cell does not know.
+  // The largest session first: it determines best a tool that the cell does not know.
   std::vector<std::size_t> order(sessions.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {

@@ -5,9 +5,9 @@
 
 namespace trammel {
 
-/// Where the instrument of each session stood, by the nominal chain and the tools that the cell or
-/// another session tells: within millimetres, enough to start from. Refuses a session whose rows do
-/// not tell it.
+/// The place of the instrument in each session, by the nominal chain and by tools that the cell or
+/// another session determines. It is right to within millimetres, enough for a start. Refuses a
+/// session whose rows do not determine it.
 [[nodiscard]] Result<std::vector<SessionSetting>> locate_sessions(const PhysicalModel& model,
                                                                   const MeasurementBatch& batch);
 

@@ -4,8 +4,8 @@ namespace trammel {
 
 namespace {
 
-// Standard deviations of where an instrument may stand from where it was located: so wide that they
-// do not matter.
+// Prior standard deviations of an instrument's place about the located one, so wide that they have
+// no influence.
 constexpr double kShift = 1;   // m
 constexpr double kTurn = 2.5;  // rad
 constexpr double kStretch = 1;

@@ -6,9 +6,9 @@
 #include "server/calibrate/sessions/session_setting.h"
 #include "server/measurement/measurement.h"
 
-/// The part of the normal equations that belongs to sessions: where the instrument of each stood,
-/// and its scale. Each session has seven unknowns of its own that no other one shares, so they are
-/// eliminated session by session (Schur complement), and the cost is linear in the sessions.
+/// The part of the normal equations that belongs to sessions: the place of each instrument, and its
+/// scale. Each session has seven unknowns that it shares with no other. They are eliminated session
+/// by session (Schur complement), so the cost is linear in the number of sessions.
 namespace trammel {
 
 inline constexpr int kOfSession = 7;
@@ -18,8 +18,8 @@ using SessionMotion = Eigen::Matrix<double, kOfSession, 1>;
 using SessionColumns = Eigen::Matrix<double, kOfSession, Eigen::Dynamic>;
 
 /// Derivative of the weighted residuals (6, or 3 without an orientation) by the motion, transposed:
-/// one column an equation. That by the stretch is 0 where the session is not `stretched`: it is
-/// then found to be 0.
+/// one column an equation. The derivative by the stretch is set to 0 unless the session is
+/// `stretched`, so that the stretch stays 0.
 [[nodiscard]] SessionColumns motion_columns(const Measurement& m, const Vector3& centre_W,
                                             double inverse_sigma, double inverse_rotation_sigma,
                                             bool stretched);

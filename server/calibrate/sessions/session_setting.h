@@ -5,13 +5,14 @@
 
 #include "server/measurement/measurement.h"
 
-/// Set-ups of the instrument. In a session s the tracker sees (1 + k(s)) p = X_WS(s)^-1 X_WB f(q) +
-/// noise: the arm is one, and X_WS(s), where the instrument stood, belongs to the session. So does
-/// the scale k(s) where the data ask for it: an instrument that measures all lengths too long, or
-/// an arm that was colder as a whole. W is the world of the newest session, and its lengths are
-/// those of W (where the cell does not say where the base stands, too: the session with the most
-/// poses only finds it). A rigid motion leaves isotropic noise as it is, and so does a scale of
-/// parts in a million; so measurements may be moved into W as if all were of one set-up.
+/// Set-ups of the instrument. In session s the tracker sees (1 + k(s)) p = X_WS(s)^-1 X_WB f(q) +
+/// noise. There is one arm; X_WS(s), the place of the instrument, belongs to the session. The scale
+/// k(s) also belongs to it, if the data ask for one: the instrument measures all lengths too long,
+/// or the whole arm was colder. W is the world of the newest session, and its lengths are the
+/// lengths of W. This also holds if the session with the most poses located the base because the
+/// cell does not state it. Isotropic noise stays isotropic under a rigid motion, and practically so
+/// under a scale of parts in a million. So measurements may be moved into W as if they were all of
+/// one set-up.
 namespace trammel {
 
 /// A scale, then a rigid motion: p -> X ((1 + scale) p).
@@ -30,12 +31,11 @@ struct SessionSetting {
   std::string first_pose;  ///< its id
   int poses = 0;
   Pose X_WS = Pose::Identity();  ///< from the session's world into that of the newest
-  double scale =
-      0;  ///< by what its lengths are to be stretched, of themselves; 0: as the model has them
-  double own_noise = 0;           ///< m, one axis: noise beyond that of the other sessions
+  double scale = 0;      ///< the relative stretch of its lengths into those of the model; 0: none
+  double own_noise = 0;  ///< m, one axis: noise in excess of the other sessions
   double own_noise_rotation = 0;  ///< rad, one axis
 
-  /// Takes what the session measured into W.
+  /// Takes measurements of the session into W.
   [[nodiscard]] Similarity into_W() const { return {X_WS, scale}; }
   void set_into_W(const Similarity& by) {
     X_WS = by.X;
@@ -63,8 +63,8 @@ struct SessionSetting {
                                        const std::vector<SessionSetting>& settings,
                                        const Tracker& tracker);
 
-/// Why the rows do not tell where their instrument stood: fewer than three positions, or all on one
-/// line, and no orientation. Empty where they do.
+/// The reason why the rows do not determine the place of their instrument: fewer than three
+/// positions, or all on one line, and no orientation. Empty if they determine it.
 [[nodiscard]] std::string why_not_placed(const MeasurementBatch& session);
 
 }  // namespace trammel

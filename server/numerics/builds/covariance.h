@@ -2,8 +2,7 @@
 
 #include "server/numerics/builds/vectors.h"
 
-/// Covariances that depend on a scaled distance alone: tiles of them, sums of them, and their
-/// slopes.
+/// Tiles, sums and slopes of covariances that depend on a scaled distance alone.
 namespace trammel {
 namespace {
 

@@ -184,9 +184,9 @@ void put_rows_of_root(Index k, Index size, const Block& block, const Workspace& 
   }
 }
 
-// Forward elimination of [M | I] in place. What would be the identity's columns takes the place of
-// the eliminated ones, so the lower triangle ends as L⁻¹. Rows above k are finished: only rows
-// below are updated.
+// Forward elimination of [M | I] in place. The identity's columns are stored in place of the
+// eliminated ones, so the lower triangle ends as L⁻¹. Rows above k are finished: only rows below
+// are updated.
 bool inverse_root(Index n, Index extra, double* a, Index ld, double* work, double* log_det) {
   const Index rows = padded_rows(n + extra);
   const Index step = block_size(n);
