@@ -23,7 +23,9 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trammel)
 if(TARGET trammel_shared)
   install(TARGETS trammel_shared EXPORT Trammel
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
-  install(DIRECTORY clients/library/trammel DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY clients/library/trammel DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h"
+    PATTERN "values.h" EXCLUDE)
+  install(FILES server/exchange/values.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel COMPONENT dev)
   install(DIRECTORY clients/library/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libtrammel-dev COMPONENT dev)
   install(EXPORT Trammel NAMESPACE Trammel:: FILE TrammelTargets.cmake DESTINATION ${package_dir} COMPONENT dev)
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/TrammelConfigVersion.cmake COMPATIBILITY SameMinorVersion)
@@ -42,7 +44,7 @@ endif()
 # The rooms: find_package(trammel COMPONENTS session offline). `common` comes with both. Rooms above the trainer are the daemon's own.
 set(common_rooms headers base)
 set(session_rooms idl_types idl clients_session)
-set(offline_rooms dense_algebra numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
+set(offline_rooms dense_algebra numerics robot exchange error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
   tasks trainer offline)
 
 set_target_properties(trammel_clients_session PROPERTIES EXPORT_NAME session)

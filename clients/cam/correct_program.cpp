@@ -14,6 +14,7 @@
 #include "clients/cam/path_check.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 #include "server/robot/branch_hint.h"
 
 namespace trammel::cam {
@@ -25,21 +26,6 @@ constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
 constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
 constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
 constexpr double kReach = 3;                 // m, the lever of a joint
-
-Pose from_wire(const client::PoseMm& pose) {
-  const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
-  return make_pose(R.normalized().toRotationMatrix(),
-                   Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
-}
-
-JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
-  JointVector q(robot.size());
-  for (int j = 0; j < robot.size(); ++j) {
-    const double value = wire[static_cast<std::size_t>(j)];
-    q(j) = robot.joint(j).type == JointType::kRevolute ? value : from_mm(value);
-  }
-  return q;
-}
 
 /// The axes in the target's own units; `axes`: degrees.
 std::vector<double> axes_of(const ProgramTarget& target, std::vector<double> axes) {
@@ -105,10 +91,10 @@ class Correcting {
 
   Status ask_all(const AskCorrections& ask) {
     for (const TargetGroup& group : groups_of(program_, nominal_)) {
-      std::vector<client::TargetMm> targets;
+      std::vector<exchange::AskedTarget> targets;
       for (const std::size_t t : group.targets)
         targets.push_back(std::move(nominal_.targets[t].asked));
-      const client::Answer<client::CorrectedTarget> answer =
+      const exchange::Answer<exchange::CorrectedTarget> answer =
           TRY(ask(group.tool, group.payload, targets));
       targets = {};
       if (!result_.model_id.empty() && result_.model.hash != answer.model.hash)
@@ -122,7 +108,7 @@ class Correcting {
     return {};
   }
 
-  void take(std::size_t t, const client::CorrectedTarget& item) {
+  void take(std::size_t t, const exchange::CorrectedTarget& item) {
     const ProgramTarget& target = program_.targets[t];
     ReceiptRow& row = rows_[t];
     row.status = item.status;
@@ -139,16 +125,14 @@ class Correcting {
     row.sigma_measured_mm = item.sigma_measured_mm;
     row.iterations = item.iterations;
     if (item.status != "ok" && item.status != "out_of_domain") return;
-    const Pose X_BT = from_wire(item.commanded);
+    const Pose X_BT = exchange::to_si(item.commanded);
     const Pose X_TF = cell_.tools.at(nominal_.tools[target.tool].tool).inverse();
-    JointVector q = from_wire(item.q_rad, arm_.robot());
+    JointVector q = exchange::si_from_degrees(item.joints_deg, arm_.robot());
     // The rail stays where the program has it.
-    if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal)
+    row.joints = item.joints_deg;
+    if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal) {
       q = arm_.near(X_BT * X_TF, *nominal);
-    row.joints = joints_on_wire(q, arm_.robot());
-    for (int j = 0; j < q.size(); ++j) {
-      if (arm_.robot().joint(j).type == JointType::kRevolute)
-        row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
+      row.joints = exchange::degrees_from_si(q, exchange::rails_of(arm_.robot()));
     }
     const std::vector<double> exact =
         is_joints(target.coordinates)

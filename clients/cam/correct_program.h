@@ -8,7 +8,7 @@
 #include "clients/cam/mark.h"
 #include "clients/cam/program.h"
 #include "clients/cam/receipt.h"
-#include "clients/session/session_types.h"
+#include "server/exchange/answer.h"
 #include "server/robot/cell.h"
 
 /// A program in, a corrected program and its receipt out. The same for every dialect, and for a
@@ -16,9 +16,9 @@
 namespace trammel::cam {
 
 /// Corrects targets with one tool and payload. All answers of one program come from one model.
-using AskCorrections = std::function<Result<client::Answer<client::CorrectedTarget>>(
+using AskCorrections = std::function<Result<exchange::Answer<exchange::CorrectedTarget>>(
     const std::string& tool, const std::string& payload,
-    const std::vector<client::TargetMm>& targets)>;
+    const std::vector<exchange::AskedTarget>& targets)>;
 
 struct CorrectProgramOptions {
   std::string tool, payload;  ///< of the cell, as the user named them

@@ -12,16 +12,11 @@
 #include "clients/cam/taught.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 
 namespace trammel::cam {
 
 namespace {
-
-client::PoseMm to_wire(const Pose& X_BT) {
-  const Eigen::Quaterniond R(X_BT.linear());
-  const Vector3 p = X_BT.translation() * to_mm(1);
-  return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
-}
 
 constexpr double kLargest = 1e7;      // of a target's numbers, mm or deg
 constexpr double kSameJoints = 1e-6;  // rad
@@ -282,7 +277,7 @@ class Finding {
       return false;
     }
     found.asked.joint_target = true;
-    found.asked.seed_rad = joints_on_wire(*q, arm_.robot());
+    found.asked.seed_rad = exchange::asked_from_si(*q, exchange::rails_of(arm_.robot()));
     found.q = *q;
     return false;
   }
@@ -298,11 +293,11 @@ class Finding {
   void take(std::size_t t, const NominalJoints& joints) {
     const ProgramTarget& target = program_.targets[t];
     NominalTarget& found = found_.targets[t];
-    found.asked.pose =
-        to_wire(program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers));
+    found.asked.pose = exchange::from_si(program_.frames[target.frame].X_BO *
+                                         pose_of(target.coordinates, target.numbers));
     found.doubt = joints.doubt;
     if (joints.q) {
-      found.asked.seed_rad = joints_on_wire(*joints.q, arm_.robot());
+      found.asked.seed_rad = exchange::asked_from_si(*joints.q, exchange::rails_of(arm_.robot()));
       found.q = *joints.q;
       if (outside(*joints.q) && joints.conf && !arm_.has_rail()) {
         // So that the answer names the branches that would reach it.
@@ -338,13 +333,6 @@ class Finding {
 };
 
 }  // namespace
-
-std::vector<double> joints_on_wire(const JointVector& q, const Chain& robot) {
-  std::vector<double> wire;
-  for (int j = 0; j < robot.size(); ++j)
-    wire.push_back(robot.joint(j).type == JointType::kRevolute ? q(j) : to_mm(q(j)));
-  return wire;
-}
 
 std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes) {
   if (coordinates == Coordinates::kJointRadians) {

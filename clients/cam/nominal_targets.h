@@ -7,13 +7,13 @@
 #include "clients/cam/cell_tools.h"
 #include "clients/cam/configuration.h"
 #include "clients/cam/program.h"
-#include "clients/session/session_types.h"
+#include "server/exchange/answer.h"
 
 namespace trammel::cam {
 
 /// A target of a program as the controller takes it.
 struct NominalTarget {
-  client::TargetMm asked;        ///< as a model is asked to correct it
+  exchange::AskedTarget asked;   ///< as a model is asked to correct it
   std::optional<JointVector> q;  ///< the controller's joints; empty: not found
   std::string why_not;           ///< why it cannot be corrected; empty: it may be
   std::string doubt = {};        ///< what the program says of it that contradicts itself
@@ -54,8 +54,6 @@ struct TargetGroup {
 [[nodiscard]] std::vector<TargetGroup> groups_of(const Program& program,
                                                  const NominalTargets& nominal);
 
-/// rad, of a rail mm.
-[[nodiscard]] std::vector<double> joints_on_wire(const JointVector& q, const Chain& robot);
 /// Axes of a joint target in degrees, whatever its dialect writes.
 [[nodiscard]] std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes);
 [[nodiscard]] std::vector<double> in_degrees(const ProgramTarget& target, std::vector<double> axes);

@@ -7,6 +7,7 @@
 
 #include "clients/cam/configuration.h"
 #include "clients/cam/nominal_targets.h"
+#include "server/exchange/si.h"
 
 namespace trammel::cam {
 
@@ -37,7 +38,7 @@ PredictedTarget left(const Program& program, const LeftAlone& left) {
   return row;
 }
 
-void take(const client::PredictedError& predicted, const Chain& robot, const JointVector& q,
+void take(const exchange::Prediction& predicted, const Chain& robot, const JointVector& q,
           PredictedTarget& row) {
   row.predicted = predicted;
   row.status = predicted.in_domain ? "ok" : "out_of_domain";
@@ -69,7 +70,7 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
   }
   for (const TargetGroup& group : groups_of(program, nominal)) {
     std::vector<std::size_t> found;
-    std::vector<client::CommandedJoints> poses;
+    std::vector<exchange::AskedJoints> poses;
     for (const std::size_t t : group.targets) {
       const auto& q = nominal.targets[t].q;
       if (!q) {
@@ -78,7 +79,7 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
         continue;
       }
       found.push_back(t);
-      poses.push_back({joints_on_wire(*q, robot), {}});
+      poses.push_back({exchange::asked_from_si(*q, exchange::rails_of(robot)), {}});
     }
     if (poses.empty()) continue;
     const auto answer = TRY(ask(group.tool, group.payload, poses));

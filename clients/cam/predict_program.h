@@ -7,16 +7,16 @@
 #include "clients/cam/cell_tools.h"
 #include "clients/cam/program.h"
 #include "clients/cam/receipt.h"
-#include "clients/session/session_types.h"
+#include "server/exchange/answer.h"
 
 /// Where the tool really goes with a program as it is.
 namespace trammel::cam {
 
 /// Predicts the error at joints with one tool and payload. All answers of one program come from one
 /// model.
-using AskPredictions = std::function<Result<client::Answer<client::PredictedError>>(
+using AskPredictions = std::function<Result<exchange::Answer<exchange::Prediction>>(
     const std::string& tool, const std::string& payload,
-    const std::vector<client::CommandedJoints>& poses)>;
+    const std::vector<exchange::AskedJoints>& poses)>;
 
 struct PredictedTarget {
   std::string name, file, motion, tool, frame;
@@ -26,12 +26,12 @@ struct PredictedTarget {
       status;  ///< `ok`, `out_of_domain`, `joint_limit`, or `refused` where nothing can be said
   std::string message;                         ///< why not ok
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, as commanded
-  client::PredictedError predicted = {};       ///< not set where refused
+  exchange::Prediction predicted = {};         ///< not set where refused
 };
 
 struct PredictedProgram {
   std::string model_id;
-  client::ModelInfo model;
+  exchange::ModelInfo model;
   std::vector<PredictedTarget> targets;  ///< by file and line
   std::vector<std::string> notes;
 };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "clients/cam/program.h"
-#include "clients/session/session_types.h"
+#include "server/exchange/answer.h"
 
 /// The outcome of a correction: for a program and for each of its targets.
 namespace trammel::cam {
@@ -50,7 +50,7 @@ struct InsertedLine {
 
 struct CorrectedProgram {
   std::string model_id;
-  client::ModelInfo model;
+  exchange::ModelInfo model;
   std::vector<SourceFile> files;  ///< corrected
   std::vector<bool> changed;      ///< of each file
   std::vector<ReceiptRow> rows;   ///< by file and line

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 
 namespace trammel::library {
 
@@ -80,14 +81,7 @@ std::vector<api::Note> to_api(const std::vector<Note>& notes) {
   return all;
 }
 
-api::Pose to_api(const Pose& X_AB) {
-  const Eigen::Quaterniond R(X_AB.linear());
-  const Vector3 p = to_mm(1) * X_AB.translation();
-  return {{p.x(), p.y(), p.z()}, {R.w(), R.x(), R.y(), R.z()}};
-}
-
 Result<Pose> from_api(const api::Pose& X_AB) {
-  const Vector3 p_mm(X_AB.xyz_mm[0], X_AB.xyz_mm[1], X_AB.xyz_mm[2]);
   for (const double mm : X_AB.xyz_mm) {
     if (!(std::abs(mm) <= kFarthestMm))
       return refused("position is {} mm, limit {:.0f}", mm, kFarthestMm)
@@ -100,14 +94,7 @@ Result<Pose> from_api(const api::Pose& X_AB) {
         .of("q_wxyz")
         .beyond(R.norm(), 1);
   }
-  return make_pose(R.normalized().toRotationMatrix(), from_mm(1) * p_mm);
-}
-
-std::vector<double> joints_to_api(const JointVector& q, const Chain& robot) {
-  std::vector<double> joints;
-  for (int j = 0; j < q.size(); ++j)
-    joints.push_back(is_rail(robot, j) ? to_mm(q(j)) : to_deg(q(j)));
-  return joints;
+  return exchange::to_si(X_AB);
 }
 
 Result<JointVector> joints_from_api(std::span<const double> joints_deg, const Chain& robot) {

@@ -20,12 +20,9 @@ template <typename T>
 
 [[nodiscard]] std::vector<api::Note> to_api(const std::vector<Note>& notes);
 
-[[nodiscard]] api::Pose to_api(const Pose& X_AB);
 /// Refuses numbers that are not finite and quaternions that are not of length 1 within 1e-3.
 [[nodiscard]] Result<Pose> from_api(const api::Pose& X_AB);
 
-/// deg, of a rail mm.
-[[nodiscard]] std::vector<double> joints_to_api(const JointVector& q, const Chain& robot);
 /// Refuses another number of joints than the robot has, and numbers that are not finite.
 [[nodiscard]] Result<JointVector> joints_from_api(std::span<const double> joints_deg,
                                                   const Chain& robot);

@@ -11,6 +11,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/budget/budget_words.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -34,8 +35,8 @@
 
 namespace trammel::api {
 
+using exchange::mm_from_si;
 using library::from_api;
-using library::joints_to_api;
 using library::passed_on;
 using library::to_api;
 
@@ -78,43 +79,9 @@ trammel::Status trainable(const Cell& cell, SpecUse use) {
   return {};
 }
 
-std::array<double, 3> mm(const Vector3& v) { return {to_mm(v.x()), to_mm(v.y()), to_mm(v.z())}; }
-std::array<double, 3> deg(const Vector3& v) {
-  return {to_deg(v.x()), to_deg(v.y()), to_deg(v.z())};
-}
-
-Prediction prediction_of(const ErrorPrediction& p) {
-  Prediction out;
-  out.nominal = to_api(p.X_BT_nominal);
-  out.predicted = to_api(p.X_BT_predicted);
-  out.error_mm = mm(p.error_B);
-  out.stddev_mm = mm(p.stddev_B);
-  out.true_stddev_mm = mm(p.true_stddev_B);
-  for (int k = 0; k < 9; ++k)
-    out.covariance_mm2[static_cast<std::size_t>(k)] = to_mm(to_mm(p.covariance_B(k / 3, k % 3)));
-  out.rotation_deg = deg(pose_difference(p.X_BT_predicted, p.X_BT_nominal).tail<3>());
-  if (p.rotation_stddev_B) out.rotation_stddev_deg = deg(*p.rotation_stddev_B);
-  out.in_domain = p.in_domain;
-  out.bias_share = p.bias_weight;
-  return out;
-}
-
-CorrectedTarget corrected(const Correction& c, const Chain& robot) {
-  return {std::string(to_string(c.status)),
-          to_api(c.X_BT_commanded),
-          joints_to_api(c.q, robot),
-          to_mm(c.error_before),
-          to_mm(c.error_after),
-          to_mm(c.stddev),
-          to_deg(c.turn_before),
-          to_deg(c.turn_after),
-          c.iterations,
-          c.message};
-}
-
 Figures figures_from(const ErrorFigures& f) {
-  return {to_mm(f.rms), to_mm(f.mean),   to_mm(f.p997),
-          to_mm(f.max), mm(f.axis_mean), mm(f.axis_stddev)};
+  return {to_mm(f.rms), to_mm(f.mean),           to_mm(f.p997),
+          to_mm(f.max), mm_from_si(f.axis_mean), mm_from_si(f.axis_stddev)};
 }
 
 Evaluation evaluation_of(const trammel::Evaluation& e) {
@@ -335,8 +302,8 @@ Measured Model::measured() const {
   }
   if (known->temperature)
     std::tie(out.temperature_min_c, out.temperature_max_c) = *known->temperature;
-  out.lower_mm = mm(known->lower);
-  out.upper_mm = mm(known->upper);
+  out.lower_mm = mm_from_si(known->lower);
+  out.upper_mm = mm_from_si(known->upper);
   out.volume_m3 = known->volume;
   if (known->reach) out.reach_mm = to_mm(*known->reach);
   return out;
@@ -364,7 +331,7 @@ Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_de
     const auto from = poses->begin() + static_cast<std::ptrdiff_t>(first);
     const auto count = static_cast<std::ptrdiff_t>(std::min(kPosesTogether, poses->size() - first));
     for (const ErrorPrediction& p : model.predict_all({from, from + count}))
-      all.push_back(prediction_of(p));
+      all.push_back(exchanged(p));
   }
   return all;
 }
@@ -385,8 +352,9 @@ Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targ
   }
   std::vector<CorrectedTarget> all;
   all.reserve(wanted.size());
+  const exchange::Rails rails = exchange::rails_of(robot);
   for (const trammel::Target& target : wanted)
-    all.push_back(corrected(model.correct(target, known->tool, known->payload), robot));
+    all.push_back(exchanged(model.correct(target, known->tool, known->payload), rails));
   return all;
 }
 
@@ -535,7 +503,8 @@ Result<Plan> plan(const Cell& cell, const PlanOptions& options) {
     if (of.tools.size() == 1) commanded.context.tool.clear();
     if (of.payloads.size() == 1) commanded.context.payload.clear();
     out.pose_ids.push_back(pose.id);
-    for (const double joint : joints_to_api(pose.context.q, of.robot))
+    for (const double joint :
+         exchange::degrees_from_si(pose.context.q, exchange::rails_of(of.robot)))
       out.joints_deg.push_back(joint);
   }
   out.csv = to_csv(list);

@@ -1,7 +1,6 @@
 #include "clients/library/trammel/service.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 
@@ -9,8 +8,8 @@
 #include "clients/session/session.h"
 #include "server/base/host_port.h"
 #include "server/base/mutex.h"
-#include "server/base/units.h"
 #include "server/compensate/model_file.h"
+#include "server/exchange/si.h"
 
 namespace trammel::api {
 
@@ -39,93 +38,34 @@ namespace {
 
 constexpr std::chrono::milliseconds kLongestTimeout = std::chrono::hours(24);
 
-client::CallContext context_of(const Asked& asked) {
-  return {asked.cell, asked.context.tool, asked.context.payload, asked.controller_compensates, {}};
+client::CallContext context_of(const Asked& asked, const Chain& robot) {
+  return {asked.cell, asked.context.tool,       asked.context.payload, asked.controller_compensates,
+          {},         exchange::rails_of(robot)};
 }
 
-client::Approach approach_of(const Context& context) {
+exchange::Approach approach_of(const Context& context) {
   return {context.directions, context.temperature_c, {}};
 }
 
-/// rad, of a rail mm.
-std::vector<double> to_wire(const JointVector& q, const Chain& robot) {
-  std::vector<double> joints;
-  for (int j = 0; j < robot.size(); ++j) {
-    const bool rail = robot.joint(j).type == JointType::kPrismatic;
-    joints.push_back(rail ? to_mm(q(j)) : q(j));
-  }
-  return joints;
-}
-
-std::vector<double> from_wire(const std::vector<double>& joints, const Chain& robot) {
-  std::vector<double> joints_deg = joints;
-  for (std::size_t j = 0; j < joints.size() && j < static_cast<std::size_t>(robot.size()); ++j) {
-    if (robot.joint(static_cast<int>(j)).type == JointType::kRevolute)
-      joints_deg[j] = to_deg(joints[j]);
-  }
-  return joints_deg;
-}
-
-client::PoseMm to_wire(const trammel::Pose& X_BT) {
-  const api::Pose pose = library::to_api(X_BT);
-  const auto& [p, q] = pose;
-  return {p[0], p[1], p[2], q[0], q[1], q[2], q[3]};
-}
-
-Pose from_wire(const client::PoseMm& p) {
-  return {{p.x_mm, p.y_mm, p.z_mm}, {p.qw, p.qx, p.qy, p.qz}};
-}
-
-Prediction from_wire(const client::PredictedError& p) {
-  const auto square = [](double s) { return s * s; };
-  Prediction out;
-  out.nominal = from_wire(p.nominal);
-  out.predicted = from_wire(p.predicted);
-  out.error_mm = {p.dx_mm, p.dy_mm, p.dz_mm};
-  out.stddev_mm = {p.sx_mm, p.sy_mm, p.sz_mm};
-  out.true_stddev_mm = {p.slx_mm, p.sly_mm, p.slz_mm};
-  out.covariance_mm2 = {square(p.sx_mm), p.cxy_mm2, p.cxz_mm2, p.cxy_mm2,      square(p.sy_mm),
-                        p.cyz_mm2,       p.cxz_mm2, p.cyz_mm2, square(p.sz_mm)};
-  out.rotation_deg = {to_deg(p.rx_rad), to_deg(p.ry_rad), to_deg(p.rz_rad)};
-  if (!std::isnan(p.srx_rad))
-    out.rotation_stddev_deg = {to_deg(p.srx_rad), to_deg(p.sry_rad), to_deg(p.srz_rad)};
-  out.in_domain = p.in_domain;
-  out.bias_share = p.bias_share;
-  return out;
-}
-
-CorrectedTarget from_wire(const client::CorrectedTarget& t, const Chain& robot) {
-  return {t.status,
-          from_wire(t.commanded),
-          from_wire(t.q_rad, robot),
-          t.error_before_mm,
-          t.error_after_mm,
-          t.sigma_mm,
-          to_deg(t.turn_before_rad),
-          to_deg(t.turn_after_rad),
-          t.iterations,
-          t.message};
-}
-
-trammel::Result<client::TargetMm> to_wire(const Target& target, const Context& context,
-                                          const Chain& robot) {
-  client::TargetMm wire;
-  wire.joint_target = !target.pose;
-  wire.conf = target.conf;
-  wire.approach = approach_of(context);
+trammel::Result<exchange::AskedTarget> asked_of(const Target& target, const Context& context,
+                                                const Chain& robot) {
+  exchange::AskedTarget asked;
+  asked.joint_target = !target.pose;
+  asked.conf = target.conf;
+  asked.approach = approach_of(context);
   if (target.pose) {
     const trammel::Result<trammel::Pose> X_BT = library::from_api(*target.pose);
     if (!X_BT) return tl::make_unexpected(X_BT.error());
-    wire.pose = to_wire(*X_BT);
+    asked.pose = exchange::from_si(*X_BT);
   }
-  if (target.joints_deg.empty() && target.pose) return wire;
+  if (target.joints_deg.empty() && target.pose) return asked;
   const trammel::Result<JointVector> seed = library::joints_from_api(target.joints_deg, robot);
   if (!seed) return tl::make_unexpected(seed.error());
-  wire.seed_rad = to_wire(*seed, robot);
-  return wire;
+  asked.seed_rad = exchange::asked_from_si(*seed, exchange::rails_of(robot));
+  return asked;
 }
 
-ModelFacts facts_of(const client::ModelInfo& model) {
+ModelFacts facts_of(const exchange::ModelInfo& model) {
   return {model.id,      model.hash,     model.cell,
           model.level,   model.batch_id, model.training_poses,
           model.version, model.in_force, library::to_api(model.notes),
@@ -199,15 +139,13 @@ Result<Answer<Prediction>> Session::predict(const Asked& asked,
     return passed_on(fits);
   const auto all = library::all_joints_from_api(joints_deg, *robot);
   if (!all) return passed_on(all);
-  std::vector<client::CommandedJoints> poses;
+  const client::CallContext context = context_of(asked, *robot);
+  std::vector<exchange::AskedJoints> poses;
   for (const JointVector& q : *all)
-    poses.push_back({to_wire(q, *robot), approach_of(asked.context)});
-  const auto answer = inside_->session->predict_error_at(context_of(asked), poses);
+    poses.push_back({exchange::asked_from_si(q, context.rails), approach_of(asked.context)});
+  auto answer = inside_->session->predict_error_at(context, poses);
   if (!answer) return passed_on(answer);
-  return Answer<Prediction>{facts_of(answer->model),
-                            each<Prediction>(answer->items, [](const client::PredictedError& p) {
-                              return from_wire(p);
-                            })};
+  return Answer<Prediction>{facts_of(answer->model), std::move(answer->items)};
 }
 
 Result<Answer<CorrectedTarget>> Session::correct(const Asked& asked,
@@ -216,20 +154,17 @@ Result<Answer<CorrectedTarget>> Session::correct(const Asked& asked,
   if (!robot) return passed_on(robot);
   if (const auto fits = library::check_context(asked.context, *robot); !fits)
     return passed_on(fits);
-  std::vector<client::TargetMm> wanted;
+  std::vector<exchange::AskedTarget> wanted;
   for (const Target& target : targets) {
-    auto wire = to_wire(target, asked.context, *robot);
-    if (!wire)
+    auto one = asked_of(target, asked.context, *robot);
+    if (!one)
       return tl::make_unexpected(
-          library::to_api(Failure(wire.error()).at_row(static_cast<long>(wanted.size())).value()));
-    wanted.push_back(std::move(*wire));
+          library::to_api(Failure(one.error()).at_row(static_cast<long>(wanted.size())).value()));
+    wanted.push_back(std::move(*one));
   }
-  const auto answer = inside_->session->correct_targets(context_of(asked), wanted);
+  auto answer = inside_->session->correct_targets(context_of(asked, *robot), wanted);
   if (!answer) return passed_on(answer);
-  return Answer<CorrectedTarget>{
-      facts_of(answer->model),
-      each<CorrectedTarget>(
-          answer->items, [&](const client::CorrectedTarget& t) { return from_wire(t, *robot); })};
+  return Answer<CorrectedTarget>{facts_of(answer->model), std::move(answer->items)};
 }
 
 Result<std::int64_t> Session::submit(const std::string& cell, const std::string& batch_id,

@@ -125,8 +125,10 @@ py::array_t<double> table(const std::vector<Item>& items, py::ssize_t columns, c
   return array;
 }
 
+// A figure of each item, by its kind.
+
 template <typename Item>
-py::array_t<double> poses(const std::vector<Item>& items, api::Pose Item::*pose) {
+py::array figure_of(const std::vector<Item>& items, api::Pose Item::*pose) {
   py::array_t<double> array({static_cast<py::ssize_t>(items.size()), py::ssize_t{7}});
   double* to = array.mutable_data();
   for (const Item& item : items) {
@@ -137,8 +139,39 @@ py::array_t<double> poses(const std::vector<Item>& items, api::Pose Item::*pose)
 }
 
 template <typename Item>
-py::array_t<double> numbers(const std::vector<Item>& items, double Item::*member) {
-  return table(items, 1, [&](const Item& item) { return &(item.*member); });
+py::array figure_of(const std::vector<Item>& items, std::array<double, 3> Item::*vector) {
+  return table(items, 3, [&](const Item& item) { return (item.*vector).data(); });
+}
+
+template <typename Item>
+py::array figure_of(const std::vector<Item>& items,
+                    std::optional<std::array<double, 3>> Item::*vector) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  static const std::array<double, 3> kNotLearned = {kNaN, kNaN, kNaN};
+  return table(items, 3, [&](const Item& item) {
+    return (item.*vector ? *(item.*vector) : kNotLearned).data();
+  });
+}
+
+template <typename Item>
+py::array figure_of(const std::vector<Item>& items, std::array<double, 9> Item::*matrix) {
+  return table(items, 9, [&](const Item& item) { return (item.*matrix).data(); })
+      .reshape({static_cast<py::ssize_t>(items.size()), py::ssize_t{3}, py::ssize_t{3}});
+}
+
+template <typename Item, typename Number>
+py::array figure_of(const std::vector<Item>& items, Number Item::*number) {
+  py::array_t<Number> array(static_cast<py::ssize_t>(items.size()));
+  for (std::size_t i = 0; i < items.size(); ++i) array.mutable_data()[i] = items[i].*number;
+  return array;
+}
+
+template <typename Item, typename Figures>
+py::dict figures_of(const std::vector<Item>& items, const Figures& figures) {
+  py::dict all;
+  exchange::each_figure(
+      figures, [&](const auto& figure) { all[figure.name] = figure_of(items, figure.value); });
+  return all;
 }
 
 template <typename Item, typename Of>
@@ -149,48 +182,20 @@ py::list texts(const std::vector<Item>& items, const Of& of) {
 }
 
 py::dict to_python(const std::vector<api::Prediction>& items) {
-  using P = api::Prediction;
-  py::array_t<double> covariance =
-      table(items, 9, [](const P& p) { return p.covariance_mm2.data(); });
-  py::array_t<bool> in_domain(static_cast<py::ssize_t>(items.size()));
-  for (std::size_t i = 0; i < items.size(); ++i) in_domain.mutable_data()[i] = items[i].in_domain;
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  static const std::array<double, 3> kNotLearned = {kNaN, kNaN, kNaN};
-  return py::dict(
-      "nominal"_a = poses(items, &P::nominal), "predicted"_a = poses(items, &P::predicted),
-      "error_mm"_a = table(items, 3, [](const P& p) { return p.error_mm.data(); }),
-      "stddev_mm"_a = table(items, 3, [](const P& p) { return p.stddev_mm.data(); }),
-      "true_stddev_mm"_a = table(items, 3, [](const P& p) { return p.true_stddev_mm.data(); }),
-      "covariance_mm2"_a = covariance.reshape(
-          {static_cast<py::ssize_t>(items.size()), py::ssize_t{3}, py::ssize_t{3}}),
-      "rotation_deg"_a = table(items, 3, [](const P& p) { return p.rotation_deg.data(); }),
-      "rotation_stddev_deg"_a =
-          table(items, 3,
-                [](const P& p) {
-                  return (p.rotation_stddev_deg ? *p.rotation_stddev_deg : kNotLearned).data();
-                }),
-      "in_domain"_a = in_domain, "bias_share"_a = numbers(items, &P::bias_share));
+  return figures_of(items, exchange::kPredictionFigures);
 }
 
 py::dict to_python(const std::vector<api::CorrectedTarget>& items, std::size_t joints) {
   using T = api::CorrectedTarget;
-  py::array_t<int> iterations(static_cast<py::ssize_t>(items.size()));
-  for (std::size_t i = 0; i < items.size(); ++i) iterations.mutable_data()[i] = items[i].iterations;
   const std::vector<double> none(joints, std::numeric_limits<double>::quiet_NaN());
-  return py::dict(
-      "status"_a = texts(items, [](const T& t) { return t.status; }),
-      "pose"_a = poses(items, &T::commanded),
-      "joints_deg"_a = table(items, static_cast<py::ssize_t>(joints),
-                             [&](const T& t) {
-                               return t.joints_deg.size() == joints ? t.joints_deg.data()
-                                                                    : none.data();
-                             }),
-      "error_before_mm"_a = numbers(items, &T::error_before_mm),
-      "error_after_mm"_a = numbers(items, &T::error_after_mm),
-      "sigma_mm"_a = numbers(items, &T::sigma_mm),
-      "turn_before_deg"_a = numbers(items, &T::turn_before_deg),
-      "turn_after_deg"_a = numbers(items, &T::turn_after_deg), "iterations"_a = iterations,
-      "message"_a = texts(items, [](const T& t) { return t.message; }));
+  py::dict all = figures_of(items, exchange::kCorrectionFigures);
+  all["status"] = texts(items, [](const T& t) { return t.status; });
+  all["pose"] = figure_of(items, &T::commanded);
+  all["joints_deg"] = table(items, static_cast<py::ssize_t>(joints), [&](const T& t) {
+    return t.joints_deg.size() == joints ? t.joints_deg.data() : none.data();
+  });
+  all["message"] = texts(items, [](const T& t) { return t.message; });
+  return all;
 }
 
 py::list to_python(const std::vector<api::Note>& notes) {

@@ -1,46 +1,9 @@
 #include "clients/session/convert.h"
 
 #include <cmath>
-#include <limits>
 
 namespace trammel::client {
 namespace {
-
-wire::PoseMm wire_pose(const PoseMm& pose) {
-  wire::PoseMm result;
-  result.x_mm(pose.x_mm);
-  result.y_mm(pose.y_mm);
-  result.z_mm(pose.z_mm);
-  result.qw(pose.qw);
-  result.qx(pose.qx);
-  result.qy(pose.qy);
-  result.qz(pose.qz);
-  return result;
-}
-
-PoseMm pose_of(const wire::PoseMm& pose) {
-  return {pose.x_mm(), pose.y_mm(), pose.z_mm(), pose.qw(), pose.qx(), pose.qy(), pose.qz()};
-}
-
-const char* text(wire::TargetStatus status) {
-  switch (status) {
-    case wire::TARGET_OK:
-      return "ok";
-    case wire::TARGET_OUT_OF_DOMAIN:
-      return "out_of_domain";
-    case wire::TARGET_JOINT_LIMIT:
-      return "joint_limit";
-    case wire::TARGET_UNREACHABLE:
-      return "unreachable";
-    case wire::TARGET_SINGULAR:
-      return "singular";
-    case wire::TARGET_NOT_CONVERGED:
-      return "not_converged";
-    case wire::TARGET_REFUSED:
-      return "refused";
-  }
-  return "refused";
-}
 
 const char* text(wire::JobStage stage) {
   switch (stage) {
@@ -114,21 +77,11 @@ const char* text(wire::JobKind kind) {
   return "train";
 }
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
 std::optional<double> if_known(double value) {
   return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 std::optional<std::int64_t> if_known(std::int64_t unix_s) {
   return unix_s < 0 ? std::nullopt : std::optional(unix_s);
-}
-
-wire::Approach wire_approach(const Approach& approach) {
-  wire::Approach result;
-  result.directions().assign(approach.directions.begin(), approach.directions.end());
-  result.temperature_c(approach.temperature_c.value_or(kUnknown));
-  result.time_s(approach.time_s.value_or(kUnknown));
-  return result;
 }
 
 ErrorCode code_of(wire::ResultCode code) {
@@ -172,35 +125,14 @@ wire::Context to_wire(const CallContext& context) {
   return result;
 }
 
-wire::CommandedJoints to_wire(const CommandedJoints& pose) {
-  wire::CommandedJoints result;
-  result.joints_rad(pose.q_rad);
-  result.approach(wire_approach(pose.approach));
-  return result;
-}
-
-wire::Target to_wire(const TargetMm& target) {
-  wire::Target result;
-  if (target.joint_target) {
-    result.kind(wire::TARGET_JOINTS);
-  } else {
-    result.kind(target.conf ? wire::TARGET_POSE_ON_BRANCH : wire::TARGET_POSE_NEAR_JOINTS);
-  }
-  result.pose(wire_pose(target.pose));
-  result.joints_rad(target.seed_rad);
-  result.conf(target.conf.value_or(0));
-  result.approach(wire_approach(target.approach));
-  return result;
-}
-
 Note note_of(const wire::Note& note) {
   constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning,
                                             Note::Severity::kStop};
   return {note.code().to_string(), kSeverities[note.severity()], note.text()};
 }
 
-ModelInfo from_wire(const wire::ModelInfo& info) {
-  ModelInfo result;
+exchange::ModelInfo from_wire(const wire::ModelInfo& info) {
+  exchange::ModelInfo result;
   result.cell = info.cell();
   result.id = info.id();
   result.hash = info.hash();
@@ -217,49 +149,6 @@ ModelInfo from_wire(const wire::ModelInfo& info) {
   result.in_force = info.in_force();
   for (const wire::Note& note : info.notes()) result.notes.push_back(note_of(note));
   for (const std::string& line : info.budget()) result.budget.push_back(line);
-  return result;
-}
-
-PredictedError from_wire(const wire::PredictedError& prediction) {
-  PredictedError result;
-  result.nominal = pose_of(prediction.nominal());
-  result.predicted = pose_of(prediction.predicted());
-  result.dx_mm = prediction.dx_mm();
-  result.dy_mm = prediction.dy_mm();
-  result.dz_mm = prediction.dz_mm();
-  result.sx_mm = prediction.sx_mm();
-  result.sy_mm = prediction.sy_mm();
-  result.sz_mm = prediction.sz_mm();
-  result.in_domain = prediction.in_domain();
-  result.rx_rad = prediction.rx_rad();
-  result.ry_rad = prediction.ry_rad();
-  result.rz_rad = prediction.rz_rad();
-  result.slx_mm = prediction.slx_mm();
-  result.sly_mm = prediction.sly_mm();
-  result.slz_mm = prediction.slz_mm();
-  result.cxy_mm2 = prediction.cxy_mm2();
-  result.cxz_mm2 = prediction.cxz_mm2();
-  result.cyz_mm2 = prediction.cyz_mm2();
-  result.srx_rad = prediction.srx_rad();
-  result.sry_rad = prediction.sry_rad();
-  result.srz_rad = prediction.srz_rad();
-  result.bias_share = prediction.bias_share();
-  return result;
-}
-
-CorrectedTarget from_wire(const wire::CorrectedTarget& correction) {
-  CorrectedTarget result;
-  result.status = text(correction.status());
-  result.commanded = pose_of(correction.commanded());
-  result.q_rad = correction.joints_rad();
-  result.error_before_mm = correction.error_before_mm();
-  result.error_after_mm = correction.error_after_mm();
-  result.sigma_mm = correction.sigma_mm();
-  result.iterations = correction.iterations();
-  result.message = correction.message();
-  result.sigma_measured_mm = correction.sigma_measured_mm();
-  result.turn_before_rad = correction.turn_before_rad();
-  result.turn_after_rad = correction.turn_after_rad();
   return result;
 }
 

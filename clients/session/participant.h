@@ -16,6 +16,7 @@
 #include "clients/session/parts.h"
 #include "clients/session/server_watch.h"
 #include "clients/session/session.h"
+#include "idl/exchange/wire_values.h"
 #include "idl/limits.h"
 #include "idl/repairs/quiet_library.h"
 #include "server/base/mutex.h"
@@ -163,24 +164,28 @@ struct Session::Participant {
                                                                    const std::string& cell = {});
 
   /// Sends `items` in parts, all to be answered by one model.
-  template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
-  [[nodiscard]] Result<Answer<Item>> call_in_parts(const CallContext& context,
-                                                   const std::vector<Wire>& items,
-                                                   const ShareListener& progress, const Put& put,
-                                                   const Get& get) {
-    const AskPart<Item> ask = [&](std::size_t first, std::size_t count) -> Result<Answer<Item>> {
+  template <typename Operation, typename Item, typename Asked, typename Put, typename Get,
+            typename Told>
+  [[nodiscard]] Result<exchange::Answer<Item>> call_in_parts(const CallContext& context,
+                                                             const std::vector<Asked>& items,
+                                                             const ShareListener& progress,
+                                                             const Put& put, const Get& get,
+                                                             const Told& told_as) {
+    const AskPart<Item> ask = [&](std::size_t first,
+                                  std::size_t count) -> Result<exchange::Answer<Item>> {
       typename Operation::Request::type request;
       request.about(to_wire(context));
-      for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
+      for (std::size_t i = first; i < first + count; ++i)
+        put(request).push_back(wire::to_wire(items[i]));
       const auto reply = call<Operation>(request, {context.cell, {}});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}",
                        reply->header().server().to_string(), get(*reply).size(), count);
       }
-      Answer<Item> answer;
+      exchange::Answer<Item> answer;
       answer.model = from_wire(reply->model());
-      for (const auto& item : get(*reply)) answer.items.push_back(from_wire(item));
+      for (const auto& item : get(*reply)) answer.items.push_back(told_as(item));
       return answer;
     };
     const PartSize size(kShareOfTimeout * PartSize::Seconds(options.timeout),

@@ -45,21 +45,20 @@ class PartSize {
 
 /// Asks for the items [first, first + count).
 template <typename Item>
-using AskPart = std::function<Result<Answer<Item>>(std::size_t first, std::size_t count)>;
+using AskPart = std::function<Result<exchange::Answer<Item>>(std::size_t first, std::size_t count)>;
 
 /// The answers to `items` items, all from one model. If the model changes between two parts, all
 /// items are asked again. A part that is not answered in time, or that a busy server has no time
 /// for, is asked again in smaller ones, a few times. kBusy: that did not help, or the model changed
 /// again and again. `progress` may be empty; `now` is the clock.
 template <typename Item>
-[[nodiscard]] Result<Answer<Item>> ask_in_parts(std::size_t items, const std::string& cell,
-                                                PartSize size, const AskPart<Item>& ask,
-                                                const std::function<void(double)>& progress,
-                                                const std::function<PartSize::Seconds()>& now) {
+[[nodiscard]] Result<exchange::Answer<Item>> ask_in_parts(
+    std::size_t items, const std::string& cell, PartSize size, const AskPart<Item>& ask,
+    const std::function<void(double)>& progress, const std::function<PartSize::Seconds()>& now) {
   constexpr int kAttempts = 5;
   int smaller_parts_left = 3;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    Answer<Item> answer;
+    exchange::Answer<Item> answer;
     bool one_model = true;
     std::size_t done = 0;
     do {

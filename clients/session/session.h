@@ -53,16 +53,16 @@ class Session {
   /// Takes any number of joint vectors. A long call is sent in parts, each answered in a small
   /// share of the timeout. One model answers all parts: if the model changes meanwhile, the call
   /// starts again with the new one.
-  [[nodiscard]] Result<Answer<PredictedError>> predict_error(
+  [[nodiscard]] Result<exchange::Answer<exchange::Prediction>> predict_error(
       const CallContext& context, const std::vector<std::vector<double>>& joints_rad,
       const ShareListener& progress = {});
   /// predict_error() with what is known of how the arm comes there.
-  [[nodiscard]] Result<Answer<PredictedError>> predict_error_at(
-      const CallContext& context, const std::vector<CommandedJoints>& poses,
+  [[nodiscard]] Result<exchange::Answer<exchange::Prediction>> predict_error_at(
+      const CallContext& context, const std::vector<exchange::AskedJoints>& poses,
       const ShareListener& progress = {});
   /// Any number, as predict_error().
-  [[nodiscard]] Result<Answer<CorrectedTarget>> correct_targets(
-      const CallContext& context, const std::vector<TargetMm>& targets,
+  [[nodiscard]] Result<exchange::Answer<exchange::CorrectedTarget>> correct_targets(
+      const CallContext& context, const std::vector<exchange::AskedTarget>& targets,
       const ShareListener& progress = {});
   /// The CSV as it is on disk. Returns the job. A repeat after a lost answer is the same request to
   /// the server.
@@ -123,7 +123,7 @@ class Session {
   /// all), when the next one is due, and how what is in force was judged: JSON, `cells` with an
   /// entry each.
   [[nodiscard]] Result<std::vector<std::string>> health(const std::string& cell, std::size_t most);
-  [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
+  [[nodiscard]] Result<std::vector<exchange::ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version,
                                      const ChangeOptions& change = {});
@@ -143,7 +143,7 @@ class Session {
       const std::function<bool(const std::vector<ServerStatus>&)>& holds,
       std::chrono::milliseconds limit);
   /// Models in force, of every cell, from ModelStatus.
-  [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
+  [[nodiscard]] Result<std::vector<exchange::ModelInfo>> model_status();
   /// Calls `listener` with the job's progress until it is done or failed, and returns its last
   /// state. kUnreachable: `limit` is over. kNotFound: no server knows the job. kRefused: several
   /// servers have a job of this number, and it is not the only one that this session waits for. If

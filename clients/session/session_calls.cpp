@@ -51,37 +51,33 @@ Session::Session(std::unique_ptr<Participant> participant) : participant_(std::m
 
 Session::~Session() = default;
 
-Result<Answer<PredictedError>> Session::predict_error(
+Result<exchange::Answer<exchange::Prediction>> Session::predict_error(
     const CallContext& context, const std::vector<std::vector<double>>& joints_rad,
     const ShareListener& progress) {
-  std::vector<CommandedJoints> poses;
+  std::vector<exchange::AskedJoints> poses;
   poses.reserve(joints_rad.size());
   for (const auto& q_rad : joints_rad) poses.push_back({q_rad});
   return predict_error_at(context, poses, progress);
 }
 
-Result<Answer<PredictedError>> Session::predict_error_at(const CallContext& context,
-                                                         const std::vector<CommandedJoints>& poses,
-                                                         const ShareListener& progress) {
-  std::vector<wire::CommandedJoints> items;
-  items.reserve(poses.size());
-  for (const CommandedJoints& pose : poses) items.push_back(to_wire(pose));
-  return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      context, items, progress,
+Result<exchange::Answer<exchange::Prediction>> Session::predict_error_at(
+    const CallContext& context, const std::vector<exchange::AskedJoints>& poses,
+    const ShareListener& progress) {
+  return participant_->call_in_parts<wire::PredictError, exchange::Prediction>(
+      context, poses, progress,
       [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
-      [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
+      [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); },
+      [](const wire::PredictedError& item) { return wire::from_wire(item); });
 }
 
-Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& context,
-                                                         const std::vector<TargetMm>& targets,
-                                                         const ShareListener& progress) {
-  std::vector<wire::Target> items;
-  items.reserve(targets.size());
-  for (const TargetMm& target : targets) items.push_back(to_wire(target));
-  return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
-      context, items, progress,
+Result<exchange::Answer<exchange::CorrectedTarget>> Session::correct_targets(
+    const CallContext& context, const std::vector<exchange::AskedTarget>& targets,
+    const ShareListener& progress) {
+  return participant_->call_in_parts<wire::CorrectTarget, exchange::CorrectedTarget>(
+      context, targets, progress,
       [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
-      [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
+      [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); },
+      [&](const wire::CorrectedTarget& item) { return wire::from_wire(item, context.rails); });
 }
 
 Result<std::vector<ServerStatus>> Session::servers() {
@@ -105,9 +101,9 @@ Result<std::vector<ServerStatus>> Session::servers_when(
   }
 }
 
-Result<std::vector<ModelInfo>> Session::model_status() {
+Result<std::vector<exchange::ModelInfo>> Session::model_status() {
   TRY(servers());
-  std::vector<ModelInfo> models;
+  std::vector<exchange::ModelInfo> models;
   for (const wire::ModelInfo& model : participant_->watch->models_in_force())
     models.push_back(from_wire(model));
   return models;

@@ -112,9 +112,9 @@ Result<std::vector<std::string>> Session::health(const std::string& cell, std::s
   return texts;
 }
 
-Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
+Result<std::vector<exchange::ModelInfo>> Session::models(const std::string& cell) {
   const auto reply = TRY(participant_->read(cell, {}, wire::READ_MODELS));
-  std::vector<ModelInfo> models;
+  std::vector<exchange::ModelInfo> models;
   for (const wire::ModelInfo& model : reply.models()) models.push_back(from_wire(model));
   return models;
 }

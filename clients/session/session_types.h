@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "server/base/note.h"
+#include "server/exchange/answer.h"
 
-/// The arguments and results of a session. Units as on the wire: mm, rad; a prismatic joint in mm.
+/// The arguments and results of a session. What it is asked and what a model answers:
+/// server/exchange.
 namespace trammel::client {
 
 /// The subject of a call; must fit what the model was trained on.
@@ -18,82 +19,7 @@ struct CallContext {
   bool controller_compensates = false;
   std::string model;  ///< empty: the model in force; else `@version` or a model id that must be the
                       ///< one in force
-};
-
-struct PoseMm {
-  double x_mm = 0, y_mm = 0, z_mm = 0;
-  double qw = 1, qx = 0, qy = 0, qz = 0;
-};
-
-/// Which model answered. Ages count from when it answered.
-struct ModelInfo {
-  std::string cell, id, hash, level, batch_id;
-  std::string batch_hash;  ///< empty: not recorded
-  int version = 0;
-  std::int64_t trained_at_unix_s = 0;
-  double training_age_s = 0;
-  std::optional<std::int64_t> measured_at_unix_s =
-      {};                                 ///< of its newest measurement; empty: not recorded
-  std::optional<double> data_age_s = {};  ///< of that measurement
-  int training_poses = 0;
-  std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
-  bool in_force = false;
-  /// The notes for a user of the model, the gravest first. In a list of versions only the one in
-  /// force has them.
-  std::vector<Note> notes = {};
-  /// Where the millimetres come from, for people, of the one in force; empty in other answers.
-  std::vector<std::string> budget = {};
-};
-
-/// The approach of the arm to a pose; what is not known is neutral.
-struct Approach {
-  std::vector<int> directions = {};  ///< of each joint: -1, 0, +1; empty: not known
-  std::optional<double> temperature_c = {};
-  std::optional<double> time_s = {};
-};
-
-/// A pose to predict the error at.
-struct CommandedJoints {
-  std::vector<double> q_rad;
-  Approach approach = {};
-};
-
-struct PredictedError {
-  PoseMm nominal, predicted;  ///< X_BT
-  double dx_mm = 0, dy_mm = 0, dz_mm = 0;
-  double sx_mm = 0, sy_mm = 0, sz_mm = 0;  ///< stddev of one measurement
-  bool in_domain = false;
-  double rx_rad = 0, ry_rad = 0, rz_rad = 0;     ///< rotation vector from nominal to predicted
-  double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error
-  double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement
-  double srx_rad = 0, sry_rad = 0,
-         srz_rad = 0;     ///< stddev of one measured orientation; NaN: none was learned
-  double bias_share = 0;  ///< of the learned residual that is taken
-};
-
-struct TargetMm {
-  PoseMm pose;                   ///< ignored for a joint target
-  std::vector<double> seed_rad;  ///< empty when `conf` says the branch
-  std::optional<int> conf;
-  bool joint_target = false;
-  Approach approach = {};
-};
-
-struct CorrectedTarget {
-  std::string status;  ///< `ok`, `out_of_domain`, ... as in files
-  PoseMm commanded;
-  std::vector<double> q_rad;
-  double error_before_mm = 0, error_after_mm = 0, sigma_mm = 0;
-  int iterations = 0;
-  std::string message;
-  double sigma_measured_mm = 0;                    ///< of one measurement
-  double turn_before_rad = 0, turn_after_rad = 0;  ///< expected orientation error
-};
-
-template <typename T>
-struct Answer {
-  ModelInfo model;  ///< all items come from this one
-  std::vector<T> items;
+  exchange::Rails rails = {};  ///< the robot's joints that are rails; empty: none
 };
 
 struct JobStatus {
@@ -144,9 +70,9 @@ struct DatedJob {
 
 /// The result of a diagnosis.
 struct DiagnosisAnswer {
-  std::string findings_json;  ///< as `trammel diagnose --json` prints them
-  std::string page_html;      ///< self-contained; empty if not asked for, or no longer kept
-  ModelInfo in_force;         ///< now; empty id: none
+  std::string findings_json;     ///< as `trammel diagnose --json` prints them
+  std::string page_html;         ///< self-contained; empty if not asked for, or no longer kept
+  exchange::ModelInfo in_force;  ///< now; empty id: none
 };
 
 /// A batch that a service has.

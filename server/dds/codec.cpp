@@ -6,11 +6,13 @@
 #include <limits>
 #include <utility>
 
+#include "idl/exchange/wire_values.h"
 #include "server/base/check.h"
 #include "server/base/hash.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/compensate/budget/budget_words.h"
+#include "server/exchange/si.h"
 
 namespace trammel {
 namespace {
@@ -70,19 +72,6 @@ double mm_or_unknown(const std::optional<double>& length) {
 
 }  // namespace
 
-wire::PoseMm to_wire(const Pose& X) {
-  const Eigen::Quaterniond rotation(X.linear());
-  wire::PoseMm pose;
-  pose.x_mm(to_mm(X.translation().x()));
-  pose.y_mm(to_mm(X.translation().y()));
-  pose.z_mm(to_mm(X.translation().z()));
-  pose.qw(rotation.w());
-  pose.qx(rotation.x());
-  pose.qy(rotation.y());
-  pose.qz(rotation.z());
-  return pose;
-}
-
 Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where) {
   const Vector3 p_mm(pose.x_mm(), pose.y_mm(), pose.z_mm());
   const Eigen::Quaterniond rotation(pose.qw(), pose.qx(), pose.qy(), pose.qz());
@@ -95,16 +84,7 @@ Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where) {
         .of("pose")
         .beyond(rotation.norm(), 1);
   }
-  return make_pose(rotation.normalized().toRotationMatrix(), p_mm * from_mm(1));
-}
-
-wire::Joints to_wire(const JointVector& q, const Chain& chain) {
-  wire::Joints joints(static_cast<std::size_t>(q.size()));
-  for (int i = 0; i < static_cast<int>(q.size()); ++i) {
-    const bool prismatic = i < chain.size() && chain.joint(i).type == JointType::kPrismatic;
-    joints[static_cast<std::size_t>(i)] = prismatic ? to_mm(q[i]) : q[i];
-  }
-  return joints;
+  return exchange::to_si(wire::from_wire(pose));
 }
 
 Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain,
@@ -352,26 +332,6 @@ wire::BatchInfo to_wire(const StoredBatch& batch) {
   info.quarantine(told_sentence(batch.quarantine));
   info.learned(batch.learned);
   return info;
-}
-
-wire::TargetStatus to_wire(CorrectionStatus status) {
-  switch (status) {
-    case CorrectionStatus::kOk:
-      return wire::TARGET_OK;
-    case CorrectionStatus::kOutOfDomain:
-      return wire::TARGET_OUT_OF_DOMAIN;
-    case CorrectionStatus::kJointLimit:
-      return wire::TARGET_JOINT_LIMIT;
-    case CorrectionStatus::kUnreachable:
-      return wire::TARGET_UNREACHABLE;
-    case CorrectionStatus::kSingular:
-      return wire::TARGET_SINGULAR;
-    case CorrectionStatus::kNotConverged:
-      return wire::TARGET_NOT_CONVERGED;
-    case CorrectionStatus::kRefused:
-      return wire::TARGET_REFUSED;
-  }
-  TRAMMEL_CHECK(false);
 }
 
 wire::ResultCode to_wire(ErrorCode code) {

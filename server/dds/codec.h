@@ -11,15 +11,14 @@
 #include "server/registry/model_registry.h"
 #include "server/trainer/trainer.h"
 
-/// Converts between the wire (mm, rad; prismatic joints mm) and the inside (m, rad).
+/// Converts between the wire (mm, rad; prismatic joints mm) and the inside (m, rad). Predictions
+/// and corrections: compensate/exchanged.h and idl/exchange.
 namespace trammel {
 
-[[nodiscard]] wire::PoseMm to_wire(const Pose& X);
 /// Refuses non-finite numbers and a quaternion whose length differs from 1 by more than 1e-3.
 /// `where` names the pose in the error.
 [[nodiscard]] Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where);
 
-[[nodiscard]] wire::Joints to_wire(const JointVector& q, const Chain& chain);
 /// Refuses non-finite numbers and a number of joints that is not the robot's. `where` names the
 /// vector in the error.
 [[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain,
@@ -41,7 +40,6 @@ namespace trammel {
 [[nodiscard]] wire::Job to_wire(const JobProgress& progress);
 [[nodiscard]] wire::Job to_wire(const Trainer::DatedJob& job);
 [[nodiscard]] wire::BatchInfo to_wire(const StoredBatch& batch);
-[[nodiscard]] wire::TargetStatus to_wire(CorrectionStatus status);
 [[nodiscard]] wire::ResultCode to_wire(ErrorCode code);
 
 /// Which DDS participant sent the request, and its trace.

@@ -1,7 +1,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/base/units.h"
+#include "idl/exchange/wire_values.h"
+#include "server/compensate/exchanged.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 
@@ -39,20 +40,11 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
   return target;
 }
 
-wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) {
-  wire::CorrectedTarget item;
-  item.status(trammel::to_wire(correction.status));
-  item.commanded(trammel::to_wire(correction.X_BT_commanded));
-  item.joints_rad(trammel::to_wire(correction.q, chain));
-  item.error_before_mm(to_mm(correction.error_before));
-  item.error_after_mm(to_mm(correction.error_after));
-  item.sigma_mm(to_mm(correction.stddev));
-  item.sigma_measured_mm(to_mm(correction.measured_stddev));
-  item.turn_before_rad(correction.turn_before);
-  item.turn_after_rad(correction.turn_after);
-  item.iterations(correction.iterations);
-  item.message(cut(correction.message, kMaxMessage));
-  return item;
+/// Of a robot with these rails.
+wire::CorrectedTarget told(const Correction& correction, const exchange::Rails& rails) {
+  exchange::CorrectedTarget answer = exchanged(correction, rails);
+  answer.message = cut(answer.message, kMaxMessage);
+  return wire::to_wire(answer, rails);
 }
 
 void count_in(WorkFigures& work, const Correction& correction) {
@@ -69,7 +61,11 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
  public:
   PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent,
                        WorkCounts& work)
-      : subject_(std::move(subject)), targets_(std::move(targets)), recent_(recent), work_(work) {
+      : subject_(std::move(subject)),
+        rails_(exchange::rails_of(subject_.served->model.cell().robot)),
+        targets_(std::move(targets)),
+        recent_(recent),
+        work_(work) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
     reply_.corrections().resize(targets_.size());
   }
@@ -79,7 +75,7 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
     WorkFigures work;
     for (std::size_t i = first; i < first + count; ++i) {
       const Correction correction = model.correct(targets_[i], subject_.tool, subject_.payload);
-      reply_.corrections()[i] = to_wire(correction, model.cell().robot);
+      reply_.corrections()[i] = told(correction, rails_);
       count_in(work, correction);
       if (i == first && correction.q.size() > 0)
         remember(correction.q);  // one of each portion stands for it
@@ -89,7 +85,6 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
   wire::CorrectTargetReply take() override { return std::move(reply_); }
 
  private:
-  const Subject subject_;
   void remember(const JointVector& q) {
     PoseContext asked;
     asked.q = q;
@@ -99,6 +94,8 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
     recent_.add(subject_.served->cell, std::move(asked));
   }
 
+  const Subject subject_;
+  const exchange::Rails rails_;
   const std::vector<Target> targets_;
   RecentPoses& recent_;  // of the trainer, which outlives every request
   WorkCounts& work_;

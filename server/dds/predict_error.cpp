@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
-#include "server/base/units.h"
+#include "idl/exchange/wire_values.h"
+#include "server/compensate/exchanged.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/measurement/pose_check.h"
@@ -13,38 +13,6 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kPosesTold = 20;  // of a request, as what is asked for lately
-constexpr double kNotLearned = std::numeric_limits<double>::quiet_NaN();
-
-wire::PredictedError to_wire(const ErrorPrediction& prediction) {
-  wire::PredictedError item;
-  item.nominal(trammel::to_wire(prediction.X_BT_nominal));
-  item.predicted(trammel::to_wire(prediction.X_BT_predicted));
-  item.dx_mm(to_mm(prediction.error_B.x()));
-  item.dy_mm(to_mm(prediction.error_B.y()));
-  item.dz_mm(to_mm(prediction.error_B.z()));
-  const Vector3 turn =
-      pose_difference(prediction.X_BT_predicted, prediction.X_BT_nominal).tail<3>();
-  item.rx_rad(turn.x());
-  item.ry_rad(turn.y());
-  item.rz_rad(turn.z());
-  item.sx_mm(to_mm(prediction.stddev_B.x()));
-  item.sy_mm(to_mm(prediction.stddev_B.y()));
-  item.sz_mm(to_mm(prediction.stddev_B.z()));
-  item.slx_mm(to_mm(prediction.true_stddev_B.x()));
-  item.sly_mm(to_mm(prediction.true_stddev_B.y()));
-  item.slz_mm(to_mm(prediction.true_stddev_B.z()));
-  const Matrix3 covariance_mm2 = to_mm(1) * to_mm(1) * prediction.covariance_B;
-  item.cxy_mm2(covariance_mm2(0, 1));
-  item.cxz_mm2(covariance_mm2(0, 2));
-  item.cyz_mm2(covariance_mm2(1, 2));
-  const Vector3 rotation = prediction.rotation_stddev_B.value_or(Vector3::Constant(kNotLearned));
-  item.srx_rad(rotation.x());
-  item.sry_rad(rotation.y());
-  item.srz_rad(rotation.z());
-  item.bias_share(prediction.bias_weight);
-  item.in_domain(prediction.in_domain);
-  return item;
-}
 
 /// The pose as the model is asked for it; refuses what the cell's arm cannot do.
 Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject,
@@ -76,7 +44,7 @@ class PortionedPredictions final : public PortionedAnswer<wire::PredictErrorRepl
     WorkFigures work;
     for (std::size_t i = first; i < first + count; ++i) {
       const ErrorPrediction prediction = model.predict_all({poses_[i]}).front();
-      reply_.predictions()[i] = to_wire(prediction);
+      reply_.predictions()[i] = wire::to_wire(exchanged(prediction));
       work.answered(prediction.in_domain, prediction.true_stddev_B.norm() / std::sqrt(3.0));
     }
     work_.add(subject_.served->cell, work);

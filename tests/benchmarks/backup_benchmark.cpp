@@ -69,7 +69,7 @@ template <typename Over>
 Asked ask(client::Session& session, const Over& over) {
   client::CallContext context;
   context.cell = "cell-7";
-  client::TargetMm target;
+  exchange::AskedTarget target;
   target.pose = {1800, 125, 1200, 0.7071067811865476, 0, 0.7071067811865476, 0};
   target.conf = 0;
   Asked asked;

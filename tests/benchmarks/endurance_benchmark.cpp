@@ -16,6 +16,7 @@
 
 #include "clients/session/session.h"
 #include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/store/store.h"
 #include "server/tasks/train/train.h"
 #include "tests/support/daemon.h"
@@ -66,19 +67,15 @@ class TwoModels {
   }
   /// True if all items are what the model that they name says, bit for bit.
   [[nodiscard]] bool is_right(const std::vector<std::vector<double>>& joints,
-                              const client::Answer<client::PredictedError>& answer) const {
+                              const exchange::Answer<exchange::Prediction>& answer) const {
     const CompensatedModel& model = models_.at(static_cast<std::size_t>(answer.model.version - 1));
     const auto [tool, payload] = *model.parts().trained_with.begin();
     for (std::size_t i = 0; i < joints.size(); ++i) {
       const JointVector q = Eigen::Map<const Eigen::VectorXd>(joints[i].data(), 6);
       const auto expected = model.predict(q, tool, payload);
-      const client::PredictedError& item = answer.items.at(i);
-      const Vector3 error_mm = {to_mm(expected.error_B.x()), to_mm(expected.error_B.y()),
-                                to_mm(expected.error_B.z())};
-      const Vector3 stddev_mm = {to_mm(expected.stddev_B.x()), to_mm(expected.stddev_B.y()),
-                                 to_mm(expected.stddev_B.z())};
-      if (Vector3(item.dx_mm, item.dy_mm, item.dz_mm) != error_mm) return false;
-      if (Vector3(item.sx_mm, item.sy_mm, item.sz_mm) != stddev_mm) return false;
+      const exchange::Prediction& item = answer.items.at(i);
+      const exchange::Prediction right = exchanged(expected);
+      if (item.error_mm != right.error_mm || item.stddev_mm != right.stddev_mm) return false;
     }
     return true;
   }
@@ -254,9 +251,9 @@ std::vector<std::jthread> everybody(TwoModels& service, std::atomic<std::int64_t
   }
   all.push_back(repeated(service, milliseconds(50), done, lost,
                          [](client::Session& session, std::uint64_t i) {
-                           std::vector<client::TargetMm> targets;
+                           std::vector<exchange::AskedTarget> targets;
                            for (const auto& joints : test::virtual_joints(50, i % 89)) {
-                             client::TargetMm target;
+                             exchange::AskedTarget target;
                              target.seed_rad = joints;
                              target.joint_target = true;
                              targets.push_back(target);

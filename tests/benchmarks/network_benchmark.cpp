@@ -35,10 +35,9 @@ struct Asked {
   int most_seconds = 10, requests = 0;
 };
 
-bool same(const client::CorrectedTarget& a, const client::CorrectedTarget& b) {
-  return a.status == b.status && a.q_rad == b.q_rad && a.commanded.x_mm == b.commanded.x_mm &&
-         a.commanded.y_mm == b.commanded.y_mm && a.commanded.z_mm == b.commanded.z_mm &&
-         a.sigma_mm == b.sigma_mm;
+bool same(const exchange::CorrectedTarget& a, const exchange::CorrectedTarget& b) {
+  return a.status == b.status && a.joints_deg == b.joints_deg &&
+         a.commanded.xyz_mm == b.commanded.xyz_mm && a.sigma_mm == b.sigma_mm;
 }
 
 /// A line of output for each answer: when it was asked and answered, ns of the steady clock, and
@@ -52,10 +51,10 @@ int ask(const Asked& asked) {
   const auto session = test::demand(client::Session::open(options));
   client::CallContext context;
   context.cell = "cell-7";
-  client::TargetMm target;
+  exchange::AskedTarget target;
   target.pose = {1800, 125, 1200, 0.7071067811865476, 0, 0.7071067811865476, 0};
   target.conf = 0;
-  std::optional<client::CorrectedTarget> first;
+  std::optional<exchange::CorrectedTarget> first;
   const auto end = Clock::now() + seconds(asked.most_seconds);
   for (int i = 0; (asked.requests == 0 || i < asked.requests) && Clock::now() < end; ++i) {
     const auto began = Clock::now();

@@ -19,6 +19,7 @@
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 #include "server/tasks/train/train.h"
@@ -72,26 +73,15 @@ std::string contour(int targets) {
   return text + "  ENDPROC\nENDMODULE\n";
 }
 
-Target target_of(const client::TargetMm& wanted) {
-  Target target;
-  const client::PoseMm& pose = wanted.pose;
-  target.X_BT = make_pose(
-      Eigen::Quaterniond(pose.qw, pose.qx, pose.qy, pose.qz).normalized().toRotationMatrix(),
-      Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
-  target.joint_target = wanted.joint_target;
-  target.conf = wanted.conf;
-  if (!wanted.conf) target.seed = Eigen::Map<const Eigen::VectorXd>(wanted.seed_rad.data(), 6);
-  return target;
-}
-
 cam::AskCorrections by(const CompensatedModel& model) {
   return [&](const std::string& tool, const std::string& payload,
-             const std::vector<client::TargetMm>& targets)
-             -> Result<client::Answer<client::CorrectedTarget>> {
-    client::Answer<client::CorrectedTarget> answer{cli::info_of(model), {}};
-    for (const client::TargetMm& target : targets)
-      answer.items.push_back(cli::to_wire(model.correct(target_of(target), tool, payload),
-                                          joint_types(model.cell().robot)));
+             const std::vector<exchange::AskedTarget>& targets)
+             -> Result<exchange::Answer<exchange::CorrectedTarget>> {
+    exchange::Answer<exchange::CorrectedTarget> answer{cli::info_of(model), {}};
+    const exchange::Rails rails = exchange::rails_of(model.cell().robot);
+    for (const exchange::AskedTarget& target : targets)
+      answer.items.push_back(
+          exchanged(model.correct(target_of(target, model.cell().robot), tool, payload), rails));
     return answer;
   };
 }
@@ -351,10 +341,10 @@ void tell_cost(int targets) {
     const CompensatedModel loaded = load_model(model).value();
     const cam::Program read =
         cam::read_program(cam::Dialect::kRapid, {{"m.mod", read_text_file(program).value()}}, {});
-    std::vector<client::TargetMm> asked;
+    std::vector<exchange::AskedTarget> asked;
     const cam::AskCorrections note = [&](const std::string&, const std::string&,
-                                         const std::vector<client::TargetMm>& all)
-        -> Result<client::Answer<client::CorrectedTarget>> {
+                                         const std::vector<exchange::AskedTarget>& all)
+        -> Result<exchange::Answer<exchange::CorrectedTarget>> {
       asked = all;
       return refused("only asked");
     };
@@ -362,8 +352,9 @@ void tell_cost(int targets) {
         cam::correct_program(read, loaded.cell().robot, cli::tools_of(loaded), note, {}));
     rusage before{}, after{};
     ::getrusage(RUSAGE_SELF, &before);
-    for (const client::TargetMm& one : asked) {
-      if (loaded.correct(target_of(one), "spindle", "spindle").q.size() != 6) return 2;
+    for (const exchange::AskedTarget& one : asked) {
+      if (loaded.correct(target_of(one, loaded.cell().robot), "spindle", "spindle").q.size() != 6)
+        return 2;
     }
     ::getrusage(RUSAGE_SELF, &after);
     folder.write("took", fmt::format("{}", processor_seconds(after) - processor_seconds(before)));

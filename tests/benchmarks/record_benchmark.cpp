@@ -40,8 +40,8 @@ struct Served {
   std::unique_ptr<client::Session> session;
 };
 
-client::TargetMm hole(std::size_t i) {
-  client::TargetMm target;
+exchange::AskedTarget hole(std::size_t i) {
+  exchange::AskedTarget target;
   target.pose = {
       1800, 125 - 0.02 * static_cast<double>(i), 1200, 0.7071067811865476, 0, 0.7071067811865476,
       0};
@@ -49,7 +49,8 @@ client::TargetMm hole(std::size_t i) {
   return target;
 }
 
-double milliseconds_of(client::Session& session, const std::vector<client::TargetMm>& targets) {
+double milliseconds_of(client::Session& session,
+                       const std::vector<exchange::AskedTarget>& targets) {
   client::CallContext context;
   context.cell = "cell-7";
   const auto began = Clock::now();
@@ -85,7 +86,7 @@ void tell_one(std::array<Served*, 2> servers, int requests, int rounds) {
 }
 
 void tell_many(std::array<Served*, 2> servers, int rounds) {
-  std::vector<client::TargetMm> targets;
+  std::vector<exchange::AskedTarget> targets;
   for (std::size_t i = 0; i < kMany; ++i) targets.push_back(hole(i));
   std::array<std::vector<double>, 2> times;
   for (int i = 0; i < 3 * rounds; ++i)

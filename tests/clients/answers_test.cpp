@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/measurement/files/csv_table.h"
 
 namespace trammel::cli {
@@ -12,20 +12,20 @@ namespace {
 
 TargetFile targets(int count) {
   TargetFile file{"t.csv", {}, {}};
-  for (int i = 0; i < count; ++i) file.rows.push_back({i + 2, Target{}});
+  for (int i = 0; i < count; ++i) file.rows.push_back({i + 2, {}});
   return file;
 }
 
-client::CorrectedTarget corrected(const std::string& status) {
-  client::CorrectedTarget target;
+exchange::CorrectedTarget corrected(const std::string& status) {
+  exchange::CorrectedTarget target;
   target.status = status;
   target.commanded = {1, 2, 3, .5, .5, -.5, .5};
-  target.q_rad = {kPi / 2, 250};
+  target.joints_deg = {90, 250};
   target.error_before_mm = 1.5;
   target.error_after_mm = 1e-5;
   target.sigma_mm = .04;
   target.sigma_measured_mm = .05;
-  target.turn_before_rad = kPi / 2;
+  target.turn_before_deg = 90;
   target.iterations = 3;
   target.message = status == "ok" ? "" : "because, so";
   return target;
@@ -64,7 +64,7 @@ TEST(Answers, ATargetWithoutACorrectionHasNoNumbersThatCouldBeCommanded) {
 }
 
 TEST(Answers, ATargetLeftAloneSaysWhatErrorToExpectWhereSomethingCanBeSaid) {
-  client::CorrectedTarget left = corrected("joint_limit");
+  exchange::CorrectedTarget left = corrected("joint_limit");
   left.error_after_mm = left.error_before_mm;
   EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_before_mm"), "1.5");
   EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_after_mm"), "1.5");
@@ -107,7 +107,7 @@ TEST(Answers, WhatIsLeftAloneIsNamedByFileRowAndReason) {
       left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("joint_limit")}}),
       "1 of 2 targets are left as they were:\n  t.csv row 3: joint_limit: because, so\n");
   const Corrections many{"abc", kTypes,
-                         std::vector<client::CorrectedTarget>(12, corrected("unreachable"))};
+                         std::vector<exchange::CorrectedTarget>(12, corrected("unreachable"))};
   EXPECT_NE(left_alone_text(targets(12), many).find("  and 2 more\n"), std::string::npos);
 }
 
@@ -128,11 +128,11 @@ TEST(Answers, TheSummaryCountsStatuses) {
 TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
   JointList list{"j.csv", kTypes, {CommandedPose{}}};
   list.poses[0].pose_id = "p, 1";
-  client::PredictedError item;
+  exchange::Prediction item;
   item.predicted = {1, 2, 3, 1, 0, 0, 0};
-  item.dx_mm = .5;
-  item.sx_mm = .25;
-  item.slx_mm = .125;
+  item.error_mm[0] = .5;
+  item.stddev_mm[0] = .25;
+  item.true_stddev_mm[0] = .125;
   item.in_domain = true;
   EXPECT_EQ(predictions_csv(list, {"abc", {item}}),
             "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,"
@@ -148,9 +148,9 @@ TEST(Answers, CovariancesAreAppendedWhereAskedForAndTheTrueErrorsStddevAlways) {
   prediction.true_stddev_B = Vector3(1e-4, 2e-4, 3e-4);
   JointList list;
   list.poses.push_back(CommandedPose{});
-  const Predictions with{"abc", {to_wire(prediction)}, {joint_uncertainty(to_wire(prediction))}};
+  const Predictions with{"abc", {exchanged(prediction)}, {}, true};
   const CsvTable table = CsvTable::parse(predictions_csv(list, with), "p.csv").value();
-  const std::string without = predictions_csv(list, {"abc", {client::PredictedError{}}});
+  const std::string without = predictions_csv(list, {"abc", {exchange::Prediction{}}});
   EXPECT_EQ(without.find("cxy_mm2"), std::string::npos);
   const auto number = [&](const char* column) {
     return std::stod(table.field(0, table.require(column).value()));
@@ -163,19 +163,39 @@ TEST(Answers, CovariancesAreAppendedWhereAskedForAndTheTrueErrorsStddevAlways) {
   EXPECT_EQ(predictions_json(list, with)["predictions"][0]["sly_mm"], 0.2);
 }
 
-TEST(Answers, TheWireHasMillimetresAndRadians) {
-  Pose X_BT = Pose::Identity();
-  X_BT.translation() = Vector3(.001, -.002, 3);
-  const client::PoseMm pose = to_wire(X_BT);
-  EXPECT_DOUBLE_EQ(pose.x_mm, 1);
-  EXPECT_DOUBLE_EQ(pose.y_mm, -2);
-  EXPECT_DOUBLE_EQ(pose.z_mm, 3000);
-  EXPECT_DOUBLE_EQ(pose.qw, 1);
-  EXPECT_EQ(to_wire(Eigen::Vector2d(1, .25), kTypes), (std::vector<double>{1, 250}));
+TEST(Answers, OrientationsComeLastWhereAskedForAndHaveTheirKeysInJson) {
+  JointList list;
+  list.poses.push_back(CommandedPose{});
+  exchange::Prediction item;
+  item.rotation_stddev_deg = {1, 2, 3};
+  const Predictions both{"abc", {item}, {}, true, true};
+  const std::string text = predictions_csv(list, both);
+  EXPECT_NE(text.find(",slz_mm,cxy_mm2,cxz_mm2,cyz_mm2,srx_deg,sry_deg,srz_deg\n"),
+            std::string::npos)
+      << text;
+  EXPECT_TRUE(text.ends_with(",1,2,3\n")) << text;
+  const auto json = predictions_json(list, both)["predictions"][0];
+  EXPECT_EQ(json["sry_deg"], 2);
+  EXPECT_EQ(json["in_domain"], false);
+  EXPECT_EQ(json["nominal"]["qw"], 1);
+  EXPECT_FALSE(predictions_json(list, {"abc", {item}})["predictions"][0].contains("sry_deg"));
+}
+
+TEST(Answers, WhatIsAskedHasMillimetresAndRadiansAndComesBack) {
   Target target;
+  target.X_BT.translation() = Vector3(.001, -.002, 3);
+  target.seed = Eigen::Vector2d(1, .25);
+  const exchange::Rails rails = exchange::rails_of(kTypes);
+  const exchange::AskedTarget asked = asked_of(target, rails);
+  EXPECT_DOUBLE_EQ(asked.pose.xyz_mm[0], 1);
+  EXPECT_DOUBLE_EQ(asked.pose.xyz_mm[1], -2);
+  EXPECT_DOUBLE_EQ(asked.pose.xyz_mm[2], 3000);
+  EXPECT_DOUBLE_EQ(asked.pose.q_wxyz[0], 1);
+  EXPECT_EQ(asked.seed_rad, (std::vector<double>{1, 250}));
+  target.seed.reset();
   target.conf = 2;
-  EXPECT_TRUE(to_wire(target, kTypes).seed_rad.empty());
-  EXPECT_EQ(to_wire(target, kTypes).conf, 2);
+  EXPECT_TRUE(asked_of(target, rails).seed_rad.empty());
+  EXPECT_EQ(asked_of(target, rails).conf, 2);
 }
 
 }  // namespace

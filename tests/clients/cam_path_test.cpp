@@ -38,13 +38,13 @@ Chain arm(std::optional<double> rad_s) {
 /// thousandth of it.
 AskCorrections growing(const std::set<std::size_t>& left = {}) {
   return [left](const std::string& tool, const std::string& payload,
-                const std::vector<client::TargetMm>& targets) {
+                const std::vector<exchange::AskedTarget>& targets) {
     auto answer = test::shift(tool, payload, targets);
     for (std::size_t k = 0; k < targets.size(); ++k) {
-      client::CorrectedTarget& item = answer->items[k];
+      exchange::CorrectedTarget& item = answer->items[k];
       item.commanded = targets[k].pose;
-      item.commanded.y_mm += 1e-3 * targets[k].pose.y_mm;
-      for (std::size_t j = 0; j < 6; ++j) item.q_rad[j] = 1.1 * targets[k].seed_rad[j];
+      item.commanded.xyz_mm[1] += 1e-3 * targets[k].pose.xyz_mm[1];
+      for (std::size_t j = 0; j < 6; ++j) item.joints_deg[j] = to_deg(1.1 * targets[k].seed_rad[j]);
       if (left.contains(k)) item.status = "joint_limit";
     }
     return answer;

@@ -18,20 +18,20 @@ struct Service {
   Seconds clock{0};
   std::vector<std::size_t> parts = {};
 
-  Result<Answer<int>> answer(std::size_t first, std::size_t count) {
+  Result<exchange::Answer<int>> answer(std::size_t first, std::size_t count) {
     parts.push_back(count);
     clock += per_item * static_cast<double>(count);
-    Answer<int> answer;
+    exchange::Answer<int> answer;
     answer.model.version = version;
     for (std::size_t i = first; i < first + count; ++i)
       answer.items.push_back(100000 * version + static_cast<int>(i));
     return answer;
   }
-  Result<Answer<int>> ask(std::size_t items, const AskPart<int>& part) {
+  Result<exchange::Answer<int>> ask(std::size_t items, const AskPart<int>& part) {
     return ask_in_parts<int>(items, "cell-7", PartSize(Seconds(0.5), kMost), part, {},
                              [this] { return clock; });
   }
-  Result<Answer<int>> ask(std::size_t items) {
+  Result<exchange::Answer<int>> ask(std::size_t items) {
     return ask(items,
                [this](std::size_t first, std::size_t count) { return answer(first, count); });
   }
@@ -83,7 +83,7 @@ TEST(Parts, AreGivenUpWhereTheModelChangesAgainAndAgain) {
 TEST(Parts, ARefusalInTheMiddleSaysHowFarItCameAndHandsOutNothing) {
   Service service;
   const auto answer =
-      service.ask(1000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+      service.ask(1000, [&](std::size_t first, std::size_t count) -> Result<exchange::Answer<int>> {
         if (first > 100) return refused("unknown tool");
         return service.answer(first, count);
       });
@@ -96,7 +96,7 @@ TEST(Parts, AProgramWhoseLaterTargetsTakeFarLongerIsAnsweredAllTheSame) {
   constexpr double kTimeout = 5;
   Service service;
   const auto answer =
-      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<exchange::Answer<int>> {
         const std::size_t slow =
             first + count > 1200 ? first + count - std::max<std::size_t>(first, 1200) : 0;
         const double takes =
@@ -114,7 +114,7 @@ TEST(Parts, AProgramWhoseLaterTargetsTakeFarLongerIsAnsweredAllTheSame) {
 TEST(Parts, AServerThatHasNoTimeForALongPartIsAskedForShorterOnes) {
   Service service{Seconds(1e-5)};
   const auto answer =
-      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<exchange::Answer<int>> {
         if (count > 300)
           return failure(ErrorCode::kBusy, "its {} items would be done too late", count);
         service.per_item = Seconds(0.001);
@@ -129,7 +129,7 @@ TEST(Parts, AServiceThatIsGoneIsNotAskedForEver) {
   Service service;
   int asked = 0;
   const auto answer =
-      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+      service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<exchange::Answer<int>> {
         ++asked;
         if (first == 0) return service.answer(first, count);
         return failure(ErrorCode::kUnreachable, "no answer in time");

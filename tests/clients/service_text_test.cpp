@@ -81,7 +81,7 @@ TEST(ServiceText, ServersThatSayDifferentThingsOfABatchAreNamed) {
 }
 
 TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
-  client::ModelInfo model;
+  exchange::ModelInfo model;
   model.cell = "cell-7";
   model.version = 2;
   model.trained_at_unix_s = 1'700'000'000;
@@ -99,7 +99,7 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
 }
 
 TEST(ServiceText, AModelsGraveNotesStandUnderTheTableAndProgramsGetAllOfThem) {
-  client::ModelInfo model;
+  exchange::ModelInfo model;
   model.cell = "cell-7";
   model.version = 2;
   model.notes = {

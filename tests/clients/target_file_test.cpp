@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 #include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
 
@@ -24,13 +25,15 @@ TEST(TargetFile, ReadsPosesWithABranch) {
       parse_targets_csv("conf," + kPose + ",note\n3,1000,-200,1500,0,1,0,0,hole 7\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   ASSERT_EQ(file->rows.size(), 1u);
-  const Target& target = file->rows[0].target;
+  const exchange::AskedTarget& target = file->rows[0].target;
   EXPECT_EQ(file->rows[0].row, 2);
   EXPECT_EQ(target.conf, 3);
-  EXPECT_FALSE(target.seed);
+  EXPECT_TRUE(target.seed_rad.empty());
   EXPECT_FALSE(target.joint_target);
-  EXPECT_TRUE(target.X_BT.translation().isApprox(Vector3(1, -.2, 1.5)));
-  EXPECT_TRUE(target.X_BT.linear().isApprox(Vector3(1, -1, -1).asDiagonal().toDenseMatrix()));
+  EXPECT_EQ(target.pose.xyz_mm, (std::array<double, 3>{1000, -200, 1500}));
+  EXPECT_TRUE(exchange::to_si(target.pose)
+                  .linear()
+                  .isApprox(Vector3(1, -1, -1).asDiagonal().toDenseMatrix()));
 }
 
 TEST(TargetFile, RefusesWhatWasCorrectedAlready) {
@@ -47,7 +50,7 @@ TEST(TargetFile, RefusesWhatWasCorrectedAlready) {
 TEST(TargetFile, ReadsPosesWithASeed) {
   const auto file = parse_targets_csv(kPose + ",q1_deg,q2_deg\n1,2,3,1,0,0,0,90,-45\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_TRUE(file->rows[0].target.seed.value().isApprox(Eigen::Vector2d(kPi / 2, -kPi / 4)));
+  EXPECT_EQ(file->rows[0].target.seed_rad, (std::vector{kPi / 2, -kPi / 4}));
   EXPECT_FALSE(file->rows[0].target.conf);
 }
 
@@ -56,26 +59,26 @@ TEST(TargetFile, EachRowMaySayItsBranchInItsOwnWay) {
       parse_targets_csv(kPose + ",conf,q1_deg\n1,2,3,1,0,0,0,5,\n1,2,3,1,0,0,0,,90\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->rows[0].target.conf, 5);
-  EXPECT_FALSE(file->rows[0].target.seed);
+  EXPECT_TRUE(file->rows[0].target.seed_rad.empty());
   EXPECT_FALSE(file->rows[1].target.conf);
-  EXPECT_TRUE(file->rows[1].target.seed);
+  EXPECT_FALSE(file->rows[1].target.seed_rad.empty());
 }
 
 TEST(TargetFile, ReadsJointTargetsAlone) {
   const auto file = parse_targets_csv("q1_deg,q2_mm\n180,250\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_TRUE(file->rows[0].target.joint_target);
-  EXPECT_TRUE(file->rows[0].target.seed.value().isApprox(Eigen::Vector2d(kPi, .25)));
+  EXPECT_EQ(file->rows[0].target.seed_rad, (std::vector{kPi, 250.}));
 }
 
 TEST(TargetFile, ReadsHowTheArmComesToATarget) {
   const auto file = parse_targets_csv(
       "conf," + kPose + ",dir1,dir2,temperature_c,time_s\n3,1,2,3,1,0,0,0,1,-1,31.5,60\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;
-  const Target& target = file->rows[0].target;
-  EXPECT_EQ(target.direction, (std::vector<int>{1, -1}));
-  EXPECT_EQ(target.temperature, 31.5);
-  EXPECT_EQ(target.time, 60);
+  const exchange::AskedTarget& target = file->rows[0].target;
+  EXPECT_EQ(target.approach.directions, (std::vector<int>{1, -1}));
+  EXPECT_EQ(target.approach.temperature_c, 31.5);
+  EXPECT_EQ(target.approach.time_s, 60);
   EXPECT_EQ(refusal_of(check_targets(*file, test::small_cell("cell-7")->robot)),
             Refusal("t.csv", {}, "dir2").beyond(2, 6));
   EXPECT_EQ(refusal("conf," + kPose + ",dir1\n3,1,2,3,1,0,0,0,2\n").of(ErrorCode::kRefused),

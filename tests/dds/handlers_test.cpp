@@ -5,7 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <random>
 
+#include "idl/exchange/wire_values.h"
+#include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
 #include "tests/dds/answered.h"
@@ -252,7 +256,8 @@ TEST_F(HandlersTest, ATargetLeftAloneNamesJointAndLimitAndRepeatsItsErrorBefore)
       << left.message();
   EXPECT_NEAR(left.error_before_mm(), 0.8, 1e-6);
   EXPECT_EQ(left.error_after_mm(), left.error_before_mm());
-  EXPECT_EQ(left.joints_rad(), request.targets()[0].joints_rad());
+  for (std::size_t j = 0; j < 6; ++j)
+    EXPECT_EQ(to_deg(left.joints_rad()[j]), to_deg(request.targets()[0].joints_rad()[j])) << j;
 }
 
 TEST_F(HandlersTest, WhereNoJointsLeadNothingIsExpected) {
@@ -993,15 +998,48 @@ TEST(Codec, PrismaticJointsTravelInMillimetres) {
   const Chain chain = Chain::make("rail and hinge", {rail, Joint{}}).value();
   JointVector q(2);
   q << 1.5, 0.25;
-  EXPECT_EQ(to_wire(q, chain), (wire::Joints{1500, 0.25}));
-  EXPECT_TRUE(from_wire(to_wire(q, chain), chain, "here")->isApprox(q));
+  Correction correction;
+  correction.q = q;
+  const exchange::Rails rails = exchange::rails_of(chain);
+  const wire::Joints joints = wire::to_wire(exchanged(correction, rails), rails).joints_rad();
+  EXPECT_EQ(joints[0], 1500);
+  EXPECT_TRUE(from_wire(joints, chain, "here")->isApprox(q));
 }
 
 TEST(Codec, PosesComeBack) {
   const Pose X = pose_zyx({0.1, -0.2, 1.3}, 0.4, -0.5, 0.6);
-  const auto back = from_wire(to_wire(X), "here");
+  const auto back = from_wire(wire::to_wire(exchange::from_si(X)), "here");
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_TRUE(back->isApprox(X, 1e-12));
+}
+
+TEST(Codec, ACorrectionComesBackFromTheWireToTheLastBit) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> angle(-kPi, kPi);
+  for (int i = 0; i < 1000; ++i) {
+    Correction correction;
+    correction.status = CorrectionStatus::kOutOfDomain;
+    correction.q = JointVector::NullaryExpr(6, [&] { return angle(random); });
+    correction.turn_before = 1e-3 * angle(random);
+    const exchange::CorrectedTarget told = exchanged(correction, {});
+    const exchange::CorrectedTarget back = wire::from_wire(wire::to_wire(told, {}), {});
+    EXPECT_EQ(back.status, "out_of_domain");
+    EXPECT_EQ(back.joints_deg, told.joints_deg);
+    EXPECT_EQ(back.turn_before_deg, told.turn_before_deg);
+  }
+}
+
+TEST(Codec, EveryStatusHasItsWord) {
+  for (const CorrectionStatus status :
+       {CorrectionStatus::kOk, CorrectionStatus::kOutOfDomain, CorrectionStatus::kJointLimit,
+        CorrectionStatus::kUnreachable, CorrectionStatus::kSingular,
+        CorrectionStatus::kNotConverged, CorrectionStatus::kRefused}) {
+    Correction correction;
+    correction.status = status;
+    const wire::TargetStatus on_wire = wire::to_wire(exchanged(correction, {}), {}).status();
+    EXPECT_EQ(wire::word_of(on_wire), to_string(status));
+    EXPECT_EQ(static_cast<int>(on_wire), static_cast<int>(status));
+  }
 }
 
 }  // namespace

@@ -264,11 +264,11 @@ TEST_F(NarrowTest, ASessionThatIsToldToTryAgainLaterDoesSo) {
     callers.push_back(std::async(std::launch::async, [&] {
       std::size_t answered = 0;
       for (int i = 0; i < 10; ++i) {
-        client::TargetMm target;
+        exchange::AskedTarget target;
         target.seed_rad = kLoadJoints;
         target.joint_target = true;
         const auto answer =
-            (*session)->correct_targets(cell_7, std::vector<client::TargetMm>(200, target));
+            (*session)->correct_targets(cell_7, std::vector<exchange::AskedTarget>(200, target));
         EXPECT_TRUE(answer) << answer.error().message;
         answered += answer ? 1 : 0;
       }

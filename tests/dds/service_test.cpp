@@ -31,8 +31,8 @@ client::CallContext context_of(const std::string& cell) {
 }
 const client::CallContext kCell7 = context_of("cell-7");
 
-client::TargetMm joint_target() {
-  client::TargetMm target;
+exchange::AskedTarget joint_target() {
+  exchange::AskedTarget target;
   target.seed_rad = kJoints;
   target.joint_target = true;
   return target;
@@ -93,7 +93,7 @@ TEST_F(ServiceTest, AnswersAClientThatCameLater) {
   ASSERT_TRUE(answer) << answer.error().message;
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4)) << "was asked twice";
   ASSERT_EQ(answer->items.size(), 2u);
-  EXPECT_NEAR(answer->items[0].dx_mm, 0.4, 1e-9);
+  EXPECT_NEAR(answer->items[0].error_mm[0], 0.4, 1e-9);
   EXPECT_EQ(answer->model.version, 4);
 }
 
@@ -191,7 +191,7 @@ TEST_F(ServiceTest, LongCallsGoInParts) {
   ASSERT_TRUE(answer) << answer.error().message;
   EXPECT_EQ(answer->items.size(), joints.size());
 
-  const std::vector<client::TargetMm> targets(wire::kTargetsPerRequest + 3, joint_target());
+  const std::vector<exchange::AskedTarget> targets(wire::kTargetsPerRequest + 3, joint_target());
   const auto corrected = session->correct_targets(kCell7, targets);
   ASSERT_TRUE(corrected) << corrected.error().message;
   ASSERT_EQ(corrected->items.size(), targets.size());
@@ -271,12 +271,12 @@ TEST_F(ServiceTest, AProgramIsCorrectedByOneModelThoughAnotherIsPutInForceMeanwh
   const auto swap_at_the_third_part = [&](double) {
     if (++calls == 3) server_.backend().serve(2);
   };
-  const std::vector<client::TargetMm> targets(3000, joint_target());
+  const std::vector<exchange::AskedTarget> targets(3000, joint_target());
   const auto corrected = session->correct_targets(kCell7, targets, swap_at_the_third_part);
   ASSERT_TRUE(corrected) << corrected.error().message;
   EXPECT_EQ(corrected->model.version, 2);
   ASSERT_EQ(corrected->items.size(), targets.size());
-  for (const client::CorrectedTarget& item : corrected->items)
+  for (const exchange::CorrectedTarget& item : corrected->items)
     EXPECT_NEAR(item.error_before_mm, 0.2, 1e-6);
 }
 
@@ -496,7 +496,7 @@ TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
         const int version = answer->model.version;
         if (answer->model.hash != hashes.at(version)) ++wrong;
         for (const auto& item : answer->items)
-          wrong += std::abs(item.dx_mm - 0.1 * version) > 1e-9 ? 1 : 0;
+          wrong += std::abs(item.error_mm[0] - 0.1 * version) > 1e-9 ? 1 : 0;
         const std::lock_guard lock(mutex);
         newest[index] = version;
       }
@@ -550,7 +550,7 @@ TEST_F(ServiceTest, ALongCorrectionDoesNotHoldUpAPrediction) {
   ASSERT_TRUE(session->predict_error(kCell7, {kJoints}));
   std::atomic<bool> corrected = false;
   auto long_call = std::async(std::launch::async, [&] {
-    const std::vector<client::TargetMm> targets(30000, joint_target());
+    const std::vector<exchange::AskedTarget> targets(30000, joint_target());
     const bool good = session->correct_targets(kCell7, targets).has_value();
     corrected = true;
     return good;

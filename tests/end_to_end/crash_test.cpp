@@ -45,10 +45,10 @@ class CrashTest : public testing::Test {
   JobStatus train(const std::string& id, const std::string& csv) {
     return wait_for(submit(id, csv));
   }
-  client::ModelInfo model() {
+  exchange::ModelInfo model() {
     const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
     EXPECT_TRUE(answer) << answer.error().message;
-    return answer ? answer->model : client::ModelInfo{};
+    return answer ? answer->model : exchange::ModelInfo{};
   }
   void crash_and_start() {
     daemon_.kill();
@@ -60,7 +60,7 @@ class CrashTest : public testing::Test {
   }
   /// The first model, or the second once it was put in force: nothing else ever answers.
   void expect_a_whole_model() {
-    const client::ModelInfo now = model();
+    const exchange::ModelInfo now = model();
     if (now.version == 1) {
       EXPECT_EQ(now.id, first_id_);
     } else {

@@ -44,10 +44,10 @@ class DaemonTest : public testing::Test {
     return over.value_or(JobStatus{});
   }
   /// The model that answers for the cell now.
-  client::ModelInfo model() {
+  exchange::ModelInfo model() {
     const auto answer = session_->predict_error(kDaemonContext, test::virtual_joints(3, 7));
     EXPECT_TRUE(answer) << answer.error().message;
-    return answer ? answer->model : client::ModelInfo{};
+    return answer ? answer->model : exchange::ModelInfo{};
   }
 
   test::Daemon daemon_;
@@ -69,7 +69,7 @@ TEST_F(DaemonTest, ASubmittedBatchBecomesTheModelThatPredicts) {
   EXPECT_EQ(answer->model.batch_id, "lt-07");
   ASSERT_EQ(answer->items.size(), 20u);
   double largest = 0;
-  for (const auto& item : answer->items) largest = std::max(largest, std::abs(item.dx_mm));
+  for (const auto& item : answer->items) largest = std::max(largest, std::abs(item.error_mm[0]));
   EXPECT_GT(largest, 0.1) << "the virtual robot misses by millimetres";
 }
 
@@ -122,10 +122,10 @@ TEST_F(DaemonTest, TheHistoryOfACellIsAPageWithItsVersionsTrainingsAndEvents) {
 
 TEST_F(DaemonTest, ServesTheSameModelAfterARestart) {
   wait_for(submit("lt-07", 60));
-  const client::ModelInfo before = model();
+  const exchange::ModelInfo before = model();
   EXPECT_EQ(daemon_.stop(), 0);
   daemon_.start();
-  const client::ModelInfo after = model();
+  const exchange::ModelInfo after = model();
   EXPECT_FALSE(before.id.empty());
   EXPECT_EQ(after.id, before.id);
   EXPECT_EQ(after.version, before.version);
@@ -194,7 +194,7 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortOrOfTheSameNameIsRefused) {
 
 TEST_F(DaemonTest, AnImportOfAnyBytesIsRefusedAndTheDaemonGoesOn) {
   wait_for(submit("lt-07", 60));
-  const client::ModelInfo before = model();
+  const exchange::ModelInfo before = model();
   const std::string head = R"({"trammel_model":2,"content":)";
   for (const std::string& text :
        {head + std::string(1'000'000, '['), std::string(30'000'000, '['), std::string("{}"),
@@ -220,7 +220,7 @@ TEST_F(DaemonTest, ARollbackThatIsRepeatedAfterACrashGoesBackOnce) {
   ASSERT_EQ(versions->size(), 3u);
   client::ChangeOptions by_force;  // the first one is worse than those after it
   by_force.force = true;
-  for (const client::ModelInfo& version : *versions) {
+  for (const exchange::ModelInfo& version : *versions) {
     ASSERT_TRUE(session_->activate("cell-7", version.version, by_force)) << version.version;
   }
   const int last = model().version;

@@ -46,7 +46,7 @@ class ReplayTest : public testing::Test {
     client::CallContext context;
     context.cell = "cell-7";
     ASSERT_TRUE(session_->predict_error(context, test::virtual_joints(20, 7)));
-    client::TargetMm near, far;
+    exchange::AskedTarget near, far;
     near.pose = {1800, 125, 1200, 0.7071067811865476, 0, 0.7071067811865476, 0};
     near.conf = 0;
     far.pose = {9000, 0, 0, 1, 0, 0, 0};

@@ -122,7 +122,9 @@ const Calls& calls() {
          return said(s.predict_error(cell_7(), {{0, 0, 0, 0, 0, 0}}));
        }},
       {"CorrectTarget",
-       [](client::Session& s) { return said(s.correct_targets(cell_7(), {client::TargetMm{}})); }},
+       [](client::Session& s) {
+         return said(s.correct_targets(cell_7(), {exchange::AskedTarget{}}));
+       }},
       {"ReadModels", [](client::Session& s) { return said(s.models("cell-7")); }},
       {"SubmitMeasurements",
        [](client::Session& s) { return said(s.submit_measurements("cell-7", "", "no csv")); }},

@@ -38,16 +38,16 @@ const cam::CellTools& tools() {
 }
 
 /// Moves every target a little, as a model would.
-Result<client::Answer<client::CorrectedTarget>> moved(
-    const std::string&, const std::string&, const std::vector<client::TargetMm>& targets) {
-  client::Answer<client::CorrectedTarget> answer;
+Result<exchange::Answer<exchange::CorrectedTarget>> moved(
+    const std::string&, const std::string&, const std::vector<exchange::AskedTarget>& targets) {
+  exchange::Answer<exchange::CorrectedTarget> answer;
   answer.model.id = "0123456789ab";
-  for (const client::TargetMm& target : targets) {
-    client::CorrectedTarget item;
+  for (const exchange::AskedTarget& target : targets) {
+    exchange::CorrectedTarget item;
     item.status = target.seed_rad.empty() ? "unreachable" : "ok";
     item.commanded = target.pose;
-    item.commanded.x_mm += 0.1234567;
-    item.q_rad = target.seed_rad;
+    item.commanded.xyz_mm[0] += 0.1234567;
+    for (const double q : target.seed_rad) item.joints_deg.push_back(to_deg(q));
     item.sigma_mm = 0.01;
     answer.items.push_back(item);
   }

@@ -8,6 +8,7 @@
 
 #include "clients/cli/text/diagnose_text.h"
 #include "clients/session/convert.h"
+#include "idl/exchange/wire_values.h"
 #include "idl/limits.h"
 #include "idl/repairs/guard/guard.h"
 #include "idl/repairs/safe_type.h"
@@ -67,10 +68,10 @@ void convert(const Sample& sample) {
   if constexpr (requires { client::from_wire(sample); })
     static_cast<void>(client::from_wire(sample));
   if constexpr (requires { sample.predictions(); }) {
-    for (const auto& one : sample.predictions()) static_cast<void>(client::from_wire(one));
+    for (const auto& one : sample.predictions()) static_cast<void>(wire::from_wire(one));
   }
   if constexpr (requires { sample.corrections(); }) {
-    for (const auto& one : sample.corrections()) static_cast<void>(client::from_wire(one));
+    for (const auto& one : sample.corrections()) static_cast<void>(wire::from_wire(one, {}));
   }
 }
 

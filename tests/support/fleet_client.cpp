@@ -225,7 +225,7 @@ void FleetClient::read_models(const std::string& cell) {
     Seen& seen = seen_[cell];
     seen = {};
     json versions = json::object();
-    for (const client::ModelInfo& model : *models) {
+    for (const exchange::ModelInfo& model : *models) {
       versions[std::to_string(model.version)] = short_hash(model.hash);
       seen.newest = std::max(seen.newest, model.version);
       if (model.in_force) seen.in_force = model.version;

@@ -92,7 +92,7 @@ class Predictor {
     }
   }
   /// Each model once; and each failure.
-  void note(const Result<client::Answer<client::PredictedError>>& answer, std::int64_t before,
+  void note(const Result<exchange::Answer<exchange::Prediction>>& answer, std::int64_t before,
             std::int64_t after) {
     json record = {{"op", "predict"}, {"cell", "cell-7"}, {"invoke", before}, {"complete", after}};
     if (!answer) {

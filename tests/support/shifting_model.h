@@ -24,21 +24,19 @@ inline cam::CellTools spindle_only() {
   return {{{"spindle", X_FT}}, {{"spindle", {100, {0, 0, .1}}}}};
 }
 
-inline Result<client::Answer<client::CorrectedTarget>> shift(
-    const std::string&, const std::string&, const std::vector<client::TargetMm>& targets) {
-  client::Answer<client::CorrectedTarget> answer;
+inline Result<exchange::Answer<exchange::CorrectedTarget>> shift(
+    const std::string&, const std::string&, const std::vector<exchange::AskedTarget>& targets) {
+  exchange::Answer<exchange::CorrectedTarget> answer;
   answer.model.id = "0123456789ab";
-  for (const client::TargetMm& target : targets) {
-    client::CorrectedTarget item;
+  for (const exchange::AskedTarget& target : targets) {
+    exchange::CorrectedTarget item;
     item.status = target.seed_rad.empty() ? "unreachable" : "ok";
     item.message =
         target.seed_rad.empty() ? "no joints bring the tool there; conf 1 would reach it" : "";
     item.commanded = target.pose;
-    item.commanded.x_mm += kShift_mm.x();
-    item.commanded.y_mm += kShift_mm.y();
-    item.commanded.z_mm += kShift_mm.z();
-    item.q_rad = target.seed_rad;
-    for (double& q : item.q_rad) q += from_deg(0.0123456);
+    for (int k = 0; k < 3; ++k) item.commanded.xyz_mm[static_cast<std::size_t>(k)] += kShift_mm(k);
+    for (const double q : target.seed_rad)
+      item.joints_deg.push_back(to_deg(q + from_deg(0.0123456)));
     item.error_before_mm = kShift_mm.norm();
     item.sigma_mm = 0.01;
     item.error_after_mm = 0.01 * std::sqrt(3.0);

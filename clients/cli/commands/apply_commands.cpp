@@ -18,6 +18,7 @@
 #include "clients/cli/text/tolerance.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/measurement/pose_columns.h"
@@ -56,6 +57,12 @@ Result<client::CallContext> call_context(const ApplyArguments& arguments) {
   return context;
 }
 
+/// As a service is asked, too: what is computed here has the same bytes as what a service answers.
+exchange::AskedJoints asked_of(const PoseContext& pose, const std::vector<JointType>& types) {
+  return {exchange::asked_from_si(pose.q, exchange::rails_of(types)),
+          {pose.direction, pose.temperature, pose.time}};
+}
+
 Result<Predictions> predict_here(JointList& list, const ApplyArguments& arguments) {
   const CompensatedModel model = TRY(load_model(arguments.model));
   JointList checked = TRY(check_against_cell(std::move(list), model.cell()));
@@ -66,17 +73,10 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
         !known) {
       return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
-    PoseContext asked;
-    asked.q = from_wire(to_wire(pose.context.q, list.joint_types), model.cell().robot);
-    asked.tool = pose.context.tool;
-    asked.payload = pose.context.payload;
-    asked.direction = pose.context.direction;
-    asked.temperature = pose.context.temperature;
-    asked.time = pose.context.time;
-    asked.served = true;
-    poses.push_back(std::move(asked));
+    poses.push_back(context_of(asked_of(pose.context, list.joint_types), model.cell().robot,
+                               pose.context.tool, pose.context.payload));
   }
-  Predictions predictions{model.provenance().id, {}, {}, {}, notes_of(model)};
+  Predictions predictions{model.provenance().id, {}, notes_of(model)};
   ProgressLine progress;
   for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
@@ -85,7 +85,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
       return poses.begin() + static_cast<std::ptrdiff_t>(i);
     };
     for (const ErrorPrediction& prediction : model.predict_all({place(from), place(to)})) {
-      predictions.items.push_back(to_wire(prediction));
+      predictions.items.push_back(exchanged(prediction));
     }
   }
   return predictions;
@@ -95,7 +95,7 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   client::CallContext context = TRY(call_context(arguments));
   context.tool = list.poses.front().context.tool;
   context.payload = list.poses.front().context.payload;
-  std::vector<client::CommandedJoints> poses;
+  std::vector<exchange::AskedJoints> poses;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context.tool || pose.context.payload != context.payload) {
       return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool,
@@ -106,26 +106,28 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
           .with_text(pose.context.tool)
           .next("a service is asked for one of each");
     }
-    poses.push_back({to_wire(pose.context.q, list.joint_types), approach_of(pose.context)});
+    poses.push_back(asked_of(pose.context, list.joint_types));
   }
   const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
   auto answer = TRY(session->predict_error_at(
       context, poses, [&](double share) { progress.show("predicting", share); }));
-  return Predictions{
-      answer.model.id, std::move(answer.items), {}, {}, std::move(answer.model.notes)};
+  return Predictions{answer.model.id, std::move(answer.items), std::move(answer.model.notes)};
 }
 
-/// Adds the uncertainties that --covariance and --orientation ask for.
+/// What --covariance and --orientation ask for. Refuses predictions of a model that did not learn
+/// orientations.
 Status add_uncertainties(Predictions& predictions, const ApplyArguments& arguments) {
-  for (const client::PredictedError& item : predictions.items) {
-    if (arguments.covariance) predictions.together.push_back(joint_uncertainty(item));
-    if (!arguments.orientation) continue;
-    const Result<RotationUncertainty> turned = rotation_uncertainty(item);
-    if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
-    predictions.turned.push_back(*turned);
-  }
-  return {};
+  predictions.covariance = arguments.covariance;
+  predictions.orientation = arguments.orientation;
+  const bool learned =
+      std::all_of(predictions.items.begin(), predictions.items.end(),
+                  [](const auto& item) { return item.rotation_stddev_deg.has_value(); });
+  if (!arguments.orientation || learned) return {};
+  return refused(
+             "the model learned no orientations: its training poses did not all have one, or its "
+             "bias is none")
+      .in(arguments.model);
 }
 
 Status predict(const ApplyArguments& arguments) {
@@ -149,23 +151,23 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   Corrections corrections{
       model.provenance().id, joint_types(model.cell().robot), {}, notes_of(model)};
   corrections.items.resize(file.rows.size());
+  const exchange::Rails rails = exchange::rails_of(model.cell().robot);
   ProgressLine progress;
   in_parallel(
       file.rows.size(),
       [&](std::size_t i) {
-        const Target target =
-            from_wire(to_wire(file.rows[i].target, corrections.joint_types), model.cell().robot);
-        corrections.items[i] =
-            to_wire(model.correct(target, tool, payload), corrections.joint_types);
+        const Target target = target_of(file.rows[i].target, model.cell().robot);
+        corrections.items[i] = exchanged(model.correct(target, tool, payload), rails);
       },
       [&](double share) { progress.show("correcting", share); });
   return corrections;
 }
 
 Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArguments& arguments) {
-  const client::CallContext context = TRY(call_context(arguments));
-  std::vector<client::TargetMm> targets;
-  for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
+  client::CallContext context = TRY(call_context(arguments));
+  context.rails = exchange::rails_of(file.joint_types);
+  std::vector<exchange::AskedTarget> targets;
+  for (const TargetRow& row : file.rows) targets.push_back(row.target);
   const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
   auto answer = TRY(session->correct_targets(
@@ -243,7 +245,7 @@ Status check_usage(const CorrectArguments& arguments) {
 std::optional<ToleranceVerdict> verdict_of(const Corrections& corrections, double tolerance_mm) {
   if (tolerance_mm <= 0) return std::nullopt;
   std::vector<ExpectedError> errors;
-  for (const client::CorrectedTarget& item : corrections.items)
+  for (const exchange::CorrectedTarget& item : corrections.items)
     errors.push_back(
         {item.error_before_mm, item.error_after_mm, item.sigma_mm, item.status != "out_of_domain"});
   return tolerance_verdict(errors, tolerance_mm);

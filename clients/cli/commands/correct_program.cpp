@@ -20,6 +20,7 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/measurement/pose_columns.h"
@@ -41,18 +42,17 @@ std::string today() {
 
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
-             const std::vector<client::TargetMm>& targets)
-             -> Result<client::Answer<client::CorrectedTarget>> {
+             const std::vector<exchange::AskedTarget>& targets)
+             -> Result<exchange::Answer<exchange::CorrectedTarget>> {
     const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
-    client::Answer<client::CorrectedTarget> answer{info_of(model), {}};
+    exchange::Answer<exchange::CorrectedTarget> answer{info_of(model), {}};
     answer.items.resize(targets.size());
-    const std::vector<JointType> types = joint_types(model.cell().robot);
+    const exchange::Rails rails = exchange::rails_of(model.cell().robot);
     in_parallel(
         targets.size(),
         [&](std::size_t i) {
-          answer.items[i] = to_wire(
-              model.correct(from_wire(targets[i], model.cell().robot), known.tool, known.payload),
-              types);
+          const Target target = target_of(targets[i], model.cell().robot);
+          answer.items[i] = exchanged(model.correct(target, known.tool, known.payload), rails);
         },
         [&](double share) { progress.show("correcting", share); });
     return answer;
@@ -95,10 +95,11 @@ Result<Corrected> correct_by_service(const cam::Program& program,
           const SawModel& saw) {
         ProgressLine progress;
         const cam::AskCorrections ask = [&](const std::string& tool, const std::string& payload,
-                                            const std::vector<client::TargetMm>& targets) {
+                                            const std::vector<exchange::AskedTarget>& targets) {
           client::CallContext context = of;
           context.tool = tool;
           context.payload = payload;
+          context.rails = exchange::rails_of(model.cell().robot);
           auto answer = session.correct_targets(
               context, targets, [&](double share) { progress.show("correcting", share); });
           if (answer) saw(answer->model);

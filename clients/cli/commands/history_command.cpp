@@ -58,7 +58,7 @@ Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
 }
 
 /// With its parameters, where the service still has the file.
-VersionOnRecord version_of(client::Session& session, const client::ModelInfo& info) {
+VersionOnRecord version_of(client::Session& session, const exchange::ModelInfo& info) {
   VersionOnRecord one{info.version,        info.id,
                       info.batch_id,       info.trained_at_unix_s,
                       info.training_poses, metres(info.validation_rms_mm),

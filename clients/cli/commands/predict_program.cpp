@@ -11,7 +11,7 @@
 #include "clients/cli/text/prediction_text.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
-#include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
@@ -21,26 +21,12 @@ namespace {
 
 constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
 
-PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot,
-                       const std::string& tool, const std::string& payload) {
-  PoseContext context;
-  context.q = JointVector(robot.size());
-  for (int j = 0; j < robot.size(); ++j) {
-    const double value = pose.q_rad[static_cast<std::size_t>(j)];
-    context.q(j) = robot.joint(j).type == JointType::kPrismatic ? from_mm(value) : value;
-  }
-  context.tool = tool;
-  context.payload = payload;
-  context.served = true;
-  return context;
-}
-
 cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
-             const std::vector<client::CommandedJoints>& poses)
-             -> Result<client::Answer<client::PredictedError>> {
+             const std::vector<exchange::AskedJoints>& poses)
+             -> Result<exchange::Answer<exchange::Prediction>> {
     const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
-    client::Answer<client::PredictedError> answer{info_of(model), {}};
+    exchange::Answer<exchange::Prediction> answer{info_of(model), {}};
     answer.items.resize(poses.size());
     const auto portion = [&](std::size_t k) {
       std::vector<PoseContext> contexts;
@@ -49,7 +35,7 @@ cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progr
       for (std::size_t i = first; i < last; ++i)
         contexts.push_back(context_of(poses[i], model.cell().robot, known.tool, known.payload));
       const std::vector<ErrorPrediction> all = model.predict_all(contexts);
-      for (std::size_t i = first; i < last; ++i) answer.items[i] = to_wire(all[i - first]);
+      for (std::size_t i = first; i < last; ++i) answer.items[i] = exchanged(all[i - first]);
     };
     in_parallel((poses.size() + kPosesTogether - 1) / kPosesTogether, portion,
                 [&](double share) { progress.show("predicting", share); });
@@ -73,7 +59,7 @@ Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
           const SawModel& saw) {
         ProgressLine progress;
         const cam::AskPredictions ask = [&](const std::string& tool, const std::string& payload,
-                                            const std::vector<client::CommandedJoints>& poses) {
+                                            const std::vector<exchange::AskedJoints>& poses) {
           client::CallContext context = of;
           context.tool = tool;
           context.payload = payload;

@@ -9,6 +9,8 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/compensate/model_file.h"
 
 namespace trammel::cli {
@@ -49,11 +51,12 @@ struct Replayed {
   std::vector<std::string> half;      ///< last lines that were not written to their ends
 };
 
-double distance(const client::PoseMm& a, const client::PoseMm& b) {
-  return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm, a.z_mm - b.z_mm);
+double distance(const exchange::Pose& a, const exchange::Pose& b) {
+  const auto &p = a.xyz_mm, &r = b.xyz_mm;
+  return std::hypot(p[0] - r[0], p[1] - r[1], p[2] - r[2]);
 }
 
-bool has_command(const client::CorrectedTarget& target) {
+bool has_command(const exchange::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
 }
 
@@ -69,9 +72,9 @@ double apart(const std::array<double, 3>& a, const std::array<double, 3>& b) {
 
 const char* domain_word(bool in_domain) { return in_domain ? "in domain" : "out of domain"; }
 
-Different compared(const RecordedPose& then, const client::PredictedError& now) {
-  const double error = apart(then.error_mm, {now.dx_mm, now.dy_mm, now.dz_mm});
-  const double spread = apart(then.true_stddev_mm, {now.slx_mm, now.sly_mm, now.slz_mm});
+Different compared(const exchange::Prediction& then, const exchange::Prediction& now) {
+  const double error = apart(then.error_mm, now.error_mm);
+  const double spread = apart(then.true_stddev_mm, now.true_stddev_mm);
   if (then.in_domain != now.in_domain)
     return {
         std::max(error, spread), true,
@@ -79,6 +82,13 @@ Different compared(const RecordedPose& then, const client::PredictedError& now) 
   return {
       std::max(error, spread), false,
       fmt::format("the error by {:.3g} mm, its standard deviation by {:.3g} mm", error, spread)};
+}
+
+/// rad, of a rail mm.
+std::vector<double> in_radians(std::vector<double> joints_deg, const exchange::Rails& rails) {
+  for (std::size_t j = 0; j < joints_deg.size(); ++j)
+    if (!exchange::is_rail(rails, j)) joints_deg[j] = from_deg(joints_deg[j]);
+  return joints_deg;
 }
 
 /// rad; infinite where there are not as many of them.
@@ -89,7 +99,10 @@ double joints_apart(const std::vector<double>& a, const std::vector<double>& b) 
   return most;
 }
 
-Different compared(const client::CorrectedTarget& then, const client::CorrectedTarget& now) {
+/// `now` with the joints of a robot with these rails.
+Different compared(const RecordedTarget& recorded, const exchange::CorrectedTarget& now,
+                   const exchange::Rails& rails) {
+  const exchange::CorrectedTarget& then = recorded.answer;
   if (then.status != now.status)
     return {
         has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY,
@@ -99,7 +112,8 @@ Different compared(const client::CorrectedTarget& then, const client::CorrectedT
   const double expected = std::max({apart(then.error_before_mm, now.error_before_mm),
                                     apart(then.error_after_mm, now.error_after_mm),
                                     apart(then.sigma_mm, now.sigma_mm)});
-  const double turned = joints_apart(then.q_rad, now.q_rad);
+  const double turned =
+      joints_apart(recorded.commanded_joints_rad, in_radians(now.joints_deg, rails));
   return {std::max(moved, expected), turned > kAnotherBranch,
           fmt::format("the commanded pose by {:.3g} mm, its joints by {:.3g} rad, the errors "
                       "expected by {:.3g} mm",
@@ -125,8 +139,9 @@ void note(Replayed& all, const RecordedCall& call, std::size_t item, Different d
 /// Who answers now: predictions and corrections of one recorded request, and the hash of the model.
 struct Answers {
   std::string hash;
-  std::vector<client::PredictedError> predictions;
-  std::vector<client::CorrectedTarget> corrections;
+  std::vector<exchange::Prediction> predictions;
+  std::vector<exchange::CorrectedTarget> corrections;
+  exchange::Rails rails = {};  ///< as the joints of the corrections are told
 };
 using Ask = std::function<Result<Answers>(const RecordedCall&)>;
 
@@ -140,29 +155,20 @@ Result<Answers> answered_here(const CompensatedModel& model, const RecordedCall&
   if (!payload) return at_line(payload.error());
   if (const Status known = model.check_trained_with(*tool, *payload); !known)
     return at_line(known.error());
-  std::vector<JointType> types;
-  for (int j = 0; j < cell.robot.size(); ++j) types.push_back(cell.robot.joint(j).type);
   const auto joints = static_cast<std::size_t>(cell.robot.size());
-  Answers answers{model.provenance().hash, {}, {}};
+  Answers answers{model.provenance().hash, {}, {}, exchange::rails_of(cell.robot)};
   const auto of_another_robot = [&] {
     return refused("joints of another robot").in(call.file).at_row(call.line).of("joints_rad");
   };
   for (const RecordedPose& pose : call.poses) {
     if (pose.asked.q_rad.size() != joints) return of_another_robot();
-    PoseContext asked;
-    asked.q = from_wire(pose.asked.q_rad, cell.robot);
-    asked.tool = *tool;
-    asked.payload = *payload;
-    asked.direction = pose.asked.approach.directions;
-    asked.temperature = pose.asked.approach.temperature_c;
-    asked.time = pose.asked.approach.time_s;
-    asked.served = true;
-    answers.predictions.push_back(to_wire(model.predict_all({asked}).front()));
+    const PoseContext asked = context_of(pose.asked, cell.robot, *tool, *payload);
+    answers.predictions.push_back(exchanged(model.predict_all({asked}).front()));
   }
   for (const RecordedTarget& target : call.targets) {
     if (!target.asked.conf && target.asked.seed_rad.size() != joints) return of_another_robot();
-    answers.corrections.push_back(
-        to_wire(model.correct(from_wire(target.asked, cell.robot), *tool, *payload), types));
+    answers.corrections.push_back(exchanged(
+        model.correct(target_of(target.asked, cell.robot), *tool, *payload), answers.rails));
   }
   return answers;
 }
@@ -175,17 +181,17 @@ Result<Answers> answered_by(client::Session& session, const ModelReference& mode
   context.payload = call.payload;
   if (model.version > 0) context.model = fmt::format("@{}", model.version);
   if (!call.poses.empty()) {
-    std::vector<client::CommandedJoints> poses;
+    std::vector<exchange::AskedJoints> poses;
     for (const RecordedPose& pose : call.poses) poses.push_back(pose.asked);
     return session.predict_error_at(context, poses)
-        .map([](client::Answer<client::PredictedError> answer) {
+        .map([](exchange::Answer<exchange::Prediction> answer) {
           return Answers{answer.model.hash, std::move(answer.items), {}};
         });
   }
-  std::vector<client::TargetMm> targets;
+  std::vector<exchange::AskedTarget> targets;
   for (const RecordedTarget& target : call.targets) targets.push_back(target.asked);
   return session.correct_targets(context, targets)
-      .map([](client::Answer<client::CorrectedTarget> answer) {
+      .map([](exchange::Answer<exchange::CorrectedTarget> answer) {
         return Answers{answer.model.hash, {}, std::move(answer.items)};
       });
 }
@@ -198,9 +204,9 @@ Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Re
   all.models_now.insert(now.hash.substr(0, 8));
   if (now.hash != call.model_hash) ++all.of_other_models;
   for (std::size_t i = 0; i < call.poses.size(); ++i)
-    note(all, call, i, compared(call.poses[i], now.predictions.at(i)), tolerance_mm);
+    note(all, call, i, compared(call.poses[i].answer, now.predictions.at(i)), tolerance_mm);
   for (std::size_t i = 0; i < call.targets.size(); ++i)
-    note(all, call, i, compared(call.targets[i].answer, now.corrections.at(i)), tolerance_mm);
+    note(all, call, i, compared(call.targets[i], now.corrections.at(i), now.rails), tolerance_mm);
   return {};
 }
 

@@ -46,9 +46,9 @@ Extent extent_of(const client::JobStatus& job) {
 /// say.
 Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell,
                                            int version) {
-  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  const std::vector<exchange::ModelInfo> models = TRY(session.models(cell));
   const auto asked =
-      std::find_if(models.begin(), models.end(), [&](const client::ModelInfo& model) {
+      std::find_if(models.begin(), models.end(), [&](const exchange::ModelInfo& model) {
         return version == 0 ? model.in_force : model.version == version;
       });
   return asked == models.end() ? std::vector<Note>() : asked->notes;
@@ -149,7 +149,7 @@ ordered_json fleet_of(const std::vector<ordered_json>& answers) {
 
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const std::vector<client::ServerStatus> servers = TRY(session.servers());
-  const std::vector<client::ModelInfo> models = TRY(session.model_status());
+  const std::vector<exchange::ModelInfo> models = TRY(session.model_status());
   const std::vector<client::BatchOfService> apart = TRY(session.quarantine(""));
   const std::vector<client::DatedJob> jobs = TRY(session.jobs(""));
   const std::vector<ordered_json> answers = TRY(health_answers(session, "", 1));
@@ -183,7 +183,7 @@ Result<Extent> watch(client::Session& session, const ServiceArguments& arguments
 
 Status list_models(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
-  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  const std::vector<exchange::ModelInfo> models = TRY(session.models(cell));
   tell(models_text(models), {arguments.json});
   return write_json(arguments.json, {{"cell", cell}, {"models", models_json(models)}});
 }
@@ -215,7 +215,7 @@ Status list_batches(client::Session& session, const ServiceArguments& arguments)
 /// The version that the service's record has in force; 0: none. Empty: not among the versions that
 /// a list has.
 Result<std::optional<int>> version_in_force(client::Session& session, const std::string& cell) {
-  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  const std::vector<exchange::ModelInfo> models = TRY(session.models(cell));
   if (models.empty()) return std::optional(0);
   const auto in_force =
       std::find_if(models.begin(), models.end(), [](const auto& model) { return model.in_force; });

@@ -26,21 +26,22 @@ std::array<double, 3> three(const json& list) {
   return {number(list.at(0)), number(list.at(1)), number(list.at(2))};
 }
 
-client::PoseMm pose(const json& list) {
-  return {number(list.at(0)), number(list.at(1)), number(list.at(2)), number(list.at(3)),
-          number(list.at(4)), number(list.at(5)), number(list.at(6))};
+exchange::Pose pose(const json& list) {
+  return {three(list),
+          {number(list.at(3)), number(list.at(4)), number(list.at(5)), number(list.at(6))}};
 }
 
-client::Approach approach(const json& item) {
+exchange::Approach approach(const json& item) {
   return {item.at("directions").get<std::vector<int>>(), known(item.at("temperature_c")),
           known(item.at("time_s"))};
 }
 
 RecordedPose pose_of(const json& item) {
-  return {{item.at("joints_rad").get<std::vector<double>>(), approach(item)},
-          three(item.at("error_mm")),
-          three(item.at("true_stddev_mm")),
-          item.at("in_domain").get<bool>()};
+  RecordedPose recorded{{item.at("joints_rad").get<std::vector<double>>(), approach(item)}, {}};
+  recorded.answer.error_mm = three(item.at("error_mm"));
+  recorded.answer.true_stddev_mm = three(item.at("true_stddev_mm"));
+  recorded.answer.in_domain = item.at("in_domain").get<bool>();
+  return recorded;
 }
 
 RecordedTarget target_of(const json& item) {
@@ -53,7 +54,7 @@ RecordedTarget target_of(const json& item) {
   target.asked.approach = approach(item);
   target.answer.status = item.at("status").get<std::string>();
   target.answer.commanded = pose(item.at("commanded_mm"));
-  target.answer.q_rad = item.at("commanded_joints_rad").get<std::vector<double>>();
+  target.commanded_joints_rad = item.at("commanded_joints_rad").get<std::vector<double>>();
   target.answer.error_before_mm = number(item.at("error_before_mm"));
   target.answer.error_after_mm = number(item.at("error_after_mm"));
   target.answer.sigma_mm = number(item.at("sigma_mm"));

@@ -1,27 +1,26 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "clients/session/session_types.h"
 #include "server/base/result.h"
+#include "server/exchange/answer.h"
 
 namespace trammel::cli {
 
-/// Joints that a service was asked about, and what it answered.
+/// Joints that a service was asked about, and what it answered, as far as that is recorded.
 struct RecordedPose {
-  client::CommandedJoints asked;
-  std::array<double, 3> error_mm{}, true_stddev_mm{};
-  bool in_domain = false;
+  exchange::AskedJoints asked;
+  exchange::Prediction answer;
 };
 
-/// A target that a service was asked about, and what it answered.
+/// A target that a service was asked about, and likewise.
 struct RecordedTarget {
-  client::TargetMm asked;
-  client::CorrectedTarget answer;
+  exchange::AskedTarget asked;
+  exchange::CorrectedTarget answer;          ///< without its joints
+  std::vector<double> commanded_joints_rad;  ///< of a rail mm
 };
 
 /// One request that a service has recorded (server/dds/records/README.md). Either poses or targets.

@@ -1,11 +1,13 @@
 #include "clients/cli/files/target_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "clients/cli/files/near_columns.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
@@ -58,39 +60,34 @@ Result<TargetColumns> find_columns(const CsvTable& table) {
   return columns;
 }
 
-Result<Pose> read_pose(const CsvTable& table, std::size_t row,
-                       const std::vector<std::size_t>& columns) {
-  Pose X_BT = Pose::Identity();
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double value = TRY(table.number(row, columns[k], kPositionLimitMm));
-    X_BT.translation()(static_cast<Eigen::Index>(k)) = from_mm(value);
-  }
+Result<exchange::Pose> read_pose(const CsvTable& table, std::size_t row,
+                                 const std::vector<std::size_t>& columns) {
+  std::array<double, 3> xyz_mm{};
+  for (std::size_t k = 0; k < xyz_mm.size(); ++k)
+    xyz_mm[k] = TRY(table.number(row, columns[k], kPositionLimitMm));
   return table.rotation(row, {columns.begin() + 3, columns.end()}).map([&](const Matrix3& R_BT) {
-    X_BT.linear() = R_BT;
-    return X_BT;
+    return exchange::Pose{xyz_mm, exchange::from_si(make_pose(R_BT, Vector3::Zero())).q_wxyz};
   });
 }
 
 Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns,
-                   Target& target) {
+                   exchange::AskedTarget& target) {
   PoseContext comes = TRY(columns.commanded.circumstances(table, row));
-  target.direction = std::move(comes.direction);
-  target.temperature = comes.temperature;
-  target.time = comes.time;
+  target.approach = {std::move(comes.direction), comes.temperature, comes.time};
   target.joint_target = columns.pose.empty();
   if (!columns.commanded.joint_types().empty() &&
       (target.joint_target || !columns.commanded.joints_empty(table, row))) {
-    JointVector seed = TRY(columns.commanded.joints(table, row));
-    target.seed = std::move(seed);
+    const JointVector seed = TRY(columns.commanded.joints(table, row));
+    target.seed_rad =
+        exchange::asked_from_si(seed, exchange::rails_of(columns.commanded.joint_types()));
   }
   if (target.joint_target) return {};
-  const Pose X_BT = TRY(read_pose(table, row, columns.pose));
-  target.X_BT = X_BT;
+  target.pose = TRY(read_pose(table, row, columns.pose));
   if (columns.conf && !table.field(row, *columns.conf).empty()) {
     const int conf = TRY(table.integer(row, *columns.conf, 0, kHighestConf));
     target.conf = conf;
   }
-  if (!target.conf && !target.seed)
+  if (!target.conf && target.seed_rad.empty())
     return table.refuse(row, "neither conf nor joints as the seed of the pose").of("conf");
   return {};
 }
@@ -138,21 +135,21 @@ Result<TargetFile> read_targets_csv(const std::string& path) {
 bool may_be_metres(const TargetFile& file) {
   return !file.rows.empty() &&
          std::all_of(file.rows.begin(), file.rows.end(), [](const TargetRow& row) {
-           const Target& target = row.target;
-           return !target.joint_target &&
-                  to_mm(target.X_BT.translation().lpNorm<Eigen::Infinity>()) < kLargestMetres;
+           const auto& p = row.target.pose.xyz_mm;
+           return !row.target.joint_target && std::all_of(p.begin(), p.end(), [](double mm) {
+             return std::abs(mm) < kLargestMetres;
+           });
          });
 }
 
 Error looks_like_metres(const TargetFile& file) {
-  const Vector3 p = file.rows.front().target.X_BT.translation();
   return refused(
              "the positions look like metres: x_mm, y_mm and z_mm are mm, and all are below {:g}",
              kLargestMetres)
       .in(file.where)
       .at_row(file.rows.front().row)
       .of("x_mm")
-      .beyond(to_mm(p.x()), kLargestMetres)
+      .beyond(file.rows.front().target.pose.xyz_mm[0], kLargestMetres)
       .next("write them in mm, 1000 times as large")
       .value();
 }
@@ -160,7 +157,10 @@ Error looks_like_metres(const TargetFile& file) {
 Status check_millimetres(const TargetFile& file, const Chain& robot) {
   if (!may_be_metres(file)) return {};
   std::vector<double> distances;
-  for (const TargetRow& row : file.rows) distances.push_back(row.target.X_BT.translation().norm());
+  for (const TargetRow& row : file.rows) {
+    const auto& p = row.target.pose.xyz_mm;
+    distances.push_back(from_mm(std::hypot(p[0], p[1], p[2])));
+  }
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   if (*middle >= kNearestShareOfReach * arm_length(robot)) return {};
@@ -172,7 +172,7 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
     TRY(check_joint_columns(file.joint_types, robot, file.where));
   }
   for (const TargetRow& row : file.rows) {
-    const auto directions = static_cast<int>(row.target.direction.size());
+    const auto directions = static_cast<int>(row.target.approach.directions.size());
     if (directions == 0 || directions == robot.size()) continue;
     return refused("{} direction columns, robot {} has {} joints", directions, robot.name(),
                    robot.size())

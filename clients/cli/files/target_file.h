@@ -4,14 +4,15 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/compensate/compensated_model.h"
+#include "server/exchange/answer.h"
+#include "server/robot/chain.h"
 
 namespace trammel::cli {
 
 /// A target with its line in the file.
 struct TargetRow {
   int row = 0;
-  Target target;
+  exchange::AskedTarget target;
   std::vector<std::string> fields = {};  ///< as they stand there, one a column
 };
 

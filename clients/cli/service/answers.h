@@ -7,56 +7,25 @@
 #include "clients/cli/files/target_file.h"
 #include "clients/session/session.h"
 #include "server/base/note.h"
-#include "server/compensate/compensated_model.h"
+#include "server/exchange/si.h"
 #include "server/measurement/files/joint_list.h"
 
-/// Predictions and corrections in the units of files and of the wire, whether this program or a
-/// service made them.
+/// Predictions and corrections as text and JSON, whether this program or a service made them.
 namespace trammel::cli {
-
-[[nodiscard]] client::PoseMm to_wire(const Pose& X_BT);
-[[nodiscard]] client::PredictedError to_wire(const ErrorPrediction& prediction);
-[[nodiscard]] client::CorrectedTarget to_wire(const Correction& correction,
-                                              const std::vector<JointType>& joint_types);
-/// rad, of a prismatic joint mm.
-[[nodiscard]] std::vector<double> to_wire(const JointVector& q,
-                                          const std::vector<JointType>& joint_types);
-[[nodiscard]] client::TargetMm to_wire(const Target& target,
-                                       const std::vector<JointType>& joint_types);
-/// As a server reads them: what is computed here has the same bytes as what a server answers.
-[[nodiscard]] Target from_wire(const client::TargetMm& wanted, const Chain& robot);
-[[nodiscard]] JointVector from_wire(const std::vector<double>& wire, const Chain& robot);
-
-/// The approach of the arm to a pose, as far as that is known.
-[[nodiscard]] client::Approach approach_of(const PoseContext& context);
-
-/// The covariances between the coordinates of a prediction.
-struct JointUncertainty {
-  double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
-};
-[[nodiscard]] JointUncertainty joint_uncertainty(const client::PredictedError& prediction);
-
-/// About the axes of the base, of one measurement of the orientation.
-struct RotationUncertainty {
-  double srx_deg = 0, sry_deg = 0, srz_deg = 0;
-};
-/// Refuses a prediction of a model that did not learn orientations.
-[[nodiscard]] Result<RotationUncertainty> rotation_uncertainty(
-    const client::PredictedError& prediction);
 
 /// Answers with the id of the one model that gave them.
 struct Predictions {
   std::string model_id;
-  std::vector<client::PredictedError> items;     ///< one a pose of the list
-  std::vector<JointUncertainty> together = {};   ///< likewise where it was asked for, else none
-  std::vector<RotationUncertainty> turned = {};  ///< likewise
-  std::vector<Note> notes = {};                  ///< of the model
+  std::vector<exchange::Prediction> items;  ///< one a pose of the list
+  std::vector<Note> notes = {};             ///< of the model
+  bool covariance = false;                  ///< whether these are to be told, too
+  bool orientation = false;                 ///< likewise; every item has them then
 };
 struct Corrections {
   std::string model_id;
   std::vector<JointType> joint_types;
-  std::vector<client::CorrectedTarget> items;  ///< one a target
-  std::vector<Note> notes = {};                ///< of the model
+  std::vector<exchange::CorrectedTarget> items;  ///< one a target
+  std::vector<Note> notes = {};                  ///< of the model
 };
 
 /// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for,

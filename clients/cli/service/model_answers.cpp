@@ -25,9 +25,9 @@ Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
   return ToolAndPayload{std::move(known_tool), std::move(known_payload)};
 }
 
-client::ModelInfo info_of(const CompensatedModel& model) {
+exchange::ModelInfo info_of(const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
-  client::ModelInfo info;
+  exchange::ModelInfo info;
   info.cell = model.cell().name;
   info.id = provenance.id;
   info.hash = provenance.hash;

@@ -13,7 +13,7 @@
 namespace trammel::cli {
 
 [[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);
-[[nodiscard]] client::ModelInfo info_of(const CompensatedModel& model);
+[[nodiscard]] exchange::ModelInfo info_of(const CompensatedModel& model);
 
 struct ToolAndPayload {
   std::string tool, payload;
@@ -25,7 +25,7 @@ struct ToolAndPayload {
                                                             const std::string& payload);
 
 /// Tells which model answered a call.
-using SawModel = std::function<void(const client::ModelInfo&)>;
+using SawModel = std::function<void(const exchange::ModelInfo&)>;
 
 /// Calls `work(session, context, model, saw)` with the model that the service answers with: it is
 /// fetched, and fetched again if another one has answered meanwhile. kBusy: that happened again and
@@ -47,7 +47,7 @@ template <typename T, typename Work>
     const Result<CompensatedModel> model = deserialize(*text, name);
     if (!model) return tl::make_unexpected(model.error());
     bool another = false;
-    const SawModel saw = [&](const client::ModelInfo& answered) {
+    const SawModel saw = [&](const exchange::ModelInfo& answered) {
       another |= answered.hash != model->provenance().hash;
     };
     Result<T> done = work(**session, context, *model, saw);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "server/base/units.h"
+#include "server/compensate/exchanged.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/tasks/train/leftover.h"
@@ -235,7 +236,8 @@ Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT,
                                        const std::vector<TargetRow>& holes) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(holes.size()), cell.robot.size());
   for (std::size_t i = 0; i < holes.size(); ++i) {
-    const InverseResult joints = TRY(nominal_joints(cell, X_FT, holes[i].target));
+    const InverseResult joints =
+        TRY(nominal_joints(cell, X_FT, target_of(holes[i].target, cell.robot)));
     if (joints.status != InverseStatus::kOk) {
       return refused("cell {} does not reach it", cell.name).in("holes").at_row(holes[i].row);
     }
@@ -319,7 +321,8 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
   const Pose X_BW = robot.truth.X_WB.inverse();
   for (std::size_t i = 0; i < holes.size(); ++i) {
     PoseContext context = measured.measurements[i].context;
-    const Correction correction = model.correct(holes[i].target, context.tool, context.payload);
+    const Correction correction = model.correct(target_of(holes[i].target, model.cell().robot),
+                                                context.tool, context.payload);
     const auto true_error = [&](const JointVector& q) {
       context.q = q;
       return ((X_BW * robot.truth.pose_W(context)).translation() -

@@ -1,8 +1,10 @@
 #include "clients/cli/text/prediction_text.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
@@ -25,15 +27,19 @@ std::string millimetres(double value) {
   return std::isfinite(value) ? fmt::format("{:.5f}", value) : "";
 }
 double rounded(double value) { return std::round(value * 1e5) / 1e5; }
+std::array<double, 3> rounded(const std::array<double, 3>& v) {
+  return {rounded(v[0]), rounded(v[1]), rounded(v[2])};
+}
 
 double error_mm(const PredictedTarget& target) {
-  return std::hypot(target.predicted.dx_mm, target.predicted.dy_mm, target.predicted.dz_mm);
+  const auto& e = target.predicted.error_mm;
+  return std::hypot(e[0], e[1], e[2]);
 }
 
 /// rms of the error to expect: its mean and what is not known of it.
 double expected_mm(const PredictedTarget& target) {
-  const client::PredictedError& item = target.predicted;
-  return std::hypot(error_mm(target), std::hypot(item.slx_mm, item.sly_mm, item.slz_mm));
+  const auto& s = target.predicted.true_stddev_mm;
+  return std::hypot(error_mm(target), std::hypot(s[0], s[1], s[2]));
 }
 
 }  // namespace
@@ -47,12 +53,12 @@ std::string prediction_csv(const PredictedProgram& program) {
                         csv_field(row.name), csv_field(row.motion),
                         csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
                         csv_field(row.tool), csv_field(row.frame), row.status);
-    const client::PredictedError& item = row.predicted;
+    const auto& [error, spread] = std::tie(row.predicted.error_mm, row.predicted.true_stddev_mm);
+    const auto& at = row.predicted.predicted.xyz_mm;
     std::vector<double> values = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
-    const std::vector<double> known = {
-        item.predicted.x_mm, item.predicted.y_mm, item.predicted.z_mm, item.dx_mm,
-        item.dy_mm,          item.dz_mm,          error_mm(row),       item.slx_mm,
-        item.sly_mm,         item.slz_mm,         expected_mm(row)};
+    const std::vector<double> known = {at[0],     at[1],     at[2],           error[0],
+                                       error[1],  error[2],  error_mm(row),   spread[0],
+                                       spread[1], spread[2], expected_mm(row)};
     const std::vector<double> unknown(known.size(), cam::kNotKnown);
     values.insert(values.end(), has_prediction(row) ? known.begin() : unknown.begin(),
                   has_prediction(row) ? known.end() : unknown.end());
@@ -72,10 +78,9 @@ ordered_json prediction_json(const PredictedProgram& program) {
     if (std::isfinite(row.p_B.x()))
       item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
     if (has_prediction(row)) {
-      const client::PredictedError& of = row.predicted;
-      item["predicted_mm"] = {of.predicted.x_mm, of.predicted.y_mm, of.predicted.z_mm};
-      item["error_mm"] = {rounded(of.dx_mm), rounded(of.dy_mm), rounded(of.dz_mm)};
-      item["sigma_mm"] = {rounded(of.slx_mm), rounded(of.sly_mm), rounded(of.slz_mm)};
+      item["predicted_mm"] = row.predicted.predicted.xyz_mm;
+      item["error_mm"] = rounded(row.predicted.error_mm);
+      item["sigma_mm"] = rounded(row.predicted.true_stddev_mm);
       item["expected_mm"] = rounded(expected_mm(row));
     }
     targets.push_back(std::move(item));

@@ -30,7 +30,7 @@ ordered_json if_known(const std::optional<Number>& number) {
   return number ? ordered_json(*number) : ordered_json(nullptr);
 }
 
-ordered_json model_json(const client::ModelInfo& model) {
+ordered_json model_json(const exchange::ModelInfo& model) {
   return {{"cell", model.cell},
           {"version", model.version},
           {"in_force", model.in_force},
@@ -124,18 +124,18 @@ std::string all_jobs_text(const std::vector<client::DatedJob>& jobs) {
   return text;
 }
 
-ordered_json models_json(const std::vector<client::ModelInfo>& models) {
+ordered_json models_json(const std::vector<exchange::ModelInfo>& models) {
   ordered_json json = ordered_json::array();
-  for (const client::ModelInfo& model : models) json.push_back(model_json(model));
+  for (const exchange::ModelInfo& model : models) json.push_back(model_json(model));
   return json;
 }
 
-std::string models_text(const std::vector<client::ModelInfo>& models) {
+std::string models_text(const std::vector<exchange::ModelInfo>& models) {
   if (models.empty()) return "no models\n";
   std::string text =
       fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id",
                   "poses", "held out mm", "trained", "data of", "error sources");
-  for (const client::ModelInfo& model : models) {
+  for (const exchange::ModelInfo& model : models) {
     text += fmt::format(
         "{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ',
         model.cell, model.version, model.id, model.training_poses,
@@ -144,7 +144,7 @@ std::string models_text(const std::vector<client::ModelInfo>& models) {
         level_in_words(model.level));
   }
   text += "  (* in force; dates in UTC)\n";
-  for (const client::ModelInfo& model : models) {
+  for (const exchange::ModelInfo& model : models) {
     for (const Note& note : grave(model.notes))
       text += fmt::format("{}@{}: {}", model.cell, model.version, notes_text({note}));
   }

@@ -18,8 +18,8 @@ namespace trammel::cli {
 /// A line each, with how those that are over ended.
 [[nodiscard]] std::string all_jobs_text(const std::vector<client::DatedJob>& jobs);
 
-[[nodiscard]] nlohmann::ordered_json models_json(const std::vector<client::ModelInfo>& models);
-[[nodiscard]] std::string models_text(const std::vector<client::ModelInfo>& models);
+[[nodiscard]] nlohmann::ordered_json models_json(const std::vector<exchange::ModelInfo>& models);
+[[nodiscard]] std::string models_text(const std::vector<exchange::ModelInfo>& models);
 
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);

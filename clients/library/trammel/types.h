@@ -1,22 +1,19 @@
 #pragma once
 
-#include <array>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "trammel/result.h"
+#include "trammel/values.h"
 
 /// The types that predictions and corrections are made of, from a file or from a service.
 namespace trammel::api {
 
-/// Where a frame is. `X_BT` is the tool T seen from the robot's base B.
-struct Pose {
-  std::array<double, 3> xyz_mm{};  ///< position, mm
-  std::array<double, 4> q_wxyz{
-      1, 0, 0, 0};  ///< orientation: unit quaternion, Hamilton, active, scalar first
-};
+using exchange::CorrectedTarget;
+using exchange::Pose;
+using exchange::Prediction;
 
 /// The circumstances that hold for all poses of a call.
 struct Context {
@@ -27,22 +24,6 @@ struct Context {
   std::optional<double> temperature_c;  ///< degrees Celsius; empty: that of the training
 };
 
-/// The error to expect at one joint vector. All vectors are in B.
-struct Prediction {
-  Pose nominal;                      ///< X_BT: where the controller believes the tool to be
-  Pose predicted;                    ///< X_BT: where it will be
-  std::array<double, 3> error_mm{};  ///< predicted - nominal, mm
-  std::array<double, 3>
-      stddev_mm{};  ///< of one measurement of it, the instrument's noise included, mm
-  std::array<double, 3> true_stddev_mm{};  ///< of the true error, mm
-  std::array<double, 9> covariance_mm2{};  ///< 3 x 3 of one measurement, row by row, mm²
-  std::array<double, 3> rotation_deg{};    ///< rotation vector from nominal to predicted, deg
-  std::optional<std::array<double, 3>>
-      rotation_stddev_deg;  ///< of one measured orientation, deg; empty: not learned
-  bool in_domain = false;   ///< false: the learned bias is not fully taken
-  double bias_share = 0;    ///< of the learned bias that is taken: 1 in domain, 0 well outside
-};
-
 /// A wanted pose of the tool, or joints whose nominal pose is wanted.
 struct Target {
   std::optional<Pose> pose;  ///< X_BT; empty: the nominal pose at `joints_deg` is wanted
@@ -50,23 +31,6 @@ struct Target {
       joints_deg;  ///< deg (of a rail mm): joints near the wanted branch; may be empty with `conf`
   std::optional<int>
       conf;  ///< branch 0..7: +4 wrist behind axis 1, +2 behind the lower arm, +1 joint 5 < 0
-};
-
-/// A corrected target. Only `ok` and `out_of_domain` are corrected; else the wanted pose is
-/// commanded.
-struct CorrectedTarget {
-  std::string
-      status;      ///< `ok out_of_domain joint_limit unreachable singular not_converged refused`
-  Pose commanded;  ///< X_BT to command so that the tool lands on the wanted pose
-  std::vector<double> joints_deg;  ///< the controller's joints for it, deg (of a rail mm)
-  double error_before_mm =
-      0;  ///< rms distance to expect without correction, mm; NaN: nothing to say
-  double error_after_mm = 0;   ///< the same with it, mm
-  double sigma_mm = 0;         ///< stddev of the true position, rms of the axes, mm
-  double turn_before_deg = 0;  ///< orientation error to expect without correction, deg
-  double turn_after_deg = 0;   ///< the same with it, deg
-  int iterations = 0;          ///< of the correction
-  std::string message;         ///< why it is not ok
 };
 
 /// A note that a user of a model should know, in the words of the command line and of the service.

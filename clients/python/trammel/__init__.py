@@ -165,6 +165,7 @@ class Corrections:
     error_before_mm: Floats  #: (N,): rms distance to expect without correction; NaN: nothing to say
     error_after_mm: Floats  #: (N,): the same with it
     sigma_mm: Floats  #: (N,): stddev of the true position, rms of the axes
+    sigma_measured_mm: Floats  #: (N,): the same of one measurement, the instrument's noise included
     turn_before_deg: Floats  #: (N,): orientation error to expect without correction
     turn_after_deg: Floats  #: (N,): the same with it
     iterations: npt.NDArray[np.int32]  #: (N,)

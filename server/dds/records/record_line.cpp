@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 
+#include "idl/exchange/wire_values.h"
 #include "server/dds/records/request_recorder.h"
 
 namespace trammel {
@@ -35,19 +36,14 @@ std::string list(const Numbers& numbers) {
 }
 
 std::string pose(const wire::PoseMm& X) {
-  return list(std::array{X.x_mm(), X.y_mm(), X.z_mm(), X.qw(), X.qx(), X.qy(), X.qz()});
+  const auto& [p, q] = wire::from_wire(X);
+  return list(std::array{p[0], p[1], p[2], q[0], q[1], q[2], q[3]});
 }
 
 std::string approach(const wire::Approach& approach) {
   return fmt::format("\"directions\":{},\"temperature_c\":{},\"time_s\":{}",
                      list(approach.directions()), number(approach.temperature_c()),
                      number(approach.time_s()));
-}
-
-const char* word_of(wire::TargetStatus status) {
-  constexpr std::array kWords = {"ok",       "out_of_domain", "joint_limit", "unreachable",
-                                 "singular", "not_converged", "refused"};
-  return kWords.at(static_cast<std::size_t>(status));
 }
 
 /// The beginning of all records.
@@ -63,13 +59,12 @@ std::string beginning(const char* operation, const Request& request, const Reply
 }
 
 std::string item(const wire::CommandedJoints& asked, const wire::PredictedError& answer) {
+  const exchange::Prediction prediction = wire::from_wire(answer);
   return fmt::format(
       "{{\"joints_rad\":{},{},\"error_mm\":{},\"stddev_mm\":{},\"true_stddev_mm\":{},\"turn_rad\":{"
       "},\"in_domain\":{}}}",
-      list(asked.joints_rad()), approach(asked.approach()),
-      list(std::array{answer.dx_mm(), answer.dy_mm(), answer.dz_mm()}),
-      list(std::array{answer.sx_mm(), answer.sy_mm(), answer.sz_mm()}),
-      list(std::array{answer.slx_mm(), answer.sly_mm(), answer.slz_mm()}),
+      list(asked.joints_rad()), approach(asked.approach()), list(prediction.error_mm),
+      list(prediction.stddev_mm), list(prediction.true_stddev_mm),
       list(std::array{answer.rx_rad(), answer.ry_rad(), answer.rz_rad()}), answer.in_domain());
 }
 
@@ -80,9 +75,9 @@ std::string item(const wire::Target& asked, const wire::CorrectedTarget& answer)
       "\"commanded_mm\":{},\"commanded_joints_rad\":{},\"error_before_mm\":{},\"error_after_mm\":{}"
       ",\"sigma_mm\":{}}}",
       kKinds.at(static_cast<std::size_t>(asked.kind())), pose(asked.pose()),
-      list(asked.joints_rad()), asked.conf(), approach(asked.approach()), word_of(answer.status()),
-      pose(answer.commanded()), list(answer.joints_rad()), number(answer.error_before_mm()),
-      number(answer.error_after_mm()), number(answer.sigma_mm()));
+      list(asked.joints_rad()), asked.conf(), approach(asked.approach()),
+      wire::word_of(answer.status()), pose(answer.commanded()), list(answer.joints_rad()),
+      number(answer.error_before_mm()), number(answer.error_after_mm()), number(answer.sigma_mm()));
 }
 
 template <typename Asked, typename Answers>

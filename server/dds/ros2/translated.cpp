@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "idl/exchange/wire_values.h"
 #include "server/base/units.h"
 
 namespace trammel::ros2 {
@@ -22,27 +23,21 @@ bool is_rail(const Chain* robot, std::size_t joint) {
          robot->joint(static_cast<int>(joint)).type == JointType::kPrismatic;
 }
 
-wire::PoseMm to_wire(const RosPose& pose) {
-  wire::PoseMm out;
-  out.x_mm(to_mm(pose.position().x()));
-  out.y_mm(to_mm(pose.position().y()));
-  out.z_mm(to_mm(pose.position().z()));
-  out.qw(pose.orientation().w());
-  out.qx(pose.orientation().x());
-  out.qy(pose.orientation().y());
-  out.qz(pose.orientation().z());
-  return out;
+exchange::Pose from_ros(const RosPose& pose) {
+  const auto& p = pose.position();
+  const auto& q = pose.orientation();
+  return {{to_mm(p.x()), to_mm(p.y()), to_mm(p.z())}, {q.w(), q.x(), q.y(), q.z()}};
 }
 
-RosPose to_ros(const wire::PoseMm& pose) {
+RosPose to_ros(const exchange::Pose& pose) {
   RosPose out;
-  out.position().x(from_mm(pose.x_mm()));
-  out.position().y(from_mm(pose.y_mm()));
-  out.position().z(from_mm(pose.z_mm()));
-  out.orientation().x(pose.qx());
-  out.orientation().y(pose.qy());
-  out.orientation().z(pose.qz());
-  out.orientation().w(pose.qw());
+  out.position().x(from_mm(pose.xyz_mm[0]));
+  out.position().y(from_mm(pose.xyz_mm[1]));
+  out.position().z(from_mm(pose.xyz_mm[2]));
+  out.orientation().w(pose.q_wxyz[0]);
+  out.orientation().x(pose.q_wxyz[1]);
+  out.orientation().y(pose.q_wxyz[2]);
+  out.orientation().z(pose.q_wxyz[3]);
   return out;
 }
 
@@ -103,7 +98,7 @@ wire::Target target_of(const CorrectTargets_& message, std::size_t i, const Chai
   target.kind(message.poses().empty() ? wire::TARGET_JOINTS
               : message.joints() != 0 ? wire::TARGET_POSE_NEAR_JOINTS
                                       : wire::TARGET_POSE_ON_BRANCH);
-  if (!message.poses().empty()) target.pose(to_wire(message.poses()[i]));
+  if (!message.poses().empty()) target.pose(wire::to_wire(from_ros(message.poses()[i])));
   if (message.joints() != 0)
     target.joints_rad(joints_of(message.joints_rad(), message.joints(), i, robot));
   if (!message.conf().empty()) target.conf(message.conf()[i]);
@@ -185,13 +180,13 @@ std::unique_ptr<wire::Received<wire::CorrectTargetRequest>> asked(
 PredictedErrors_ answered(const wire::PredictErrorReply& reply, const ServedCells&) {
   auto message = begun<PredictedErrors_>(reply);
   for (const wire::PredictedError& item : reply.predictions()) {
-    message.nominal().push_back(to_ros(item.nominal()));
-    message.predicted().push_back(to_ros(item.predicted()));
-    for (const double mm : {item.sx_mm(), item.sy_mm(), item.sz_mm()})
-      message.stddev_m().push_back(from_mm(mm));
-    for (const double mm : {item.slx_mm(), item.sly_mm(), item.slz_mm()})
+    const exchange::Prediction prediction = wire::from_wire(item);
+    message.nominal().push_back(to_ros(prediction.nominal));
+    message.predicted().push_back(to_ros(prediction.predicted));
+    for (const double mm : prediction.stddev_mm) message.stddev_m().push_back(from_mm(mm));
+    for (const double mm : prediction.true_stddev_mm)
       message.true_stddev_m().push_back(from_mm(mm));
-    message.in_domain().push_back(item.in_domain());
+    message.in_domain().push_back(prediction.in_domain);
   }
   return message;
 }
@@ -203,7 +198,7 @@ CorrectedTargets_ answered(const wire::CorrectTargetReply& reply, const ServedCe
   message.joints(static_cast<std::uint32_t>(n));
   for (const wire::CorrectedTarget& item : reply.corrections()) {
     message.status().push_back(static_cast<std::uint8_t>(item.status()));
-    message.commanded().push_back(to_ros(item.commanded()));
+    message.commanded().push_back(to_ros(wire::from_wire(item.commanded())));
     add_joints(item.joints_rad(), robot, n, message.joints_rad());
     message.error_before_m().push_back(from_mm(item.error_before_mm()));
     message.error_after_m().push_back(from_mm(item.error_after_mm()));

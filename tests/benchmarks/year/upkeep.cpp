@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "server/base/units.h"
+#include "server/exchange/si.h"
 #include "server/plan/plan.h"
 #include "server/robot/rigid_fit.h"
 #include "tests/support/demand.h"
@@ -57,8 +58,8 @@ std::vector<double> joints(const Eigen::MatrixXd& q, Eigen::Index row) {
   return all;
 }
 
-Eigen::Vector3d position(const client::PoseMm& pose) {
-  return from_mm(1) * Eigen::Vector3d(pose.x_mm, pose.y_mm, pose.z_mm);
+Eigen::Vector3d position(const exchange::Pose& pose) {
+  return from_mm(1) * Eigen::Map<const Eigen::Vector3d>(pose.xyz_mm.data());
 }
 
 }  // namespace
@@ -118,7 +119,7 @@ Said Metrologist::check(int week) {
 int Metrologist::in_force() const {
   const auto models = session_.models(arm_.cell()->name);
   if (!models) return 0;
-  for (const client::ModelInfo& model : *models)
+  for (const exchange::ModelInfo& model : *models)
     if (model.in_force) return model.version;
   return 0;
 }
@@ -145,7 +146,7 @@ client::CallContext Driller::context() const {
 }
 
 std::optional<Eigen::Matrix3Xd> Driller::predicted(const Eigen::MatrixXd& q, int week) const {
-  std::vector<client::CommandedJoints> asked;
+  std::vector<exchange::AskedJoints> asked;
   for (Eigen::Index i = 0; i < q.rows(); ++i)
     asked.push_back({joints(q, i), {.temperature_c = arm_.temperature(week)}});
   const auto answer = session_.predict_error_at(context(), asked);
@@ -181,9 +182,9 @@ double Driller::error_of(const CompensatedModel& model, int week) const {
 
 std::vector<Hole> Driller::drill(int week, int count, std::uint64_t seed) const {
   const Eigen::MatrixXd q = arm_.poses(count, seed);
-  std::vector<client::TargetMm> targets;
+  std::vector<exchange::AskedTarget> targets;
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    client::TargetMm target;
+    exchange::AskedTarget target;
     target.joint_target = true;
     target.seed_rad = joints(q, i);
     target.approach.temperature_c = arm_.temperature(week);
@@ -196,9 +197,9 @@ std::vector<Hole> Driller::drill(int week, int count, std::uint64_t seed) const 
   Eigen::MatrixXd commanded = q;
   Eigen::Matrix3Xd wanted(3, count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    const client::CorrectedTarget& item = answer->items[static_cast<std::size_t>(i)];
-    if (item.q_rad.size() == static_cast<std::size_t>(q.cols()))
-      commanded.row(i) = Eigen::Map<const Eigen::RowVectorXd>(item.q_rad.data(), q.cols());
+    const exchange::CorrectedTarget& item = answer->items[static_cast<std::size_t>(i)];
+    if (item.joints_deg.size() == static_cast<std::size_t>(q.cols()))
+      commanded.row(i) = exchange::si_from_degrees(item.joints_deg, arm_.cell()->robot).transpose();
     Pose X_FT = *arm_.cell()->tools.at("spindle");
     wanted.col(i) = (arm_.cell()->robot.flange_pose(q.row(i)) * X_FT).translation();
   }
@@ -206,7 +207,7 @@ std::vector<Hole> Driller::drill(int week, int count, std::uint64_t seed) const 
   const Eigen::Matrix3Xd aims = aligned(arm_.true_positions(reference, week), *said, wanted);
   std::vector<Hole> holes;
   for (Eigen::Index i = 0; i < count; ++i) {
-    const client::CorrectedTarget& item = answer->items[static_cast<std::size_t>(i)];
+    const exchange::CorrectedTarget& item = answer->items[static_cast<std::size_t>(i)];
     Hole hole;
     hole.error = (real.col(i) - aims.col(i)).norm();
     hole.promised = from_mm(item.error_after_mm);
