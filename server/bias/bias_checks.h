@@ -13,8 +13,8 @@ namespace trammel {
 /// Most observations of a kernel with blocks: learning from so many takes half a gigabyte.
 inline constexpr Eigen::Index kMostCoupled = 4000;
 
-/// Most numbers of a bias at the flange, 3 for each joint vector with one lever, 5 with two, 6 with
-/// more: it keeps a matrix of their square, 128 MB.
+/// Limit for a bias at the flange, in numbers: 3 for each joint vector with one lever, 5 with two,
+/// 6 with more. The bias keeps a matrix of their square, 128 MB.
 inline constexpr Eigen::Index kMostFlangeNumbers = 4000;
 
 [[nodiscard]] Status check_observations(const Eigen::MatrixXd& q, const Eigen::MatrixXd& residual_B,
@@ -25,8 +25,8 @@ inline constexpr Eigen::Index kMostFlangeNumbers = 4000;
 /// Checks the same for a bias at the flange: that the joint vectors are few enough.
 [[nodiscard]] Status check_flange(const Eigen::MatrixXd& q,
                                   const std::vector<BiasFeatures>& features);
-/// Checks that the hyperparameters of `state` have the shape that `bias` asks for, and its features
-/// where it has blocks.
+/// Checks that the hyperparameters of `state` have the shape that `bias` needs, and its features
+/// too if `bias` has blocks.
 [[nodiscard]] Status check_hyperparameters(const BiasState& state, const SpelledBias& bias);
 
 }  // namespace trammel

@@ -46,9 +46,9 @@ struct BiasPrediction {
   double prior_share = 1.0;
 };
 
-/// All that is needed to restore a fitted model bit for bit; factors and tables are computed again.
-/// `features` follow from the physics: they need not be stored, but must be given again as they
-/// were.
+/// All data that restore a fitted model bit for bit; factors and tables are computed again.
+/// `features` follow from the physics, so they are not stored, but the caller must pass the same
+/// ones again.
 struct BiasState {
   std::string kernel;
   Eigen::MatrixXd q;           ///< N x n, rad
@@ -58,8 +58,8 @@ struct BiasState {
       offset;  ///< of each coordinate, m: the mean residual, predicted far from all data
   Eigen::MatrixXd hyperparameters;  ///< a column for each coordinate, natural logarithms: kernel,
                                     ///< log σ_f, log σ_n
-  /// The hyperparameters of all blocks in their order, natural logarithms; of `flange` those of the
-  /// kernel and log σ (rad) of the rotation.
+  /// The hyperparameters of all blocks in their order, natural logarithms; for `flange` those of
+  /// the kernel and log σ (rad) of the rotation.
   Eigen::VectorXd block_hyperparameters = {};
   std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };

@@ -207,7 +207,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   state.hyperparameters = as_columns(found->found.outputs);
   state.block_hyperparameters = found->found.blocks;
 
-  // By the same way as a stored model, so that a restored one cannot differ.
+  // Conditions the model in the same way as a stored one, so that a restored model is equal.
   const auto fitted = TRY(Fitted::from(state, VarianceForm::kLearned));
   fitted->report.starts_at_best = found->starts_at_best;
   fitted->report.evaluations = found->evaluations;

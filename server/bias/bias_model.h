@@ -34,9 +34,9 @@ class BiasModel {
   /// hyperparameters of the wrong shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
-  /// With more observations, the hyperparameters as they are. Takes N² operations for each where
-  /// the kernel has no blocks and the median sigma stays the same, else N³. Equal to restoring the
-  /// longer state, to rounding. Refuses what fit() refuses.
+  /// The model with more observations and unchanged hyperparameters. Costs N² operations for each
+  /// if the kernel has no blocks and the median sigma stays, otherwise N³. Equal, up to rounding,
+  /// to restoring the longer state. Refuses the same as fit().
   [[nodiscard]] Result<BiasModel> with(const BiasProblem& more) const;
   /// Without these observations (rising indices), at the same cost. Refuses to keep fewer than 10.
   [[nodiscard]] Result<BiasModel> without(const std::vector<Eigen::Index>& observations) const;
@@ -44,8 +44,8 @@ class BiasModel {
   /// new starts.
   [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
 
-  /// True if the kernel has blocks or is of the flange. Only then features must be given; else they
-  /// are ignored.
+  /// True if the kernel has blocks or is at the flange. Only then features are needed; otherwise
+  /// they are ignored.
   [[nodiscard]] bool needs_features() const;
   /// True if the kernel has blocks: parts that do not fade with the distance from the training
   /// poses.
@@ -67,18 +67,18 @@ class BiasModel {
   [[nodiscard]] std::vector<BiasPrediction> predict_all(
       const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& features = {}) const;
 
-  /// N, in [0, 1]: `prior_share` of every training row without its joint vector. A target whose
-  /// share is above the 99 % quantile of these is farther from the data than the data are from each
-  /// other.
+  /// N, in [0, 1]: `prior_share` of every training row with its joint vector left out. A target
+  /// with a share above the 99 % quantile of these is farther from the data than the data are from
+  /// each other.
   [[nodiscard]] Eigen::VectorXd leave_one_out_prior_share() const;
   /// N x 3, m: every training row predicted from those at all other joint vectors.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
   /// N x 3, m: standard deviation of the measurement of every training row, given the same. With
   /// more than 5000 poses: given the others of its expert (local_experts.h).
   [[nodiscard]] Eigen::MatrixXd leave_one_out_stddev_B() const;
-  /// Errors of these observations when they are predicted from all others, with the hyperparameters
-  /// as found; `residual_B` (N x 3, m) takes the place of what the model was fitted to. Empty for a
-  /// kernel with blocks and for more than 5000 poses.
+  /// Errors of these observations when they are predicted from all others, with unchanged
+  /// hyperparameters. `residual_B` (N x 3, m) replaces the observations. Empty for a kernel with
+  /// blocks and for more than 5000 poses.
   [[nodiscard]] std::optional<Eigen::MatrixXd> left_out_error_B(
       const Eigen::MatrixXd& residual_B, const std::vector<Eigen::Index>& observations) const;
 

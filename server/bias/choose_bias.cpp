@@ -185,9 +185,8 @@ double hyperparameters_of(const BiasModel& model) {
   return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
 }
 
-/// True if `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters
-/// were found with the pose that is left out, so each of them raises the sum by one nat (Akaike
-/// 1974).
+/// True if `nlpd` (per pose, the sum of its rows) is clearly below `other`. The left-out pose took
+/// part in the search, so each hyperparameter adds a bias of one nat to the sum (Akaike 1974).
 bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
   const Mean likelier = mean_of(other - nlpd);
   return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) >
@@ -204,7 +203,7 @@ struct Best {
 
 class Choosing {
  public:
-  /// `problem`: all of `all`, or rows of it by which to choose.
+  /// `problem` is all of `all`, or the rows of it that choose.
   Choosing(const BiasProblem& problem, const BiasProblem& all, const BiasOptions& options,
            const ResidualWithout& residual_without, Index most_coupled)
       : problem_(problem),
@@ -360,7 +359,7 @@ class Choosing {
     return {std::move(choice_), std::move(best_.model)};
   }
 
-  /// True if the block `parameters` leaves clearly less than the same kernel without it.
+  /// True if the block `parameters` leaves clearly less error than the same kernel without it.
   [[nodiscard]] bool learns_physics() const {
     const BiasCandidate& taken = choice_.candidates[best_.candidate];
     const auto plain = std::find_if(choice_.candidates.begin(), choice_.candidates.end(),
@@ -420,8 +419,8 @@ BiasOptions as_share(BiasOptions options, double from, double to) {
   return options;
 }
 
-/// The model that was found on some rows of `problem`, on all of them: its search goes on from
-/// where it ended.
+/// Refits `model`, which was found on some rows of `problem`, to all rows. The search continues
+/// from its end.
 Result<BiasModel> grown(const BiasModel& model, const BiasProblem& problem,
                         const BiasOptions& options) {
   BiasState state = model.state();

@@ -20,16 +20,16 @@ struct BiasCandidate {
       0;  ///< m, Euclidean; eighths of the observations, in their order, left out
   double joint_block_rms = 0;  ///< m, Euclidean; eighths of joint space left out
   double gain =
-      0;  ///< m²: by how much the mean square falls against `none`, blocks in time left out
+      0;  ///< m²: reduction of the mean square error against `none`, with blocks in time left out
   double gain_stddev = 0;  ///< m²: standard error of the gain, from its scatter over the blocks
   std::string verdict;     ///< why it was not taken, or `taken`
-  bool skipped = false;    ///< not fitted: no figures, the verdict says why
+  bool skipped = false;  ///< true: not fitted; it has no figures, and the verdict gives the reason
 };
 
 struct BiasChoice {
   std::string kernel;                     ///< the one taken
   std::vector<BiasCandidate> candidates;  ///< those tried, the simplest first
-  std::string sentence;  ///< for people: which was taken, and what it is worth in mm
+  std::string sentence;                   ///< for people: the chosen bias, and its gain in mm
 };
 
 struct ChosenBias {
@@ -52,9 +52,9 @@ using ResidualWithout =
 [[nodiscard]] bool is_worth_it(const BiasProblem& problem, const BiasModel& model);
 
 /// Takes the simplest bias that no other beats. The cheap ones are tried first: `none`, `se`,
-/// `matern52`, `se + parameters`, and where the observations have several levers `se + flange` and
-/// `matern52 + flange`. Where the best of them leaves clearly more than the instrument's noise, so
-/// are `matern52 + joint_map + parameters` and `se + joint_map`.
+/// `matern52`, `se + parameters`; with several levers also `se + flange` and `matern52 + flange`.
+/// If the best of them leaves clearly more than the instrument's noise, `matern52 + joint_map +
+/// parameters` and `se + joint_map` are tried, too.
 ///
 /// One bias beats another where
 /// - its leave-one-out log density, summed over the observations, is higher by more than one nat
@@ -63,14 +63,16 @@ using ResidualWithout =
 /// - with blocks in time left out, its mean square error is below that of `none` by more than twice
 /// the standard error
 ///   over the blocks;
-/// - with blocks in joint space left out, its mean square error is not above that of `none` by as
-/// much. A block is an eighth of the observations that are neighbours; `problem` is in the order of
-/// measuring. The hyperparameters stay as found, the physics is as `residual_without` says (empty:
-/// as in `problem`). A block that the physics cannot be identified without does not judge, and the
-/// sentence says so. Where fewer than half of the blocks judge, nothing is taken.
+/// - with blocks in joint space left out, its mean square error is not above that of `none` by more
+///   than twice the standard error. A block is an eighth of the observations, all neighbours;
+///   `problem` is in the order of measuring. The hyperparameters stay; `residual_without` gives the
+///   physics (empty: as in `problem`). A block is not judged if the physics cannot be identified
+///   without it, and the sentence says so. If fewer than half of the blocks are judged, no bias is
+///   taken.
 ///
-/// Beyond 1200 observations some 900 of them choose: whole poses, evenly in the order of measuring;
-/// the sentence says so. The bias that they choose is fitted to all, from where its search ended.
+/// Beyond 1200 observations, about 900 of them choose: whole poses, evenly in the order of
+/// measuring; the sentence says so. The chosen bias is then fitted to all observations, and its
+/// search continues from its end.
 ///
 /// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled`
 /// observations; 0: they are not tried. At most seven fits. The same problem and seed give the same

@@ -192,7 +192,7 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
     coordinates = coordinates_of(model, *batch);
     accuracy.judged_by_ = static_cast<int>(coordinates.size() / 3);
   } else if (judges_domain(held_out)) {
-    // Only the rms of these poses is known: each coordinate is taken as the mean of a pose of the
+    // Only the rms of these poses is known, so each coordinate gets the mean of a pose of the
     // domain.
     const double squared = std::pow(held_out->compensated.rms, 2) / 3;
     double stated = 0;
@@ -221,7 +221,7 @@ double PositionAccuracy::at(double share) const {
   return high;
 }
 
-/// `share` of what is likely of the factor lies below it.
+/// The quantile of the factor at `share`.
 double PositionAccuracy::factor_at(double share) const {
   double sum = 0;
   for (const Factor& one : factors_) {

@@ -5,18 +5,18 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// The distance of the tool from where a model says it is, at a pose of its domain that nobody has
-/// measured.
+/// The distance between the tool's true position and the model's prediction, at a pose of its
+/// domain that was not measured.
 ///
-/// The true error t of such a pose is normal with the covariance S(q) that the model states, the
-/// tracker's noise taken out. A statement may be wrong by a factor: t ~ N(0, f² S(q)), ln f ~ N(0,
-/// kDoubt²). Poses held out from training tell f: e = t + noise, noise ~ N(0, g² sigma²), ln g ~
-/// N(0, kNoiseDoubt²), as nobody knows a tracker's sigma better. Where t is far below the noise
-/// they tell little, and the model is believed. `at(share)` is the radius that holds this share of
-/// fresh poses on average over poses, f and g: a beta-expectation tolerance limit (Guttman,
-/// Statistical Tolerance Regions, 1970), which is right in `share` of fresh poses over many models,
-/// however few poses judged each. What it cannot see: a lasting error that an overstated sigma of
-/// the tracker hides (hidden()).
+/// The true error t of such a pose is normal with the stated covariance S(q) of the model, without
+/// the tracker's noise. The statement may be wrong by a factor f: t ~ N(0, f² S(q)), ln f ~ N(0,
+/// kDoubt²). Poses held out from training determine f through e = t + noise, noise ~ N(0, g²
+/// sigma²). The factor g, ln g ~ N(0, kNoiseDoubt²), is there because nobody knows a tracker's
+/// sigma better. Where t is far below the noise, these poses say little, and the model is believed.
+/// `at(share)` is the radius that contains this share of fresh poses, averaged over poses, f and g:
+/// a beta-expectation tolerance limit (Guttman, Statistical Tolerance Regions, 1970). It is right
+/// in `share` of fresh poses over many models, however few poses judged each. It cannot see a
+/// lasting error that an overstated sigma of the tracker hides (hidden()).
 namespace trammel {
 
 /// The square error of a pose that was not trained on, m² per axis.
@@ -30,12 +30,12 @@ class PositionAccuracy {
  public:
   static constexpr double kDoubt = 0.2;       ///< of the stated standard deviations, relative
   static constexpr double kNoiseDoubt = 0.1;  ///< of the tracker's sigma, relative
-  /// Radius and probability at which it is told: 95 % of positions.
+  /// The stated radius contains this share of positions.
   static constexpr double kShare = 0.95;
 
-  /// By the poses that the model held out; `batch`: more poses, not trained on, with positions,
-  /// checked against the cell. Empty where the model knows no position: it was trained with
-  /// nothing, or its domain has no pose that this cell can ask for.
+  /// Estimates from the poses that the model held out and from `batch`: more poses, not trained on,
+  /// with positions, checked against the cell. Empty if the model knows no position, because it was
+  /// trained without any or because this cell can request no pose of its domain.
   [[nodiscard]] static std::optional<PositionAccuracy> of(
       const CompensatedModel& model, const std::optional<MeasurementBatch>& batch = {});
 
@@ -72,10 +72,10 @@ class PositionAccuracy {
 };
 
 /// Joint vectors within the range of the training poses and near a measured one, drawn evenly, with
-/// the tools and payloads of the training in turn. None where the cell has none of these any more;
-/// fewer where hardly any is near.
+/// the tools and payloads of the training in turn. Empty if the cell has none of these any more. It
+/// has fewer than `count` if few drawn vectors are near.
 [[nodiscard]] std::vector<PoseContext> poses_in_range(const CompensatedModel& model, int count);
-/// Those of them that the model says are in its domain.
+/// Those poses_in_range() that the model counts as in its domain.
 [[nodiscard]] std::vector<PoseContext> poses_of_domain(const CompensatedModel& model, int count);
 
 }  // namespace trammel

@@ -14,16 +14,15 @@ namespace trammel {
 [[nodiscard]] Pose served_base(const PhysicalModel& physics);
 [[nodiscard]] Pose served_tool(const PhysicalModel& physics, const std::string& tool);
 
-/// The features of a pose for a bias with blocks: the same function for training and for
-/// predicting. Parameters are the model's own and, where it has not all of them, those of the
-/// standard sources `base`, `geometry` and `compliance` at zero
-/// (`tool` as well where a tool is unknown). So the bias learns what an incomplete model leaves
-/// over in the shape of physics, and what identification left uncertain is part of the bias'
-/// uncertainty. Immutable, thread-safe.
+/// The features of a pose for a bias with blocks, by one function for training and prediction.
+/// Parameters are the model's own. If it lacks parameters of the standard sources `base`,
+/// `geometry` and `compliance` (and `tool`, if a tool is unknown), these are added at zero. So the
+/// bias can learn the errors of an incomplete model in the shape of physics, and the uncertainty of
+/// identification is part of the bias' uncertainty. Immutable, thread-safe.
 class BiasPhysics {
  public:
   explicit BiasPhysics(const PhysicalModel& physics);
-  /// For a bias that was learned beside another physics: `whole` has all the parameters of that
+  /// For a bias that was learned beside an earlier physics: `whole` has all the parameters of that
   /// time.
   [[nodiscard]] static BiasPhysics learned_at(PhysicalModel whole) {
     return BiasPhysics(std::move(whole), {});

@@ -14,7 +14,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kIdLength =
-    12;  // of a model, in digits of its hash: enough to tell every model of a plant
+    12;  // of a model, in digits of its hash: enough to distinguish every model of a plant
 
 Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
@@ -155,7 +155,8 @@ Status check_fit(const ModelParts& parts) {
   return {};
 }
 
-/// The bias of the orientation, told what that of the position, `of_position`, is told.
+/// The bias of the orientation, with the same features and contexts as that of the position,
+/// `of_position`.
 Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_position) {
   if (rotation.kernel != without_flange(of_position.kernel) || rotation.q != of_position.q)
     return refused(

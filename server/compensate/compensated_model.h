@@ -20,9 +20,9 @@ namespace trammel {
 /// The error expected at one joint vector, all in B.
 struct ErrorPrediction {
   Pose X_BT_nominal;                   ///< where the controller believes the tool to be
-  Pose X_BT_predicted;                 ///< where it will be
+  Pose X_BT_predicted;                 ///< the predicted pose
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
-  Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
+  Vector3 stddev_B = Vector3::Zero();  ///< m, of one measurement of the position
   /// The standard deviation of the true error, m: as above without the tracker's own noise.
   Vector3 true_stddev_B = Vector3::Zero();
   /// The covariance of one measurement, m²; stddev_B is the root of its diagonal.
@@ -47,9 +47,9 @@ class CompensatedModel {
   [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
   [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
 
-  /// Refuses a tool with a payload that no training pose had: what was learned holds for the
-  /// trained ones only. A bias at the flange holds for every tool of the cell file that weighs what
-  /// a trained one did.
+  /// Refuses a tool with a payload that no training pose had: the model learned from the trained
+  /// ones only. A bias at the flange holds for every tool of the cell file that weighs the same as
+  /// a trained one.
   [[nodiscard]] Status check_trained_with(const std::string& tool,
                                           const std::string& payload) const;
   /// The error expected at `q`, whose size the caller has checked; tool and payload as
@@ -94,8 +94,8 @@ class CompensatedModel {
   /// The model must know their anchors, or its cell file where they are (in_world_of()).
   [[nodiscard]] GaugeErrors gauge_errors(const MeasurementBatch& batch) const;
   /// Figures of the errors on `batch`, which is checked against the cell and not empty. Poses of
-  /// another batch than the model's own are predicted as in service: what began at a training pose
-  /// has happened, and errors of the tracker do not count.
+  /// another batch than the model's own are predicted as in service: changes that began at a
+  /// training pose have happened, and errors of the tracker do not count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
@@ -132,8 +132,8 @@ class CompensatedModel {
     Eigen::MatrixXd J_W;  ///< 6 x P, by the parameters
     double growth = 0;    ///< m², Domain::growth()
   };
-  /// 3 x 3, in B: what the parameters leave uncertain of a position or rotation with these
-  /// derivatives (3 x P, in B); and the part of it that was identified after the bias was learned.
+  /// 3 x 3, in B: the covariance of a position or rotation by the parameters, given its derivatives
+  /// (3 x P, in B); and the part of it that was identified after the bias was learned.
   [[nodiscard]] Matrix3 identified(const Eigen::MatrixXd& J_B) const;
   [[nodiscard]] Matrix3 identified_since(const Eigen::MatrixXd& J_B) const;
   /// m²: variance of one axis that the physics leaves over at a pose.
@@ -141,8 +141,8 @@ class CompensatedModel {
   /// `covariance` of one measurement with the bias_spread as far as the bias is taken, the
   /// instrument's part as it is.
   [[nodiscard]] Matrix3 spread(const Matrix3& covariance, double bias_weight) const;
-  /// Adds what the bias says with the weight that stands in `prediction`; the covariance then, what
-  /// was unsaid left out.
+  /// Adds the bias with the weight in `prediction`. Returns the new covariance, without the part of
+  /// unstated quantities.
   [[nodiscard]] Matrix3 add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,
                                           ErrorPrediction* prediction) const;
   void add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias,
@@ -162,8 +162,8 @@ class CompensatedModel {
   [[nodiscard]] static Pose moved(const Pose& X_BT, const LearnedMotion& by);
   /// X_BT as predict() has it, without the variances.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
-  /// Covariance of the position, in B, from what a source needs and nobody gave: the side from
-  /// which a joint is approached, the temperature.
+  /// Covariance of the position, in B, by quantities that a source needs but the request does not
+  /// state: the approach direction of a joint, or the temperature.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
   /// The joints that the controller takes for the target without correction.
@@ -180,8 +180,8 @@ class CompensatedModel {
   [[nodiscard]] Approach approach(const Pose& X_BT_wanted, PoseContext context,
                                   const Pose& X_BT_predicted, double bias_weight,
                                   const CorrectOptions& options) const;
-  /// The other branches (conf) on which the target can be corrected; none for an arm whose branches
-  /// have no numbers.
+  /// The other branches (conf) on which the target can be corrected; empty for an arm whose
+  /// branches have no numbers.
   [[nodiscard]] std::vector<int> branches_that_reach(const Target& asked, const Pose& X_BT_wanted,
                                                      PoseContext context,
                                                      const CorrectOptions& options) const;

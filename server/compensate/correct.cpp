@@ -17,9 +17,10 @@ namespace {
 
 constexpr double kRotationTolerance = 1e-7;  // rad: 0.1 µm at 1 m
 constexpr int kHighestConf = 7;              // three signs, inverse_kinematics.h
-constexpr int kJointsNamed = 2;   // of those outside their limits, in one message: more is not read
+constexpr int kJointsNamed = 2;   // joints outside their limits that a message names: more are not
+                                  // read
 constexpr int kDecimalsTold = 9;  // more than a controller takes
-constexpr double kTurnTold = 1e-6;  // rad: less that is left of a rotation is not told
+constexpr double kTurnTold = 1e-6;  // rad: a smaller remaining rotation is not reported
 
 /// A joint value with so many decimals that it differs from the limit it is beyond.
 std::string told_from(double limit, double value) {
@@ -72,8 +73,8 @@ std::string direction_text(const Vector3& direction_B) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
 }
 
-/// The direction in which the flange cannot go, in the base; with fewer than six joints, which of
-/// the directions that they have.
+/// The direction in which the flange cannot move, in the base. With fewer than six joints it is one
+/// of the directions that the joints do have.
 std::string immovable(const Chain& robot, const JointVector& q) {
   const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeFullU);
@@ -92,8 +93,8 @@ std::string turn_left(const Chain& robot, const Vector3& missing_B) {
       to_deg(missing_B.norm()), direction_text(missing_B));
 }
 
-/// True if the arm passes a singularity, to another configuration, from one of these joints to the
-/// other: between two near places its Jacobians then differ in the sense of one motion.
+/// True if the arm passes a singularity, into another configuration, between these joints. At two
+/// near places the Jacobians then differ in the sign of one motion.
 bool changes_configuration(const Chain& robot, const JointVector& from, const JointVector& to) {
   const Eigen::MatrixXd before = flange_motion(robot, from).jacobian;
   const Eigen::MatrixXd after = flange_motion(robot, to).jacobian;
@@ -147,7 +148,7 @@ PoseContext way_to(const Target& target) {
 /// Deviation of one measurement where the true position has this stddev an axis.
 double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
 
-/// rms of an error of this mean whose true value spreads by this stddev.
+/// rms of an error with this mean, whose true value has this standard deviation.
 double rms(const Vector3& mean, const Vector3& stddev) {
   return std::sqrt(mean.squaredNorm() + stddev.squaredNorm());
 }
@@ -213,9 +214,9 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
     return now.missing.head<3>().norm() < options.tolerance &&
            now.missing.tail<3>().norm() < kRotationTolerance;
   };
-  // The learned bias hardly changes over the way of a correction, and takes longer to compute than
-  // the physics. So it is taken from where it was asked for last, and asked for again once the
-  // physics has settled.
+  // The learned bias hardly changes along a correction, and takes longer to compute than the
+  // physics. So the steps reuse its last value, and it is computed again once the physics has
+  // settled.
   context = completed(std::move(context));
   const Pose X_BT_calibrated = calibrated_pose_B(context);
   LearnedMotion learned{X_BT_predicted.translation() - X_BT_calibrated.translation(),

@@ -10,10 +10,10 @@ namespace {
 // Within 6 deg of the singularity a turn of 1 mrad would need 10 mrad of joints 4 and 6 and more.
 constexpr double kBorder = 0.105;
 constexpr double kMostDamping =
-    0.06;  // of the idle motion, at the singularity: its square is more than what is left
+    0.06;  // of the idle motion, at the singularity; the remaining rotation is more than its square
 constexpr int kFreeSteps = 6;  // that choose the idle motion; then it stays, and the rest settles
 constexpr double kMostOfOpening =
-    0.9;  // that a correction may take: the wrist never opens to the other side
+    0.9;  // share of the opening that a correction may use: the wrist never opens to the other side
 
 /// Whatever a correction asks for, cut smoothly so that it never reaches the whole opening.
 double cut(double asked, double opening) {
@@ -24,9 +24,10 @@ double cut(double asked, double opening) {
                        asked);
 }
 
-/// Steps of the joints: the point comes to where it is missing, of the rotation as much as may be
-/// had: min |J_r d - e_r|² + λ² (idle · (so far + d))²  with  J_p d = e_p,  rails held. After
-/// kFreeSteps  idle · d = 0: what is left of the rotation would keep the idle motion from settling.
+/// Steps of the joints: they bring the point to its target, and as much of the rotation as
+/// possible: min |J_r d - e_r|² + λ² (idle · (so far + d))²  with  J_p d = e_p,  rails held. After
+/// kFreeSteps steps idle · d = 0, since the remaining rotation would keep the idle motion from
+/// settling.
 class WristSteps {
  public:
   WristSteps(const Chain& robot, const Vector3& p_FT, const WristOpening& wrist)

@@ -5,10 +5,10 @@
 #include "server/compensate/joint_steps.h"
 #include "server/robot/wrist.h"
 
-/// Corrections near the wrist's singularity, where not every turn can be corrected: the tool's
-/// point comes to where it is wanted, and the joints stay near those that the controller takes for
-/// the target, on the same side of the singularity. What is left of the rotation grows smoothly
-/// towards the singularity, from nothing at the border.
+/// Corrections near the wrist's singularity, where not every rotation can be corrected. The tool's
+/// point reaches its target, and the joints stay near the controller's joints for it, on the same
+/// side of the singularity. The remaining rotation grows smoothly towards the singularity, from
+/// zero at the border.
 namespace trammel {
 
 /// The wrist where it is so near to its singularity that correct_in_wrist() corrects; else empty.

@@ -8,7 +8,7 @@
 
 #include "server/robot/chain.h"
 
-/// A target, and how it is commanded so that the tool lands on it.
+/// A target, and the command with which the tool lands on it.
 namespace trammel {
 
 enum class CorrectionStatus {
@@ -43,20 +43,19 @@ struct Target {
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();
-  Pose X_BT_commanded =
-      Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
-  JointVector q;         ///< the controller's joints for it (nominal inverse kinematics), rad
+  Pose X_BT_commanded = Pose::Identity();  ///< the command with which the tool lands on the target
+  JointVector q;  ///< the controller's joints for it (nominal inverse kinematics), rad
   double error_before = kNothingToSay;  ///< m, to expect without correction
   double error_after =
       kNothingToSay;  ///< m, to expect with it; the same where the target is not corrected
   double stddev = kNothingToSay;  ///< m, of the true position: root mean square of the three axes
   double measured_stddev =
       kNothingToSay;  ///< m, likewise of one measurement of it, the instrument's noise included
-  /// rad, angle to expect between the wanted orientation and the true one. Where the model learned
-  /// no orientations, what the error sources say.
+  /// rad, expected angle between the target orientation and the true one. If the model learned no
+  /// orientations, it is the angle by the error sources.
   double turn_before = kNothingToSay;
   double turn_after = kNothingToSay;
-  double left = 0;  ///< m, what the iteration left over; part of error_after
+  double left = 0;  ///< m, the remainder of the iteration; part of error_after
   int iterations = 0;
   std::string message;  ///< why not ok
 

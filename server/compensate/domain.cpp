@@ -9,11 +9,12 @@ namespace trammel {
 namespace {
 
 constexpr double kDomainMargin =
-    0.05;  // of a joint's training range: a Latin hypercube leaves as much at its edges
+    0.05;  // of a joint's training range: a Latin hypercube leaves this much at its edges
 constexpr double kLeastMargin = 1e-9;  // rad, for a joint that stood still: rounding
-constexpr double kRangeFade = 0.20;    // of the range, from the margin to where nothing is taken
+constexpr double kRangeFade = 0.20;    // of the range: from the margin to the point where the bias
+                                       // has faded out
 constexpr double kLeastFade =
-    0.01;  // rad, for a joint that stood still: several times what a correction moves it
+    0.01;  // rad, for a joint that stood still: several times its motion in a correction
 constexpr double kUnknownShare = 0.5;  // half of the prior variance is left: the bias knows little
 constexpr double kLeastFadeOfShare = 2.0;  // times the limit, where the limit itself is high
 constexpr double kKnownExactly = 1e-12;    // of the prior variance; keeps the logarithm finite

@@ -25,9 +25,8 @@ struct Domain {
                               const Chain& robot) const;
 };
 
-/// The distance that counts for a joint that is `beyond` its range (rad, m). For a revolute joint
-/// it is the chord of the angle, at most that of half a turn: after a full turn the joint is where
-/// it was.
+/// The effective distance of a joint that is `beyond` its range (rad, m). For a revolute joint it
+/// is the chord of the angle, at most that of half a turn, since a full turn brings the joint back.
 [[nodiscard]] double distance_beyond(const Joint& joint, double beyond);
 
 }  // namespace trammel

@@ -13,7 +13,7 @@ struct ErrorFigures {
   double rms = 0, mean = 0, p997 = 0, max = 0;
   Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
 };
-/// The figures of no position: none of them is a number.
+/// The figures without any position: none of them is a number.
 [[nodiscard]] ErrorFigures no_figures();
 /// For the errors in the columns of `e_B` (3 x N, m, not empty).
 [[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
@@ -26,8 +26,8 @@ struct OrientationFigures {
                                       ///< models that learned orientations
 };
 
-/// Errors of rows that tell one number (Gauge), m: measured - predicted of that number. They are no
-/// position errors, and never compared with them.
+/// Errors of rows with one number (Gauge), m: measured - predicted value. They are not position
+/// errors and are never compared with them.
 struct GaugeFigures {
   int rows = 0;
   double nominal = 0, calibrated = 0, compensated = 0;  ///< rms

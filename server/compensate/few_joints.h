@@ -10,9 +10,9 @@ namespace trammel {
 
 [[nodiscard]] bool has_few_joints(const Chain& robot);
 
-/// Nominal joints near `seed` for a tool wanted at `X_BT`, as inverse_kinematics(). kUnreachable:
-/// the point is out of reach, or more than 0.01 deg of the orientation would be left, which is more
-/// than the rounding of a wanted one.
+/// Nominal joints near `seed` that bring the tool to `X_BT`, like inverse_kinematics().
+/// kUnreachable: the point is out of reach, or the orientation would be off by more than 0.01 deg,
+/// which is more than the rounding of a target.
 [[nodiscard]] InverseResult inverse_kinematics_of_few(const Chain& robot, const Pose& X_BT,
                                                       const Pose& X_FT, const JointVector& seed);
 
@@ -23,8 +23,8 @@ namespace trammel {
                                                  const MissingAt& missing_at,
                                                  const CorrectOptions& options);
 
-/// True if these joints of inverse_kinematics_of_few(), kUnreachable, bring the tool's point to
-/// where it is wanted.
+/// True if these joints, from an inverse_kinematics_of_few() that was kUnreachable, bring the
+/// tool's point to its target.
 [[nodiscard]] bool point_is_reached(const Chain& robot, const Pose& X_BT, const Pose& X_FT,
                                     const JointVector& q);
 

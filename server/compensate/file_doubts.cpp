@@ -15,7 +15,8 @@ namespace {
 
 using Severity = Note::Severity;
 
-/// The most by which a number of a robot may be off its drawing, SI, and how people read it.
+/// The largest credible deviation of a robot's number from its drawing, SI, and its unit for
+/// people.
 struct Drawing {
   const char* symbol;
   double limit;
@@ -61,7 +62,7 @@ OffDrawing off_drawing(const PhysicalModel& model,
       if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
       const bool is_zero = drawing == kDrawing;
       off.zeros_alone = off.zeros_alone && is_zero;
-      // A zero as the controller counts, which is what people read of it everywhere else.
+      // A zero in the controller's sign, as in all other texts for people.
       const double sign =
           is_zero ? model.cell->robot.joint(std::stoi(one.parameter.name.substr(1)) - 1).sign : 1.0;
       off.numbers += fmt::format(

@@ -37,8 +37,7 @@ Gauging gauging_of(const ModelParts& parts) {
   return gauging;
 }
 
-/// A value at one pose, and its variance beside the instrument's noise where a bias has a part in
-/// it.
+/// The value at one pose, and its variance without the instrument's noise if a bias contributes.
 struct Told {
   double value = 0, variance = 0;
 };
@@ -106,7 +105,7 @@ CompensatedModel::GaugeErrors CompensatedModel::gauge_errors(const MeasurementBa
     if (gauge.minus != nullptr) gauge.minus = std::make_shared<const PoseContext>(poses[1]);
     Eigen::RowVectorXd J;
     const double calibrated = predicted_gauge(physics, poses[0], gauge, physics.values, &J);
-    // Without a bias what the anchors and the arm leave uncertain is known together.
+    // Without a bias, the joint covariance of anchors and arm is known.
     variance +=
         inside_->bias ? with_bias.variance : (J * gauging.covariance * J.transpose()).value();
     errors.nominal(i) = gauge.value - nominal_of(physics, poses[0], gauge, anchor);

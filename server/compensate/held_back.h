@@ -5,8 +5,8 @@
 
 namespace trammel {
 
-/// Why a new model is not put in force by itself, whatever the poses held out say of it: a person
-/// decides.
+/// The reason why a new model is not put in force automatically, whatever its held-out poses say: a
+/// person decides.
 enum class HeldBack {
   kNo,         ///< the poses held out decide
   kFewJudges,  ///< too few poses can judge it; nothing speaks against it or its batch
@@ -18,8 +18,8 @@ enum class HeldBack {
 /// kNo where there is no such reason.
 [[nodiscard]] HeldBack held_back_of(std::string_view text);
 
-/// True if the batch of such a model is doubtful: no later training learns from it until a model
-/// that learned from it has been in force.
+/// True if the batch of such a model is doubtful. Then no later training learns from it until a
+/// model that learned from it has been in force.
 [[nodiscard]] constexpr bool is_doubt(HeldBack reason) {
   return reason == HeldBack::kStopNote || reason == HeldBack::kStepLimit;
 }

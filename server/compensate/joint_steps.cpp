@@ -13,7 +13,7 @@ CorrectedJoints settle_joints(JointVector start, const Vector6& missing_at_start
                               const JointStep& next, const MissingAt& missing_at, double tolerance,
                               int max_iterations) {
   CorrectedJoints now{start, missing_at_start};
-  bool asked_here = true;  // what was learned
+  bool asked_here = true;  // the bias was computed at `now`
   while (true) {
     const JointVector step = next(now.q, now.q - start, now.missing);
     const bool still = step.norm() < kSettled && now.missing.head<3>().norm() < tolerance;

@@ -4,12 +4,12 @@
 
 #include "server/compensate/correction.h"
 
-/// Corrections by steps of the joints, where the tool cannot be moved in every way: its point comes
-/// to where it is wanted, and turns as far as it can be turned.
+/// Corrections by steps of the joints, for places where the tool cannot move in every way: its
+/// point reaches its target, and it turns as far as it can.
 namespace trammel {
 
-/// Wanted - predicted pose of the tool with the arm at these joints, in B: m, rad. `anew`: what was
-/// learned is asked for there; else it is taken from where it was asked for last.
+/// Target pose minus predicted pose of the tool with the arm at these joints, in B: m, rad. `anew`:
+/// computes the bias there; otherwise reuses its last value.
 using MissingAt = std::function<Vector6(const JointVector& q, bool anew)>;
 
 struct CorrectedJoints {
@@ -23,8 +23,8 @@ struct CorrectedJoints {
 using JointStep = std::function<JointVector(const JointVector& q, const JointVector& so_far,
                                             const Vector6& missing)>;
 
-/// Takes steps from `start` (a copy: `missing_at` may write to where the caller has it) until they
-/// are next to nothing and the point is where it is wanted.
+/// Takes steps from `start` (a copy, since `missing_at` may write to the caller's vector) until
+/// they are negligible and the point is on its target.
 [[nodiscard]] CorrectedJoints settle_joints(JointVector start, const Vector6& missing_at_start,
                                             const JointStep& next, const MissingAt& missing_at,
                                             double tolerance, int max_iterations);

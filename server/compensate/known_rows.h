@@ -11,9 +11,9 @@ namespace trammel {
 /// still in its cell.
 [[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
 
-/// Tells whether the model learned from this row of a batch: it is the batch that it was trained on
-/// or refitted with, but for the rows that its column `set` holds out; or its bias was learned at
-/// these joints, to the last digit.
+/// Tests whether the model learned from a row of a batch. This is so if the batch is one that it
+/// was trained on or refitted with, except for rows that its column `set` holds out, or if its bias
+/// was learned at these joints, to the last digit.
 class LearnedFrom {
  public:
   /// `hash`: batch_hash() of the batch as it came.

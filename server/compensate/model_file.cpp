@@ -39,7 +39,7 @@ Status check_format(const Members& members, const std::string& where) {
       .with_text(excerpt(said->second));
 }
 
-/// Checks that the outermost keys are there, and no others: a damaged key must not pass for a
+/// Checks that the outermost keys are there, without others: a damaged key must not pass for a
 /// missing one.
 Status check_keys(const Members& members, const std::string& where) {
   static const std::set<std::string_view> kKeys = {

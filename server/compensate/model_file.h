@@ -5,7 +5,7 @@
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 
-/// A model as a file; MODEL_FILE.md says what stands in it.
+/// A model as a file; MODEL_FILE.md describes its contents.
 namespace trammel {
 
 /// The model as text: JSON, one object. Same data, same seed, same content, same hash, same id.
@@ -13,11 +13,11 @@ namespace trammel {
 /// The strictness towards the names, sentences and times of a model, which change no answer.
 enum class ModelTexts {
   kChecked,   ///< of a file from outside: see check_texts()
-  kAsTheyAre  ///< of a model that was accepted before: it goes on, and whoever shows them cleans
-              ///< them
+  kAsTheyAre  ///< for a model that was accepted before: it stays valid, and code that shows its
+              ///< texts cleans them
 };
-/// The model that `text` holds; `where` names the file in messages. Refuses a text that is no
-/// model, whose hash does not fit its content, or whose numbers or texts no model can have.
+/// The model in `text`; `where` names the file in messages. Refuses a text that is not a model, a
+/// hash that does not fit the content, and numbers or texts that no model can have.
 [[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text,
                                                    const std::string& where,
                                                    ModelTexts texts = ModelTexts::kChecked);

@@ -79,7 +79,7 @@ bool carries_nothing(const CompensatedModel::Parts& parts) {
   return !loaded && !cell.robot.has_link_masses();
 }
 
-/// Says what the model is without a source that does nothing, for people.
+/// Describes, for people, the model without a source that has no effect.
 std::string so_it_is(const CompensatedModel::Parts& parts, const ErrorSource& idle) {
   std::vector<std::string> others;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
@@ -100,7 +100,7 @@ std::string what_would_give_way() {
   return text;
 }
 
-/// Adds notes on what training added by itself.
+/// Adds notes on sources that training added by itself.
 void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto& added = source->cause().added_by_data;
@@ -147,7 +147,7 @@ void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
        "length in it is not the controller's, corrected poses land off by the difference"});
 }
 
-/// m: what is left of an axis of a training pose, or of a gauge, and what was stated for it.
+/// m: the residual of one axis of a training pose, or of a gauge, and the stated sigma.
 struct LeftOver {
   double left = 0, stated = 0;
   bool is_of_gauges = false;
@@ -169,7 +169,7 @@ double stated_of_gauges(const Cell& cell) {
   return stated > 0 ? stated : cell.tracker.sigma;
 }
 
-/// The residuals of positions or of gauges, whichever is farther from what was stated.
+/// The residuals of positions or of gauges, whichever exceed their stated sigma more.
 LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   const Cell& cell = *parts.physics.cell;
   LeftOver worst{0, cell.tracker.sigma};
@@ -199,9 +199,10 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                        : "trammel diagnose")});
 }
 
-/// The residual of the physics is the most that the instrument's own error can be. Where more is
-/// stated, an error of the arm is taken for the instrument's. Said where that changes a promise:
-/// without a bias it is promised with (hidden_by_sigma()), and that is for information.
+/// The instrument's own error is at most the residual of the physics. If the stated sigma is
+/// larger, an error of the arm passes for the instrument's. The note appears if that changes a
+/// stated accuracy: without a bias the accuracy includes the hidden part (hidden_by_sigma()), and
+/// the note is information.
 void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   const bool counted = parts.discrepancy > 0;
@@ -220,7 +221,7 @@ void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
                  "larger")});
 }
 
-/// A base that the cell does not say, and whose turn the poses do not tell.
+/// Adds the note on a base that the cell leaves open and whose turn the poses do not determine.
 void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   if (parts.physics.cell->X_WB) return;
   for (const UnidentifiableCombination& one : parts.unidentifiable)

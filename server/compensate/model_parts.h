@@ -28,7 +28,7 @@ struct RefitRecord {
   int poses = 0;
 };
 
-/// Where a model comes from. `refits` tells what was identified anew since it was trained, in that
+/// The origin of a model. `refits` lists the later identifications since its training, in their
 /// order.
 struct ModelProvenance {
   std::string id;     ///< first 12 characters of the hash
@@ -56,7 +56,7 @@ struct LeftOutSession {
   std::string why;
 };
 
-/// All that a model is made of, and all that its file holds.
+/// All parts of a model, and all contents of its file.
 struct ModelParts {
   PhysicalModel physics;
   std::vector<IdentifiedParameter> parameters;
@@ -71,29 +71,28 @@ struct ModelParts {
   /// empty: there was one.
   std::vector<SessionSetting> sessions;
   bool sessions_as_given =
-      false;  ///< no clock told their order: they are in that in which they were given
+      false;  ///< false: no clock gave their order, so they are in the given one
   std::vector<LeftOutSession> sessions_left_out;
   std::vector<Change>
       changes;  ///< of the arm between these sessions; their sources are among those of the physics
   double discrepancy = 0;  ///< m per axis, see CalibrationResult
   std::optional<CauseChoice>
-      cause_choice;  ///< where the error sources were `auto`: what was tried, and what it brought
-  std::optional<BiasChoice>
-      bias_choice;  ///< where the bias was `auto`: what was tried and what it is worth
+      cause_choice;                       ///< with error sources `auto`: the trials and their gains
+  std::optional<BiasChoice> bias_choice;  ///< with bias `auto`: the trials and their gains
   std::optional<BiasState>
       bias;  ///< without features, which follow from the physics and bias_contexts
   std::optional<BiasState>
-      rotation_bias;  ///< of the same poses: residuals are rotation vectors in B, rad
-  /// For a bias that was kept while sources were identified anew: the physics that it was learned
-  /// beside, with all the parameters that its blocks knew; and P x P, SI, the covariance of the
-  /// parameters identified since, which the bias does not know.
+      rotation_bias;  ///< at the same poses: residuals are rotation vectors in B, rad
+  /// The origin of a bias that was kept while sources were identified anew. `physics` is the one
+  /// beside which it was learned, with all the parameters that its blocks knew. `covariance` (P x
+  /// P, SI) is that of the parameters identified since, which the bias does not know.
   struct BiasOrigin {
     PhysicalModel physics;
     Eigen::MatrixXd covariance;
   };
   std::optional<BiasOrigin> bias_origin;
   int oriented_poses =
-      0;  ///< where only some poses had an orientation and none is learned: how many
+      0;  ///< the number of poses with an orientation, if too few had one to learn from
   std::vector<PoseContext> bias_contexts;  ///< of the bias' observations; empty without blocks
   std::optional<double>
       temperature_mean;  ///< degrees Celsius, of the training poses; empty where not recorded
@@ -105,7 +104,7 @@ struct ModelParts {
       extrapolation_slope;  ///< see Domain::growth(); empty in models from before it was learned
   double prior_share_limit = 0;  ///< a pose in domain has no larger prior share
   double bias_spread =
-      1;  ///< times the standard deviation of what a pose misses, the instrument's aside
+      1;  ///< factor on the standard deviation of a pose's error, without the instrument's part
   std::set<std::pair<std::string, std::string>>
       trained_with;                      ///< tool and payload of each training pose
   ModelProvenance provenance;            ///< id and hash are filled in by make()

@@ -25,8 +25,8 @@ double signed_rank_z(const Eigen::VectorXd& differences) {
     const double rank = 0.5 * static_cast<double>(first + 1 + last);
     for (std::size_t i = first; i < last; ++i) sum += std::copysign(rank, d[i]);
   }
-  // The variance of ranks without ties. That of mean ranks is smaller: nine equal differences would
-  // pass in 2 of 100 cases.
+  // The variance of ranks without ties. That of mean ranks would be smaller, and nine equal
+  // differences would pass in 2 of 100 cases.
   const auto n = static_cast<double>(d.size());
   return d.empty() ? 0 : sum / std::sqrt(n * (n + 1) * (2 * n + 1) / 6);
 }

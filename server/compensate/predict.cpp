@@ -19,8 +19,8 @@ BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   return now;
 }
 
-/// Sets the prior shares to those with the arm as it was learned: a tool that has moved since makes
-/// no pose an unknown one. The motion of the tool's point is in the covariance.
+/// Sets the prior shares to those of the arm as it was when learned: a tool that has moved since
+/// does not make a pose unknown. The covariance contains the motion of the tool's point.
 void share_as_learned(const BiasModel& bias, const BiasPhysics& then,
                       const std::vector<PoseContext>& poses, const Eigen::MatrixXd& q,
                       const std::vector<BiasFeatures>& now,
@@ -151,7 +151,7 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
 
 namespace {
 
-/// As after a long move of that joint.
+/// The context after a long move of that joint.
 PoseContext come_from_afar(PoseContext context, int joint) {
   context.before = context.q;
   (*context.before)(joint) -= 1;
@@ -197,7 +197,7 @@ struct Uncertainty {
   Matrix3 identified;  ///< covariance that the parameters leave
   Matrix3 since;       ///< the part of it that was identified after the bias was learned
   double metrology;    ///< variance of one axis: the instrument's
-  double unlearned;   ///< variance of one axis where no bias is taken: what the physics leaves over
+  double unlearned;    ///< variance of one axis without a bias: the residual of the physics
   double growth;      ///< variance of one axis that grows with the distance from the training poses
   Vector3 bias_size;  ///< rms of the bias over the training poses, where no slope was learned
 };
@@ -205,14 +205,14 @@ struct Uncertainty {
 /// Covariance of one measurement.
 /// - Noise is never less than the instrument's: a fit to few poses takes some of the noise for
 /// signal.
-/// - What the parameters leave uncertain: a bias that has the parameters (`has_parameters`) counts
-/// it itself. Any other
-///   bias corrects it as far as the bias is taken and knows the pose; the rest counts in full.
-/// - No bias corrects what was identified after it was learned.
+/// - Covariance of the parameters: a bias with blocks of parameters (`has_parameters`) contains it.
+///   Any other bias corrects it to the extent that the bias is applied and knows the pose; the rest
+///   counts in full.
+/// - No bias corrects parameters that were identified after it was learned.
 /// - What of the bias is not taken may be missing. It is as large as the bias is there, or was at
 /// the training poses.
-/// - The bias' own covariance stays: far from its poses a kernel has its prior, blocks what the
-/// data left them.
+/// - The bias' own covariance stays: far from its poses a kernel has its prior, and blocks have
+///   what the data left them.
 Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters,
                   const Uncertainty& of) {
   const Vector3 known = bias.stddev_B.cwiseAbs2();
@@ -262,8 +262,8 @@ Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const Bi
                  .growth = 0,
                  .bias_size = inside_->bias_size_B};
   if (inside_->bias->has_blocks()) {
-    // With blocks the slope is of what the bias misses beyond its own covariance; else it is of the
-    // physics.
+    // With blocks, the slope describes errors beyond the bias' own covariance; otherwise errors of
+    // the physics.
     of.unlearned = of.metrology;
     of.growth = pose.growth;
   }

@@ -56,8 +56,8 @@ VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batc
   return along;
 }
 
-/// Poses, and what is left of each in the mean of the rows at its joint vector: rows of one pose
-/// keep one sign, and that is no structure.
+/// The poses, each with the mean residual of the rows at its joint vector. Rows of one pose share a
+/// sign, which is not structure.
 std::pair<MeasurementBatch, Eigen::Matrix3Xd> one_a_pose(const MeasurementBatch& batch,
                                                          const Eigen::Matrix3Xd& residual_B) {
   const std::vector<PoseGroup> poses = pose_groups(batch);

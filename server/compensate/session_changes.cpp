@@ -14,7 +14,7 @@ namespace {
 constexpr double kMilli = 1e3;  // angles are told in mrad
 constexpr const char* kRestsOnOrder = "; this rests on the order in which the sessions were given";
 
-/// By what a parameter is told, and in which unit.
+/// The factor and the unit in which a parameter is shown.
 std::pair<double, std::string> shown(const Parameter& parameter) {
   if (parameter.unit == "rad") return {parameter.scale * kMilli, "mrad"};
   return {parameter.scale, parameter.unit};

@@ -10,27 +10,27 @@ namespace trammel {
 
 /// The change of the arm between two sessions that a model was made from.
 struct SessionChange {
-  /// A number of it, in the unit that people read: an angle in mrad, a length in mm.
+  /// A number of the change, in the unit that people read: an angle in mrad, a length in mm.
   struct Size {
     std::string name, unit;
     double value = 0, u95 = 0;  ///< U(k = 2)
   };
   enum class Course {
     kSince,      ///< from that session on
-    kThatAlone,  ///< in that session, and the later ones are as those before
+    kThatAlone,  ///< in that session only; the later ones are as before it
     kWanders     ///< from session to session, a random walk; `sizes`: how far since the session
   };
-  std::string source;  ///< as a list of error sources has it: `joint_slip:3@121`
+  std::string source;  ///< in the spelling of a list of error sources: `joint_slip:3@121`
   std::string cause;   ///< as the contract spells it: `joint_slip`
   std::optional<int> joint;
   Course course = Course::kSince;
   std::string session_id, pose_id;  ///< since when
-  double rate = 0;                  ///< mrad from session to session, of what wanders
+  double rate = 0;                  ///< mrad per session, for a wandering zero
   std::vector<Size> sizes;
   double strength = 0;  ///< twice the log likelihood that it adds
   double p_value = 1;
   std::vector<std::string> could_also_be;  ///< sources that explain it nearly as well
-  bool rests_on_order = false;             ///< of the sessions, which no clock told
+  bool rests_on_order = false;             ///< on the order of the sessions, which no clock gave
 };
 /// The parameters that were identified from several sessions.
 struct IdentifiedTogether {
@@ -49,8 +49,8 @@ struct IdentifiedTogether {
 /// k=2)`.
 [[nodiscard]] std::string sentence(const SessionChange& change);
 
-/// The order of the sessions says what is before and what after, and which of them is today's.
-/// Empty where the instruments' clocks told it, and where there is one session.
+/// The note that the order of the sessions decides which are before a change, which are after it,
+/// and which one is today's. Empty if the instruments' clocks gave the order, and with one session.
 [[nodiscard]] std::optional<std::string> note_on_order(const std::vector<SessionSetting>& sessions,
                                                        bool as_given);
 

@@ -19,21 +19,21 @@ constexpr double kNeighbour =
 constexpr double kBeyond =
     1.5;  // times it: fresh poses lie between the measured ones, and a little outside
 constexpr double kFew = 4;            // among n poses the distance is known to 1 + 4/n
-constexpr double kLeastReach = 0.05;  // of the region's diagonal, where poses stand in clusters
+constexpr double kLeastReach = 0.05;  // of the region's diagonal, if poses form clusters
 constexpr Eigen::Index kFewestOfTail = 12, kLeastTail = 2,
                        kMostTail = 6;  // places; of a tail the outermost ones
 constexpr double kTailScales =
     7;  // 1 of 1000 places is farther out; the reach ends it sooner where they are many
 constexpr double kUsualMargin = 0.05;  // of a joint's range
 constexpr double kMarginOfFew =
-    45;  // over n² places, beside it: what a Latin hypercube of n leaves at its edges
+    45;  // over n² places, in addition: a Latin hypercube of n places leaves this at its edges
 constexpr double kMostMargin = 0.1;
 constexpr double kRounding = 1e-6;  // m
 constexpr Eigen::Index kPlaces =
-    2000;                   // at most, evenly among the poses: each prediction looks at all of them
-constexpr int kCells = 24;  // of the box along each axis
-constexpr double kBothSides =
-    0.1;  // of the poses that say it come from the rarer side, or a joint has but one
+    2000;  // at most, evenly among the poses, since each prediction looks at all of them
+constexpr int kCells = 24;          // of the box along each axis
+constexpr double kBothSides = 0.1;  // of the poses with a recorded side must come from the rarer
+                                    // side, otherwise the joint has one side
 constexpr const char* kNotOnRecord = "not on record";
 
 double nearest(const Eigen::Matrix3Xd& places, const Vector3& place) {
@@ -145,7 +145,7 @@ Side side_of(const WhatWasMeasured::Approaches& one) {
   return one.rising > one.falling ? Side::kBelow : Side::kAbove;
 }
 
-/// The joints of a side: ` in joints 1 2`; empty where it is all of them.
+/// The joints of a side: ` in joints 1 2`; empty for all joints.
 std::optional<std::string> joints_of(const WhatWasMeasured& measured, Side side) {
   std::vector<std::size_t> joints;
   for (std::size_t j = 0; j < measured.approaches.size(); ++j)

@@ -25,8 +25,8 @@ struct WhatWasMeasured {
           upper = Vector3::Zero();  ///< corners of a box in B that the tool was in, m
   double volume = 0;  ///< m³: the part of the box within `reach` of a place where the tool was
   Eigen::Matrix3Xd flange_B;  ///< places of the nominal flange, m
-  /// m: a pose whose flange is farther from all of them is another region of the robot. Empty where
-  /// one joint vector was measured, which tells no distance.
+  /// m: a pose whose flange is farther than this from all places is in another region of the robot.
+  /// Empty if only one joint vector was measured, since that gives no distance.
   std::optional<double> reach;
   /// m: how far the places go in 16 horizontal directions, x of B first, and a little farther. A
   /// pose beyond is out of the outline that they have from above: where places are few, their reach
@@ -38,22 +38,22 @@ struct WhatWasMeasured {
   /// True if the nominal flange at `q` is within reach of a place where it was measured, and inside
   /// their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
-  /// The share of a joint's range by which other poses of the same kind go beyond these: a
-  /// twentieth, more where they are few.
+  /// The share of a joint's range by which other poses of the same kind exceed these: a twentieth,
+  /// more if they are few.
   [[nodiscard]] double range_margin() const;
 };
 
-/// The record of the poses of `batch`, whose tools `physics` knows. `reach` follows the distances
-/// between the poses themselves: 1.5 times that within which 95 % of them have a neighbour, more
-/// where they are few, and no less than a twentieth of the region. The outline goes beyond the
-/// places by the median distance between neighbours, and away from the base by more where the
-/// outermost places are thinly spread: never towards the far side. What stands at one joint vector
-/// is one place and no neighbour of itself.
+/// The record of the poses of `batch`; `physics` gives their tools. `reach` follows from the
+/// distances between the poses: 1.5 times the distance within which 95 % of them have a neighbour,
+/// more if they are few, and at least a twentieth of the region. The outline goes beyond the places
+/// by the median distance between neighbours. Away from the base it goes farther where the
+/// outermost places are sparse, but never towards the far side. Rows at one joint vector are one
+/// place, which is no neighbour of itself.
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics,
                                                 const MeasurementBatch& batch);
 
-/// WhatWasMeasured in words, each part by itself, for people. Where a model has none, parts are
-/// `not on record`.
+/// WhatWasMeasured in words for people, in separate parts. Without a record the parts are `not on
+/// record`.
 struct MeasuredWords {
   std::string sides;        ///< `every joint from both sides`
   std::string temperature;  ///< `20.0 to 23.5 degrees Celsius`

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kFarthest = 5;
 constexpr std::size_t kNext = 12;
-constexpr double kNear =
-    0.1;  // of the joints' ranges at work, in every joint: such a pose tells the same
+constexpr double kNear = 0.1;  // of the joints' ranges at work, in every joint: a pose this near
+                               // gives the same information
 
 std::vector<PoseContext> known_to(const CompensatedModel& in_force, const CompensatedModel* other,
                                   const std::vector<PoseContext>& poses) {

@@ -26,8 +26,7 @@ struct WorkAsked {
     double difference = 0;  ///< m
   };
   std::vector<Step> farthest;
-  /// Where the model in force is least sure, no two of them near each other: the poses to measure
-  /// next.
+  /// The poses to measure next: where the model in force is least certain, and not near each other.
   std::vector<PoseContext> measure_next;
 };
 

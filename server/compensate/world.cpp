@@ -13,7 +13,7 @@ namespace trammel {
 
 namespace {
 
-/// As the model has it; null where it does not know the session.
+/// The setting in the model; null if it does not know the session.
 const SessionSetting* known_session(const CompensatedModel& model, const std::string& name) {
   const std::vector<SessionSetting>& sessions = model.parts().sessions;
   const auto found =
@@ -22,7 +22,7 @@ const SessionSetting* known_session(const CompensatedModel& model, const std::st
   return found == sessions.end() ? nullptr : &*found;
 }
 
-/// By what a batch of its own, or a part of one, may be called in a model.
+/// The names that a batch, or a part of one, may have as a session of the model.
 const SessionSetting* known_session(const CompensatedModel& model, const MeasurementBatch& batch,
                                     const std::string& session) {
   for (const std::string& name : {session, batch.id + "/" + session, batch.id}) {
@@ -47,11 +47,11 @@ Result<Pose> located(const CompensatedModel& model, const MeasurementBatch& sess
   return X_WB * X_SB->inverse();
 }
 
-constexpr double kOtherSetUp = 3;          // times what is left where the rows themselves put it
+constexpr double kOtherSetUp = 3;          // times the residual with the rows placed by themselves
 constexpr double kSlack = 1e-4;            // m
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after all sessions
 
-/// m rms, of what the model leaves of the rows, taken into W so.
+/// m rms: the model's residuals of the rows, moved into W by the setting.
 double left_of(const CompensatedModel& model, const MeasurementBatch& session,
                const Similarity& into_W, int index) {
   MeasurementBatch rows = known_rows(model, session);
@@ -64,8 +64,8 @@ double left_of(const CompensatedModel& model, const MeasurementBatch& session,
   return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
 }
 
-/// True if the rows were measured from where the model knows the session of that name to have
-/// stood: names are used again.
+/// True if the rows were measured from the place where the instrument of that session stood; names
+/// may be reused.
 bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session,
                     const SessionSetting& known) {
   const Result<Pose> X_WS = located(model, session);
@@ -93,8 +93,8 @@ MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& b
 
 namespace {
 
-/// Refuses gauges that the model cannot tell: where several set-ups are to be placed, and of an
-/// anchor whose place neither it nor its cell file knows.
+/// Refuses gauges that the model cannot predict: with several set-ups to be placed, or to an anchor
+/// whose place neither the model nor its cell file knows.
 Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return {};
   if (has_sessions(batch))

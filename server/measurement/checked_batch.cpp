@@ -85,8 +85,8 @@ std::vector<std::string> session_names(const MeasurementBatch& next) {
   return names;
 }
 
-/// The numbers that two rows share only if they are one measurement: all digits of joints and
-/// position, and what was on the arm.
+/// The numbers that identify a measurement: two rows share them only if they are copies. All digits
+/// of joints and position count, and the tool and payload on the arm.
 using Fingerprint =
     std::tuple<std::vector<double>, std::array<double, 3>, std::string, std::string>;
 
@@ -97,7 +97,7 @@ Fingerprint fingerprint_of(const Measurement& m) {
           m.context.payload};
 }
 
-/// True for each row of `batch` that `met` has; adds those that it has not.
+/// A flag for each row of `batch`, true if `met` already has it. Adds the other rows to `met`.
 std::vector<bool> copied_rows(const MeasurementBatch& batch, std::set<Fingerprint>& met) {
   std::vector<bool> copied;
   std::vector<Fingerprint> own;
@@ -111,7 +111,7 @@ std::vector<bool> copied_rows(const MeasurementBatch& batch, std::set<Fingerprin
   return copied;
 }
 
-/// The batch without the rows of `left_out`, and without sessions of which no row is left.
+/// The batch without the rows of `left_out`, and without sessions that have no row left.
 MeasurementBatch without_rows(const MeasurementBatch& batch, const std::vector<bool>& left_out) {
   MeasurementBatch rest = batch;
   rest.measurements.clear();
@@ -147,7 +147,7 @@ void append(MeasurementBatch& all, const MeasurementBatch& next) {
   all.source_text += next.source_text;
 }
 
-/// Completes what the file leaves out of passive joints, in all poses that it tells of.
+/// Adds the passive joints that the file leaves out, in all poses, referenced ones included.
 void complete_passive_joints(const Chain& robot, MeasurementBatch& batch) {
   std::vector<PoseContext*> poses;
   for (Measurement& m : batch.measurements) {
@@ -262,7 +262,7 @@ CheckedBatch joined(std::vector<CheckedBatch> batches) {
       if (!copied[i]) is_held_out.push_back(batch.content_->is_held_out[i]);
     }
   }
-  if (taken == 1) {  // the first, and nothing but copies of it
+  if (taken == 1) {  // all others are copies of the first one
     MeasurementBatch rows = batches.front().rows();
     rows.copies = all.copies;
     return CheckedBatch(std::move(rows), std::move(is_held_out), batches.front().hash());

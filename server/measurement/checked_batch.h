@@ -22,9 +22,9 @@ using HoldOut = std::function<std::vector<bool>(const MeasurementBatch& batch)>;
 /// and validation code takes this type, so each batch is checked and split once. Only
 /// check_against_cell() makes one.
 ///
-/// Tools and payloads are resolved, rows of a session stand together (divide_into_sessions()),
-/// times count from the first one that was recorded in it, and poses of a continuous path have
-/// velocities (fill_velocity()). Immutable; copies share their content.
+/// A batch with its tools and payloads resolved. Rows of a session stand together
+/// (divide_into_sessions()), times count from the first recorded time of their session, and poses
+/// of a continuous path have velocities (fill_velocity()). Immutable; copies share their content.
 class CheckedBatch {
  public:
   [[nodiscard]] const std::string& id() const { return rows().id; }
@@ -67,12 +67,12 @@ class CheckedBatch {
 [[nodiscard]] Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell,
                                                       const HoldOut& hold_out = drawn(0, 0));
 
-/// Joins batches of one cell into one, in the order of time where the instruments' clocks say it,
-/// else in their order. Each batch is a session, or as many as it has, because the tracker may have
-/// been set up anew. The ids are joined by plus signs, pose ids become `batch/pose`, extra columns
-/// are dropped. Held-out rows stay held out. A row that an earlier batch has to the last digit is
-/// the same measurement under another name: it counts once, and `copies` counts it. A single batch
-/// is returned unchanged.
+/// Joins batches of one cell into one, in the order of time if the instruments' clocks give it,
+/// otherwise in the given order. Each batch becomes a session, or keeps its own sessions, because
+/// the tracker may have been set up anew. The ids are joined by plus signs, pose ids become
+/// `batch/pose`, extra columns are dropped. Held-out rows stay held out. A row that equals one of
+/// an earlier batch to the last digit is the same measurement under another name: it is dropped and
+/// counted in `copies`. A single batch is returned unchanged.
 [[nodiscard]] CheckedBatch joined(std::vector<CheckedBatch> batches);
 
 }  // namespace trammel

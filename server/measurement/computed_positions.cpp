@@ -10,7 +10,8 @@ namespace trammel {
 
 namespace {
 
-constexpr int kEnoughPoses = 10;  // so many are no chance, and no fit of an arm takes them all up
+constexpr int kEnoughPoses = 10;  // with so many poses, close agreement is not chance, and no arm
+                                  // model absorbs them all
 constexpr double kNoArmRepeats = 2e-6;  // m
 
 }  // namespace

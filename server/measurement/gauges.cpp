@@ -26,7 +26,7 @@ Result<std::string> resolved(const std::string& name, const Cell& cell, const An
           "known: {}; anchors stand in the cell file, anchors: {{a1: {{xyz_mm: null}}}}", known));
 }
 
-/// The pose that it is told against, as the cell has it.
+/// Checks the pose against which the gauge is read, and completes it from the cell.
 Status check_minus(Gauge& gauge, const Cell& cell) {
   if (gauge.minus == nullptr) return {};
   PoseContext other = *gauge.minus;

@@ -3,7 +3,7 @@
 #include "server/base/result.h"
 #include "server/measurement/measurement.h"
 
-/// Rows of a batch that tell one number of an instrument (Gauge) instead of a position.
+/// Rows of a batch that give one number of an instrument (Gauge) instead of a position.
 namespace trammel {
 
 [[nodiscard]] bool has_gauges(const MeasurementBatch& batch);
@@ -16,9 +16,9 @@ namespace trammel {
 [[nodiscard]] Status require_positions(const MeasurementBatch& batch, const std::string& who);
 
 /// Resolves anchors, tools and payloads of the gauges, and gives a value without a sigma that of
-/// its instrument. Refuses an anchor that the cell file does not have, a touch of a point, a pose
-/// against which is told that is none of the robot's, and a missing name where the cell has several
-/// anchors. The caller adds file and row to errors.
+/// its instrument. Refuses an anchor that the cell file does not have, a touch of a point, a
+/// reference pose with joints that the robot cannot have, and a missing anchor name if the cell has
+/// several anchors. The caller adds file and row to errors.
 [[nodiscard]] Status check_gauge(Measurement& measurement, const Cell& cell,
                                  const Anchors& anchors);
 

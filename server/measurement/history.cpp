@@ -43,7 +43,7 @@ void fill_before(const Rows& rows, const Chain& robot) {
 /// `from` to `to`.
 double followed(double body, double from, double to, double time, double lag) {
   if (!(time > 0)) return body;
-  const double behind = (to - from) / time * lag;  // how far it stays behind in the end
+  const double behind = (to - from) / time * lag;  // K: the lag that remains in the end
   return to - behind + (body - from + behind) * std::exp(-time / lag);
 }
 

@@ -23,7 +23,7 @@ struct Measurement {
   std::optional<Gauge> gauge;     ///< one number instead of a position (gauges.h)
   std::optional<double> sigma;    ///< m, of one axis of this point, or of the gauge
   std::optional<double>
-      sigma_rotation;  ///< rad, of one axis of this orientation, where it is not the tracker's
+      sigma_rotation;  ///< rad, of one axis of this orientation, if it differs from the tracker's
   MeasurementSet set = MeasurementSet::kUnassigned;
   std::string session_id;  ///< as recorded: one set-up of the instrument; empty: the batch is one
   int session = 0;         ///< its place in MeasurementBatch::sessions
@@ -44,13 +44,13 @@ struct MeasurementBatch {
   std::optional<std::int64_t> measured_at =
       {};  ///< Unix time, s, of the newest measurement; empty = unknown
   std::optional<std::int64_t> clock =
-      {};  ///< the same where the instrument's clock says it, else empty
+      {};  ///< measured_at if the instrument's clock gave it, otherwise empty
   /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch
   /// is one. A session has a frame W of its own, because the tracker was set up anew.
   std::vector<std::string> sessions = {};
   int copies = 0;        ///< rows that were left out: an earlier batch has them, see joined()
-  bool as_then = false;  ///< its poses are placed by their index among those of a model: what began
-                         ///< later had not begun
+  bool as_then = false;  ///< true: its poses keep their index among those of a model, so causes
+                         ///< that began later do not act on them
 };
 
 /// The batch with measured_at set: the latest `time_s` if that column is Unix time, else
@@ -58,13 +58,14 @@ struct MeasurementBatch {
 /// time before September 2001, or more than a day after `taken_in`, is no Unix time.
 [[nodiscard]] MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in);
 
-/// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit:
-/// an empty file, a missing or doubled column, a row of another length, a number that is not
-/// finite, a quaternion that is not a unit one (limit 1e-3), a sigma that is not positive, a
-/// direction outside -1, 0, +1, two rows with one pose_id. In an optional column an empty field
-/// means that nothing was recorded. Joints are counted, not checked against a robot. A row tells a
-/// position, or one of `distance_mm` and `touch_mm` with `anchor_id`, perhaps against the pose
-/// `minus_pose_id`; a row that others name so may tell nothing, and is then no measurement.
+/// Reads the batch CSV of DESIGN section 3. Refuses an empty file, a missing or repeated column, a
+/// row of another length, a number that is not finite, a quaternion that is not normalised (limit
+/// 1e-3), a sigma that is not positive, a direction outside -1, 0, +1, and two rows with one
+/// pose_id. The error names `where`, row, column, value and limit. An empty field in an optional
+/// column means that nothing was recorded. Joints are counted, but not checked against a robot. A
+/// row has a position, or one of `distance_mm` and `touch_mm` with `anchor_id`, optionally against
+/// the pose `minus_pose_id`. A row to which such an id refers may have no value; it is then not a
+/// measurement.
 [[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text,
                                                        const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);

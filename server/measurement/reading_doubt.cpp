@@ -27,19 +27,20 @@ constexpr std::size_t kMostFitted =
     16;  // readings that are tried with all of the arm, the nearest first
 // Distances, m.
 constexpr double kWorthAsking =
-    1e-3;  // below it no reading is tried: what a model of a robot leaves
+    1e-3;  // m: with a smaller misfit no reading is tried, since a robot's model error is as large
 constexpr double kOfRows =
     5e-3;  // the same for rows: on a path, a late clock looks like the next row
 constexpr double kMuchBetter = 0.25;  // of the distance as given: a reading that was surely meant
-constexpr double kAsGood = 1.5;       // times the best: a reading that cannot be told from it
+constexpr double kAsGood = 1.5;  // times the best misfit: readings below it cannot be distinguished
 constexpr double kFollow =
-    20e-3;  // what fits within it can be asked for single rows, zeros and tools
+    20e-3;  // m: below this misfit, single rows, zeros and tools are examined
 constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joints
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
 constexpr double kFixedPoint = 1e-3;   // spread of a tip's places on a spike
 constexpr double kSamePlace = 1e-6;    // the same where nobody measured it
-constexpr double kOtherPlace = 50e-3;  // farther, no base stands from where the cell file has it
+constexpr double kOtherPlace = 50e-3;  // m: a base farther from the cell file's stands at another
+                                       // place
 // A larger zero error than any robot has.
 constexpr double kMostZero = from_deg(15);
 constexpr double kCertainZero = from_deg(4);  // its standard deviation is below that
@@ -50,10 +51,11 @@ constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell 
 // Stated uncertainties.
 constexpr std::size_t kFewestForSigma = 20;  // poses: below that an arm follows noise
 constexpr double kNotThatGood =
-    0.25;  // of the stated deviation: honest noise leaves at least 0.8 of it
+    0.25;  // share of the stated deviation: honest noise leaves at least 0.8 of it
 constexpr double kHarmless = 3e-4;  // m: who states less may be careful, and does no harm
 // Angles.
-constexpr double kOtherTurn = from_deg(0.5);  // by which orientations decide between readings
+constexpr double kOtherTurn = from_deg(0.5);  // a larger difference in turn lets orientations
+                                              // decide between readings
 constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
 
 std::string mm(double metres) {
@@ -68,8 +70,8 @@ struct Tried {
   ArmFit fit;
 };
 
-/// rad, median turn of the orientations from what the arm and its tool say; empty where there are
-/// none.
+/// rad: the median turn between the measured orientations and those of the arm with its tool; empty
+/// if there are none.
 std::optional<double> turned(const NumberTable& table, const Cell& cell, const ArmFit& fit) {
   std::map<std::string, std::vector<Matrix3>> by_tool;
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -214,8 +216,8 @@ const ArmFit& Look::anywhere() {
   return *anywhere_;
 }
 
-/// A reading that shrinks the positions shrinks what is left of them, too: it must fit better
-/// beside their spread.
+/// True if the reading fits much better relative to the spread of its positions. A reading that
+/// shrinks the positions also shrinks their misfit.
 bool Look::is_much_better(const Tried& tried) const {
   const double as_given = spread_of(table_.p_W);
   return tried.fit.quality < kFollow &&
@@ -261,9 +263,9 @@ void Look::keep_best(std::vector<Tried> tried) {
   found_ = std::move(tried);
 }
 
-/// Rows at one joint vector that tell places far apart at most of those vectors: several reflectors
-/// under one name, or something changed in between. Averaged, they would tell a place where none
-/// is. Of rows that do not follow each other a few may be a check whether something changed.
+/// Doubts rows at one joint vector with places far apart, if most such vectors have this: several
+/// reflectors share a name, or something changed in between. Their average would be a place where
+/// nothing is. If such rows do not follow each other and are few, they may be a check for changes.
 std::optional<Error> Look::of_several_points() const {
   struct Apart {
     std::size_t repeated = 0, apart = 0;
@@ -305,8 +307,8 @@ std::optional<Error> Look::of_several_points() const {
       .value();
 }
 
-/// Positions at one fixed point where a base that stands where the cell says does not have it. They
-/// do not tell how it stands instead, and the arm would be bent until it reached there.
+/// Doubts positions at one fixed point that the cell's base contradicts. They do not determine
+/// another base, and a fit would bend the arm until it reached the point.
 std::optional<Error> Look::of_place() const {
   const bool tools_known = std::all_of(table_.from.begin(), table_.from.end(), [&](const auto* m) {
     return cell_.tools.at(m->context.tool).has_value();
@@ -399,7 +401,7 @@ std::optional<Error> Look::of_units() const {
   return std::nullopt;
 }
 
-/// A block of rows whose joints stand in other rows, while the others follow theirs.
+/// Doubts a block of rows whose joints belong to other rows, if the remaining rows are right.
 std::optional<Error> Look::of_some_rows() {
   const std::vector<double> off = distances(table_, cell_, *given_);
   const double limit = std::max(kBadRow, kBadRowRatio * median(off));
@@ -471,7 +473,7 @@ std::optional<Error> Look::of_sigma() const {
       .value();
 }
 
-/// A measured point that is not that of the tool.
+/// Doubts that the measured point is the tool's point.
 std::optional<Error> Look::of_tool() {
   for (const auto& [tool, X_FT] : given_->tools) {
     const auto& drawn = cell_.tools.at(tool);

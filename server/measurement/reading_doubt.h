@@ -9,30 +9,29 @@
 /// The check whether the measured positions belong to the commanded joints, made before anything is
 /// learned from them.
 ///
-/// Nothing is known of the robot but its drawing. So an arm is fitted that may be anything a robot
-/// can be: base free, zeros off by degrees, links and tool by millimetres, gears that give way. A
-/// good batch fits it to a millimetre, however badly the robot was mastered. Numbers that were read
-/// wrongly do not, and fit in the one way in which they were meant: rows shifted against joints,
-/// two columns exchanged, another sign, unit or zero in one of them, mirrored axes, another point
-/// of the tool, a robot file in another convention.
+/// Only the drawing of the robot is known. So the check fits an arm with wide priors: base free,
+/// zeros off by degrees, links and tool by millimetres, compliant gears. A good batch fits it to a
+/// millimetre, even if the robot was badly mastered. Misread numbers do not fit, except in the
+/// reading in which they were meant: rows shifted against joints, two columns exchanged, another
+/// sign, unit or zero in one of them, mirrored axes, another point of the tool, a robot file in
+/// another convention.
 ///
-/// Some mistakes cannot be told: of positions alone from a tracker that may stand anywhere, which
-/// of three axes is mirrored, and that two of them were exchanged instead; a turned joint 1, which
-/// is a turned base; a mistake in a joint that moves the measured point by less than a millimetre,
-/// which does no harm to positions; a mirrored axis from a mirrored drawing (several joints that
-/// count the other way). Single rows are outliers, not mistakes of reading, but for those that are
-/// in another unit of length than the others. Rows that follow each other at the same joints and
-/// tell places far apart are several reflectors under one name.
+/// Some mistakes cannot be found. Positions alone, from a tracker that may stand anywhere, do not
+/// show which of three axes is mirrored, or that two of them were exchanged instead. A turned joint
+/// 1 equals a turned base. A mistake in a joint that moves the measured point by less than a
+/// millimetre is harmless for positions. A mirrored axis equals a mirrored drawing (several joints
+/// of the other sign). Single rows count as outliers, not as mistakes of reading, unless their unit
+/// of length differs from the others'. Rows that follow each other at the same joints with places
+/// far apart are several reflectors under one name.
 namespace trammel {
 
 /// The doubts about how a batch was read.
 struct ReadingLook {
-  /// The doubt about the positions: how far they are off (`value`, mm), the reading that would
-  /// fit (`text`, `with q2_deg and q3_deg exchanged`), its columns and the first row that it is
-  /// about. Empty where they follow the joints, where no other reading fits much better, and of
-  /// fewer than 6 poses.
+  /// The doubt about the positions: their misfit (`value`, mm), the reading that would fit (`text`,
+  /// `with q2_deg and q3_deg exchanged`), its columns and the first row concerned. Empty if the
+  /// positions follow the joints, if no other reading fits much better, or with fewer than 6 poses.
   std::optional<Error> doubt;
-  /// The doubt is of another tool, another point of it or another place of the base, and of no
+  /// true: the doubt concerns another tool, another point of it or another place of the base, not a
   /// mistake of reading.
   bool of_tool = false;
   JointVector zeros;  ///< rad (m), of each joint: where the positions put its zero; 0 where they do
@@ -40,7 +39,7 @@ struct ReadingLook {
   /// m: how far the positions are off the drawing itself, base and unknown tools wherever they fit
   /// best; of the seven of ten that fit best. Negative: fewer than 6 poses.
   double off_drawing = -1;
-  /// Where the base stands by the positions, if they tell to a degree how it is turned.
+  /// The base by the positions, if they determine its orientation to a degree.
   std::optional<Pose> X_WB;
 };
 /// The cell knows the tools of the batch.

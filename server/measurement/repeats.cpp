@@ -18,7 +18,7 @@ constexpr double kRotationStep = 1e-14;  // rad
 using Group = std::vector<const Measurement*>;
 
 bool are_repeats(const Measurement& a, const Measurement& b) {
-  if (a.gauge || b.gauge) return false;  // at one pose, several instruments tell different numbers
+  if (a.gauge || b.gauge) return false;  // at one pose, several instruments give different numbers
   if (a.context.velocity || b.context.velocity || a.set != b.set || a.session != b.session)
     return false;
   if (a.context.tool != b.context.tool || a.context.payload != b.context.payload) return false;
@@ -88,7 +88,7 @@ std::vector<Matrix3> rotations_of(const Group& group) {
   return rotations;
 }
 
-/// Mean of those that are recorded.
+/// Mean of the recorded values.
 template <typename Field>
 std::optional<double> mean_of(const Group& group, Field field) {
   double sum = 0;

@@ -10,18 +10,18 @@ namespace trammel {
 /// True if the batch has more than one session.
 [[nodiscard]] bool has_sessions(const MeasurementBatch& batch);
 
-/// Divides the batch by the session ids of its rows: the rows of one stand together and keep their
-/// order, the sessions are ordered by when they began where all have Unix times, else as they first
-/// come (and the batch has no clock). Rows without an id are a session that has the batch's name.
-/// One id is one session: such a batch stays as it is.
+/// Groups the rows of the batch by their session ids; rows of a session keep their order. If all
+/// rows have Unix times, sessions are ordered by their start. Otherwise they stay in the order of
+/// their first rows, and the batch has no clock. Rows without an id form a session with the batch's
+/// name. With a single id the batch is one session and stays unchanged.
 void divide_into_sessions(MeasurementBatch& batch);
 
 /// The sessions as batches of their own, in their order: each has the id of its session. Indices
 /// and rows stay.
 [[nodiscard]] std::vector<MeasurementBatch> by_session(const MeasurementBatch& batch);
 
-/// Without the sessions whose flag is false; those left keep their order. One that is left alone is
-/// a whole batch.
+/// The batch without the sessions whose flag is false; the others keep their order. A single
+/// remaining session becomes a whole batch.
 [[nodiscard]] MeasurementBatch only_sessions(const MeasurementBatch& batch,
                                              const std::vector<bool>& kept);
 

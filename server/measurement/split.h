@@ -17,10 +17,10 @@ struct BatchSplit {
 /// Reproducible.
 [[nodiscard]] std::vector<bool> drawn_of(std::size_t count, double share, std::uint64_t seed);
 
-/// One flag per row, true if it is held out. Uses the `set` column if the batch has one, else draws
-/// `share` of the poses with `seed` (at least one stays for training), each with all rows that
-/// stand at its joint vector: a row that is learned from would vouch for its siblings.
-/// Reproducible: same rows, seed and share, same flags.
+/// One flag per row, true if it is held out. Uses the `set` column if the batch has one. Otherwise
+/// it draws `share` of the poses with `seed`; at least one stays for training. All rows at one
+/// joint vector are drawn together, since a training row would vouch for the others. Reproducible:
+/// same rows, seed and share give the same flags.
 [[nodiscard]] std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share,
                                               std::uint64_t seed);
 

@@ -21,7 +21,8 @@ namespace {
 constexpr Index kRun =
     10;  // poses that follow one another and are left out together: they share a drift
 constexpr Index kThreefold = 3;  // parts of the cross-validation: two thirds still tell the weights
-constexpr Index kTargets = 64;  // at once: the matrices pass through the cache once for all of them
+constexpr Index kTargets = 64;  // targets at once: the matrices pass through the cache once for all
+                                // of them
 
 // δ: the covariances that are left out; σ²: the least noise variance. |Δ kᵀM⁻¹k| <= 2 σ_f |δ|/σ +
 // |δ|²/σ², and the standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver
@@ -29,15 +30,13 @@ constexpr Index kTargets = 64;  // at once: the matrices pass through the cache 
 constexpr double kPassedOver = 1e-3;
 constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
 
-// The share of the noise variance that few points leave unexplained of any pose: what they say of
-// the columns is then off by no more of a posterior variance than R A⁻¹ Rᵀ of their errors, which
-// is below it.
+// A share of the noise variance. Few points may leave at most this share of any pose unexplained.
+// Their error in the columns then changes a posterior variance by less than this share, too.
 constexpr double kUnexplained = 1e-4;
-constexpr Index kWorthFew = 3;  // few points pay where they are less than one in so many
+constexpr Index kWorthFew = 3;  // few points pay if they are less than one in so many
 
-// R from near points is tried at so many joint vectors between the poses. The variance that follows
-// may be smaller and larger than that from all poses by these shares of the variance of a
-// measurement.
+// Joint vectors between the poses at which R from near points is tested. The resulting variance may
+// be below and above that from all poses by these shares of the variance of a measurement.
 constexpr Index kTried = 64;
 constexpr double kNearTooSmall = 0.005;
 constexpr double kNearTooLarge = 0.02;
@@ -145,8 +144,8 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   return posterior;
 }
 
-// The columns of a joint vector between two poses are taken to be those between theirs: what near
-// points miss of kᵀ M⁻¹ H does not depend on them.
+// The columns of a joint vector between two poses are interpolated from those of the poses. The
+// part of kᵀ M⁻¹ H that near points miss does not depend on them.
 void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& data,
                                        const CoupledSolution& solution) {
   if (!outputs_[output].is_near_enough()) return;

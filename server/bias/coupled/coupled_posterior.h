@@ -26,16 +26,16 @@ class CoupledPosterior {
       std::shared_ptr<const Kernel> kernel, const LinearBlocks& blocks, const CoupledData& data,
       const CoupledHyperparameters& at, VarianceForm form = VarianceForm::kCompressed);
 
-  /// At the rows of `q`; `columns` is H there, not scaled, as in CoupledData. With kCompressed,
-  /// training poses whose covariance with the target is too small to matter are left out. The
-  /// variance of an output is then off by less than 0.003 of its noise variance (bound: decision
+  /// Predicts at the rows of `q`; `columns` is H there, not scaled, as in CoupledData. With
+  /// kCompressed, training poses with a negligible covariance with the target are left out. This
+  /// changes the variance of an output by less than 0.003 of its noise variance (bound: decision
   /// 46).
   [[nodiscard]] std::vector<CoupledPrediction> predict(
       const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns) const;
   /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
-  /// The number of outputs of which only the points near a target say how uncertain they are.
+  /// The number of outputs whose uncertainty is computed from the points near a target alone.
   [[nodiscard]] Eigen::Index outputs_from_near_points() const;
 
   /// p: ŵ of the columns of H, not scaled.
@@ -58,10 +58,10 @@ class CoupledPosterior {
  private:
   CoupledPosterior() = default;
   void leave_out(const CoupledSolution& solution, const CoupledData& data);
-  /// R of an output from the points near a target, where these say as much of it as all.
+  /// Computes R of an output from the points near a target, if these give as much as all.
   void explain_by_near(std::size_t output, const CoupledData& data,
                        const CoupledSolution& solution);
-  /// Takes `explained_` of an output from few of its points, where these stand for all.
+  /// Computes `explained_` of an output from few of its points, if these can replace all.
   void explain_by_few(std::size_t output, const Eigen::VectorXd& noise);
   /// The contribution of one output at some targets.
   struct Part {

@@ -103,11 +103,11 @@ class CoupledSearch {
     return likelihood(1, true).pack(start);
   }
 
-  /// Where a search has come to, and what it knows of the curvature there.
+  /// The present point of a search, and the curvature there as far as it is known.
   struct Place {
     CoupledHyperparameters at;
     MatrixXd inverse_hessian;
-    Index points = 0;  // that it was found with
+    Index points = 0;  // the number of points of the search that found it
     double value = HUGE_VAL;
   };
 

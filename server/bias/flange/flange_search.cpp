@@ -12,8 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTypicalArm =
-    0.5;  // m: what turns the flange stands so far from the tool, between wrist and shoulder
+constexpr double kTypicalArm = 0.5;  // m: a typical distance from the tool to the parts that turn
+                                     // the flange, between wrist and shoulder
 constexpr Index kStartNumbers =
     600;  // of the first searches: a likelihood takes a fiftieth of a second
 constexpr Index kFewestStartPoints = 40;

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 constexpr double kSameLever = 1e-3;  // m: what a calibration moves a tool by teaches no rotation
 constexpr double kLeastSeen =
-    1e-9;  // singular value over the largest: what is below it is not seen
+    1e-9;  // singular value over the largest: a smaller one counts as not seen
 
 Vector3 mean_lever(const std::vector<BiasFeatures>& features) {
   Vector3 sum = Vector3::Zero();

@@ -8,13 +8,14 @@
 /// The arm's error at the flange, seen through levers (README.md).
 namespace trammel {
 
-/// Rows, each of which is a number that was seen of a twist [position; rotation].
+/// Each row maps a twist [position; rotation] to one measured number.
 using TwistRows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6>;
 /// The part of the twist that one coordinate of each row sees.
 using TwistRow = Eigen::Matrix<double, 3, 6>;
 
-/// All rows of one joint vector, brought to as few numbers as tell the same of the twist: rows /
-/// sqrt(noise shape) = basis (view twist + noise of unit shape) + what no twist explains.
+/// All rows of one joint vector, reduced to the fewest numbers with the same information about the
+/// twist: rows / sqrt(noise shape) = basis (view twist + noise of unit shape) + a part that no
+/// twist explains.
 struct FlangeView {
   std::vector<Eigen::Index> rows;  ///< of the observations, rising
   TwistRows view;                  ///< r x 6, r <= 6
@@ -43,7 +44,8 @@ struct FlangeViews {
 /// These views alone.
 [[nodiscard]] FlangeViews some_of(const FlangeViews& all, const std::vector<Eigen::Index>& views);
 
-/// `y` (N x 3) as the views have it: their numbers, and the square of what no twist explains.
+/// `y` (N x 3) expressed in the views: their numbers, and the square of the part that no twist
+/// explains.
 struct SeenNumbers {
   Eigen::VectorXd of_twist;  ///< size
   double beside = 0;

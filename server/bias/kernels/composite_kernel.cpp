@@ -10,7 +10,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kLeastAmplitude =
-    0.05;  // over that of the first part: where a search starts at the least
+    0.05;  // least share of the first part's size with which a search starts
 
 std::string joined(const std::vector<KernelPtr>& parts, std::string_view separator) {
   std::string name = "(";

@@ -10,7 +10,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kHarmonicsBefore = 48;  // of models whose power was not learned
+constexpr Index kHarmonicsBefore = 48;  // in models without a learned power
 constexpr double kPowerBefore = 2;      // of theirs
 constexpr Index kFewestHarmonics = 48;
 constexpr Index kMostHarmonics = 112;    // a finer one gains little and costs as much
@@ -20,7 +20,7 @@ constexpr double kTypicalAmplitude = 1e-4;  // rad: 0.1 mm at 1 m, as gears have
 constexpr double kTypicalKnee = 6.0;   // harmonic: gear errors of an arm begin to fall off there
 constexpr double kTypicalPower = 1.6;  // 1: amplitudes that fall as 1/h; 2: as 1/h²
 constexpr double kAmplitudeSpread =
-    2.0;  // in logs, one standard deviation: from a seventh to seven times as large
+    2.0;  // in logs, one standard deviation: a factor between a seventh and seven
 constexpr double kKneeSpread = 0.7;       // in logs: from half to twice the harmonic
 constexpr double kPowerSpread = 0.4;      // in logs: from 1.1 to 2.4
 constexpr double kHarmonicsSpread = 1.0;  // they are not searched
@@ -45,7 +45,7 @@ Eigen::Vector2d density_slope(Index harmonic, const Spectrum& spectrum) {
 /// power; then, once, the log of the number of harmonics, which stays.
 class JointMapBlock final : public LinearBlock {
  public:
-  /// As models have it whose power was not learned.
+  /// The block of a model without a learned power.
   JointMapBlock() : harmonics_(kHarmonicsBefore) {}
   JointMapBlock(Index harmonics, Index told) : harmonics_(harmonics), told_(told) {}
 

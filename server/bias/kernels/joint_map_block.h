@@ -7,11 +7,11 @@
 /// The number of harmonics that the block `joint_map` has in a bias.
 namespace trammel {
 
-/// As many as that many observations can tell.
+/// The number of harmonics that so many observations can determine.
 [[nodiscard]] Eigen::Index harmonics_for(Eigen::Index observations);
 
-/// The number in a model with these hyperparameters, for an arm of that many joints. Empty: a model
-/// from before the power was learned.
+/// The number of harmonics in a model with these hyperparameters, for an arm with so many joints.
+/// Empty: a model without a learned power.
 [[nodiscard]] std::optional<Eigen::Index> harmonics_in(const Eigen::VectorXd& block_hyperparameters,
                                                        Eigen::Index joints);
 

@@ -10,9 +10,9 @@
 
 namespace trammel {
 
-/// The kernel that is written so: `matern52 + periodic`, `se(sincos) * (linear + white)`. Words are
-/// those of kernel_names(), each also with `(sincos)`; `*` binds before `+`. Refuses unknown words,
-/// naming the known ones; what is no such sum; more than 32 words or 1000 bytes.
+/// Parses a kernel: `matern52 + periodic`, `se(sincos) * (linear + white)`. Words are those of
+/// kernel_names(), each also with `(sincos)`; `*` binds before `+`. Refuses unknown words and names
+/// the known ones. Refuses a text that is not such a sum, and more than 32 words or 1000 bytes.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
 
 /// The parts of a bias.
@@ -26,9 +26,9 @@ struct SpelledBias {
 };
 
 /// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 +
-/// joint_map`; or the word `flange` (flange/README.md): `se + flange`. Refuses what
-/// spelled_kernel() refuses; a block that stands in a product or in parentheses, comes twice, or
-/// has no kernel beside it; and `flange` beside a block.
+/// joint_map`; or the word `flange` (flange/README.md): `se + flange`. Refuses the same as
+/// spelled_kernel(). Refuses a block that is in a product or in parentheses, is repeated, or has no
+/// kernel beside it. Refuses `flange` beside a block.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
 
 /// The spelling without the word `flange`: a rotation is the same at every lever.

@@ -60,8 +60,8 @@ inline void weighted_sum_by_tiles(const Kernel& kernel, const Eigen::VectorXd& p
   }
 }
 
-/// Where a search of length scales starts: half to ten times the standard deviation of each column
-/// of `x`.
+/// The box in which a search of length scales starts: half to ten times the standard deviation of
+/// each column of `x`.
 inline SearchBox length_scale_box(const Eigen::MatrixXd& x) {
   const Eigen::RowVectorXd mean = x.colwise().mean();
   SearchBox box{Eigen::VectorXd(x.cols()), Eigen::VectorXd(x.cols())};

@@ -30,7 +30,7 @@ class LinearBlock {
 
   /// As it is written in a bias.
   [[nodiscard]] virtual std::string_view name() const = 0;
-  /// The number of weights and the number of hyperparameters for features of that shape.
+  /// The number of weights, and the number of hyperparameters, for features of that shape.
   [[nodiscard]] virtual Eigen::Index column_count(const BiasFeatures& shape) const = 0;
   [[nodiscard]] virtual Eigen::Index parameter_count(const BiasFeatures& shape) const = 0;
   /// Prior of the hyperparameters: mean, where the search starts, and standard deviation.
@@ -52,7 +52,7 @@ using LinearBlockPtr = std::shared_ptr<const LinearBlock>;
 /// An error of each gear that depends on that gear's angle alone: Σ_j J_j(q) k_j(g_j, g_j')
 /// J_j(q')ᵀ, g_j the angle of gear j. k_j is a Matérn 3/2 kernel on the circle in a Fourier basis:
 /// periodic and once differentiable. Hyperparameters of each joint: log amplitude, rad; log of the
-/// harmonic from which on the spectrum falls.
+/// harmonic at which the spectrum begins to fall.
 [[nodiscard]] LinearBlockPtr make_joint_map_block();
 /// The effect that errors of the physical parameters leave, identified or not: H = J_θ(q). No
 /// hyperparameters: the weights have the prior variances of the parameters.

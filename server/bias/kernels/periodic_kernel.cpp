@@ -11,9 +11,9 @@ using Eigen::VectorXd;
 
 constexpr double kLeastPeriod = 0.15;  // over a joint's range: poses can hardly show shorter ones
 
-// With u = 2πq/p the kernel is the squared exponential of (cos u, sin u) / l, and is computed so.
-// Features: cos u / l of each joint, sin u / l of each, half the sum of their squares, and u of
-// each for the slope by p.
+// With u = 2πq/p the kernel is the squared exponential of (cos u, sin u) / l, and is computed in
+// that form. Features: cos u / l of each joint, sin u / l of each, half the sum of their squares,
+// and u of each for the slope by p.
 class PeriodicKernel : public Kernel {
  public:
   std::string_view name() const override { return "periodic"; }

@@ -59,8 +59,8 @@ class BiasOutputs {
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_variance() const = 0;
   [[nodiscard]] virtual Eigen::VectorXd leave_one_out_share() const = 0;
 
-  /// The error of `y` (N x D, instead of the observations) at these points when they are predicted
-  /// from all others; empty where only conditioning anew says it.
+  /// The error of `y` (N x D, in place of the observations) at these points when they are predicted
+  /// from all others. Empty if that needs a new conditioning.
   [[nodiscard]] virtual std::optional<Eigen::MatrixXd> left_out_error(
       const Eigen::MatrixXd& /*y*/, const std::vector<Eigen::Index>& /*points*/) const {
     return std::nullopt;

@@ -50,8 +50,8 @@ CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
           columns_of(blocks, data.q, data.features, 0, data.q.rows(), data.y.cols())};
 }
 
-// Variances are widened by what cross-validation shows. Many hyperparameters, and the drift of a
-// measuring session, make the process surer than it should be.
+// Coupled outputs with variances widened by cross-validation. Many hyperparameters, and the drift
+// of a measuring session, make the process too certain.
 class CoupledOutputs final : public BiasOutputs {
  public:
   CoupledOutputs(LinearBlocks blocks, CoupledPosterior posterior, const CoupledHyperparameters& at,

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr Index kTargetsAtATime = 64;     // their covariances with all numbers are six megabytes
 constexpr double kLeastVariance = 1e-10;  // of the prior: rounding leaves no less
 
-/// The error of the flange, conditioned on what was seen of it (flange/README.md).
+/// The error of the flange, conditioned on the measured numbers of its twist (flange/README.md).
 class FlangeOutputs final : public BiasOutputs {
  public:
   FlangeOutputs(KernelPtr kernel, FlangeViews views, const MatrixXd& y, FlangeSolution solution,

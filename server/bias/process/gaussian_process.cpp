@@ -25,7 +25,7 @@ constexpr double kLeastLogRatio =
 
 // The compressed variance.
 constexpr double kUnexplained =
-    1e-3;  // of the noise variance, at any training point: far below what anybody sees
+    1e-3;  // of the noise variance, at any training point: far too small to matter
 constexpr double kMostKept = 0.75;        // of the points: with more, little time would be saved
 constexpr Index kMostKeptPoints = 2000;   // finding them takes time with the square of their number
 constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
@@ -33,15 +33,15 @@ constexpr Index kFewestToCompress = 200;  // below that the exact variance is fa
 // The variance that is served.
 constexpr Index kMostServedPoints =
     400;                           // with more, all points in single precision are nearly as fast
-constexpr double kFewTell = 0.02;  // of the variance: what few points may leave out
+constexpr double kFewTell = 0.02;  // of the variance: the part that few points may leave out
 constexpr Index kLeftOutPoints = 128;  // of the points, that near ones are tried at
 constexpr Index kAsked = 64;  // joint vectors between the points, that few points are tried at
-// The shares by which few points may be too small beside the places that were tried: measured 0.2 %
-// of a standard deviation, and 1e-5 of the noise variance.
+// Allowance by which few points may be too small between the tested places. Measured: 0.2 % of a
+// standard deviation, and 1e-5 of the noise variance.
 constexpr double kFewSlack = 1.004;
 constexpr double kFewSlackOfNoise = 1e-4;
-// A share of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to
-// single precision (6e-8) makes of t.
+// A share of the smallest noise's root: five standard deviations of 2 tᵀδ, where δ is the error of
+// t by rounding to single precision (6e-8).
 constexpr double kRounded = 3.5e-7;
 constexpr double kMostRounding = 1e-3;  // of the variance of a measurement
 
@@ -170,8 +170,8 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
   return std::isfinite(out->value) && out->gradient.allFinite();
 }
 
-// ½ tr(G dM) with G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, from the lower triangle: elements off
-// the diagonal count once, those on it half.
+// ½ tr(G dM) with G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, from the lower triangle: off-diagonal
+// elements count once, diagonal ones half.
 VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio,
                                       const VectorXd& output_weights) {
   const Index n = size();

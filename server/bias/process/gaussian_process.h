@@ -30,7 +30,7 @@ struct GpData {
   Eigen::VectorXd noise_shape;  ///< N, w: noise variance of each point relative to σ_n²
 };
 
-/// Weak log-normal priors; they decide only what the data leave open.
+/// Weak log-normal priors; they decide only parameters that the data leave open.
 struct GpPrior {
   double noise_stddev = 1e-5;  ///< m, the instrument's; noise below it costs ½ (log ratio /
                                ///< spread)², noise above it nothing
@@ -44,8 +44,8 @@ struct GpPrior {
 };
 
 /// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over
-/// the outputs. σ_f² of each output is at its best value y'M⁻¹y / N. Keeps its matrix between
-/// calls: for one thread at a time.
+/// the outputs. σ_f² of each output has its best value y'M⁻¹y / N. Keeps its matrix between calls:
+/// for one thread at a time.
 class ProfiledLikelihood {
  public:
   ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior);
@@ -91,23 +91,22 @@ enum class VarianceForm {
   /// be at most 0.2 %
   /// too small (bound: decision 25). Exact where many points would be needed.
   kCompressed,
-  /// The form in which a model is served. From the 24 or 48 points nearest to a target, where these
-  /// say as much as all: mostly of a signal below the noise. Else from at most 400 points that
-  /// stand for all. Else from all points, in single precision where the noise allows it. Never
-  /// below the exact variance; above it by less than 2 % at every training point when it is left
-  /// out, mostly by far less. Nothing else is kept: what is for with(), without() and
-  /// left_out_error() alone is computed anew when one of them is called.
+  /// The form in which a model is served. It uses the 24 or 48 points nearest to a target if they
+  /// give as much as all points, mostly for a signal below the noise. Otherwise it uses at most 400
+  /// points that replace all. If these do not suffice, it uses all points, in single precision if
+  /// the noise allows it. The variance is never below the exact one. At every training point, left
+  /// out, it is above the exact one by less than 2 %, mostly by far less. Data that only with(),
+  /// without() and left_out_error() need are not kept; each call computes them anew.
   kServed,
   /// The variances of kServed, and all is kept.
   kLearned,
-  /// As kServed, and less than 2 % is of the variance of a measurement: where what the process
-  /// leaves is one part of
-  /// what is uncertain.
+  /// As kServed, but less than 2 % of the variance of a measurement, for a process whose variance
+  /// is one part of the uncertainty.
   kServedAsPart,
   kExact,
-  /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of
-  /// the points and is
-  /// for with(), without() and left_out_error() alone is computed anew when one of them is called.
+  /// As kCompressed, but if it is compressed, nothing else is kept. Data that grow with the square
+  /// of the points and that only with(), without() and left_out_error() need are computed anew in
+  /// each call.
   kCompressedOnly,
 };
 
@@ -133,16 +132,16 @@ class GaussianProcess {
                                         VarianceForm form = VarianceForm::kExact) const;
 
   /// Errors of these points when they are predicted from all others, in N operations for each pair
-  /// of them; `y` (N, m) takes the place of the observations.
+  /// of them; `y` (N, m) replaces the observations.
   [[nodiscard]] Eigen::VectorXd left_out_error(const Eigen::VectorXd& y,
                                                const std::vector<Eigen::Index>& points) const;
 
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
   void mean(const Eigen::MatrixXd& q, double* out) const;
 
-  /// `near`: the points that each variance was computed from, where near ones are enough; else it
-  /// becomes empty. `mean` takes the posterior mean, too, equal to mean() but for rounding: cheaper
-  /// than asking for both.
+  /// `near`: the points from which each variance was computed, if near ones suffice; otherwise it
+  /// becomes empty. `mean` receives the posterior mean as well, equal to mean() up to rounding,
+  /// which is cheaper than two calls.
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
                                                         std::vector<NearWeights>* near = nullptr,
                                                         double* mean = nullptr) const;
@@ -157,10 +156,10 @@ class GaussianProcess {
   [[nodiscard]] double noise_variance() const { return noise_variance_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// Every training point predicted from those at all other joint vectors: mean, m, and posterior
-  /// over prior variance of the function. For the points p of one joint vector, Rasmussen &
-  /// Williams, eqs. 5.10-5.12, with a block of K⁻¹ instead of its diagonal: μ_p = y_p - [K⁻¹]_pp⁻¹
-  /// [K⁻¹ y]_p, Σ_p = [K⁻¹]_pp⁻¹ (noise included).
+  /// Prediction of every training point from those at all other joint vectors: mean, m, and the
+  /// ratio of posterior to prior variance of the function. For the points p of one joint vector it
+  /// uses Rasmussen & Williams, eqs. 5.10-5.12, with a block of K⁻¹ instead of its diagonal: μ_p =
+  /// y_p - [K⁻¹]_pp⁻¹ [K⁻¹ y]_p, Σ_p = [K⁻¹]_pp⁻¹ (noise included).
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
   /// Variance of the measurement of every training point given those at all other joint vectors,
@@ -178,13 +177,13 @@ class GaussianProcess {
   // Leaves out the points of each joint vector together.
   void leave_poses_out();
   void compress(Eigen::Index at_most);
-  // Chooses what variances are served from, by what it makes of the points left out and at the rows
-  // of `q`.
+  // Chooses the points for served variances. It tests them at left-out points and at the rows of
+  // `q`.
   void make_served(const Eigen::MatrixXd& q, bool as_part);
   [[nodiscard]] NearPoints near_points(Eigen::Index count) const;
-  // The most that few points may leave where all leave `left`.
+  // The most variance that few points may leave where all points leave `left`.
   [[nodiscard]] Eigen::VectorXd at_most(const Eigen::VectorXd& left, bool as_part) const;
-  // True if so many near points leave at most this at the points when they are left out, and at the
+  // True if `count` near points leave at most the given variance, at left-out points and at the
   // rows of `asked`.
   [[nodiscard]] bool near_is_enough(Eigen::Index count, const Eigen::VectorXd& most_of_points,
                                     const FeatureBlock& asked, const Eigen::VectorXd& most) const;
@@ -201,7 +200,7 @@ class GaussianProcess {
   AlignedMatrix weights_;             // M⁻¹ y
   Eigen::VectorXd inverse_diagonal_;  // of M⁻¹
   double log_det_ = 0;                // of M
-  VarianceTable exact_;  // of all points; empty where only what variances are computed from is kept
+  VarianceTable exact_;  // of all points; empty if only the data for served variances are kept
   std::optional<VarianceTable> compressed_;
   Eigen::Index near_ =
       0;  // points that a target's variance is computed from; 0: not from near ones

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 constexpr Index kPanel = 48;  // candidates at a time: their columns are computed together
 constexpr double kPanelShare =
-    0.25;  // of the variance that the best candidate explains: below it a new panel is better
+    0.25;  // share of the variance that the best candidate explains: below it a new panel is better
 
 AlignedMatrix gathered(const AlignedMatrix& features, const std::vector<Index>& rows) {
   AlignedMatrix table(padded_rows(static_cast<Index>(rows.size())), features.cols());

@@ -8,9 +8,9 @@
 #include "server/bias/process/variance_table.h"
 #include "server/numerics/aligned_matrix.h"
 
-/// A Gaussian process approximated by a few of its points, u. What they do not explain of the rest
-/// counts as unknown and independent of the data (deterministic training conditional;
-/// Quiñonero-Candela & Rasmussen, JMLR 6, 2005).
+/// A Gaussian process approximated by a few of its points, u. The part of the other points that u
+/// does not explain counts as unknown and independent of the data (deterministic training
+/// conditional; Quiñonero-Candela & Rasmussen, JMLR 6, 2005).
 namespace trammel {
 
 /// Points that leave at most `tolerance` of the prior variance of any point unexplained, the most

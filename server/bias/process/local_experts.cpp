@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostExact = 5000;  // an exact process of so many takes 100 MB for each output, of
-                                    // twice as many four times that
+constexpr Index kMostExact = 5000;  // an exact process of so many takes 100 MB per output; twice as
+                                    // many points take four times that
 constexpr Index kMostOfAnExpert =
     1200;  // neighbours: twice as many take twice the time and leave a tenth less (decision 28)
 constexpr double kKnownExactly =

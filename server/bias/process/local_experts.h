@@ -7,29 +7,29 @@
 
 namespace trammel {
 
-/// One output with any number of points. Up to 5000 it is one exact process. Beyond, it is several
-/// exact processes of neighbouring points with the same hyperparameters, the experts, joined by the
-/// robust Bayesian committee machine (Deisenroth & Ng, ICML 2015): with β_k = ½ log(prior variance
-/// / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior. All experts predict everywhere, so the
-/// prediction is as smooth as theirs; where none knows anything it is the prior. Immutable,
-/// thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
+/// One output with any number of points. Up to 5000 points it is one exact process. Beyond, it is
+/// several exact processes of neighbouring points with common hyperparameters, the experts. The
+/// robust Bayesian committee machine joins them (Deisenroth & Ng, ICML 2015): with β_k = ½
+/// log(prior variance / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior. All experts predict
+/// everywhere, so the prediction is as smooth as theirs. Far from all data it is the prior.
+/// Immutable, thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
 class LocalExperts {
  public:
-  /// Empty when a covariance is not positive definite. `form`: of a single process; that of several
-  /// is kCompressed, for their variances decide the mean.
+  /// Empty if a covariance is not positive definite. `form` applies to a single process. Several
+  /// processes use kCompressed, since their variances decide the mean.
   [[nodiscard]] static std::optional<LocalExperts> condition(
       const std::shared_ptr<const Kernel>& kernel, const Eigen::MatrixXd& q,
       const Eigen::VectorXd& y, const Eigen::VectorXd& noise_shape,
       const GpHyperparameters& hyperparameters, VarianceForm form = VarianceForm::kLearned);
 
-  /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the
-  /// expert that knows it best. without() takes points out of their experts, and drops an expert
-  /// without points.
+  /// The same functions as in GaussianProcess, in m² operations for each point. with() gives each
+  /// point to the expert that knows it best. without() removes points from their experts, and drops
+  /// an expert without points.
   [[nodiscard]] std::optional<LocalExperts> with(const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                  const Eigen::VectorXd& noise_shape) const;
   [[nodiscard]] LocalExperts without(const std::vector<Eigen::Index>& points) const;
 
-  /// As GaussianProcess has it; empty with more than one expert.
+  /// As GaussianProcess::left_out_error(); empty with more than one expert.
   [[nodiscard]] std::optional<Eigen::VectorXd> left_out_error(
       const Eigen::VectorXd& y, const std::vector<Eigen::Index>& points) const {
     if (experts_.size() > 1) return std::nullopt;

@@ -8,16 +8,16 @@
 
 namespace trammel {
 
-/// Weights of the points near a target in its mean, Σ weights y; they are (R + noise)⁻¹ r of
+/// Weights of the points near a target in its mean, Σ weights y: the vector (R + noise)⁻¹ r of
 /// these points.
 struct NearWeights {
   std::vector<Eigen::Index> points;  ///< rising
   Eigen::VectorXd weights;
 };
 
-/// The variance that the points leave which a target has most in common with. Fewer points know
-/// less, so it is never below the variance that all points leave. Nothing is kept for it. Refers to
-/// what it is made of.
+/// The variance of a target given the points with the largest covariance with it. Fewer points know
+/// less, so it is never below the variance given all points. It stores nothing of its own, and
+/// refers to its arguments.
 struct NearPoints {
   static constexpr Eigen::Index kMost = 48;
 
@@ -31,9 +31,9 @@ struct NearPoints {
   /// σ_f².
   [[nodiscard]] AlignedMatrix covariance_with(const FeatureBlock& target) const;
 
-  /// The variance that is left of `prior`, that of a target without data, in units of σ_f².
-  /// `covariance`: the target's with each point; minus infinity takes a point out. Tells the points
-  /// and their weights, too, where it is asked for them.
+  /// The variance left of `prior`, the variance of a target without data, in units of σ_f².
+  /// `covariance` is that of the target with each point; minus infinity excludes a point. On
+  /// request it also returns the points and their weights.
   [[nodiscard]] double left_of(const AlignedMatrix& covariance, double prior,
                                NearWeights* weights = nullptr) const;
 };

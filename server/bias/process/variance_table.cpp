@@ -10,8 +10,8 @@ namespace trammel {
 
 using Eigen::Index;
 
-// The last rows first. Columns to the right of a row are not needed for the rows above, and their
-// memory is given back: there is never more than one matrix and one triangle.
+// Packs the last rows first. Columns to the right of a row are not needed for the rows above, so
+// their memory is freed, and at most one matrix and one triangle exist at a time.
 VarianceTable::VarianceTable(PointFeatures features, Index size, AlignedMatrix root)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
   const Numerics& n = numerics();

@@ -15,7 +15,7 @@ struct PosteriorVariance {
   double prior;
 };
 
-/// Features of points, padded; shared by all that computes with these points.
+/// Features of points, padded. All computations with these points share them.
 using PointFeatures = std::shared_ptr<const AlignedMatrix>;
 
 /// The variance that some points leave: prior - |G k(points, x)|², G lower triangular.

@@ -18,12 +18,11 @@ using Eigen::VectorXd;
 // Points of each stage. Cheap stages do most of the work, so that few evaluations on all points are
 // enough.
 constexpr double kStartShare =
-    0.125;  // of all points, for the first searches; kStartPoints at least
-constexpr Index kCarryPoints =
-    300;  // to which the first optima are carried: they judge them by leave-one-out
+    0.125;                           // of all points, for the first searches; kStartPoints at least
+constexpr Index kCarryPoints = 300;  // for the first optima, which are then judged by leave-one-out
 constexpr double kCarryShare = 0.45;  // of all points, for the stage before the last
 constexpr Index kCurvaturePoints =
-    1000;  // at most, to difference the curvature on: more points show the same
+    1000;  // at most, for finite differences of the curvature: more points show the same
 constexpr Index kMostSearched = 2500;  // more points would take longer than the last nats are worth
 constexpr Index kFinerPoints =
     400;  // at least, to look for finer length scales: fewer cannot show them
@@ -90,7 +89,7 @@ class Search {
   }
 
  private:
-  // On few points the fine influence of a joint looks like noise, and no start finds it. Where more
+  // On few points a fine influence of a joint looks like noise, and no start finds it. If more
   // noise is left than the instrument has, one search on more points tries shorter length scales.
   void look_finer(ProfiledLikelihood* likelihood, std::vector<Optimum>* rivals) {
     const Optimum& best = rivals->front();
@@ -113,16 +112,15 @@ class Search {
     return log_noise(optimum) - std::log(prior_.noise_stddev);
   }
 
-  // A function that is finer than the spacing of few points shows on many points only, and joints
-  // of weak influence hide each other. Where much noise is left, this tries all joints fine at
-  // once. Then, until nothing gains, it tries all weak joints without influence at once, and each
-  // joint without influence with a fine one.
+  // A function finer than the spacing of few points shows on many points only, and joints of weak
+  // influence hide each other. So if much noise is left, this tries fine length scales for all
+  // joints at once. Then it tries to remove all weak joints at once, and to give a fine scale to
+  // each joint without influence, until neither gains.
   Optimum looked_around(Index d, const Optimum& from, double share_before, double share_after) {
     ProfiledLikelihood many = likelihood(std::min(all(), kAroundPoints), d, 1);
     Optimum best = counted(searched(&many, from.x, {.max_evaluations = 1}), many);
-    double left =
-        share_after -
-        share_before;  // how many tries there will be is unknown: each takes a tenth of the rest
+    double left = share_after - share_before;  // the number of tries is unknown in advance, so each
+                                               // takes a tenth of the rest
     const auto worthwhile = [&] {
       return !result_.given_up && unexplained_noise(best) >= kUnexplainedNoise;
     };
@@ -216,7 +214,8 @@ class Search {
     return different(std::move(found), kCarried);
   }
 
-  // By likelihood, without those that predict left-out points clearly worse than another.
+  // The optima by likelihood, without those that predict left-out points clearly worse than
+  // another.
   std::vector<Optimum> carried(std::vector<Optimum> candidates) {
     ProfiledLikelihood medium = likelihood(std::min(all(), kCarryPoints), 0, data_.y.cols());
     std::vector<double> leave_one_out;

@@ -13,14 +13,14 @@ struct SearchOptions {
   std::function<bool(double)>
       progress;  ///< told the share done, in [0, 1]; returns false to give up
   std::vector<GpHyperparameters>
-      last;  ///< where given, one for each output: refined, and there are no other starts
+      last;  ///< if given, one for each output: the search refines these and has no other starts
 };
 
 struct SearchResult {
   std::vector<GpHyperparameters> outputs;
   int starts_at_best = 0;  ///< starts that ended within kSameOptimum of the best on the subset
   int evaluations = 0;     ///< on the largest set of points
-  bool given_up = false;   ///< `progress` returned false; nothing else is set
+  bool given_up = false;   ///< `progress` returned false; no other member is set
 };
 
 /// The most probable hyperparameters.

@@ -18,7 +18,7 @@ constexpr double kSameParameters =
 constexpr double kHopeless =
     30.0;  // nat behind the best on the same points: more points will not make up for it
 constexpr double kOtherKind = 0.7;    // in logs of the noise: half or twice as much
-constexpr double kDifference = 0.02;  // in logs: a step over which a curvature stays the same
+constexpr double kDifference = 0.02;  // in logs: a step over which a curvature is constant
 
 bool same(const Optimum& a, const Optimum& b) {
   return std::abs(a.value - b.value) < kSameOptimum ||

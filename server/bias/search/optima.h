@@ -28,8 +28,8 @@ void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now);
 /// True if one takes clearly more of the data for noise than the other.
 [[nodiscard]] bool other_kind(const Optimum& a, const Optimum& b);
 
-/// The different ones, best first, `most` at most, without those that cannot win any more. One more
-/// where the best of the other kind (other_kind()) would be missing.
+/// The different optima, best first, at most `most`, without hopeless ones. It adds one more if the
+/// best of the other kind (other_kind()) would be missing.
 [[nodiscard]] std::vector<Optimum> different(std::vector<Optimum> optima, std::size_t most);
 
 }  // namespace trammel

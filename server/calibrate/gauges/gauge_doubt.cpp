@@ -23,7 +23,7 @@ using CellPtr = std::shared_ptr<const Cell>;
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 constexpr double kFarRow = 0.1;  // m: no drawing is so far off at a single row
 constexpr double kAsked = 3;     // times the stated sigma, for touches: a larger misfit starts the
-                              // search for another reading
+                                 // search for another reading
 constexpr double kMuchBetter = 0.2;  // share of the misfit as given, relative to the spread of the
                                      // values; below it the other reading was surely meant
 

@@ -15,7 +15,7 @@ namespace {
 
 bool is_sure(const BudgetNumber& number) { return std::abs(number.value) > number.u95; }
 
-/// True if somebody would put the line right: it stands out, or it is a zero that the poses tell.
+/// True if a person would repair the line: it stands out, or it is a zero that the poses determine.
 bool is_to_put_right(const BudgetLine& line) {
   if (!line.value) return false;
   return !line.action.empty() || (line.kind == LineKind::kJointZero && is_sure(*line.value) &&

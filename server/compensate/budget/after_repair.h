@@ -16,7 +16,7 @@ struct LineOutcome {
     kPutRight,    ///< no longer beyond its U, or beyond what is usual
     kPartly,      ///< nearer to the drawing than before
     kTooFar,      ///< beyond the drawing to the other side
-    kNotMoved,    ///< it stands where it stood
+    kNotMoved,    ///< it is where it was
     kWrongWay,    ///< farther off than before
     kCannotTell,  ///< these poses do not tell it so well as it was off
   };
@@ -33,7 +33,7 @@ struct AfterRepair {
   ErrorBudget before, now;     ///< of both models, at the poses after the repair
   ModelDifference difference;  ///< now minus before
   std::vector<LineOutcome>
-      lines;  ///< those that stood out before, and lost zeros; the largest first
+      lines;  ///< lines that stood out before, and lost zeros; the largest first
 };
 
 /// `before` and `now` are of one drawing; `poses` are not empty, and both models know their tools
@@ -41,7 +41,7 @@ struct AfterRepair {
 [[nodiscard]] AfterRepair after_repair(const CompensatedModel& before, const CompensatedModel& now,
                                        const std::vector<PoseContext>& poses);
 
-/// For people: the whole error before and now, what became of each line, then what else moved.
+/// For people: the whole error before and now, the outcome of each line, and the other changes.
 [[nodiscard]] std::vector<std::string> in_words(const AfterRepair& repair, int most = 6);
 
 }  // namespace trammel

@@ -38,7 +38,7 @@ void add(const ModelParts& parts, double sign, CalibrationResult& between) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     double& value = between.model.values(places[i]);
     const double own = parts.physics.values(static_cast<Eigen::Index>(i));
-    // The order of a ripple says where it is: a difference of two ripples has the order of the
+    // The order of a ripple gives its place. A difference of two ripples keeps the order of the
     // newer one.
     if (!parameters[i].is_place) value += sign * own;
     if (parameters[i].is_place && value == 0) value = own;
@@ -48,7 +48,7 @@ void add(const ModelParts& parts, double sign, CalibrationResult& between) {
   }
 }
 
-/// The arm whose errors are what is between the two.
+/// An arm whose errors are the difference between the two models.
 CalibrationResult between(const ModelParts& before, const ModelParts& now) {
   CalibrationResult result;
   result.model = now.physics;
@@ -91,7 +91,7 @@ std::vector<ParameterDifference> parameters_of(const CalibrationResult& found,
   return all;
 }
 
-/// kg, of the payload `id`: as its cell has it, and what was identified beyond it.
+/// kg, of the payload `id`: the cell's value plus the identified correction.
 BudgetNumber mass_of(const ModelParts& parts, const std::string& id) {
   BudgetNumber mass{"mass", 0, 0, "kg"};
   const auto payload = parts.physics.cell->payloads.find(id);
@@ -104,7 +104,7 @@ BudgetNumber mass_of(const ModelParts& parts, const std::string& id) {
   return mass;
 }
 
-/// Adds what the newer arm does otherwise because it carries something else than the older one.
+/// Adds the part of the difference that comes from another load on the arm.
 void add_load(const ModelParts& before, const ModelParts& now, PredictedDifference& predicted) {
   const PhysicalModel as_before = with_load_of(now.physics, before.physics);
   Eigen::Matrix3Xd load(3, std::ssize(predicted.poses));
@@ -125,7 +125,9 @@ void add_load(const ModelParts& before, const ModelParts& now, PredictedDifferen
 ModelDifference difference_between(const CompensatedModel& before, const CompensatedModel& now,
                                    const std::vector<PoseContext>& at) {
   std::vector<PoseContext> poses = at;
-  for (PoseContext& pose : poses) pose.served = true;  // what began at a training pose has happened
+  for (PoseContext& pose : poses)
+    pose.served = true;  // changes that began at a training pose have
+                         // happened
   const CalibrationResult found = between(before.parts(), now.parts());
   ModelDifference difference;
   difference.parameters = parameters_of(found, before.parts().physics, now.parts().physics);

@@ -19,15 +19,17 @@ struct ParameterDifference {
 };
 
 struct ModelDifference {
-  std::vector<ParameterDifference> parameters;  ///< those of `now`, then those of `before` alone
-  /// The predicted poses of `now` minus those of `before`, line by line; `error_rms` is of that
-  /// difference. Nothing is left beyond the two models, so it has no steps to put right.
+  std::vector<ParameterDifference> parameters;  ///< parameters of `now`, then those of `before`
+                                                ///< alone
+  /// The predicted poses of `now` minus those of `before`, line by line; `error_rms` is that of the
+  /// difference. The two models explain the difference completely, so there are no steps to put
+  /// right.
   ErrorBudget budget;
   std::vector<Vector3> moved_B;  ///< m, of each pose, seen from the base
 };
 
-/// `before` and `now` are of one drawing; `poses` are not empty. What both models learned from the
-/// same measurements counts as independent in U: it is then too large.
+/// `before` and `now` have the same drawing; `poses` are not empty. Measurements that both models
+/// learned from count as independent in U, so U is then too large.
 [[nodiscard]] ModelDifference difference_between(const CompensatedModel& before,
                                                  const CompensatedModel& now,
                                                  const std::vector<PoseContext>& poses);

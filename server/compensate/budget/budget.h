@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-/// Where the millimetres come from: the error of an arm, from its drawing to what is left, a line
-/// for each thing that a person can point at. server/compensate/budget/README.md derives the
-/// arithmetic.
+/// The origin of the millimetres: the error of an arm from its drawing to the remaining residual,
+/// with one line for each thing that a person can point at. server/compensate/budget/README.md
+/// derives the arithmetic.
 namespace trammel {
 
 /// The kind of a line of the budget.
@@ -20,9 +20,9 @@ enum class LineKind {
   kJointCompliance,
   kCause,       ///< a further cause of the catalogue
   kLearned,     ///< the bias
-  kTogether,    ///< what the lines do together beyond what each does alone
-  kUntold,      ///< what these poses cannot tell
-  kRest,        ///< what the model leaves, beyond the noise of the instrument
+  kTogether,    ///< the joint effect of the lines beyond the sum of the single ones
+  kUntold,      ///< combinations that these poses do not determine
+  kRest,        ///< the model's residual beyond the noise of the instrument
   kInstrument,  ///< the stated noise of the instrument
 };
 /// As JSON and the wire spell it: `joint_zero`.
@@ -32,7 +32,7 @@ enum class LineKind {
 
 /// A number of a line, in the unit that people read.
 struct BudgetNumber {
-  std::string name;  ///< as the model has it: `q4`
+  std::string name;  ///< the model's name: `q4`
   double value = 0;
   double u95 = 0;  ///< U(k = 2)
   std::string unit;
@@ -48,16 +48,17 @@ struct BudgetLine {
   std::string name;   ///< for people: `the zero of joint 4`
   std::optional<BudgetNumber>
       value;  ///< the one number of the line, the largest of a link; a distance for a place
-  std::vector<BudgetNumber> numbers;  ///< of a line with several, each of them
-  double alone_rms = 0;               ///< m, of the poses: what the line does to them
+  std::vector<BudgetNumber> numbers;  ///< all numbers of a line with several
+  double alone_rms = 0;               ///< m, at the poses: the effect of the line by itself
   double alone_max = 0;               ///< m
   double share = 0;          ///< of the mean square error; may be negative; all lines add to 1
-  double left_if_right = 0;  ///< m rms: what is left of the error if only this line were put right
-  std::optional<double> times_usual;  ///< the value over what arms of this kind show
+  double left_if_right = 0;  ///< m rms: the remaining error if only this line were put right
+  std::optional<double> times_usual;  ///< the value over the usual size for arms of this kind
   std::vector<std::string>
-      with;                   ///< lines that the poses cannot tell from it: they are counted here
-  std::string action;         ///< what to do; empty: nothing stands out
-  std::string since_session;  ///< of a change between sessions: the first that has it; else empty
+      with;            ///< lines that the poses cannot distinguish from it; they are counted here
+  std::string action;  ///< the repair; empty: nothing stands out
+  std::string since_session;  ///< for a change between sessions: the first session with it; else
+                              ///< empty
   [[nodiscard]] std::string cause_or_kind() const;
 };
 
@@ -80,8 +81,8 @@ struct PutRight {
 struct ErrorBudget {
   int poses = 0;
   BudgetView as_it_stands;
-  /// The view of the error that touching base and tool frames would leave: the best fit of both to
-  /// the error is taken out of it and of every line. Lines of frames do not stand here.
+  /// The view of the error that remains after touching base and tool frames: the best fit of both
+  /// to the error is removed from it and from every line. Lines of frames are absent here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
   /// The changes of the arm between several sessions, each line at the poses where it

@@ -26,7 +26,8 @@ std::string joined(const std::vector<std::string>& all) {
   return fmt::format("{}", fmt::join(all, ", "));
 }
 
-/// By how much a frame is turned; its uncertainty along its axis, of numbers that stand alone.
+/// The angle by which a frame is turned, with its uncertainty along the axis. The numbers count as
+/// independent.
 std::optional<BudgetNumber> turn_of(const BudgetLine& line) {
   if (line.kind != LineKind::kBase && line.kind != LineKind::kTool) return std::nullopt;
   double square = 0, variance = 0;
@@ -96,7 +97,7 @@ std::vector<std::string> difference_in_words(const ModelDifference& difference, 
   std::vector<std::string> text;
   for (BudgetLine line : difference.budget.beyond_frames.lines) {
     if (line.alone_rms <= 0 || most-- <= 0) continue;
-    line.action.clear();  // of a difference nothing can be told to be far beyond what is usual
+    line.action.clear();  // a difference has no usual size that it could exceed
     text.push_back(sentence(line));
   }
   return text;

@@ -11,18 +11,19 @@ namespace trammel {
 namespace {
 
 constexpr double kNothingTold =
-    0.1;  // of one comparison size: a direction with less is not told by the poses
-constexpr double kPartner = 0.3;      // of the effect: a parameter with more is a partner
-constexpr double kBeyondChance = 3;   // standard deviations
-constexpr double kPull = 0.05;        // of what two frames do apart: together they do less
+    0.1;  // of one comparison size: the poses do not determine a direction with less
+constexpr double kPartner = 0.3;     // of the effect: a parameter with more is a partner
+constexpr double kBeyondChance = 3;  // standard deviations
+constexpr double kPull = 0.05;  // share of the single effects of two frames: together they do less
+                                // than this
 constexpr double kOneNumber = 0.999;  // a correlation: apart 20 times worse than together
 constexpr int kSteps = 2;             // of Gauss-Newton: the change of the datum is small
 constexpr double kMatched = 1e-7;     // m
 constexpr double kLaterJoint =
     1e-6;  // of two equal candidates the later joint counts as being on its drawing
 
-/// The information of the measurements about the parameters that were identified, F x F in units of
-/// `sizes`: the inverse of the covariance without what the priors said.
+/// The information of the measurements about the identified parameters, F x F in units of `sizes`:
+/// the inverse of the covariance without the information of the priors.
 struct Told {
   std::vector<Eigen::Index> free;  // places among the model's P
   Eigen::MatrixXd information;
@@ -59,8 +60,8 @@ Eigen::MatrixXd untold_directions(const Eigen::MatrixXd& information) {
   return solved.eigenvectors().leftCols(count);
 }
 
-/// The R parameters that count as being on their drawing: those with the largest parts in what is
-/// not told.
+/// The R parameters that count as being on their drawing: they have the largest parts in the
+/// undetermined directions.
 std::vector<Eigen::Index> chosen(const Eigen::MatrixXd& untold) {
   Eigen::MatrixXd rows = untold.transpose();
   for (Eigen::Index k = 0; k < rows.cols(); ++k)
@@ -110,8 +111,8 @@ void match(PhysicalModel& model, const std::vector<Eigen::Index>& kept,
   }
 }
 
-/// Draws what the measurements hardly tell towards the drawing, as far as it is not beyond chance,
-/// and sets the covariance of what is kept.
+/// Shrinks weakly determined values towards the drawing if they are not beyond chance, and sets the
+/// covariance of the kept ones.
 void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& sizes,
             const Eigen::MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
@@ -130,8 +131,9 @@ void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::Ve
   datum.covariance(kept, kept) = root * variance.asDiagonal() * root.transpose();
 }
 
-/// Widens the variance of each kept parameter by what is left at the poses that tell it, beside
-/// what is left on average. As many numbers as twice the parameters must have been measured.
+/// Widens the variance of each kept parameter by the residual at the poses that determine it,
+/// relative to the average residual. It needs at least twice as many measured numbers as
+/// parameters.
 void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
            const std::vector<PoseContext>& poses, const Eigen::Matrix3Xd& left) {
   const double whole = left.squaredNorm();
@@ -150,7 +152,8 @@ void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
   datum.covariance(kept, kept) = wider.asDiagonal() * C * wider.asDiagonal();
 }
 
-/// Pairs of which the poses tell one number: each of the two is known far worse than that.
+/// Finds pairs for which the poses determine one number: each of the two alone is far less certain
+/// than that number.
 void pair_up(Datum& datum, const std::vector<Eigen::Index>& kept) {
   const Eigen::VectorXd stddev = datum.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   for (std::size_t a = 0; a < kept.size(); ++a)
@@ -178,9 +181,9 @@ std::vector<Eigen::Index> shifts_of_frames(const PhysicalModel& model,
   return shifts;
 }
 
-/// Takes out shifts of base and tools that do nearly nothing together where each alone does much:
-/// of a tool that is always held one way. The model leaves more (`left`, 3 x N, m) than they do, so
-/// that no number of poses makes a measurement of them.
+/// Removes shifts of base and tools that nearly cancel each other although each alone has a large
+/// effect, as with a tool that is always held one way. The model's residual (`left`, 3 x N, m) is
+/// larger than their joint effect, so more poses would not measure them.
 void take_out_pulls(Datum& datum, const std::vector<Eigen::Index>& kept,
                     const Eigen::VectorXd& sizes, const std::vector<PoseContext>& poses,
                     const Eigen::Matrix3Xd& left) {
@@ -210,7 +213,7 @@ void take_out_pulls(Datum& datum, const std::vector<Eigen::Index>& kept,
   }
 }
 
-/// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that
+/// The parameters with the same effect as `untold` (a direction of all P, SI), except the one that
 /// it is named after.
 std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index named,
                                    const std::vector<Eigen::Index>& not_among,
@@ -243,8 +246,8 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
     if (!is_gone) kept_of_free.push_back(k);
   }
   if (!gone.empty()) {
-    // Along what is not told the poses stay as they are, to first order: the chosen parameters go
-    // to their drawing.
+    // The undetermined directions do not move the poses, to first order. Along them the chosen
+    // parameters move to their drawing.
     Eigen::MatrixXd of_gone(std::ssize(gone), untold.cols());
     for (Eigen::Index r = 0; r < of_gone.rows(); ++r)
       of_gone.row(r) = untold.row(gone[static_cast<std::size_t>(r)]);

@@ -4,19 +4,19 @@
 
 #include "server/calibrate/calibration.h"
 
-/// Inside of the room: which of all parameter values that predict the same poses a budget speaks
-/// of.
+/// Inside of the room: many parameter values predict the same poses; the datum chooses the ones
+/// that a budget reports.
 namespace trammel {
 
-/// Values and covariance of a model in the datum of the budget. What the poses cannot tell apart is
-/// counted once: of the parameters of such a combination, those that are smallest beside what is
-/// usual count as being on their drawing, and the others take what they would have. Frames take
-/// what they can.
+/// Values and covariance of a model in the datum of the budget. Parameters that the poses cannot
+/// distinguish are counted once. In such a combination, the parameters that are smallest relative
+/// to their usual size count as being on their drawing, and the others take over their effect.
+/// Frames take as much as they can.
 struct Datum {
   PhysicalModel model;         ///< with the values of the datum
   Eigen::MatrixXd covariance;  ///< P x P, SI, of these values; 0 where `on_drawing`
-  /// A parameter that counts as being on its drawing, and those that the poses cannot tell from it;
-  /// none: the poses do not show it at all.
+  /// A parameter that counts as being on its drawing, and its partners, which the poses cannot
+  /// distinguish from it. No partners: the poses do not show it at all.
   struct OnDrawing {
     Eigen::Index parameter = 0;
     std::vector<Eigen::Index> with;
@@ -33,9 +33,10 @@ struct Identified {
   const std::vector<IdentifiedParameter>& parameters;
   const Eigen::MatrixXd& covariance;  ///< P x P, SI
 };
-/// `poses`: those of the budget. What the measurements tell is taken from the covariance. `left`: 3
-/// x N, m, in W, what the physics leaves at these poses: where that is larger at the poses that
-/// tell a parameter than at others, its variance is larger, too (White 1980). Null: not measured.
+/// `poses` are those of the budget. The covariance gives the information of the measurements.
+/// `left`: 3 x N, m, in W, the residual of the physics at these poses. Where it is larger at the
+/// poses that determine a parameter than elsewhere, the parameter's variance is larger, too (White
+/// 1980). Null: not measured.
 [[nodiscard]] Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses,
                              const Eigen::Matrix3Xd* left = nullptr);
 

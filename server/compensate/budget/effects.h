@@ -14,7 +14,7 @@ struct Effects {
   std::vector<Eigen::Matrix3Xd> lines;  ///< of each item: the model minus the model without it
   Eigen::Matrix3Xd learned;             ///< of the bias
   Eigen::Matrix3Xd rest;                ///< measured minus compensated
-  Eigen::Matrix3Xd together;            ///< what is then missing: lines that act on one another
+  Eigen::Matrix3Xd together;            ///< the remainder, because lines act on one another
 };
 /// Measured minus predicted, 3 x N, m, in W: by the drawing, by the physics as identified, and with
 /// the bias.
@@ -25,13 +25,12 @@ struct LeftAt {
                                  const std::vector<BudgetItem>& items,
                                  const MeasurementBatch& positions);
 
-/// The effect of all `items` together: the model minus the model in which all of them are on their
-/// drawing.
+/// The effect of all `items` together: the model minus the model with all of them on their drawing.
 [[nodiscard]] Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model,
                                              const std::vector<const BudgetItem*>& items,
                                              const MeasurementBatch& positions);
 
-/// Takes out of 3 x N vectors at poses what a small motion of the base and of each tool could do.
+/// Removes from 3 x N vectors at poses the effect of small motions of the base and of each tool.
 class BeyondFrames {
  public:
   BeyondFrames(const PhysicalModel& model, const MeasurementBatch& positions);

@@ -39,7 +39,7 @@ Reading shown(const Parameter& parameter) {
 
 double u95(double variance) { return 2 * std::sqrt(std::max(variance, 0.0)); }
 
-/// A joint's zero is told as the controller counts: the joint stands at the angle shown plus this.
+/// A joint's zero in the controller's sign: the joint stands at the angle shown plus this.
 double counted(const BudgetItem& item, const Chain& robot) {
   return item.line.kind == LineKind::kJointZero ? robot.joint(item.line.joint).sign : 1.0;
 }
@@ -76,7 +76,8 @@ void add_values(const Datum& datum, const std::vector<Parameter>& parameters, Bu
   }
 }
 
-/// Judges whether a value is there at all, and far beyond what is usual; then says what to do.
+/// Judges whether a value is certain, and whether it is far beyond the usual size; then sets the
+/// repair.
 void judge(const Datum& datum, BudgetItem& item) {
   BudgetLine& line = item.line;
   const std::optional<double> usual = usual_value(item, datum.model);
@@ -98,9 +99,9 @@ void add_name(const std::string& name, std::vector<std::string>& names) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
 }
 
-/// Names a line that counts as being on its drawing where it is counted: beside its partners, or,
-/// where they have many or none, in one line of what is not told. A frame of which other numbers
-/// stand names its partners, too.
+/// Reports a line that counts as being on its drawing: beside its partners or, if it has many or
+/// none, in one line of undetermined combinations. A frame whose other numbers are counted names
+/// its partners, too.
 void name_partners(BudgetItem& item, const std::set<std::ptrdiff_t>& partners,
                    std::vector<BudgetItem>& items, BudgetLine& untold) {
   constexpr std::size_t kMostPartners = 2;
@@ -125,7 +126,7 @@ void name_all_of(const std::vector<Eigen::Index>& parameters, std::vector<Budget
                  items[static_cast<std::size_t>(one)].line.with);
 }
 
-/// Leaves out parameters that count as being on their drawing, and lines that have no other.
+/// Removes parameters that count as being on their drawing, and lines without any other parameter.
 void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold) {
   for (const Datum::OnDrawing& one : datum.on_drawing) {
     const std::ptrdiff_t own = item_with(items, one.parameter);
@@ -157,8 +158,8 @@ BudgetLine named(LineKind kind, std::string name) {
   return line;
 }
 
-/// A position tells three numbers. Where there are too few of them, says how many poses there must
-/// be at least; as many as there are numbers to tell leave enough beside.
+/// A position gives three numbers. If there are too few of them, the line states the fewest poses
+/// that are enough: as many numbers as there are parameters, with a margin.
 BudgetLine untold_line(const Identified& found, int poses) {
   const auto free = static_cast<int>((found.covariance.diagonal().array() > 0).count());
   std::string name = "what these poses cannot tell";
@@ -177,7 +178,7 @@ BudgetLine sized(BudgetLine line, const Eigen::Matrix3Xd& effect, const Eigen::M
   return line;
 }
 
-/// m², of a position: what the instrument says of its own noise.
+/// m², of a position: the noise that the instrument states.
 double stated_mean_square(const MeasurementBatch& positions, const Cell& cell) {
   double sum = 0;
   for (const Measurement& m : positions.measurements)
@@ -185,7 +186,7 @@ double stated_mean_square(const MeasurementBatch& positions, const Cell& cell) {
   return sum / static_cast<double>(positions.measurements.size());
 }
 
-/// Splits what is left into the noise that the instrument states and the rest.
+/// Splits the residual into the stated noise of the instrument and the rest.
 void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, double stated,
               BudgetView& view) {
   const double whole = mean_square(total);
@@ -211,7 +212,7 @@ struct ViewAsked {
   bool has_bias = false;
 };
 
-/// `seen` maps vectors at the poses to what of them counts.
+/// `seen` maps vectors at the poses to the part of them that counts.
 template <typename Seen>
 BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
   BudgetView view;
@@ -230,8 +231,8 @@ BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
                      return one.action.empty() == other.action.empty() ? one.share > other.share
                                                                        : other.action.empty();
                    });
-  // The effect of frames is out of every vector, so that their small remainder counts with what
-  // acts together.
+  // The effect of frames is removed from every vector, so their small remainder counts as joint
+  // effect.
   Eigen::Matrix3Xd together = asked.effects.together;
   for (std::size_t k = 0; k < asked.items.size(); ++k)
     if (!frames && is_frame(asked.items[k].line.kind)) together += asked.effects.lines[k];
@@ -248,8 +249,7 @@ std::vector<PoseContext> contexts_of(const MeasurementBatch& positions) {
   return contexts;
 }
 
-/// The residuals of `positions` by the drawing and by the physics; where nothing is learned, that
-/// is all.
+/// The residuals of `positions` by the drawing and by the physics, where nothing is learned.
 LeftAt left_by(const PhysicalModel& physics, const MeasurementBatch& positions) {
   const auto n = std::ssize(positions.measurements);
   LeftAt left{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
@@ -330,14 +330,14 @@ std::vector<BudgetLine> between_sessions(const PhysicalModel& model,
   return lines;
 }
 
-/// The facts that are told beside the parameters.
+/// Facts beside the parameters.
 struct ToldBeside {
   bool has_bias = false;
   Since since = {};
   const PredictedDifference* difference = nullptr;
 };
 
-/// Between two models whose arms carry something else, one line has all that follows from it.
+/// If the arms of the two models carry different loads, one line has the whole effect.
 void add_load(const PredictedDifference& difference, const PhysicalModel& model,
               std::vector<BudgetItem>& items, Effects& effects) {
   for (std::size_t k = items.size(); k-- > 0;) {
@@ -440,7 +440,7 @@ double alone_of_zero(const CompensatedModel& model, int joint, double by,
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return std::numeric_limits<double>::quiet_NaN();
   const PhysicalModel& physics = model.parts().physics;
-  // The zero moves its own axis alone, whatever else the controller moves with it.
+  // The zero moves its own axis alone, even if the controller couples other joints to it.
   JointVector gears = JointVector::Zero(physics.cell->robot.size());
   gears(joint) = by;
   const JointVector moved = physics.cell->robot.commanded(gears);

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// True if a budget can be told from such rows: some have a position, and not all of a tool stand
-/// at one place, where base, tool and zeros of the last joints do the same.
+/// True if such rows allow a budget: some have a position, and no tool has all its positions at one
+/// place. At one place, base, tool and zeros of the last joints have the same effect.
 [[nodiscard]] bool tells_a_budget(const MeasurementBatch& measured);
 
 /// `measured`: rows with positions in the world of the model (in_world_of()), checked against its
@@ -18,12 +18,12 @@ namespace trammel {
 /// The budget at targets, where the error is the predicted one: nothing is left beyond the model.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const std::vector<PoseContext>& targets);
-/// The budget of a calibration, at the poses that it was made from: nothing is learned beside it.
+/// The budget of a calibration, at its own poses; no bias is learned beside it.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& calibration,
                                        const MeasurementBatch& measured);
 
-/// The difference of two models' predictions, 3 x N, m, in W; `learned` of it is by what they
-/// learned beyond the physics.
+/// The difference between two models' predictions, 3 x N, m, in W. `learned` is the part of their
+/// biases.
 struct PredictedDifference {
   std::vector<PoseContext> poses;
   Eigen::Matrix3Xd all, learned;
@@ -31,12 +31,14 @@ struct PredictedDifference {
   Eigen::Matrix3Xd load;
   std::optional<BudgetNumber> load_change;  ///< of the mass, kg
 };
-/// The budget of the difference between two models, whose parameters differ by those of `between`.
+/// The budget of the difference between two models; `between` has the differences of their
+/// parameters.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& between,
                                        const PredictedDifference& predicted);
 
-/// m rms, at positions beyond what touching base and tool frames would take away: a joint's zero
-/// (0-based) that is off by `by`, rad (m of a rail). Not a number without poses.
+/// m rms: the effect of a joint's zero (0-based) that is off by `by`, rad (m for a rail), at
+/// positions beyond the part that touching base and tool frames would remove. Not a number without
+/// poses.
 [[nodiscard]] double alone_of_zero(const CompensatedModel& model, int joint, double by,
                                    const MeasurementBatch& measured);
 

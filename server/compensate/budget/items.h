@@ -14,7 +14,7 @@ struct BudgetItem {
   BudgetLine line;                   ///< with `line`, `kind`, `cause`, `joint` and `name`
   std::size_t source = 0;            ///< in PhysicalModel::sources
   std::vector<Eigen::Index> places;  ///< of its parameters, among the model's
-  bool whole_source = false;  ///< all that its source does: without it the source is not there
+  bool whole_source = false;  ///< the item is the complete source: without it the source is absent
 };
 
 /// For people: `the length of link 3 (a3)`.
@@ -28,12 +28,12 @@ struct BudgetItem {
 
 /// The model as it would be if this line were on its drawing.
 [[nodiscard]] PhysicalModel without(const PhysicalModel& model, const BudgetItem& item);
-/// The model without the sources that change what the arm carries (payload, balancer): what they do
-/// is counted in their own lines, and not once more in those of the gearboxes.
+/// The model without the sources that change the load of the arm (payload, balancer). Their effects
+/// are counted in their own lines, so the lines of the gearboxes must not contain them.
 [[nodiscard]] PhysicalModel with_told_load(const PhysicalModel& model);
 /// True if the source changes what the arm carries (payload, balancer).
 [[nodiscard]] bool changes_load(const ErrorSource& source);
-/// The model with what another model's arm carries: the payloads of its cell, and its sources that
+/// The model with the load of another model's arm: the payloads of its cell, and its sources that
 /// change the load.
 [[nodiscard]] PhysicalModel with_load_of(const PhysicalModel& model, const PhysicalModel& other);
 /// The place of `item` in with_told_load().

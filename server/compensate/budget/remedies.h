@@ -23,9 +23,9 @@ struct ZeroRemedy {
 /// `loads`.
 [[nodiscard]] bool is_of_step(const BudgetLine& line, std::string_view step);
 
-/// A number that is set in a step, and what is added to what is stated now.
+/// A number to set in a step, and the amount to add to its present value.
 struct RemedyValue {
-  std::string name;  ///< `joint 4`; else as the model has it
+  std::string name;  ///< `joint 4`; otherwise the model's name
   double add = 0, u95 = 0;
   std::string unit;
 };

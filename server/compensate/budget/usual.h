@@ -5,8 +5,8 @@
 /// The usual sizes by which a value is judged.
 namespace trammel {
 
-/// The size that a healthy arm does not exceed in about one of twenty cases, SI. Estimates of
-/// this project: no published table stands behind them.
+/// The size that a healthy arm exceeds in about one of twenty cases, SI. These are estimates of
+/// this project, without a published table.
 struct UsualSizes {
   double zero = 0, twist = 0;  ///< rad
   double rail_zero = 0;        ///< m
@@ -19,12 +19,12 @@ struct UsualSizes {
 /// base stands anywhere).
 [[nodiscard]] std::optional<double> usual_value(const BudgetItem& item, const PhysicalModel& model);
 
-/// The size by which parameters are compared when the poses cannot tell them apart, SI, one for
-/// each of the model's: what is usual for the arm; for frames far more, so that what a frame can
-/// take is counted as the frame's.
+/// The sizes by which parameters are compared if the poses cannot distinguish them, SI, one for
+/// each parameter of the model. For the arm they are the usual sizes. For frames they are far
+/// larger, so that a shared effect is counted as the frame's.
 [[nodiscard]] Eigen::VectorXd sizes_to_compare_by(const PhysicalModel& model);
 
-/// From so many times what is usual on, a line stands out.
+/// A line stands out from this multiple of the usual size on.
 inline constexpr double kStandsOut = 3;
 
 /// The advice for a line that stands out.

@@ -7,12 +7,13 @@
 namespace trammel::model_file {
 namespace {
 
-constexpr double kRigid = 1e-6;         // |RᵀR - 1|: rounding of what was rigid is far below
+constexpr double kRigid = 1e-6;         // |RᵀR - 1|: rounding of a rotation is far below
 constexpr double kMostStretched = 0.1;  // of a session's lengths: a tenth is no instrument's scale
 constexpr double kMostMetres = 1e6;     // of a frame: no cell is larger
-constexpr double kCorrelationRounding = 1e-6;  // of what was symmetric and positive semidefinite
+constexpr double kCorrelationRounding = 1e-6;  // of a matrix that was symmetric and positive
+                                               // semidefinite before rounding
 constexpr Eigen::Index kMostTrainingPoses =
-    20'000;                       // of one training: the memory of a bias grows with them
+    20'000;                       // of one training: the memory of a bias grows with their number
 constexpr double kMostLog = 200;  // of a hyperparameter: its square is still a number
 
 Status check_frame(const Pose& X, const std::string& name) {

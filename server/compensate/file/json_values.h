@@ -10,8 +10,8 @@
 
 #include "server/robot/pose.h"
 
-/// Numbers, matrices and poses as a model file holds them. What reads them throws exceptions of
-/// nlohmann; deserialize() (model_file.h) turns them into a refusal.
+/// Numbers, matrices and poses in the form of a model file. Their readers throw exceptions of
+/// nlohmann; deserialize() (model_file.h) turns these into a refusal.
 namespace trammel::model_file {
 
 using Json = nlohmann::json;

@@ -173,7 +173,7 @@ void read_sessions(const Json& content, ModelParts& parts) {
     parts.sessions_left_out.push_back({session.at("id"), session.at("why")});
 }
 
-/// The physics of this cell with the frames and values that a file gives.
+/// The physics of this cell with the frames and values from a file.
 Result<PhysicalModel> physics_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
   Result<PhysicalModel> physics =
       make_physical_model(cell, json.at("error_sources").get<std::vector<std::string>>());
@@ -343,8 +343,8 @@ std::string learned_of_coupled_joints(const ModelParts& parts) {
   return bias && bias->has("joint_map") && !robot.couplings().empty() ? parts.bias->kernel : "";
 }
 
-/// Once, causes of coupled joints were functions of the commanded angle on every arm, and files
-/// said nothing of it.
+/// Refuses files from before angle causes on coupled joints changed: they used the commanded angle
+/// on every arm, and files did not record this.
 Status check_angles(const Json& content, const std::string& where, const ModelParts& parts) {
   if (content.value("angles", "") == kAngles) return {};
   const std::string learned = learned_of_coupled_joints(parts);

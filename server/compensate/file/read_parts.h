@@ -8,10 +8,10 @@
 
 namespace trammel::model_file {
 
-/// The parts that `content` and `stamp` of a model file say (MODEL_FILE.md); `where` names the file
-/// in messages. Refuses a cell, a robot or error sources that this program does not know,
-/// parameters that are not those of the error sources, and a bias that would answer otherwise than
-/// it did. Throws exceptions of nlohmann where a key is missing or a value is of the wrong kind.
+/// The parts in `content` and `stamp` of a model file (MODEL_FILE.md); `where` names the file in
+/// messages. Refuses a cell, a robot or error sources that this program does not know, parameters
+/// that do not match the error sources, and a bias that would now answer differently. Throws
+/// exceptions of nlohmann if a key is missing or a value is of the wrong kind.
 [[nodiscard]] Result<ModelParts> parts_from(const nlohmann::json& content,
                                             const nlohmann::json& stamp, const std::string& where);
 

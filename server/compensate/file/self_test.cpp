@@ -20,7 +20,7 @@ struct TestPose {
   std::string tool, payload;
 };
 
-/// In the range of the training: its middle, and two more that lie elsewhere for each joint. Then
+/// Three poses in the range of the training: its middle, and two with each joint elsewhere. Then
 /// one beside the range.
 std::vector<TestPose> test_poses(const CompensatedModel& model) {
   const ModelParts& parts = model.parts();

@@ -67,7 +67,7 @@ Json json_of(const BiasState& bias) {
   return json;
 }
 
-/// One observation of a bias with blocks: all but its joints, and only what was recorded.
+/// One observation of a bias with blocks: all recorded values except the joints.
 Json json_of(const PoseContext& context) {
   Json json = {{"tool", context.tool}, {"payload", context.payload}, {"index", context.index}};
   if (context.time) json["time_s"] = *context.time;
@@ -205,7 +205,7 @@ void add_calibration(const ModelParts& parts, Json& content) {
   const std::vector<Parameter> drawn = parts.physics.parameters();
   for (std::size_t k = 0; k < drawn.size(); ++k) {
     const Parameter& used = parts.parameters[k].parameter;
-    if (!(used.prior_scale < drawn[k].prior_scale)) continue;  // as its source has it, or wider
+    if (!(used.prior_scale < drawn[k].prior_scale)) continue;  // equal to its source's, or wider
     content["parameters"][k]["prior"] = used.prior;
     content["parameters"][k]["prior_stddev"] = used.prior_scale;
   }

@@ -7,8 +7,8 @@
 
 namespace trammel::model_file {
 
-/// The `content` of a model file (MODEL_FILE.md): everything that decides what the model answers
-/// and where it comes from, except the moment it was made.
+/// The `content` of a model file (MODEL_FILE.md): all that decides the model's answers and states
+/// its origin, except the time when it was made.
 [[nodiscard]] nlohmann::json content_of(const ModelParts& parts);
 
 /// The `stamp`: when the model was made, and by which program.

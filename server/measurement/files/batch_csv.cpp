@@ -21,7 +21,7 @@ constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
 constexpr double kSigmaLimitMm =
     5;  // no instrument is worse, and micrometres read as millimetres are
 constexpr std::size_t kMostMeasurements =
-    100'000;  // of one file: five times what one training takes
+    100'000;  // rows of one file: five times the limit of one training
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
 const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
@@ -213,9 +213,8 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
   return measurement;
 }
 
-/// Gives the gauges that are told against another pose that pose, and takes out the rows that tell
-/// nothing themselves. Refuses one that is not there, and a row that tells nothing and that nobody
-/// names.
+/// Links each gauge that is read against another pose to that pose, and removes the rows that hold
+/// such a pose only. Refuses a missing pose, and a row without a value that no gauge refers to.
 Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& line_of_pose) {
   std::map<std::string, std::shared_ptr<const PoseContext>> named;
   for (Measurement& m : batch.measurements) {
@@ -289,8 +288,7 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
 
 namespace {
 
-/// A column of a table that has no header: our name of it, and by what its numbers are to be
-/// multiplied.
+/// A column of a table without a header: our name for it, and the factor for its numbers.
 struct ToldColumn {
   std::string name;  ///< empty: passed over
   double scale = 1;
@@ -311,7 +309,7 @@ ToldColumn told_column(const std::string& name) {
   return {name, 1};
 }
 
-/// The rows as the columns say: in our units, without those that are passed over.
+/// The rows in our units and columns, without the skipped columns.
 Result<std::vector<CsvTable::Row>> told_rows(const std::vector<CsvTable::Row>& rows,
                                              const std::vector<ToldColumn>& columns,
                                              const std::string& where) {
@@ -472,8 +470,8 @@ void add_circumstance_columns(const MeasurementBatch& batch, std::vector<Written
 
 namespace {
 
-/// The batch with the poses that gauges are told against and that tell nothing themselves, which
-/// are no measurements.
+/// Adds the reference poses of gauges to the batch as rows. Rows without a value are not
+/// measurements.
 MeasurementBatch with_named_poses(MeasurementBatch batch) {
   std::map<std::string, const PoseContext*> missing;
   for (const Measurement& m : batch.measurements) {

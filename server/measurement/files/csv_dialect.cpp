@@ -22,7 +22,7 @@ std::string_view without_mark(std::string_view text) {
   return text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text;
 }
 
-/// The first record of the text that is neither empty nor a comment, and what follows it.
+/// The first record of the text that is neither empty nor a comment, and the text behind it.
 struct Record {
   std::string_view text, rest;
 };

@@ -14,28 +14,27 @@ namespace trammel {
 /// how to export it.
 [[nodiscard]] Status check_is_text(std::string_view text, const std::string& where);
 
-/// Where a table begins, and what separates its values.
+/// The start of a table, and the separator of its values.
 struct CsvStart {
   char separator = ',';
   std::size_t skipped_bytes = 0;  ///< byte order mark, and a line `sep=;`
   int line = 1;                   ///< of the first byte that is not skipped
 };
 
-/// `,`, `;` or tab: what stands between the names of the header line. Where several of them do, the
-/// one that the first row has as often; `sep=;` as the first line says it. Characters in double
-/// quotes do not count, nor do tabs beside another separator, which are blanks. Refuses a header
-/// and a first row that leave several.
+/// Finds the separator of the header line: `,`, `;` or tab. If several occur, it is the one that
+/// occurs equally often in the first row; a first line `sep=;` decides. Characters in double quotes
+/// do not count. Tabs beside another separator count as blanks. Refuses a header and a first row
+/// that leave several candidates.
 [[nodiscard]] Result<CsvStart> start_of_csv(std::string_view text, const std::string& where);
 
 /// True if a column of this name holds quantities, as tables of measurements call them: `x_mm`,
 /// `Q1_DEG`, `Rx [deg]`, `qw`.
 [[nodiscard]] bool holds_quantities(std::string_view column);
 
-/// The sign before the decimals of a number: `,`, `.`, or nothing where it has none or is no
-/// number.
+/// The decimal sign of a number: `,` or `.`. Empty if the field has no decimals or is not a number.
 [[nodiscard]] std::optional<char> decimal_sign(std::string_view field);
 
-/// `1,5` as `1.5`; what has no decimal comma stays.
+/// `1,5` becomes `1.5`; a field without a decimal comma is unchanged.
 [[nodiscard]] std::string with_decimal_point(std::string_view field);
 
 }  // namespace trammel

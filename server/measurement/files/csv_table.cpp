@@ -337,8 +337,8 @@ std::optional<std::size_t> CsvTable::find(std::string_view column) const {
 
 namespace {
 
-/// Columns of which one was meant, by spelling or by what stands before the unit; empty where none
-/// looks like it.
+/// Lists the columns that a missing name may have meant: a similar spelling, or the same name with
+/// another unit. Empty if none is similar.
 std::string meant_by(const std::string& column, const std::vector<std::string>& columns) {
   std::vector<std::string> names;
   for (const std::string& name : columns) names.push_back(lower(name));

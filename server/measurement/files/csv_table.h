@@ -11,11 +11,10 @@
 
 namespace trammel {
 
-/// Text in columns with a header line: UTF-8 with or without byte order mark, lines ended by LF or
-/// CRLF, `#` lines are comments, fields may be quoted. Values are separated by `,`, `;` or tab, by
-/// what separates the names of the header (csv_dialect.h); with `;` or tab a number may have a
-/// decimal comma. Rows without any value are passed over. Rows are counted from 0, messages name
-/// the line in the file.
+/// Text in columns with a header line: UTF-8 with or without byte order mark, lines that end with
+/// LF or CRLF. `#` lines are comments, and fields may be quoted. The separator is `,`, `;` or tab,
+/// as found in the header (csv_dialect.h); with `;` or tab a number may have a decimal comma. Rows
+/// without any value are skipped. Rows are counted from 0; messages name the line in the file.
 class CsvTable {
  public:
   static constexpr std::size_t kMostRows = 1'000'000;
@@ -23,11 +22,11 @@ class CsvTable {
   static constexpr std::size_t kMostValues =
       5'000'000;  ///< of a table: each takes 32 bytes at least
 
-  /// Refuses what is no text, a text without header, a column without a name or named twice, a row
-  /// of another length than the header, an open quote, bytes that are not UTF-8, control
-  /// characters, and what may be read in two ways: commas between values and in numbers, decimal
+  /// Refuses binary data, a text without header, a column without a name or with a repeated name, a
+  /// row of another length than the header, an open quote, bytes that are not UTF-8, and control
+  /// characters. Refuses ambiguous texts: commas both between values and in numbers, or decimal
   /// points beside decimal commas. Refuses as kTooLarge more than `most_rows`, 1000 columns, 5
-  /// million values or 64 KiB in one value, while it reads and before it keeps them.
+  /// million values or 64 KiB in one value; it stops reading there and keeps nothing beyond.
   [[nodiscard]] static Result<CsvTable> parse(std::string_view text, std::string where,
                                               std::size_t most_rows = kMostRows);
   /// A row that another reader has split at `separator`. A table made of such rows has the same
@@ -45,8 +44,8 @@ class CsvTable {
   [[nodiscard]] std::size_t size() const { return rows_.size(); }
   [[nodiscard]] int line(std::size_t row) const { return rows_[row].line; }
 
-  /// The column of this name; where there is none, the only one that differs by upper and lower
-  /// case alone.
+  /// The column of this name. If there is none, the only column that differs from it in upper and
+  /// lower case alone.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
   /// Refuses a column that is missing; the error says which one is like it, and lists the columns
   /// of the file.

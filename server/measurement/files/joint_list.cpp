@@ -68,12 +68,12 @@ std::string to_csv(const JointList& list) {
 
 namespace {
 
-/// Refuses a list whose joints look like radians: all of them small, and many of them turned by
-/// several degrees.
+/// Refuses a list whose joints look like radians: all values are small, yet many joints should have
+/// turned by several degrees.
 Status check_degrees(const JointList& list, const Chain& robot) {
   constexpr std::size_t kFewestPoses = 6;
   constexpr int kFewestTurned =
-      4;  // joints: an arm with so many has no pose where all of them are near zero
+      4;                         // joints: an arm with more has no pose with all of them near zero
   constexpr double kTurned = 1;  // rad, or deg as read
   if (list.poses.size() < kFewestPoses) return {};
   int turned = 0;

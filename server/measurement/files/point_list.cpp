@@ -137,7 +137,7 @@ class PointReader {
         .beyond(*u, 0);
   }
 
-  /// Expanded uncertainties; nothing where they are 0 or not recorded.
+  /// Reads expanded uncertainties; sets none where they are 0 or not recorded.
   [[nodiscard]] Status read_u95(std::size_t row, NamedPoint& point) const {
     double square = 0;  // m², of the three axes together
     const std::vector<std::size_t> columns = !u95_axes_.empty() ? u95_axes_
@@ -156,7 +156,7 @@ class PointReader {
     return unit == LengthUnit::kMetre ? 1 : unit == LengthUnit::kInch ? kInch : from_mm(1);
   }
 
-  /// Three numbers in m and rad; which of them are angles follows from the coordinates.
+  /// Three numbers in m and rad; the coordinate system decides which of them are angles.
   [[nodiscard]] Result<Vector3> read_three(std::size_t row, const std::vector<std::size_t>& columns,
                                            Coordinates coordinates, double length_limit) const {
     Vector3 values;
@@ -282,7 +282,7 @@ Result<PointList> read_points(const std::string& path, const PointFileOptions& o
 
 namespace {
 
-/// The point as what was measured at that pose.
+/// The point as the measurement of that pose.
 Measurement measured_at(const CommandedPose& pose, const NamedPoint& point, int index) {
   Measurement measurement;
   measurement.pose_id = pose.pose_id;

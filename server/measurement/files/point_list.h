@@ -26,21 +26,20 @@ struct PointList {
   std::string where;  ///< the file as messages name it
   std::vector<NamedPoint> points;
   std::vector<std::string> extra_columns =
-      {};  ///< what the software of a tracker recorded beside: the air, time stamps
+      {};  ///< additional columns of tracker software: the air, time stamps
 };
 
 /// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points",
 /// "Export Frames"), and any list of named points with a header line, `name,x_mm,y_mm,z_mm` among
 /// them.
 ///
-/// Lines: one point each; empty lines are passed over, `//` and `#` start comments. Fields are
-/// separated by `;`, tab,
-/// `,` or blanks, by the first of these that is in the first line of data; a name with a separator
-/// in it stands in double quotes, and of a name with its collection and group,
+/// Lines: one point each. Empty lines are skipped; `//` and `#` start comments. The separator is
+/// the first of `;`, tab, `,` and blanks that occurs in the first line of data. A name that
+/// contains the separator needs double quotes. Of a name with collection and group,
 /// `Collection::Group::p1`, the last component counts. Between `;`, tabs or blanks a number may
-/// have a decimal comma; where commas separate values without a header and no number has a decimal
+/// have a decimal comma. If commas separate values without a header and no number has a decimal
 /// point, the file is refused. Time stamps at the end of a line (fields with `/` or `:`, AM, PM, an
-/// ISO date) are passed over.
+/// ISO date) are skipped.
 ///
 /// Layouts without a header line, told by the number of fields, the same in every line:
 ///
@@ -54,13 +53,13 @@ struct PointList {
 /// Euler`, `uncertainties`) or `options.behind` must say which of the three it is. A number with a
 /// decimal point where a name belongs is refused.
 ///
-/// Layouts with a header (the first line of data, or a comment of as many fields that names a point
-/// and three coordinates), columns in any order, found by name without regard to case, blanks and
-/// underscores: `name` (`point`, `target`, `frame`, each also with `name`), `x y z`, `r theta z` or
-/// `r theta phi`; optional `ux uy uz` (`ur utheta uz`, `ur utheta uphi`), `sigma`, `rx ry rz` (in
-/// this order or as `rz ry rx`). Others are passed over. Units may stand in brackets or behind an
-/// underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines above the header, in which a program
-/// tells of itself, are passed over.
+/// Layouts with a header. The header is the first line of data, or a comment with as many fields
+/// that names a point and three coordinates. Columns may be in any order; names are compared
+/// without case, blanks and underscores: `name` (`point`, `target`, `frame`, each also with
+/// `name`), `x y z`, `r theta z` or `r theta phi`; optional `ux uy uz` (`ur utheta uz`, `ur utheta
+/// uphi`), `sigma`, `rx ry rz` (in this order or as `rz ry rx`). Other columns are skipped. Units
+/// may stand in brackets or behind an underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines
+/// above the header, in which a program describes the file, are skipped.
 ///
 /// Files of Leica Tracker Pilot have also `pointid`; `u95` of the point (k = 2, of its three axes
 /// together: sigma of one axis is U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx
@@ -77,9 +76,9 @@ struct PointList {
 /// mean square of the three, in metres, over `options.coverage`; three zeros mean that none was
 /// recorded.
 ///
-/// Refuses, naming file, row, column, value and limit: no points, another number of fields, a
-/// number that is none or too large (1 km), a negative radius or uncertainty, a name twice, other
-/// Euler angles, statements that contradict.
+/// Refuses, naming file, row, column, value and limit: no points, another number of fields, a value
+/// that is not a number or too large (1 km), a negative radius or uncertainty, a repeated name,
+/// other Euler angles, statements that contradict each other.
 [[nodiscard]] Result<PointList> parse_points(const std::string& text, const std::string& where,
                                              const PointFileOptions& options = {});
 [[nodiscard]] Result<PointList> read_points(const std::string& path,

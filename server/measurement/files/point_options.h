@@ -11,8 +11,8 @@ enum class BehindCoordinates { kUncertainties, kFixedXyz, kEulerZyx };
 
 /// Facts that a file may leave out. A file that contradicts them is refused.
 struct PointFileOptions {
-  std::optional<LengthUnit> unit;          ///< else what the file says, else mm
-  std::optional<Coordinates> coordinates;  ///< else what the file says, else cartesian
+  std::optional<LengthUnit> unit;          ///< empty: as the file says, else mm
+  std::optional<Coordinates> coordinates;  ///< empty: as the file says, else cartesian
   std::optional<BehindCoordinates> behind;
   double coverage = 1;  ///< uncertainties in the file are this many standard deviations
 };

@@ -164,7 +164,7 @@ std::optional<Coordinates> coordinates_of(const std::vector<std::string>& column
   return std::nullopt;
 }
 
-/// True if the unit of the column is neither that of lengths nor that of angles.
+/// True if the column has a unit that is neither a length nor an angle.
 bool has_no_length(const std::string& column) {
   return column == kTimeStamp ||
          std::find(kWeather.begin(), kWeather.end(), column) != kWeather.end() ||

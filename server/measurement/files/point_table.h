@@ -10,9 +10,9 @@
 /// Finds the layout of a list of points.
 namespace trammel {
 
-/// Our names of columns that the software of trackers writes beside coordinates: expanded
-/// uncertainties (U95, k = 2) of the point and of its axes, when it was measured, and the air.
-/// Brackets say that they hold numbers.
+/// Our names for columns that tracker software writes beside coordinates: expanded uncertainties
+/// (U95, k = 2) of the point and of its axes, the time of the measurement, and the air. Brackets
+/// mark columns with numbers.
 inline const std::string kU95 = "u95 [point]";
 inline const std::array<std::string, 3> kU95Axes = {"u95x [axis]", "u95y [axis]", "u95z [axis]"};
 inline const std::string kTimeStamp = "timestamp";
@@ -27,7 +27,7 @@ struct Statements {
   std::optional<bool> radians;
 };
 
-/// The file as a table with our column names (those of parse_points()), and what it says about
+/// The file as a table with our column names (see parse_points()), and the settings that it states
 /// itself.
 struct PointTable {
   CsvTable table;

@@ -17,7 +17,7 @@ struct ReferenceOptions {
 
 enum class ReferenceVerdict {
   kFine,              ///< rms <= localise_above: go on measuring
-  kLocalise,          ///< apply the transform to what is measured from now on
+  kLocalise,          ///< apply the transform to all measurements from now on
   kLocaliseAndRepeat  ///< rms > repeat_above: also repeat the test before this check
 };
 
@@ -44,7 +44,7 @@ struct ReferenceCheck {
 
 /// Assumes that both measurements are from the same station. Refuses fewer than 3 common
 /// reflectors, reflectors on a line, a measured reflector without a reference of that name, and
-/// limits that are not 0 < localise <= repeat.
+/// limits that violate 0 < localise <= repeat.
 [[nodiscard]] Result<ReferenceCheck> check_references(const PointList& references,
                                                       const PointList& measured,
                                                       const ReferenceOptions& options = {});

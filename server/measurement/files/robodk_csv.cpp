@@ -235,8 +235,8 @@ std::vector<std::string> positional_names(std::size_t count) {
   return names.size() == count ? names : std::vector<std::string>{};
 }
 
-/// Refuses numbers without any decimal point between commas: of half as many numbers with decimal
-/// commas they cannot be told.
+/// Refuses numbers between commas without any decimal point: they could also be half as many
+/// numbers with decimal commas.
 Status check_commas_of_columns(const std::vector<CsvTable::Row>& rows, const std::string& where) {
   for (const CsvTable::Row& row : rows) {
     const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
@@ -372,7 +372,8 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
   return measurement;
 }
 
-/// Names a tool for each TCP if there are several. Refuses what is none: another one in most rows.
+/// Names a tool for each TCP if there are several. Refuses a TCP that differs in most rows, since
+/// it is not a tool.
 Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp,
                   MeasurementBatch& batch) {
   std::map<std::vector<double>, std::size_t> tools;

@@ -67,9 +67,9 @@ bool is_number_with_decimals(const std::string& field) {
   return within && is_number(with_decimal_point(field));
 }
 
-/// True if blanks separate the values of a line that has commas or tabs as well: each comma stands
-/// in a number (`p1 3233,95 -2853,67 1899,04`), or two lists of numbers stand side by side and the
-/// tab is between them.
+/// True if blanks separate the values of a line that also has commas or tabs. Then each comma is a
+/// decimal comma (`p1 3233,95 -2853,67 1899,04`), or two lists of numbers stand side by side with a
+/// tab between them.
 bool do_blanks_separate(std::string_view line) {
   const bool tabs = line.find('\t') != std::string_view::npos;
   const std::vector<std::string> fields = split_fields(line, ' ');

@@ -28,9 +28,9 @@ struct TextLine {
 /// The first lines of data, `count` at most, without comments.
 [[nodiscard]] std::vector<TextLine> first_lines(std::string_view text, std::size_t count);
 
-/// `;`, tab or `,`, whichever of them comes first in this list and is in the line; ' ' where none
-/// is, where all commas stand in numbers between blanks, and where a tab stands between two lists
-/// of numbers that blanks separate.
+/// The first of `;`, tab and `,` that is in the line. It is ' ' if none is, if all commas are
+/// decimal commas between blanks, or if a tab separates two lists of numbers with blanks between
+/// them.
 [[nodiscard]] char separator_of(std::string_view line);
 
 /// The fields of a line, without blanks around them; `' '` separates by any run of blanks. A field
@@ -51,9 +51,9 @@ struct ColumnName {
   std::string unit;  ///< lower case; longer spellings become deg, rad and in; empty: none given
 };
 [[nodiscard]] ColumnName column_name(std::string_view field);
-/// The joint that a column_name() is of, from 1: `j3`, `joint3`, `axis3`, `a3`, `q3`, and in other
-/// languages `achse3`, `axe3`, `asse3`, `eje3`, `gelenk3`, `theta3`. 0 is one of those that count
-/// from 0; nothing for any other name, and beyond 12 joints.
+/// The joint that a column_name() names, from 1: `j3`, `joint3`, `axis3`, `a3`, `q3`, and in other
+/// languages `achse3`, `axe3`, `asse3`, `eje3`, `gelenk3`, `theta3`. 0 appears in files that count
+/// from 0. Empty for other names, and beyond 12 joints.
 [[nodiscard]] std::optional<int> joint_number(std::string_view name);
 
 }  // namespace trammel

@@ -14,7 +14,7 @@ namespace trammel::reading {
 
 namespace {
 
-// Standard deviations of what a robot is before it was calibrated.
+// Prior standard deviations of an arm before calibration.
 constexpr double kZero = from_deg(3);
 constexpr double kZeroOfRail = 5e-3;  // m
 constexpr double kLength = 3e-3;      // m, of a and d
@@ -80,7 +80,7 @@ class Layout {
   [[nodiscard]] int arm_at() const { return kBaseParameters + 3 * static_cast<int>(tools_.size()); }
   [[nodiscard]] int arm_size() const { return static_cast<int>(stddev_.size()); }
   [[nodiscard]] int size() const { return arm_at() + arm_size(); }
-  /// The prior deviations of the arm's numbers; 0: it has none of this kind.
+  /// The prior deviations of the arm's numbers; 0: the arm has no number of this kind.
   [[nodiscard]] const Eigen::VectorXd& stddev() const { return stddev_; }
 
  private:
@@ -123,7 +123,7 @@ void give_way(ArmState& state, const ArmFit& fit, JointArray* torque) {
   }
 }
 
-/// One position: where the arm leads, and how that changes with all that is free.
+/// One predicted position, and its derivatives by all free numbers.
 class Prediction {
  public:
   Prediction(const NumberTable& table, std::size_t row, const Cell& cell, const ArmFit& fit)
@@ -220,7 +220,7 @@ class Fitting {
     const auto& X_FT = cell_.tools.at(tool);
     return X_FT ? X_FT->translation() : Vector3(Vector3::Zero());
   }
-  /// The squared deviations from what is expected of a robot.
+  /// The squared deviations of the numbers from their priors.
   [[nodiscard]] double strain(const ArmFit& fit) const {
     double sum = 0;
     for (Eigen::Index k = 0; k < fit.arm.size(); ++k) {
@@ -342,8 +342,8 @@ ArmFit located(const NumberTable& table, const Cell& cell, ToolPoints points) {
   const Fitting fitting(table, cell, points, false);
   const std::size_t n = table.size();
   std::optional<ArmFit> best;
-  // All rows; then thirds of them, of which one at least is likely to be without the mistake of a
-  // block.
+  // All rows, then thirds of them: if a block of rows is wrong, at least one third is likely free
+  // of it.
   for (const auto& [begin, end] : {std::pair(std::size_t{0}, n), std::pair(std::size_t{0}, n / 3),
                                    std::pair(n / 3, 2 * n / 3), std::pair(2 * n / 3, n)}) {
     const auto X_WB = base_from(table.p_W, p_B, begin, end);

@@ -27,7 +27,7 @@ struct ArmFit {
 };
 
 enum class ToolPoints {
-  kAsDrawn,  ///< those of the cell where it says them
+  kAsDrawn,  ///< the frames of the cell, where it states them
   kAnywhere
 };
 
@@ -43,7 +43,7 @@ enum class ToolPoints {
 [[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell,
                                            const ArmFit& start);
 
-/// m, of every row: how far the position is from where the joints lead.
+/// m, per row: the distance between the measured position and the predicted one.
 [[nodiscard]] std::vector<double> distances(const NumberTable& table, const Cell& cell,
                                             const ArmFit& fit);
 /// X_WF of a row.

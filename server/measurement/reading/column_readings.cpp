@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kGon = 0.9;           // deg
 constexpr int kMostWithManySigns = 7;  // joints of a robot: of more only single signs are tried
-constexpr double kOtherUnit = 3;       // times: rows that are nearer than the others by that much
+constexpr double kOtherUnit = 3;  // times: rows nearer than the others by this factor may be in
+                                  // another unit
 constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
 constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
 constexpr const char* kAllRadians = "with all joints in radians";
@@ -70,8 +71,7 @@ class JointReadings {
     all_.push_back(of_joints(std::move(name), std::move(columns), std::move(change)));
   }
 
-  /// One joint that counts the other way, then two, and so on: a drawing that was mirrored has
-  /// several.
+  /// Tries one joint of the other sign, then two, and so on: a mirrored drawing has several.
   void signs() {
     const int most = robot_.size() <= kMostWithManySigns ? robot_.size() : 1;
     for (int count = 1; count <= most; ++count) {
@@ -130,8 +130,8 @@ class JointReadings {
                       return table;
                     }});
   }
-  /// A controller that reports a joint together with one that drives it, or the joint file without
-  /// it.
+  /// Tries a controller that reports a joint together with the joint that drives it, or a robot
+  /// file without that coupling.
   void couplings() {
     for (int j = 1; j < robot_.size(); ++j) {
       for (int by = std::max(0, j - 2); by < j; ++by) {

@@ -1,8 +1,8 @@
-// Which rows belong together. The distance from one measured position to the next does not depend
-// on where the tracker stands, and is that of the nominal arm but for millimetres. Where the joints
-// of a block of rows stand `shift` rows away, its distances are those of the nominal arm `shift`
-// rows away: the block with the largest gain is found for each shift in one pass, then the next one
-// beside it.
+// Finds which rows belong together. The distance from one measured position to the next does not
+// depend on the tracker's place, and equals that of the nominal arm within millimetres. If the
+// joints of a block of rows are `shift` rows away, its distances match those of the nominal arm
+// `shift` rows away. For each shift one pass finds the block with the largest gain; then the next
+// block beside it is searched.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -137,7 +137,7 @@ class Rows {
   const NumberTable& table_;
   const std::size_t n_;
   std::vector<double> measured_, nominal_;  // m, from each row to the next
-  std::vector<double> expected_;            // of them, with the blocks taken so far
+  std::vector<double> expected_;            // the expected distances, with the blocks taken so far
   double most_ = 0;                         // that one step may count
   std::vector<std::optional<std::size_t>> joints_of_;
 };
