@@ -12,7 +12,7 @@ struct Mark {
   std::string model;     ///< id
   std::string version;   ///< of this program
   std::string date;      ///< 2026-11-22
-  std::string original;  ///< first 16 digits of the SHA-256 of the bytes before
+  std::string original;  ///< first 16 digits of the SHA-256 of the bytes before (UTF-16: as UTF-8)
 };
 
 [[nodiscard]] std::string short_hash(std::string_view bytes);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "clients/cam/encoding.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -14,16 +15,6 @@
 namespace trammel::cam {
 
 namespace {
-
-/// By its mark, or by the zeros beside its first letters.
-bool is_utf16(const std::string& text) {
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) return true;
-  if (text.size() < 4) return false;
-  const auto zeros = [&](std::size_t first) {
-    return text[first] == '\0' && text[first + 2] == '\0';
-  };
-  return zeros(0) != zeros(1);
-}
 
 double near_turn(double angle, double like) {
   return angle + 360 * std::round((like - angle) / 360);
@@ -300,7 +291,7 @@ std::size_t line_begin(const std::string& text, std::size_t at) {
 
 Status check_files(const Program& program) {
   for (const SourceFile& file : program.files) {
-    if (is_utf16(file.text))
+    if (encoding_of(file.text) != Encoding::kBytes)
       return refused("text in UTF-16, expected UTF-8").in(file.name).next("save it as UTF-8");
     if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos)
       continue;

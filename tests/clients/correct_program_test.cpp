@@ -15,6 +15,7 @@ namespace trammel::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::string_literals;
 
 constexpr int kProgramNotAll = 1;
 constexpr int kProgramWrongUsage = 2;
@@ -77,6 +78,64 @@ TEST_F(CorrectProgram, WhatItWasBeforeIsKeptBesideItAndRestoredByteForByte) {
   const auto told_json = nlohmann::json::parse(text("r.json"));
   EXPECT_EQ(told_json["moves_corrected"], 1);
   EXPECT_EQ(told_json["inserted_lines"].size(), 1u);
+}
+
+/// As Windows stores a text with letters of its own: two bytes each, the lower or the higher one
+/// first; `marked`: behind a byte order mark.
+std::string stored_in_utf16(const std::string& ascii, bool big, bool marked) {
+  std::string bytes = !marked ? "" : big ? "\xFE\xFF" : "\xFF\xFE";
+  for (const char c : ascii) bytes += big ? std::string{'\0', c} : std::string{c, '\0'};
+  return bytes;
+}
+
+TEST_F(CorrectProgram, AProgramInUtf16IsWrittenInUtf16AndUndoneByteForByte) {
+  module("plain.mod");
+  ASSERT_EQ(correct({"--model", model(), file("plain.mod"), "-o", file("out-plain.mod")}), 0);
+  for (const bool big : {false, true}) {
+    for (const bool marked : {false, true}) {
+      folder_.write("wide.mod", stored_in_utf16(text("plain.mod"), big, marked));
+      ASSERT_EQ(correct({"--model", model(), file("wide.mod"), "-o", file("out.mod")}), 0);
+      EXPECT_EQ(text("out.mod.original"), text("wide.mod"));
+      const std::string wide = text("out.mod");
+      EXPECT_EQ(wide.size() % 2, 0u);
+      EXPECT_EQ(wide.starts_with(big ? "\xFE\xFF" : "\xFF\xFE"), marked);
+      const std::string robtarget = "robtarget p10:=[[1800.1,0,1000]";
+      EXPECT_NE(wide.find(stored_in_utf16(robtarget, big, false)), std::string::npos);
+      EXPECT_NE(wide.find(stored_in_utf16("TRAMMEL model=", big, false)), std::string::npos);
+      if (!marked) {
+        EXPECT_EQ(wide, stored_in_utf16(text("out-plain.mod"), big, false));
+      }
+      ASSERT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), 0);
+      EXPECT_EQ(text("back.mod"), text("wide.mod"));
+    }
+  }
+}
+
+TEST_F(CorrectProgram, LettersOfOtherScriptsInUtf16StayAsTheyAre) {
+  const std::string name = "\xE4\0\x2D\x4E\x3D\xD8\x00\xDE"s;  // an umlaut, a sign, a pair
+  const std::string comment =
+      stored_in_utf16("! ", false, false) + name + stored_in_utf16("\r\n", false, false);
+  module("plain.mod");
+  const std::string rest = stored_in_utf16(text("plain.mod"), false, false);
+  folder_.write("wide.mod", "\xFF\xFE" + comment + rest);
+  ASSERT_EQ(correct({"--model", model(), file("wide.mod"), "-o", file("out.mod")}), 0);
+  EXPECT_NE(text("out.mod").find(comment), std::string::npos);
+  ASSERT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), 0);
+  EXPECT_EQ(text("back.mod"), text("wide.mod"));
+}
+
+TEST_F(CorrectProgram, Utf16ThatIsBrokenIsRefusedWithTheWayOut) {
+  module("plain.mod");
+  const std::string wide = "\xFF\xFE" + stored_in_utf16(text("plain.mod"), false, false);
+  for (const std::string& broken : {wide + "x", wide + "\x3D\xD8"s, wide + "\0\0"s}) {
+    folder_.write("wide.mod", broken);
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(correct({"--model", model(), file("wide.mod"), "-o", file("out.mod")}),
+              kProgramRefusedData);
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_NE(said.find("text in UTF-16, expected UTF-8"), std::string::npos) << said;
+    EXPECT_NE(said.find("save it as UTF-8"), std::string::npos) << said;
+  }
 }
 
 TEST_F(CorrectProgram, WithoutItsOriginalOrWithAnotherOneNothingIsUndone) {

@@ -119,9 +119,10 @@ Texts texts_of(const ProgramFiles& before, const std::vector<cam::SourceFile>& a
                const std::vector<bool>& keep_before, const std::vector<std::string>& paths) {
   Texts texts;
   for (std::size_t k = 0; k < after.size(); ++k) {
-    texts.push_back({paths[k], after[k].text});
+    const cam::Encoding encoding = before.encodings[k];
+    texts.push_back({paths[k], cam::encoded(after[k].text, encoding)});
     if (keep_before[k] && paths[k] != "-")
-      texts.push_back({cam::original_path(paths[k]), before.files[k].text});
+      texts.push_back({cam::original_path(paths[k]), cam::encoded(before.files[k].text, encoding)});
   }
   return texts;
 }

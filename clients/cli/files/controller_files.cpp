@@ -73,6 +73,12 @@ std::vector<std::string> left_unread(cam::Dialect dialect, const std::string& fo
 
 }  // namespace
 
+Result<cam::DecodedText> read_program_text(const std::string& path) {
+  return read_text_file(path, kLargestProgram).map([](std::string bytes) {
+    return cam::decoded(std::move(bytes));
+  });
+}
+
 Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
                                                   const std::string& folder) {
   std::vector<cam::SourceFile> found;
@@ -81,8 +87,8 @@ Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& n
        it.increment(error)) {
     if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error))
       continue;
-    std::string text = TRY(read_text_file(it->path().string(), kLargestProgram));
-    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
+    cam::DecodedText file = TRY(read_program_text(it->path().string()));
+    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(file.text)});
   }
   std::sort(found.begin(), found.end(),
             [](const auto& one, const auto& other) { return one.name < other.name; });
@@ -132,7 +138,7 @@ Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect diale
         .in(path)
         .of("--frames")
         .next("save them as text: SYSFRAME.VA");
-  std::string text = TRY(read_text_file(path, kLargestProgram));
+  std::string text = TRY(read_program_text(path)).text;
   const std::vector<const char*> wanted = own == cam::Dialect::kInform
                                               ? std::vector<const char*>{"//TOOL ", "BUSER"}
                                               : std::vector<const char*>{"$MNUFRAME", "$MNUTOOL"};

@@ -13,6 +13,10 @@ namespace trammel::cli {
 
 constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a file
 
+/// A file of a program or of a controller, its letters as readers take them. What cannot be turned
+/// into UTF-8 stays as it is, for cam::check_files() to refuse.
+[[nodiscard]] Result<cam::DecodedText> read_program_text(const std::string& path);
+
 /// True if a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat`
 /// and its folders System, Mada and Steu, ABB's system modules and parameters.
 [[nodiscard]] bool is_of_the_controller(const std::string& name);

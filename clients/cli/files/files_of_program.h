@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "clients/cam/dialect.h"
+#include "clients/cam/encoding.h"
 
 namespace trammel::cli {
 
@@ -12,10 +13,11 @@ namespace trammel::cli {
 struct ProgramFiles {
   cam::Dialect dialect = cam::Dialect::kRapid;
   std::vector<cam::SourceFile> files;
-  std::vector<std::string> paths;     ///< of each file; `-` is standard input
-  bool from_folder = false;           ///< the output is a folder too
-  std::set<std::string> system = {};  ///< names of files that belong to the controller and were
-                                      ///< found in a folder: read, not written
+  std::vector<std::string> paths;        ///< of each file; `-` is standard input
+  std::vector<cam::Encoding> encodings;  ///< of each file as it is stored; its text is UTF-8
+  bool from_folder = false;              ///< the output is a folder too
+  std::set<std::string> system = {};     ///< names of files that belong to the controller and were
+                                         ///< found in a folder: read, not written
   std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
   std::string task = {};  ///< of RAPID, whose modules were taken; empty: of all
   std::vector<cam::SourceFile> beside =

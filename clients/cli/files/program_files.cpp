@@ -44,6 +44,7 @@ std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
   std::string head(kHead, ' ');
   std::ifstream file(path, std::ios::binary);
   head.resize(static_cast<std::size_t>(file.read(head.data(), kHead).gcount()));
+  std::erase(head, '\0');  // of UTF-16
   return upper(head).find("DEFDAT") == std::string::npos ? std::nullopt : dialect;
 }
 
@@ -81,8 +82,8 @@ std::vector<Found> keep_task(const std::string& task, std::vector<Found>& progra
 
 Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& found) {
   for (const Found& file : found) {
-    std::string text = TRY(read_text_file(file.path, kLargestProgram));
-    files.push_back({file.name, std::move(text)});
+    cam::DecodedText read = TRY(read_program_text(file.path));
+    files.push_back({file.name, std::move(read.text)});
   }
   return {};
 }
@@ -187,10 +188,11 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
     if (!dialect) dialect = own;
     if (!names.insert(file.name).second)
       return refused("two files of the name {}", file.name).in(file.path);
-    std::string text =
-        TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargestProgram));
-    program.files.push_back({file.name, std::move(text)});
+    cam::DecodedText read =
+        TRY(file.path == "-" ? standard_input().map(cam::decoded) : read_program_text(file.path));
+    program.files.push_back({file.name, std::move(read.text)});
     program.paths.push_back(file.path);
+    program.encodings.push_back(read.encoding);
   }
   program.dialect = dialect.value_or(cam::Dialect::kRapid);
   for (const std::string& folder : folders) {
@@ -351,18 +353,20 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
     if (!mark) continue;
     any = true;
     const std::string kept = cam::original_path(before.paths[k]);
-    Result<std::string> text = before.paths[k] == "-" ? Result<std::string>(refused("not kept"))
-                                                      : read_text_file(kept, kLargestProgram);
-    if (!text) {
+    Result<cam::DecodedText> original = before.paths[k] == "-"
+                                            ? Result<cam::DecodedText>(refused("not kept"))
+                                            : read_program_text(kept);
+    if (!original) {
       return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
           .in(before.paths[k])
           .next("fetch it from where it was corrected");
     }
-    if (cam::short_hash(*text) != mark->original)
+    if (cam::short_hash(original->text) != mark->original)
       return refused("it is not what {} was corrected from: the mark names other bytes",
                      before.files[k].name)
           .in(kept);
-    before.files[k].text = std::move(*text);
+    before.files[k].text = std::move(original->text);
+    before.encodings[k] = original->encoding;
   }
   if (!any && !all)
     return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
