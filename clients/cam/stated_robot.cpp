@@ -151,6 +151,69 @@ double abb_reach(const std::string& type) {
   return reach ? reach->value : 0;
 }
 
+/// ABB's load and reach behind the model: 205 and 2.75 of `IRB 6640-205/2.75`, 205 and 275 of
+/// `ROB1_6640_205_275`.
+std::vector<double> numbers_behind(const std::string& type, const std::string& model) {
+  std::vector<double> numbers;
+  std::size_t at = type.find(model) + model.size();
+  while ((at = type.find_first_of("0123456789", at)) < type.size()) {
+    const std::size_t end = std::min(type.find_first_not_of("0123456789.", at), type.size());
+    if (const auto number = read_number(std::string_view(type).substr(at, end - at)))
+      numbers.push_back(number->value);
+    at = end;
+  }
+  return numbers;
+}
+
+bool is_abb_type(const std::string& theirs, const std::string& ours) {
+  const std::string model = abb_model(theirs);
+  if (model.empty() || model != digits_behind(ours, "IRB", 2)) return false;
+  const std::vector<double> said = numbers_behind(theirs, model),
+                            wanted = numbers_behind(ours, model);
+  const double reach = abb_reach(ours);
+  const auto has = [&](double number) {
+    return std::any_of(said.begin(), said.end(), [&](double one) {
+      constexpr double kCentimetres = 100;
+      return number == reach ? std::abs(one - reach) <= kSameReach ||
+                                   std::abs(one / kCentimetres - reach) <= kSameReach
+                             : one == number;
+    });
+  };
+  return std::all_of(wanted.begin(), wanted.end(), has);
+}
+
+/// The words of a name; `KR210R2700 EXTRA` has KR210R2700 and EXTRA.
+std::vector<std::string> words_of_name(const std::string& name) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; (at = name.find_first_not_of(" #_", at)) < name.size();) {
+    const std::size_t end = std::min(name.find_first_of(" #_", at), name.size());
+    words.push_back(name.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+bool is_kuka_type(const std::string& theirs, const std::string& ours) {
+  const std::string load = digits_behind(ours, "KR", 1), reach = digits_behind(ours, "R", kFewest);
+  if (load.empty() || reach.empty() || digits_behind(theirs, "KR", 1) != load ||
+      digits_behind(theirs, "R", kFewest) != reach)
+    return false;
+  const std::vector<std::string> said = words_of_name(theirs), wanted = words_of_name(ours);
+  return std::all_of(wanted.begin(), wanted.end(), [&](const std::string& word) {
+    const bool plain =
+        word.find_first_of("0123456789") == std::string::npos && word != "KUKA" && word != "KR";
+    return !plain || std::find(said.begin(), said.end(), word) != said.end();
+  });
+}
+
+/// FANUC's and Yaskawa's types are the name of the robot without its maker's.
+bool is_plain_type(const std::string& theirs, const std::string& ours) {
+  std::string name = ours;
+  for (const char* maker : {"FANUC ", "YASKAWA ", "MOTOMAN "})
+    if (name.starts_with(maker)) name.erase(0, std::string_view(maker).size());
+  return name != ours && theirs == name;
+}
+
 /// The coupling of a turning axis in the robot file; nullptr: it follows no other.
 const Coupling* coupling_of(const Chain& robot, int axis) {
   for (int j = 0; j < robot.size(); ++j) {
@@ -220,6 +283,11 @@ std::optional<Error> contradiction(const StatedType& stated, const Chain& robot)
 }
 
 }  // namespace
+
+bool is_type(const std::string& type, const std::string& robot) {
+  const std::string theirs = upper(type), ours = upper(robot);
+  return is_abb_type(theirs, ours) || is_kuka_type(theirs, ours) || is_plain_type(theirs, ours);
+}
 
 void take_stated(const StatedRobot& stated, StatedRobot& all) {
   all.bases.insert(all.bases.end(), stated.bases.begin(), stated.bases.end());

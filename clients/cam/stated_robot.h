@@ -20,6 +20,10 @@ void stand_in_world(Program& program, const ReadOptions& options);
 /// those of `robot`, each with both places and values.
 [[nodiscard]] Status check_stated_robot(const Program& program, const Chain& robot);
 
+/// True if a robot file of this name is of the type that a controller names: maker's model, load
+/// and reach are the same, as far as the name of the file says them.
+[[nodiscard]] bool is_type(const std::string& type, const std::string& robot);
+
 /// Refuses a program that says of its robot that it is mounted otherwise than the cell's base and
 /// gravity do.
 [[nodiscard]] Status check_gravity(const Program& program, const CellTools& cell);

@@ -69,6 +69,7 @@ class Backup {
       if (!read) return tl::make_unexpected(read.error());
     }
     read_calibration(*robot);
+    if (const Status read = read_factory(*robot); !read) return tl::make_unexpected(read.error());
     return cell_;
   }
 
@@ -214,6 +215,47 @@ class Backup {
           "the parameters do not name a calibration (use_robot_calib): it is taken as not in use");
     cell_.controller_compensates =
         used.find("calib") != std::string::npos && used.find("uncalib") == std::string::npos;
+  }
+
+  /// What the maker measured at this arm. An attribute that is not there is 0.
+  Status read_factory(const ParameterInstance& robot) {
+    std::vector<double> compliances;
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      const std::string name = robot.text(fmt::format("use_joint_{}", k));
+      const int axis = static_cast<int>(k) + 1;
+      if (const ParameterInstance* arm = named(instances_, "ARM_CALIB", name))
+        TRY(add_factory("arm", axis, *arm));
+      const ParameterInstance* joint = named(instances_, "JOINT_CALIB", name);
+      double compliance = 0;
+      if (joint != nullptr) {
+        TRY(add_factory("joint", axis, *joint));
+        TRY(number(*joint, "Compl", 0, compliance));
+      }
+      compliances.push_back(compliance);
+    }
+    if (std::any_of(compliances.begin(), compliances.end(), [](double c) { return c > 0; }))
+      cell_.compliances = std::move(compliances);
+    const auto untaken = std::count_if(cell_.factory.begin(), cell_.factory.end(),
+                                       [](const FactoryValue& one) { return one.part == "arm"; });
+    if (untaken > 0)
+      cell_.notes.push_back(fmt::format(
+          "the maker measured this arm: {} values of ARM_CALIB are shown by --json and not taken, "
+          "since the maker does not say in which frames they hold",
+          untaken));
+    return {};
+  }
+
+  Status add_factory(const char* part, int axis, const ParameterInstance& of) {
+    for (const auto& [name, text] : of.values) {
+      const bool length = name.starts_with("error_offset"),
+                 angle = name == "error_roll" || name == "error_pitch" || name == "error_jaw";
+      if (!length && !angle && name != "Compl" && !name.starts_with("arm_compliance")) continue;
+      double value = 0;
+      TRY(number(of, name, 0, value));
+      if (value != 0)
+        cell_.factory.push_back({part, axis, name, value, length ? "m" : angle ? "rad" : "rad/Nm"});
+    }
+    return {};
   }
 
   static Status check_texts(std::vector<SourceFile> files) {
@@ -389,6 +431,18 @@ std::string unit_of_task(const std::string& parameters, const std::string& task)
     return number_of(robot) == number_of(task);
   });
   return same == robots.end() ? "" : *same;
+}
+
+Chain with_compliances(const Chain& arm, const std::vector<double>& compliances) {
+  std::vector<Joint> joints;
+  std::size_t turning = 0;
+  for (int j = 0; j < arm.size(); ++j) {
+    joints.push_back(arm.joint(j));
+    const bool turns = joints.back().type == JointType::kRevolute;
+    if (turns && turning < compliances.size())
+      joints.back().compliance_prior = compliances[turning++];
+  }
+  return Chain::make(arm.name(), std::move(joints), arm.couplings()).value_or(arm);
 }
 
 StatedRobot stated_by(const ControllerRobot& robot) {

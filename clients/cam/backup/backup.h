@@ -15,6 +15,15 @@
 /// (SYSPAR/MOC.cfg) and the modules, that of another maker lists of its own.
 namespace trammel::cam {
 
+/// A value that the maker measured at this arm and keeps in the controller.
+struct FactoryValue {
+  std::string part;  ///< `arm`, `joint` or `tool`
+  int axis = 0;      ///< from 1; 0: of none
+  std::string name;  ///< `error_offset_z`
+  double value = 0;  ///< in the unit
+  std::string unit;  ///< `m`, `rad`, `rad/Nm`
+};
+
 /// A robot as the system parameters have it.
 struct ControllerRobot {
   std::string maker = "ABB";
@@ -31,6 +40,12 @@ struct ControllerRobot {
   bool controller_compensates = false;  ///< Absolute Accuracy is in use
   std::vector<std::string> notes;       ///< what was passed over, and why
   StatedRobot stated = {};  ///< where the files say it in their own way (KUKA); else of the above
+  std::optional<Chain> arm = {};  ///< where the files tell lengths, senses and limits
+  std::string why_no_arm =
+      "the files of its controller do not tell lengths";  ///< a clause; of no use where there is
+                                                          ///< one
+  std::vector<FactoryValue> factory = {};
+  std::vector<double> compliances = {};  ///< rad/Nm, of each axis by its maker; empty: not told
 };
 
 /// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only
@@ -69,6 +84,13 @@ struct ControllerCell : ControllerRobot {
                                                  const std::vector<SourceFile>& modules,
                                                  const std::string& unit);
 
+/// The arm with what its maker measured at it that has a place in a robot file: the compliances of
+/// its axes, as a first guess.
+[[nodiscard]] Chain with_compliances(const Chain& arm, const std::vector<double>& compliances);
+
+/// The names of the files that say a robot's type beside the lists, in lower case: SYSVARS.VA,
+/// SUMMARY.DG and VERSION.DG of a FANUC, SYSTEM.SYS of a Yaskawa.
+[[nodiscard]] std::set<std::string> type_files_of(Dialect dialect);
 /// The names of the files that read_own_lists() takes, in lower case; empty: none are known.
 [[nodiscard]] std::set<std::string> own_lists_of(Dialect dialect);
 /// The cell as the controller's own lists have it: `$machine.dat` and `$config.dat` of a KUKA,

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <string_view>
+
 #include "clients/cam/backup/backup.h"
 #include "clients/cam/fanuc/fanuc.h"
 #include "clients/cam/inform/inform.h"
 #include "clients/cam/krl/krl.h"
+#include "clients/cam/scan.h"
 #include "server/base/letters.h"
 
 namespace trammel::cam {
@@ -35,6 +38,8 @@ ControllerCell kuka_cell(const std::vector<SourceFile>& files) {
   cell.robot_type = data.stated.types.empty() ? "no $TRAFONAME" : data.stated.types.front().type;
   if (!data.stated.bases.empty()) cell.X_WB = data.stated.bases.front().X_WB;
   cell.limits = std::move(data.limits);
+  cell.arm = std::move(data.arm);
+  cell.why_no_arm = std::move(data.why_no_arm);
   cell.notes = std::move(data.notes);
   for (const auto& [number, tool] : data.tools) {
     const std::string name = plain_name(tool.name);
@@ -46,11 +51,51 @@ ControllerCell kuka_cell(const std::vector<SourceFile>& files) {
   return cell;
 }
 
+/// `$SCR_GRP[1].$ROBOT_ID  Access: RW: STRING[37] = 'M-20iA'`; in SUMMARY.DG and VERSION.DG the
+/// line above that of the servo code, without its version: `M-20iA  V9.30P/15`.
+std::string fanuc_type(std::string_view line, std::string_view before) {
+  constexpr std::string_view kNamed = "$SCR_GRP[1].$ROBOT_ID", kBelow = "Servo Code";
+  if (line.find(kNamed) != std::string_view::npos) {
+    const std::size_t end = line.rfind('\''), begin = line.find('\'');
+    return begin < end && end != std::string_view::npos
+               ? std::string(trimmed(line.substr(begin + 1, end - begin - 1)))
+               : "";
+  }
+  if (!line.starts_with(kBelow)) return "";
+  const std::string_view name = before.substr(0, before.find("  "));
+  return std::string(trimmed(name));
+}
+
+/// Below `//ROBOT NAME`: `R1 : 1-06VX25-A0*(GP25)  0011_1111`.
+std::string yaskawa_type(std::string_view line, std::string_view before) {
+  const std::size_t begin = line.find('('), end = line.find(')');
+  const bool names_it =
+      before.starts_with("//ROBOT NAME") && begin < end && end != std::string_view::npos;
+  return names_it ? std::string(trimmed(line.substr(begin + 1, end - begin - 1))) : "";
+}
+
+/// The type of the robot as one of the files says it.
+StatedRobot stated_type(Dialect dialect, const std::vector<SourceFile>& files) {
+  StatedRobot stated;
+  for (const SourceFile& file : files) {
+    std::string_view before;
+    for (const TextLine& line : text_lines(file.text)) {
+      const std::string type = dialect == Dialect::kFanuc ? fanuc_type(line.text, before)
+                                                          : yaskawa_type(line.text, before);
+      if (!type.empty() && stated.types.empty())
+        stated.types.push_back({type, "the robot's type", file.name, line.number});
+      before = line.text;
+    }
+  }
+  return stated;
+}
+
 /// Tools and frames are called as programs call them: `UTOOL[1]`, `USER[2]`.
-ControllerCell listed_cell(const ListedValues& lists, const char* maker) {
+ControllerCell listed_cell(const ListedValues& lists, const char* maker, StatedRobot stated) {
   ControllerCell cell;
   cell.maker = maker;
-  cell.robot_type = "no list names it";
+  cell.robot_type = stated.types.empty() ? "no list names it" : stated.types.front().type;
+  cell.stated = std::move(stated);
   for (const auto& [name, value] : lists.all()) {
     const bool is_tool = name.find("TOOL[") != std::string::npos;
     const bool is_set =
@@ -78,14 +123,22 @@ std::set<std::string> own_lists_of(Dialect dialect) {
   return {};
 }
 
+std::set<std::string> type_files_of(Dialect dialect) {
+  if (dialect == Dialect::kFanuc) return {"sysvars.va", "system.va", "summary.dg", "version.dg"};
+  if (dialect == Dialect::kInform) return {"system.sys"};
+  return {};
+}
+
 Result<ControllerCell> read_own_lists(Dialect dialect, const std::vector<SourceFile>& files) {
   Program as_it_is;
   as_it_is.files = files;
   TRY(check_files(as_it_is));
   ControllerCell cell;
   if (dialect == Dialect::kKrl && !files.empty()) cell = kuka_cell(files);
-  if (dialect == Dialect::kFanuc) cell = listed_cell(fanuc::system_frames(files), "FANUC");
-  if (dialect == Dialect::kInform) cell = listed_cell(inform::conditions(files), "Yaskawa");
+  if (dialect == Dialect::kFanuc)
+    cell = listed_cell(fanuc::system_frames(files), "FANUC", stated_type(dialect, files));
+  if (dialect == Dialect::kInform)
+    cell = listed_cell(inform::conditions(files), "Yaskawa", stated_type(dialect, files));
   cell.unit = "ROBOT";
   cell.notes.emplace_back(
       "whether the controller corrects the robot itself is not in these files: write "

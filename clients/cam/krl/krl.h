@@ -1,11 +1,13 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/cam/program.h"
+#include "server/robot/chain.h"
 
 namespace trammel::cam {
 
@@ -23,6 +25,8 @@ struct KukaData {
   std::map<int, ProgramTool> tools;  ///< that are set, with their loads; a reason where not known
   std::map<int, ProgramFrame> bases;
   std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty: not all are said
+  std::optional<Chain> arm;                       ///< with these limits, where its lengths are told
+  std::string why_no_arm;                         ///< a clause; empty: there is one
   std::vector<std::string> notes;                 ///< on what is not told there
 };
 [[nodiscard]] KukaData read_kuka_data(const std::vector<SourceFile>& files);

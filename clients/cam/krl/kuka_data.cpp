@@ -5,6 +5,7 @@
 #include "clients/cam/keep.h"
 #include "clients/cam/krl/krl.h"
 #include "clients/cam/krl/lines.h"
+#include "clients/cam/krl/machine_arm.h"
 #include "clients/cam/krl/stated.h"
 #include "clients/cam/krl/tools.h"
 #include "clients/cam/krl/variables.h"
@@ -33,6 +34,7 @@ class KukaDataReader {
       read_base(number);
     }
     read_limits();
+    read_arm();
     data_.stated = program_;
     for (std::string& note : program_.notes) data_.notes.push_back(std::move(note));
     return std::move(data_);
@@ -106,6 +108,16 @@ class KukaDataReader {
       if (!lower || !upper) return data_.limits.clear();
       data_.limits.emplace_back(*lower, *upper);
     }
+  }
+
+  void read_arm() {
+    std::string name = program_.types.empty() ? "arm" : program_.types.front().type;
+    name.erase(0, name.find_first_not_of("# "));
+    krl::Told<Chain> arm = krl::machine_arm(lines_, names_, "KUKA " + name, data_.limits);
+    if (arm)
+      data_.arm = std::move(*arm);
+    else
+      data_.why_no_arm = arm.error();
   }
 
   ReadOptions options_;

@@ -9,6 +9,7 @@
 #include "server/compensate/model_notes.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/note_json.h"
+#include "server/robot/robot_file.h"
 
 namespace trammel::cli {
 
@@ -125,27 +126,6 @@ std::string pose_yaml(const Pose& X) {
       p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z());
 }
 
-std::string joint_yaml(const Joint& own, const LinkGeometry& link) {
-  std::string text = own.type == JointType::kPrismatic ? "type: prismatic, " : "";
-  text += fmt::format("theta_deg: {:.15g}, ", to_deg(link.theta));
-  if (!own.hayati) text += fmt::format("d_mm: {:.15g}, ", to_mm(link.d));
-  text += fmt::format("a_mm: {:.15g}, alpha_deg: {:.15g}", to_mm(link.a), to_deg(link.alpha));
-  if (own.hayati) text += fmt::format(", beta_deg: {:.15g}, hayati: true", to_deg(link.beta));
-  if (own.sign < 0) text += ", sign: -1";
-  const bool rail = own.type == JointType::kPrismatic;
-  if (std::isfinite(own.lower) && std::isfinite(own.upper)) {
-    text += fmt::format(", limits_{}: [{:.12g}, {:.12g}]", rail ? "mm" : "deg",
-                        rail ? to_mm(own.lower) : to_deg(own.lower),
-                        rail ? to_mm(own.upper) : to_deg(own.upper));
-  }
-  if (own.gear_ratio != 0) text += fmt::format(", gear_ratio: {:.12g}", own.gear_ratio);
-  if (own.max_speed) {
-    text += fmt::format(", max_speed_{}_s: {:.12g}", rail ? "mm" : "deg",
-                        rail ? to_mm(*own.max_speed) : to_deg(*own.max_speed));
-  }
-  return "  - {" + text + "}\n";
-}
-
 /// Two standard uncertainties of the parameter that calibration calls `name`; empty where it
 /// identified none.
 std::string u95_of(const CompensatedModel& model, const std::string& name) {
@@ -238,16 +218,9 @@ std::string robot_yaml_text(const CompensatedModel& model, const RigidRobot& rob
   text += fmt::format("#   base: {}\n", pose_yaml(robot.X_WB));
   for (const auto& [name, X_FT] : robot.tools)
     text += fmt::format("#   tools: {{{}: {}}}\n", shown(name), pose_yaml(X_FT));
-  text += fmt::format("version: 1\nname: {}\njoints:\n",
+  text += fmt::format("version: 1\nname: {}\n",
                       nlohmann::json(chain.name() + ", calibrated").dump());
-  for (int j = 0; j < chain.size(); ++j)
-    text += joint_yaml(chain.joint(j), robot.links[static_cast<std::size_t>(j)]);
-  std::string couplings;
-  for (const Coupling& one : chain.couplings()) {
-    couplings += fmt::format("  - {{joint: {}, follows: {}, ratio: {:.15g}, kind: {}}}\n",
-                             one.joint + 1, one.follows + 1, one.ratio, to_string(one.kind));
-  }
-  return text + (couplings.empty() ? "" : "coupling:\n" + couplings);
+  return text + joints_yaml(chain, robot.links);
 }
 
 std::string robot_table(const CompensatedModel& model, const RigidRobot& robot) {
