@@ -471,14 +471,18 @@ Result<ControllerCell> read_backup(const std::string& parameters, const std::str
   return Backup(parameters, where).read(modules, unit);
 }
 
-std::string cell_file_of(const ControllerCell& controller, const std::string& name,
-                         const std::string& robot) {
+std::string cell_file_of(const ControllerCell& controller, const CellFileOptions& options) {
   std::string text = fmt::format(
       "# From the backup of a controller ({}): {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
-      controller.maker, shown(controller.unit), shown(controller.robot_type), name, robot);
-  text += fmt::format(
-      "base: {}   # in the controller's world; of the tracker's: null finds it from the data\n",
-      yaml_pose(controller.X_WB));
+      controller.maker, shown(controller.unit), shown(controller.robot_type), options.name,
+      options.robot);
+  text += options.base_from_data
+              ? fmt::format("base: null   # found from the data; in the controller's world: {}\n",
+                            yaml_pose(controller.X_WB))
+              : fmt::format(
+                    "base: {}   # in the controller's world; of the tracker's: null finds "
+                    "it from the data\n",
+                    yaml_pose(controller.X_WB));
   text += "tools:\n";
   for (const auto& [tool, stated] : controller.tools)
     text += fmt::format("  {}: {}\n", tool, yaml_pose(stated.X_FT));
@@ -498,6 +502,12 @@ std::string cell_file_of(const ControllerCell& controller, const std::string& na
                                    to_deg(controller.limits[k].first),
                                    to_deg(controller.limits[k].second)));
     text += fmt::format("joint_ranges_deg: {{{}}}\n", fmt::join(ranges, ", "));
+  }
+  if (options.workspace) {
+    const Vector3 a = options.workspace->lower * to_mm(1), b = options.workspace->upper * to_mm(1);
+    text += fmt::format(
+        "workspace_mm: {{lower: [{:.6g}, {:.6g}, {:.6g}], upper: [{:.6g}, {:.6g}, {:.6g}]}}\n",
+        a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
   }
   return text + fmt::format("controller_compensates: {}\n", controller.controller_compensates);
 }

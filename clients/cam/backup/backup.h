@@ -68,6 +68,7 @@ struct StatedTool {
   Pose X_FT = Pose::Identity();
   std::optional<StatedLoad> load;  ///< empty where it is a placeholder
   std::string where;               ///< `TASK1/SYSMOD/user.sys line 12`
+  int number = 0;                  ///< by which a program selects it (KUKA); 0: by its name
 };
 
 struct ControllerCell : ControllerRobot {
@@ -99,9 +100,20 @@ struct ControllerCell : ControllerRobot {
 [[nodiscard]] Result<ControllerCell> read_own_lists(Dialect dialect,
                                                     const std::vector<SourceFile>& files);
 
-/// A cell file (YAML) of it. `robot`: the path of the robot file, as it is to stand there.
-[[nodiscard]] std::string cell_file_of(const ControllerCell& controller, const std::string& name,
-                                       const std::string& robot);
+/// What a cell file says beside what the controller does.
+struct CellFileOptions {
+  std::string name;
+  std::string robot;            ///< path of the robot file, as it is to stand there
+  bool base_from_data = false;  ///< the instrument stands elsewhere than the controller's world
+  std::optional<Workspace> workspace = {};
+};
+/// A cell file (YAML) of it.
+[[nodiscard]] std::string cell_file_of(const ControllerCell& controller,
+                                       const CellFileOptions& options);
+
+/// The cell as a program alone says it: tools and frames that its files tell, and the robot, where
+/// they name it.
+[[nodiscard]] ControllerCell cell_of_program(const Program& program);
 
 /// One sentence for each thing of the controller that an existing cell has otherwise, with both
 /// values and how far they are apart.

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "clients/cam/backup/backup.h"
+#include "clients/cam/cell_tools.h"
 #include "clients/cam/fanuc/fanuc.h"
 #include "clients/cam/inform/inform.h"
 #include "clients/cam/krl/krl.h"
@@ -21,6 +22,14 @@ std::string plain_name(const std::string& name) {
     plain += fits ? c : '_';
   }
   return plain;
+}
+
+/// A name that a program has, `UTOOL[1]` as it stands.
+std::string yaml_key(const std::string& name) {
+  const std::size_t bracket = name.find('[');
+  const bool numbered = bracket != std::string::npos && name.back() == ']' &&
+                        name.find_first_not_of("0123456789", bracket + 1) == name.size() - 1;
+  return numbered ? plain_name(name.substr(0, bracket)) + name.substr(bracket) : plain_name(name);
 }
 
 void add_tool(const std::string& name, StatedTool tool, ControllerCell& cell) {
@@ -44,7 +53,8 @@ ControllerCell kuka_cell(const std::vector<SourceFile>& files) {
   for (const auto& [number, tool] : data.tools) {
     const std::string name = plain_name(tool.name);
     add_tool(cell.tools.contains(name) ? fmt::format("{}_{}", name, number) : name,
-             {*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line)}, cell);
+             {*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line), number},
+             cell);
   }
   for (const auto& [number, base] : data.bases) cell.frames.emplace(base.name, base.X_BO);
   cell.stated = std::move(data.stated);
@@ -121,6 +131,26 @@ std::set<std::string> own_lists_of(Dialect dialect) {
   if (dialect == Dialect::kFanuc) return {"sysframe.va", "framevar.va"};
   if (dialect == Dialect::kInform) return {"tool.cnd", "uframe.cnd"};
   return {};
+}
+
+ControllerCell cell_of_program(const Program& program) {
+  ControllerCell cell;
+  cell.maker = program.dialect;
+  cell.unit = "ROBOT";
+  cell.robot_type = program.types.empty() ? "no file names it" : program.types.front().type;
+  cell.stated = program;
+  if (!program.bases.empty()) cell.X_WB = program.bases.front().X_WB;
+  for (const ProgramTool& tool : program.tools) {
+    const bool told = tool.X_FT && tool.why_not.empty() && !tool.name.empty();
+    const bool is_set = told && (tool.load || !same_place(*tool.X_FT, Pose::Identity()));
+    if (!is_set || cell.tools.contains(tool.name)) continue;
+    StatedTool stated{*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line)};
+    if (stated.load && is_placeholder(*stated.load)) stated.load.reset();
+    add_tool(yaml_key(tool.name), std::move(stated), cell);
+  }
+  for (const ProgramFrame& frame : program.frames)
+    if (frame.why_not.empty() && !frame.name.empty()) cell.frames.emplace(frame.name, frame.X_BO);
+  return cell;
 }
 
 std::set<std::string> type_files_of(Dialect dialect) {

@@ -4,16 +4,14 @@
 
 #include "clients/cam/backup/backup.h"
 #include "clients/cli/commands/commands.h"
-#include "clients/cli/files/controller_files.h"
-#include "clients/cli/files/program_files.h"
+#include "clients/cli/files/backup_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
-#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
-#include "server/base/units.h"
-#include "server/measurement/files/csv_table.h"
+#include "server/robot/cell.h"
 #include "server/robot/cell_rules.h"
+#include "server/robot/robot_file.h"
 
 namespace trammel::cli {
 
@@ -23,53 +21,8 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 struct BackupArguments {
-  std::string backup, robot, cell, unit, task, compare, output, frames, json;
+  std::string backup, robot, robot_output, cell, unit, task, compare, output, frames, json;
 };
-
-/// The entry of a folder with this name, whatever its case: backups are copied by all kinds of
-/// systems.
-std::string inside(const std::string& folder, const std::string& name) {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (lower(entry.path().filename().string()) == lower(name)) return entry.path().string();
-  }
-  return (fs::path(folder) / name).string();
-}
-
-Result<std::vector<cam::SourceFile>> modules_of(const BackupArguments& arguments) {
-  const std::string rapid = inside(arguments.backup, "RAPID");
-  const std::string folder = arguments.task.empty() ? rapid : inside(rapid, arguments.task);
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) {
-    if (arguments.task.empty()) return std::vector<cam::SourceFile>{};
-    return refused("no task {} in the backup", shown(arguments.task))
-        .in(folder)
-        .of("--task")
-        .with_text(arguments.task);
-  }
-  bool any = false;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder, error))
-    any |= cam::dialect_of_file(entry.path().string()) == cam::Dialect::kRapid;
-  if (!any) return std::vector<cam::SourceFile>{};
-  ProgramFiles files = TRY(read_program_files({folder}, cam::name_of(cam::Dialect::kRapid)));
-  return std::move(files.files);
-}
-
-/// As --frames of `correct` reads it. A program uses a few of them.
-std::string frames_csv(const cam::ControllerCell& controller) {
-  std::string text = "name,x_mm,y_mm,z_mm,qw,qx,qy,qz,may_be_unused\n";
-  const auto add = [&](const std::string& name, const Pose& X) {
-    const Vector3 p = X.translation() * to_mm(1);
-    const Eigen::Quaterniond q(X.linear());
-    text += csv_field(name);
-    for (const double value : {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()})
-      text += "," + csv_number(value);
-    text += ",yes\n";
-  };
-  add(cam::kRobotBase, controller.X_WB);
-  for (const auto& [name, X_BO] : controller.frames) add(name, X_BO);
-  return text;
-}
 
 ordered_json as_json(const cam::ControllerCell& controller,
                      const std::vector<std::string>& differing) {
@@ -78,12 +31,20 @@ ordered_json as_json(const cam::ControllerCell& controller,
   for (const auto& [name, tool] : controller.tools) tools.push_back(name);
   for (const auto& [name, X_BO] : controller.frames) frames.push_back(name);
   for (const auto& [name, load] : controller.loads) loads.push_back(name);
+  ordered_json factory = ordered_json::array();
+  for (const cam::FactoryValue& one : controller.factory)
+    factory.push_back({{"part", one.part},
+                       {"axis", one.axis},
+                       {"name", one.name},
+                       {"value", one.value},
+                       {"unit", one.unit}});
   return {{"unit", controller.unit},
           {"robot_type", controller.robot_type},
           {"controller_compensates", controller.controller_compensates},
           {"tools", tools},
           {"work_objects", frames},
           {"loads", loads},
+          {"factory", factory},
           {"notes", controller.notes},
           {"differences", differing}};
 }
@@ -102,43 +63,12 @@ std::string in_words(const cam::ControllerCell& controller, const BackupArgument
 
 /// The robot file as it is to stand in the cell file: relative to it, unless the cell goes to
 /// standard output.
-std::string robot_in(const BackupArguments& arguments) {
+std::string robot_in(const std::string& cell, const std::string& robot_path) {
   std::error_code error;
-  const fs::path robot = fs::absolute(arguments.robot, error);
-  if (arguments.output.empty() || arguments.output == "-") return robot.string();
-  const fs::path relative =
-      fs::relative(robot, fs::absolute(arguments.output, error).parent_path(), error);
+  const fs::path robot = fs::absolute(robot_path, error);
+  if (cell == "-") return robot.string();
+  const fs::path relative = fs::relative(robot, fs::absolute(cell, error).parent_path(), error);
   return relative.empty() ? robot.string() : relative.string();
-}
-
-/// The dialect of another maker's backup, by the names of files that only his controllers have.
-std::optional<cam::Dialect> dialect_of(const std::string& folder) {
-  const auto has = [&](const std::string& file, cam::Dialect dialect) {
-    return cam::own_lists_of(dialect).contains(file) || cam::dialect_of_file(file) == dialect;
-  };
-  std::error_code error;
-  std::vector<std::string> files;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error))
-    files.push_back(lower(it->path().filename().string()));
-  for (const cam::Dialect dialect :
-       {cam::Dialect::kKrl, cam::Dialect::kFanuc, cam::Dialect::kInform}) {
-    if (std::any_of(files.begin(), files.end(),
-                    [&](const std::string& file) { return has(file, dialect); }))
-      return dialect;
-  }
-  return std::nullopt;
-}
-
-Result<cam::ControllerCell> controller_of(const BackupArguments& arguments) {
-  const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
-  const Result<std::string> parameters = read_text_file(moc);
-  const auto dialect = parameters ? std::nullopt : dialect_of(arguments.backup);
-  if (dialect)
-    return cam::read_own_lists(*dialect,
-                               TRY(files_called(cam::own_lists_of(*dialect), arguments.backup)));
-  if (!parameters) return tl::make_unexpected(parameters.error());
-  return cam::read_backup(*parameters, moc, TRY(modules_of(arguments)), arguments.unit);
 }
 
 /// Which modules to take is for whoever asks to say, unless he has.
@@ -154,41 +84,86 @@ Status check_usage(const BackupArguments& arguments) {
     return failure(ErrorCode::kUsage, "nothing to do")
         .of("--output")
         .next("--output writes a cell, --compare compares one");
-  if (!arguments.output.empty() && (arguments.robot.empty() || arguments.cell.empty()))
-    return failure(ErrorCode::kUsage, "a cell needs --robot and --name").of("--output");
+  if (arguments.output != "-") return {};
+  if (arguments.cell.empty() || (arguments.robot.empty() && arguments.robot_output.empty()))
+    return failure(ErrorCode::kUsage,
+                   "a cell on standard output needs --name, and --robot or --robot-output")
+        .of("--output");
   return {};
+}
+
+/// The robot of the cell: a file that is there, or one that is written.
+struct RobotOfCell {
+  Chain chain;
+  std::string path, text;
+  bool is_new = false;
+};
+
+/// Beside the cell: `cell-robot.yaml`.
+std::string robot_beside(const std::string& cell) {
+  const fs::path path(cell);
+  return (path.parent_path() / (path.stem().string() + "-robot.yaml")).string();
+}
+
+Result<RobotOfCell> robot_of(const BackupArguments& arguments,
+                             const cam::ControllerCell& controller) {
+  if (!arguments.robot.empty()) {
+    std::string text = TRY(read_text_file(arguments.robot));
+    Chain chain = TRY(parse_robot(text, arguments.robot));
+    return RobotOfCell{std::move(chain), arguments.robot, std::move(text)};
+  }
+  const BackupRobot found = TRY(robot_of_backup(controller));
+  const std::string path =
+      arguments.robot_output.empty() ? robot_beside(arguments.output) : arguments.robot_output;
+  return RobotOfCell{found.arm, path, robot_yaml(found.arm, found.source), true};
+}
+
+/// The cell file and its robot file, as far as they are asked for; nothing where they would not be
+/// read again.
+Result<std::vector<OutputText>> cell_texts(const BackupArguments& arguments,
+                                           const cam::ControllerCell& controller) {
+  std::vector<OutputText> texts;
+  if (arguments.output.empty()) return texts;
+  if (controller.tools.empty()) {
+    return refused("no tool in the modules of the backup, a cell needs one")
+        .in(arguments.backup)
+        .of("tooldata")
+        .next("--task may have left out the modules that have it");
+  }
+  const RobotOfCell robot = TRY(robot_of(arguments, controller));
+  TRY(cam::check_robot(controller, robot.chain));
+  const std::string name =
+      arguments.cell.empty() ? fs::path(arguments.output).stem().string() : arguments.cell;
+  std::string text = cam::cell_file_of(controller, {name, robot_in(arguments.output, robot.path)});
+  TRY(parse_cell(text, robot.text, arguments.output));
+  if (robot.is_new) texts.push_back({"--robot-output", robot.path, robot.text});
+  texts.push_back({"--output", arguments.output, std::move(text)});
+  return texts;
+}
+
+Result<std::vector<std::string>> compared(const BackupArguments& arguments,
+                                          const cam::ControllerCell& controller) {
+  if (arguments.compare.empty()) return std::vector<std::string>{};
+  const Cell cell = TRY(read_cell(arguments.compare));
+  TRY(cam::check_robot(controller, cell.robot));
+  const CellRules rules = TRY(rules_of(cell));
+  return cam::differences(controller, cell, rules.controller_compensates);
 }
 
 Result<Extent> import_backup(const BackupArguments& arguments) {
   TRY(check_usage(arguments));
-  const auto controller = controller_of(arguments);
+  const auto controller = read_controller({arguments.backup, arguments.unit, arguments.task});
   if (!controller) return tl::make_unexpected(advised(controller.error(), arguments));
   if (!arguments.robot.empty()) {
     const Chain robot = TRY(read_robot(arguments.robot));
     TRY(cam::check_robot(*controller, robot));
   }
-  std::vector<std::string> differing;
-  if (!arguments.compare.empty()) {
-    const Cell cell = TRY(read_cell(arguments.compare));
-    TRY(cam::check_robot(*controller, cell.robot));
-    const CellRules rules = TRY(rules_of(cell));
-    differing = cam::differences(*controller, cell, rules.controller_compensates);
-  }
-  if (!arguments.output.empty()) {
-    if (controller->tools.empty()) {
-      return refused("no tool in the modules of the backup, a cell needs one")
-          .in(arguments.backup)
-          .of("tooldata")
-          .next("--task may have left out the modules that have it");
-    }
-    const std::string text = cam::cell_file_of(*controller, arguments.cell, robot_in(arguments));
-    TRY(write_output(arguments.output, text));
-  }
-  if (!arguments.frames.empty()) {
-    TRY(write_output(arguments.frames, frames_csv(*controller)));
-  }
+  const std::vector<std::string> differing = TRY(compared(arguments, *controller));
+  std::vector<OutputText> texts = TRY(cell_texts(arguments, *controller));
+  texts.push_back({"--frames", arguments.frames, frames_csv(*controller)});
+  TRY(write_together(texts));
   tell(in_words(*controller, arguments, differing),
-       {arguments.output, arguments.frames, arguments.json});
+       {arguments.output, arguments.robot_output, arguments.frames, arguments.json});
   TRY(write_json(arguments.json, as_json(*controller, differing)));
   return differing.empty() ? Extent::kAll : Extent::kPart;
 }
@@ -209,9 +184,16 @@ void add_backup_command(CLI::App& app, Action& chosen) {
   command->add_option("-o,--output", arguments->output,
                       "Cell file to write (YAML): base frame, tools, loads, axis ranges, whether "
                       "the controller's own calibration is in use");
-  command->add_option("--name", arguments->cell, "Cell id, for --output");
-  command->add_option("--robot", arguments->robot,
-                      "Robot file (YAML) that the cell file names, for --output");
+  command->add_option("--name", arguments->cell,
+                      "Cell id, for --output; the name of its file where none is given");
+  command->add_option(
+      "--robot", arguments->robot,
+      "Robot file (YAML) that the cell file names, for --output; without it one is "
+      "written: by the lengths that the controller tells (KUKA), else as the shipped "
+      "robot of the type that it names");
+  command->add_option("--robot-output", arguments->robot_output,
+                      "Robot file to write (YAML) where --robot names none; beside the cell file "
+                      "where none is given");
   command->add_option(
       "--compare", arguments->compare,
       "Cell file (YAML) to compare with; what differs is told, and the exit code is 1");

@@ -6,12 +6,12 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
+#include "clients/cli/files/plan_csv.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/near_miss.h"
 #include "server/base/units.h"
 #include "server/measurement/files/joint_list.h"
-#include "server/measurement/pose_columns.h"
 #include "server/plan/measuring_program.h"
 #include "server/plan/plan.h"
 #include "server/plan/travel.h"
@@ -58,19 +58,6 @@ Status read_criterion(const std::string& text, PlanOptions& options) {
   return {};
 }
 
-std::string as_csv(const Cell& cell, const std::string& where, const Plan& plan) {
-  JointList list{where, joint_types(cell.robot), {}};
-  for (const PlannedPose& planned : plan.poses) {
-    CommandedPose pose;
-    pose.pose_id = planned.id;
-    pose.context = planned.context;
-    if (cell.tools.size() == 1) pose.context.tool.clear();
-    if (cell.payloads.size() == 1) pose.context.payload.clear();
-    list.poses.push_back(std::move(pose));
-  }
-  return to_csv(list);
-}
-
 ProgramOptions program_called_after(const std::string& path, ProgramOptions options) {
   if (path != "-") options.name = std::filesystem::path(path).stem().string();
   return options;
@@ -81,7 +68,7 @@ ProgramOptions program_called_after(const std::string& path, ProgramOptions opti
 Result<Outputs> outputs_of(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   Outputs outputs;
   outputs.add("--output", arguments.output);
-  outputs.put("--output", as_csv(cell, arguments.output, plan));
+  outputs.put("--output", plan_csv(cell, arguments.output, plan));
   const auto add = [&](const char* option, const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
     Result<std::string> text =

@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
-#include <filesystem>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/shipped_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/study_text.h"
@@ -16,16 +16,6 @@ struct StudyArguments {
   std::optional<std::string> bias;
   std::uint64_t seed = 1;
 };
-
-/// A file that ships: beside the installed program, or in the tree that it was built from.
-std::string shipped_file(const std::string& name) {
-  std::error_code error;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path installed = program.parent_path() / TRAMMEL_DATA_FROM_PROGRAM / name;
-  if (!error && std::filesystem::exists(installed, error))
-    return installed.lexically_normal().string();
-  return TRAMMEL_SOURCE_DATA "/" + name;
-}
 
 Result<VirtualRobot> robot_to_study(const StudyArguments& arguments) {
   Cell cell =

@@ -19,9 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// In the order in which two that are the same are named.
-constexpr std::array<std::string_view, 11> kOutputs = {
-    "--output", "--report", "--receipt",  "--residuals", "--next-poses", "--rapid",
-    "--krl",    "--fanuc",  "--urscript", "--frames",    "--json"};
+constexpr std::array<std::string_view, 12> kOutputs = {
+    "--output", "--robot-output", "--report", "--receipt",  "--residuals", "--next-poses",
+    "--rapid",  "--krl",          "--fanuc",  "--urscript", "--frames",    "--json"};
 /// The options whose files a command may write over by design, or judges by itself.
 constexpr std::array<std::string_view, 2> kJudgedElsewhere = {"--cell-out", "--store"};
 
@@ -91,9 +91,10 @@ std::string folder_of_program(const CLI::App& correct, const std::string& output
 
 /// The folder that the command makes where it is not there; empty: it makes none.
 std::string folder_that_is_made(const CLI::App& command) {
-  if (command.get_name() != "correct" && command.get_name() != "manual") return "";
+  const std::string name = command.get_name();
+  if (name != "correct" && name != "manual" && name != "setup") return "";
   const std::string output = command.get_option("--output")->as<std::string>();
-  return command.get_name() == "manual" ? output : folder_of_program(command, output);
+  return name == "correct" ? folder_of_program(command, output) : output;
 }
 
 /// That the folder may be written to, or can be made. What is a file is refused by whoever needs a

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "server/plan/plan.h"
+#include "server/robot/cell.h"
+
+namespace trammel::cli {
+
+/// The poses of a plan as a joint list (CSV). `where` names it in errors of whoever reads it.
+[[nodiscard]] std::string plan_csv(const Cell& cell, const std::string& where, const Plan& plan);
+
+}  // namespace trammel::cli
