@@ -82,6 +82,7 @@ void add_commands(CLI::App& app, Action& chosen) {
   add_remedies_command(app, chosen);
   add_compare_command(app, chosen);
   add_backup_command(app, chosen);
+  add_setup_command(app, chosen);
   add_robot_command(app, chosen);
   add_confirm_command(app, chosen);
   add_structure_commands(app, chosen);

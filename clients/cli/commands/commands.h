@@ -48,6 +48,7 @@ void add_structure_commands(CLI::App& app, Action& chosen);    // cpa, deflectio
 void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluate, report
 void add_apply_commands(CLI::App& app, Action& chosen);        // predict, correct
 void add_backup_command(CLI::App& app, Action& chosen);        // import-backup
+void add_setup_command(CLI::App& app, Action& chosen);
 void add_store_backup_command(CLI::App& app, Action& chosen);  // backup
 void add_store_command(CLI::App& app, Action& chosen);
 void add_robot_command(CLI::App& app, Action& chosen);    // export-robot

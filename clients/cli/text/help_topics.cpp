@@ -130,6 +130,9 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"compare", "  trammel compare a.model b.model --batch fresh.csv --report page.html"},
     {"study", "  trammel study drilling --json -"},
     {"fleet", "  trammel fleet --model a.model --model b.model --model c.model"},
+    {"setup",
+     "  trammel setup BACKUP -o cell-7\n"
+     "  trammel setup PROGRAM -o cell-7 --robot robot.yaml --tool spindle"},
     {"import-backup",
      "  trammel import-backup BACKUP -o cell.yaml\n"
      "  trammel import-backup BACKUP --compare cell.yaml"},
