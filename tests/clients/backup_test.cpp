@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <tuple>
 
 #include "clients/cli/command_line.h"
 #include "server/base/text_file.h"
@@ -42,6 +44,16 @@ class ImportBackup : public testing::Test {
   std::vector<std::string> differing(const std::string& cell) {
     EXPECT_NE(run({"--compare", cell, "--json", file("d.json")}), 3);
     return nlohmann::json::parse(text("d.json"))["differences"].get<std::vector<std::string>>();
+  }
+  /// The exit code, and what was said on standard error.
+  std::pair<int, std::string> told(std::vector<std::string> arguments) {
+    testing::internal::CaptureStderr();
+    const int code = run(std::move(arguments));
+    return {code, testing::internal::GetCapturedStderr()};
+  }
+  void clear_backup() const {
+    std::filesystem::remove_all(file("backup"));
+    std::filesystem::create_directories(file("backup"));
   }
   const std::string moc = "backup/SYSPAR/MOC.cfg", user = "backup/RAPID/TASK1/SYSMOD/user.sys";
 
@@ -88,7 +100,7 @@ TEST_F(ImportBackup, TellsWhereACellDiffersWithBothValuesAndHowFar) {
 }
 
 TEST_F(ImportBackup, RefusesWhatDoesNotMakeACell) {
-  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c"}), 2) << "no robot file";
+  EXPECT_EQ(run({"-o", "-", "--name", "c"}), 2) << "where does the robot file go?";
   EXPECT_EQ(run({}), 2);
   const std::string good = text(moc);
   change(moc, "-base_frame_orient_u0 1", "-base_frame_orient_u0 2");
@@ -111,6 +123,101 @@ TEST_F(ImportBackup, RefusesWhatDoesNotMakeACell) {
   EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1",
                  "--task", "task1"}),
             0);
+}
+
+/// m and rad: the largest difference of two arms' flanges at poses within a turn.
+double farthest_apart(const Chain& one, const Chain& other) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> angle(-kPi, kPi);
+  double farthest = 0;
+  for (int pose = 0; pose < 60; ++pose) {
+    JointVector q(6);
+    for (Eigen::Index j = 0; j < q.size(); ++j) q(j) = angle(random);
+    const Eigen::Matrix4d apart = one.flange_pose(q).matrix() - other.flange_pose(q).matrix();
+    farthest = std::max(farthest, apart.cwiseAbs().maxCoeff());
+  }
+  return farthest;
+}
+
+TEST_F(ImportBackup, OfAnAbbTheShippedRobotOfItsTypeIsWrittenBesideTheCell) {
+  ASSERT_EQ(run({"-o", file("cell-7.yaml")}), 0);
+  const Cell cell = read_cell(file("cell-7.yaml")).value();
+  EXPECT_EQ(cell.name, "cell-7");
+  EXPECT_TRUE(std::filesystem::exists(file("cell-7-robot.yaml")));
+  const Chain shipped = read_robot(kRobot).value();
+  EXPECT_EQ(cell.robot.name(), shipped.name());
+  EXPECT_LT(farthest_apart(cell.robot, shipped), 1e-12);
+  EXPECT_EQ(cell.robot.joint(1).upper, shipped.joint(1).upper);
+  EXPECT_EQ(cell.robot.joint(1).compliance_prior, 0);
+}
+
+TEST_F(ImportBackup, OfAnAbbWhatTheMakerMeasuredIsShownAndCompliancesAreAFirstGuess) {
+  const std::string measured =
+      "#\nARM_CALIB:\n\n      -name \"rob1_1\" -error_offset_x 0.0002 -error_roll -0.0003\n\n"
+      "      -name \"rob1_3\" -arm_compliance_z 2.5E-05\n#\nJOINT_CALIB:\n\n"
+      "      -name \"rob1_1\"\n\n      -name \"rob1_2\" -Compl 1.5E-06\n";
+  folder_.write(moc, text(moc) + measured);
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--json", file("j.json")}), 0);
+  const Chain robot = read_cell(file("cell.yaml"))->robot;
+  EXPECT_EQ(robot.joint(0).compliance_prior, 0);
+  EXPECT_NEAR(robot.joint(1).compliance_prior, 1.5e-6, 1e-15);
+  EXPECT_LT(farthest_apart(robot, read_robot(kRobot).value()), 1e-12) << "offsets are not taken";
+  const auto json = nlohmann::json::parse(text("j.json"));
+  ASSERT_EQ(json["factory"].size(), 4u) << json["factory"].dump();
+  EXPECT_EQ(json["factory"][0]["name"], "error_offset_x");
+  EXPECT_EQ(json["factory"][0]["unit"], "m");
+  EXPECT_EQ(json["factory"][0]["axis"], 1);
+  EXPECT_NE(json["notes"].dump().find("3 values of ARM_CALIB"), std::string::npos);
+  folder_.write(moc, replaced(text(moc), "-Compl 1.5E-06", "-Compl much"));
+  EXPECT_EQ(run({"-o", file("cell.yaml")}), 3);
+}
+
+TEST_F(ImportBackup, ATypeOfWhichNoRobotFileShipsIsNamed) {
+  const std::string good = text(moc);
+  for (const char* type : {"ROB1_4600_2.55_40", "ROB1_6640_3.2_130", "ROB1_6640_2.75_130"}) {
+    folder_.write(moc, replaced(good, "ROB1_6640_205_275", type));
+    const auto [code, said] = told({"-o", file("cell.yaml")});
+    EXPECT_EQ(code, 3) << type;
+    EXPECT_NE(said.find(type), std::string::npos) << said;
+    EXPECT_NE(said.find("--robot names its file"), std::string::npos) << said;
+    EXPECT_FALSE(std::filesystem::exists(file("cell.yaml")));
+    EXPECT_FALSE(std::filesystem::exists(file("cell-robot.yaml")));
+  }
+  folder_.write(moc, replaced(good, "ROB1_6640_205_275", "ROB1_6640_2.75_205"));
+  EXPECT_EQ(run({"-o", file("cell.yaml")}), 0) << "as newer controllers spell it";
+}
+
+TEST_F(ImportBackup, OfAFanucAndAYaskawaTheTypeSelectsAShippedRobotOrIsNamed) {
+  clear_backup();
+  folder_.write("backup/SYSFRAME.VA",
+                "[*SYSTEM*]$MNUTOOL  Storage: SHADOW\n    [1,2] = \n"
+                "  X:   100.000   Y:      .000   Z:   150.000\n"
+                "  W:      .000   P:   -45.000   R:      .000\n");
+  EXPECT_EQ(told({"-o", file("c.yaml")}).first, 3) << "nobody says which robot it is";
+  const std::string id =
+      "[*SYSTEM*]$SCR_GRP\n     Field: $SCR_GRP[1].$ROBOT_ID Access: RO: STRING[37] = '{}'\n";
+  folder_.write("backup/SYSVARS.VA", fmt::format(fmt::runtime(id), "M-20iA"));
+  ASSERT_EQ(run({"-o", file("c.yaml")}), 0);
+  EXPECT_EQ(read_cell(file("c.yaml"))->robot.name(), "FANUC M-20iA");
+  folder_.write("backup/SYSVARS.VA", fmt::format(fmt::runtime(id), "R-2000iC/165F"));
+  EXPECT_NE(told({"-o", file("d.yaml")}).second.find("R-2000iC/165F"), std::string::npos);
+  std::filesystem::remove(file("backup/SYSVARS.VA"));
+  folder_.write("backup/SUMMARY.DG",
+                "Robot No. : F1\nM-20iA        V9.30P/15 \nServo Code   : V09\n");
+  EXPECT_EQ(run({"-o", file("e.yaml")}), 0);
+
+  clear_backup();
+  folder_.write("backup/TOOL.CND",
+                "//TOOL 1\n///NAME SPINDLE\n100.000,0.000,150.000,0.0000,-45.0000,0.0000\n"
+                "0.000,0.000,100.000\n10.000\n0.000,0.000,0.000\n");
+  const std::string system = "/SYSTEM 8\n//ROBOT NAME\nR1 : 1-06VX25-A0*({})    0011_1111\n";
+  folder_.write("backup/SYSTEM.SYS", fmt::format(fmt::runtime(system), "GP25"));
+  ASSERT_EQ(run({"-o", file("f.yaml")}), 0);
+  EXPECT_EQ(read_cell(file("f.yaml"))->robot.name(), "Yaskawa Motoman GP25");
+  folder_.write("backup/SYSTEM.SYS", fmt::format(fmt::runtime(system), "GP88"));
+  const auto [code, said] = told({"-o", file("g.yaml")});
+  EXPECT_EQ(code, 3);
+  EXPECT_NE(said.find("GP88"), std::string::npos) << said;
 }
 
 TEST_F(ImportBackup, AWorkObjectWithTwoValuesIsLeftOutAndNamedWithBoth) {
@@ -202,6 +309,21 @@ class ImportKuka : public ImportBackup {
       "$SOFTN_END[3]=-115.0\n$SOFTN_END[4]=-345.0\n$SOFTN_END[5]=-120.0\n"
       "$SOFTN_END[6]=-345.0\n$SOFTP_END[1]=180.0\n$SOFTP_END[2]=-10.0\n$SOFTP_END[3]=150.0\n"
       "$SOFTP_END[4]=345.0\n$SOFTP_END[5]=120.0\n$SOFTP_END[6]=345.0\nENDDAT\n";
+  /// What makes an arm of it, as controllers have it behind the rest.
+  static constexpr const char* kArm =
+      "DECL KINCLASS $KINCLASS=#STANDARD ;KINEMATIC CLASS\nINT $TRAFO_AXIS=6\n"
+      "DECL MAIN_AXIS $MAIN_AXIS=#NR ;SS, CC, NR\nDECL WRIST_AXIS $WRIST_AXIS=#ZEH ;NOH, ZEH\n"
+      "BOOL $DEF_A4FIX=FALSE\nBOOL $DEF_A5LINK=FALSE\nINT $AXIS_DIR[12]\n$AXIS_DIR[1]=-1\n"
+      "$AXIS_DIR[2]=1\n$AXIS_DIR[3]=1\n$AXIS_DIR[4]=-1\n$AXIS_DIR[5]=-1\n$AXIS_DIR[6]=-1\n"
+      "FRAME $TIRORO={X 0.0,Y 0.0,Z 675.000,A 0.0,B 0.0,C 0.0}\n"
+      "FRAME $TFLWP={X 0.0,Y 0.0,Z 215.000,A 0.0,B 0.0,C 0.0} ;FLANGE\n"
+      "FRAME $TX3P3={X 1200.00,Y 0.0,Z -41.0000,A 0.0,B 90.0000,C 0.0}\n"
+      "DECL DHART $DH_4={DHART_A 0.0,DHART_D 0.0,DHART_ALPHA 90.0000}\n"
+      "DECL DHART $DH_5={DHART_A 0.0,DHART_D 0.0,DHART_ALPHA -90.0000}\n"
+      "DECL FRA $RAT_MOT_AX[12]\n$RAT_MOT_AX[1]={N -1800,D 8}\nREAL $VEL_AXIS_MA[12]\n"
+      "$VEL_AXIS_MA[1]=4500.00\nENDDAT\n";
+  static std::string with_arm() { return replaced(kMachine, "ENDDAT\n", kArm); }
+
   static constexpr const char* kConfig =
       "DEFDAT $CONFIG PUBLIC\nDECL FRAME TOOL_DATA[16]\nDECL CHAR TOOL_NAME[16,24]\n"
       "TOOL_DATA[1]={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\nTOOL_NAME[1,]=\"Drill end\"\n"
@@ -254,6 +376,58 @@ TEST_F(ImportKuka, TellsWhereACellDiffers) {
   const std::vector<std::string> found = differing(file("cell.yaml"));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_NE(found[0].find("3.500 mm"), std::string::npos) << found[0];
+}
+
+TEST_F(ImportKuka, WritesTheRobotOfItsMachineDataEqualToTheDrawing) {
+  folder_.write(machine, with_arm());
+  ASSERT_EQ(run({"-o", file("cell-3.yaml")}), 0);
+  const Cell cell = read_cell(file("cell-3.yaml")).value();
+  EXPECT_EQ(cell.robot.name(), "KUKA KR210R2700 EXTRA C4 FLR");
+  EXPECT_LT(farthest_apart(cell.robot, read_robot(kKuka).value()), 1e-9);
+  EXPECT_NEAR(to_deg(cell.robot.joint(1).lower), -135, 1e-9) << "the controller's own limits";
+  EXPECT_NEAR(cell.robot.joint(0).gear_ratio, 225, 1e-9);
+  EXPECT_NEAR(to_deg(cell.robot.joint(0).max_speed.value()), 120, 1e-9);
+  EXPECT_FALSE(cell.robot.joint(1).max_speed);
+  EXPECT_EQ(run({"--compare", file("cell-3.yaml")}), 0);
+}
+
+TEST_F(ImportKuka, AnArmThatDoesNotShipIsWrittenFromItsMachineData) {
+  std::string data = replaced(with_arm(), "Z 675.000", "Z 645.000");
+  data = replaced(data, "$LENGTH_A=350.0", "$LENGTH_A=330.0");
+  data = replaced(data, "X 1200.00,Y 0.0,Z -41.0000", "X 1220.00,Y 0.0,Z 115.0000");
+  data = replaced(data, "KR210R2700 EXTRA", "KR120R2700-2");
+  folder_.write(machine, data);
+  ASSERT_EQ(run({"-o", file("cell.yaml")}), 0);
+  const Chain robot = read_cell(file("cell.yaml"))->robot;
+  // Stretched out level along x, the flange looks ahead.
+  const Pose stretched = robot.flange_pose(JointVector::Zero(6));
+  EXPECT_LT((stretched.translation() - Vector3(2.915, 0, .760)).norm(), 1e-9);
+  EXPECT_LT((stretched.linear().col(2) - Vector3::UnitX()).norm(), 1e-9);
+  JointVector q = JointVector::Zero(6);
+  q(1) = from_deg(-90);  // the lower arm upright, the forearm with it
+  const Pose upright = robot.flange_pose(q);
+  EXPECT_LT((upright.translation() - Vector3(.330 - .115, 0, .645 + 2.585)).norm(), 1e-9);
+}
+
+TEST_F(ImportKuka, WithoutLengthsTheShippedRobotOfItsTypeIsTaken) {
+  ASSERT_EQ(run({"-o", file("cell.yaml")}), 0);
+  EXPECT_EQ(read_cell(file("cell.yaml"))->robot.name(), "KUKA KR 210 R2700 extra");
+}
+
+TEST_F(ImportKuka, AnArmOfAnotherKindIsRefusedWithItsTypeAndTheReason) {
+  const std::string other = replaced(with_arm(), "KR210R2700 EXTRA", "KR 40 PA");
+  for (const auto& [what, by, why] :
+       {std::tuple("=#ZEH", "=#SRH", "$WRIST_AXIS is #SRH"),
+        std::tuple("=#NR", "=#SS", "$MAIN_AXIS is #SS"),
+        std::tuple("$DEF_A5LINK=FALSE", "$DEF_A5LINK=TRUE", "$DEF_A5LINK is TRUE"),
+        std::tuple("$AXIS_DIR[4]=-1\n", "", "$AXIS_DIR[4] is not in the files"),
+        std::tuple("Z -41.0000,A 0.0", "Z -41.0000,A 10.0", "at a right angle to axis 3")}) {
+    folder_.write(machine, replaced(other, what, by));
+    const auto [code, said] = told({"-o", file("cell.yaml")});
+    EXPECT_EQ(code, 3) << by;
+    EXPECT_NE(said.find("KR 40 PA"), std::string::npos) << said;
+    EXPECT_NE(said.find(why), std::string::npos) << said;
+  }
 }
 
 TEST_F(ImportKuka, RefusesAnotherRobotAndABackupWithoutTools) {

@@ -141,8 +141,8 @@ Result<std::vector<OutputText>> cell_texts(const BackupArguments& arguments,
   return texts;
 }
 
-Result<std::vector<std::string>> compared(const BackupArguments& arguments,
-                                          const cam::ControllerCell& controller) {
+Result<std::vector<std::string>> differences_from_cell(const BackupArguments& arguments,
+                                                       const cam::ControllerCell& controller) {
   if (arguments.compare.empty()) return std::vector<std::string>{};
   const Cell cell = TRY(read_cell(arguments.compare));
   TRY(cam::check_robot(controller, cell.robot));
@@ -158,7 +158,7 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
     const Chain robot = TRY(read_robot(arguments.robot));
     TRY(cam::check_robot(*controller, robot));
   }
-  const std::vector<std::string> differing = TRY(compared(arguments, *controller));
+  const std::vector<std::string> differing = TRY(differences_from_cell(arguments, *controller));
   std::vector<OutputText> texts = TRY(cell_texts(arguments, *controller));
   texts.push_back({"--frames", arguments.frames, frames_csv(*controller)});
   TRY(write_together(texts));
