@@ -85,7 +85,7 @@ TEST_F(Setup, MakesACellOfAKukasBackup) {
 TEST_F(Setup, MeasuresAboveTheMountingPlaneAndFromBothSides) {
   ASSERT_EQ(setup(), 0);
   const Cell cell = read_cell(file("cell-3/cell.yaml")).value();
-  const JointList list = read_joint_file(file("cell-3/plan.csv")).value();
+  const JointList list = read_joint_csv(file("cell-3/plan.csv")).value();
   ASSERT_EQ(list.poses.size(), 24u);
   int from_above = 0, from_below = 0;
   for (const CommandedPose& pose : list.poses) {

@@ -49,12 +49,14 @@ struct Proposal {
   std::vector<std::string> missing;    ///< a sentence each, with what to do about it
 };
 
-/// How often motions of the program go somewhere with the tool.
-std::size_t uses_of(const std::string& tool, const cam::Program& program) {
+/// How often motions of the program go somewhere with the tool, whatever they call it.
+std::size_t uses_of(const cam::StatedTool& tool, const cam::Program& program) {
   std::size_t uses = 0;
-  for (const cam::ProgramTarget& target : program.targets)
-    if (program.tools[target.tool].name == tool)
+  for (const cam::ProgramTarget& target : program.targets) {
+    const std::optional<Pose>& X_FT = program.tools[target.tool].X_FT;
+    if (X_FT && cam::same_place(*X_FT, tool.X_FT))
       uses += std::max<std::size_t>(target.used_at.size(), 1);
+  }
   return uses;
 }
 
@@ -115,7 +117,7 @@ Status choose_tool(const SetupArguments& arguments, Proposal& proposal) {
   proposal.tool = arguments.tool;
   std::size_t most = 0;
   for (const auto& [name, tool] : tools) {
-    const std::size_t uses = proposal.program ? uses_of(name, *proposal.program) : 0;
+    const std::size_t uses = proposal.program ? uses_of(tool, *proposal.program) : 0;
     if (!arguments.tool.empty() || (!proposal.tool.empty() && uses <= most)) continue;
     proposal.tool = name;
     most = uses;
