@@ -79,7 +79,7 @@ TEST_F(Setup, MakesACellOfAKukasBackup) {
   EXPECT_EQ(json()["tool"], "spindle") << "the program's motions use it";
   EXPECT_EQ(json()["targets"], 2);
   EXPECT_TRUE(std::filesystem::exists(file("cell-3/measure.src")));
-  EXPECT_NE(read_text_file(file("cell-3/measure.src"))->find("TOOL_DATA[2]"), std::string::npos);
+  EXPECT_NE(read_text_file(file("cell-3/measure.src"))->find("BAS (#TOOL,2)"), std::string::npos);
 }
 
 TEST_F(Setup, MeasuresAboveTheMountingPlaneAndFromBothSides) {
