@@ -218,8 +218,8 @@ std::string robot_yaml_text(const CompensatedModel& model, const RigidRobot& rob
   text += fmt::format("#   base: {}\n", pose_yaml(robot.X_WB));
   for (const auto& [name, X_FT] : robot.tools)
     text += fmt::format("#   tools: {{{}: {}}}\n", shown(name), pose_yaml(X_FT));
-  text += fmt::format("version: 1\nname: {}\n",
-                      nlohmann::json(chain.name() + ", calibrated").dump());
+  text +=
+      fmt::format("version: 1\nname: {}\n", nlohmann::json(chain.name() + ", calibrated").dump());
   return text + joints_yaml(chain, robot.links);
 }
 
