@@ -1,7 +1,6 @@
 #include "server/calibrate/orientation_check.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -10,7 +9,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
-#include "server/measurement/reading_units.h"
+#include "server/calibrate/orientation_readings.h"
 #include "server/measurement/sessions.h"
 #include "server/robot/rigid_fit.h"
 
@@ -18,18 +17,21 @@ namespace trammel {
 
 namespace {
 
-using Quaternion = Eigen::Quaterniond;
-using Quaternions = std::vector<Quaternion>;
+using orientations::angle;
+using orientations::angles;
+using orientations::common;
+using orientations::kMostOff;
+using orientations::nearer;
+using orientations::Oriented;
+using orientations::Quaternion;
+using orientations::Quaternions;
+using orientations::Reading;
 
 // Angles, rms of all poses or of one pose.
-constexpr double kMostOff = from_deg(10);  // no nominal arm, and no mounted tool, is farther off
 constexpr double kWorthAsking =
     from_deg(0.2);  // below it one way of reading cannot be told from another
-constexpr double kMostCounted =
-    from_deg(30);  // more counts as much: wrong is wrong, and few rows must not decide
 constexpr double kMuchBetter =
     0.25;                      // of the rms as given: another way of reading that was surely meant
-constexpr double kGon = 0.9;   // deg
 constexpr double kFarRow = 5;  // times the median of all poses: a row of another pose
 // Positions.
 constexpr double kTellingSpread =
@@ -40,85 +42,13 @@ constexpr double kMostBadPositions = 0.1;  // share of all positions: more are n
 // Numbers of poses.
 constexpr std::size_t kFewestOriented =
     3;  // of a tool: two orientations agree with too many readings
-constexpr std::size_t kMostTries =
-    40;  // poses whose own R_FT is tried: half may be wrong, one must be right
-constexpr std::size_t kRowsOfFirstLook = 24;  // evenly drawn: which of many readings are hopeless
 constexpr std::size_t kMostPositions =
     300;  // evenly drawn beyond: more do not make the base more certain
-
-/// The measured orientations of one tool.
-struct Oriented {
-  std::string tool;
-  std::vector<const Measurement*> rows;
-  std::vector<Pose> X_BF;
-};
-
-/// One way in which the numbers may have been meant.
-struct Reading {
-  std::string name;  ///< after "read "
-  Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
-  bool by_order =
-      true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
-  std::string remedy;        ///< the change to make in the file; empty if none is certain
-  Quaternions or_else = {};  ///< alternative orientations of each pose; empty: none
-
-  [[nodiscard]] const Quaternions& second() const { return or_else.empty() ? q_FT : or_else; }
-};
-
-double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
 
 double rms(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value * value;
   return std::sqrt(sum / static_cast<double>(values.size()));
-}
-
-/// The numbers (x, y, z, w) where (w, x, y, z) was understood, and the other way round.
-Quaternion from_xyzw(const Quaternion& q) { return {q.z(), q.w(), q.x(), q.y()}; }
-Quaternion from_wxyz(const Quaternion& q) { return {q.x(), q.y(), q.z(), q.w()}; }
-
-std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about) {
-  std::vector<double> all;
-  for (const Quaternion& q : q_FT) all.push_back(angle(q, about));
-  return all;
-}
-
-/// Angle of every pose from `about`, by the nearer of two readings.
-std::vector<double> nearer(const Quaternions& one, const Quaternions& other,
-                           const Quaternion& about) {
-  std::vector<double> all = angles(one, about);
-  const std::vector<double> others = angles(other, about);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = std::min(all[i], others[i]);
-  return all;
-}
-
-/// The rotation that most poses have in common, each pose by its nearer reading. First the best
-/// candidate among single poses, then the mean of the poses near it.
-Quaternion common(const Quaternions& one, const Quaternions& other) {
-  const std::size_t n = one.size();
-  const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
-  Quaternion best = one.front();
-  double least = -1;
-  for (std::size_t i = 0; i < n; i += step) {
-    for (const Quaternion& tried : {one[i], other[i]}) {
-      double sum = 0;
-      for (const double off : nearer(one, other, tried)) sum += std::min(off, kMostCounted);
-      if (least < 0 || sum < least) least = sum, best = tried;
-    }
-  }
-  for (int round = 0; round < 2; ++round) {
-    const std::vector<double> off = nearer(one, other, best);
-    const double near = 3 * median(off) + 1e-9;
-    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-    for (std::size_t i = 0; i < n; ++i) {
-      if (off[i] > near) continue;
-      const bool by_other = angle(other[i], best) < angle(one[i], best);
-      const Eigen::Vector4d q = (by_other ? other : one)[i].coeffs();
-      sum += q.dot(best.coeffs()) < 0 ? Eigen::Vector4d(-q) : q;
-    }
-    best = Quaternion(Eigen::Vector4d(sum.normalized()));
-  }
-  return best;
 }
 
 /// Some of the poses: positions as measured, and the nominal flange.
@@ -191,241 +121,6 @@ Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
     turned.bad.assign(off.size(), false);
   return {turned, true};
 }
-
-/// The numbers as `reread` has them, with the base turned by q_WB.
-template <typename Reread>
-Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
-                const Reread& reread) {
-  Reading one{.name = std::move(name), .q_FT = {}, .remedy = {}, .or_else = {}};
-  for (std::size_t i = 0; i < group.rows.size(); ++i) {
-    const Quaternion q_BF(group.X_BF[i].linear());
-    one.q_FT.push_back(q_BF.conjugate() *
-                       (q_WB.conjugate() * reread(Quaternion(*group.rows[i]->R_WT))));
-  }
-  return one;
-}
-
-Quaternion as_it_is(const Quaternion& q) { return q; }
-
-/// Adds readings with one of four columns negated, with two exchanged, or of a left-handed frame.
-void add_columns(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
-  const std::array<const char*, 4> columns = {"qx", "qy", "qz", "qw"};  // as Eigen counts
-  const auto add = [&](const std::string& name, const auto& change) {
-    all.push_back(reading(name, group, q_WB, [&](const Quaternion& q) {
-      Eigen::Vector4d numbers = q.coeffs();
-      change(numbers);
-      return Quaternion(numbers);
-    }));
-  };
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    add(fmt::format("with the other sign of {}", columns[k]),
-        [&](Eigen::Vector4d& q) { q(at) *= -1; });
-  }
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    for (std::size_t j = i + 1; j < columns.size(); ++j) {
-      add(fmt::format("with {} and {} exchanged", columns[i], columns[j]), [&](Eigen::Vector4d& q) {
-        std::swap(q(static_cast<Eigen::Index>(i)), q(static_cast<Eigen::Index>(j)));
-      });
-    }
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    add(fmt::format("as of a left-handed frame (mirrored {} axis)", columns[k][1]),
-        [&](Eigen::Vector4d& q) {
-          for (std::size_t other = 0; other < 3; ++other)
-            q(static_cast<Eigen::Index>(other)) *= other == k ? 1 : -1;
-        });
-  }
-}
-
-/// The last joint in another unit, or counted together with one before it: a point on its axis does
-/// not show that.
-void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& robot,
-                    std::vector<Reading>& all) {
-  const int last = robot.size() - 1;
-  if (robot.joint(last).type != JointType::kRevolute) return;
-  const auto add = [&](std::string name, const auto& change) {
-    Oriented changed = group;
-    for (std::size_t i = 0; i < group.rows.size(); ++i) {
-      JointVector q = group.rows[i]->context.q;
-      change(q);
-      changed.X_BF[i] = robot.flange_pose(q);
-    }
-    all.push_back(reading(std::move(name), changed, q_WB, as_it_is));
-    all.back().by_order = false;
-  };
-  const std::string column = fmt::format("q{}_deg", last + 1);
-  add(fmt::format("with {} in radians", column), [&](JointVector& q) { q(last) *= 180 / kPi; });
-  add(fmt::format("with {} in gon", column), [&](JointVector& q) { q(last) *= kGon; });
-  for (int by = std::max(0, last - 2); by < last; ++by) {
-    if (robot.joint(by).type != JointType::kRevolute) continue;
-    add(fmt::format("with q{}_deg subtracted from {}", by + 1, column),
-        [&](JointVector& q) { q(last) -= q(by); });
-    add(fmt::format("with q{}_deg added to {}", by + 1, column),
-        [&](JointVector& q) { q(last) += q(by); });
-  }
-}
-
-/// A convention in which three numbers give an orientation, and its name.
-struct Told {
-  std::string name;
-  std::array<int, 3> axes;   ///< of the turns, each about the axis as turned so far
-  bool from_behind = false;  ///< the last number is of the first turn
-  std::string columns = {};  ///< the column names of this convention in a file; empty: it has none
-  bool is_vector = false;    ///< a rotation vector, which has no turns
-
-  [[nodiscard]] Quaternion from(const Vector3& rad) const {
-    if (is_vector) return Quaternion(rotation_exp(rad));
-    Quaternion q = Quaternion::Identity();
-    for (int k = 0; k < 3; ++k)
-      q = q * Eigen::AngleAxisd(rad(from_behind ? 2 - k : k), Vector3::Unit(axes[k]));
-    return q;
-  }
-  /// The numbers (within half a turn) that tell R, the smaller ones first: of turns there are two
-  /// ways.
-  [[nodiscard]] std::array<Vector3, 2> numbers(const Matrix3& R) const {
-    if (is_vector) return {rotation_log(R), rotation_log(R)};
-    const auto wrapped = [&](const Vector3& turns) {
-      const Vector3 within =
-          turns.unaryExpr([](double angle) { return std::remainder(angle, 2 * kPi); });
-      return from_behind ? Vector3(within.reverse()) : within;
-    };
-    const Vector3 one = R.eulerAngles(axes[0], axes[1], axes[2]);
-    const double half = axes[0] == axes[2] ? 0 : kPi;
-    std::array<Vector3, 2> both = {wrapped(one),
-                                   wrapped({one.x() + kPi, half - one.y(), one.z() + kPi})};
-    if (both[1].cwiseAbs().maxCoeff() < both[0].cwiseAbs().maxCoeff()) std::swap(both[0], both[1]);
-    return both;
-  }
-};
-
-constexpr std::size_t kToldInFiles = 5;  // the first ways: files with three numbers are read so
-
-/// The ways of controllers, then all other orders of turns.
-const std::vector<Told>& ways_to_tell() {
-  static const std::vector<Told> all = [] {
-    std::vector<Told> ways = {{"as A B C", {2, 1, 0}, false, "A, B, C"},
-                              {"as W P R", {2, 1, 0}, true, "W, P, R"},
-                              {"as Rx Ry Rz", {0, 1, 2}, false, "Rx, Ry, Rz"},
-                              {"as a rotation vector", {}, false, "rvx, rvy, rvz", true},
-                              {"as O A T (turns about z, y, z)", {2, 1, 2}, false, "O, A, T"}};
-    constexpr std::array<const char*, 3> kNames = {"x", "y", "z"};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        for (int k = 0; k < 3; ++k) {
-          const std::array<int, 3> axes = {i, j, k};
-          const auto is_there = [&](const Told& way) { return way.axes == axes; };
-          if (i == j || j == k || std::any_of(ways.begin(), ways.end(), is_there)) continue;
-          ways.push_back(
-              {fmt::format("as turns about {}, {}, {}", kNames[i], kNames[j], kNames[k]), axes});
-        }
-      }
-    }
-    return ways;
-  }();
-  return all;
-}
-
-/// The orientation columns to write where three numbers were meant `way`.
-std::string remedy_of(const Told& way, bool in_radians) {
-  if (way.columns.empty()) return "write the orientation as a quaternion: qw, qx, qy, qz";
-  const char* unit = in_radians ? "rad" : "deg";
-  if (way.is_vector) return fmt::format("name its columns rvx_{0}, rvy_{0}, rvz_{0}", unit);
-  if (in_radians) return "write the unit into the names of their columns: A_rad, Rx (rad)";
-  return fmt::format("name the columns {}, as they are meant", way.columns);
-}
-
-/// At most `count` rows of a tool, evenly drawn.
-Oriented some_of(const Oriented& group, std::size_t count) {
-  const std::size_t n = group.rows.size(), kept = std::min(n, count);
-  Oriented some{group.tool, {}, {}};
-  for (std::size_t k = 0; k < kept; ++k) {
-    some.rows.push_back(group.rows[k * n / kept]);
-    some.X_BF.push_back(group.X_BF[k * n / kept]);
-  }
-  return some;
-}
-
-/// Adds readings of the same three numbers as radians, in another order of turns, or as a rotation
-/// vector. The file may have used any of these conventions; read by a wrong one, the numbers fit
-/// nothing. From turns only the orientation is left, and it has two possible triples of numbers.
-void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
-  const std::vector<Told>& ways = ways_to_tell();
-  const Oriented few = some_of(group, kRowsOfFirstLook);
-  for (std::size_t k = 0; k < kToldInFiles; ++k) {
-    const Told& was = ways[k];
-    const bool small = std::all_of(group.rows.begin(), group.rows.end(), [&](const Measurement* m) {
-      return was.numbers(*m->R_WT)[0].cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
-    });
-    for (const Told& meant : ways) {
-      const bool same = &was == &meant;
-      if (same && (!small || was.is_vector)) continue;
-      const bool reversed = !same && was.axes == meant.axes && !was.is_vector;
-      if (reversed && was.from_behind) continue;  // A B C are W P R from behind
-      std::string name = same       ? "as angles"
-                         : reversed ? "with the three angles from behind (A B C, W P R)"
-                                    : meant.name;
-      if (small) name += " in radians";
-      const auto reread = [&](std::size_t way) {
-        return [&, way](const Quaternion& q) {
-          return meant.from((small ? to_deg(1) : 1) * was.numbers(q.matrix())[small ? 0 : way]);
-        };
-      };
-      const Quaternions q = reading("", few, q_WB, reread(0)).q_FT,
-                        other = reading("", few, q_WB, reread(1)).q_FT;
-      if (median(nearer(q, other, common(q, other))) > kMostOff) continue;
-      Reading one = reading(std::move(name), group, q_WB, reread(0));
-      one.or_else = reading("", group, q_WB, reread(1)).q_FT;
-      one.by_order = false;
-      one.remedy = remedy_of(meant, small);
-      all.push_back(std::move(one));
-    }
-  }
-}
-
-/// As given first, then all others.
-std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, const Chain& robot) {
-  const auto inverse = [](const Quaternion& q) { return q.conjugate(); };
-  std::vector<Reading> all = {
-      reading("as given", group, q_WB, as_it_is),
-      reading("as xyzw", group, q_WB, from_xyzw),
-      reading("as the inverse", group, q_WB, inverse),
-      reading("as xyzw and the inverse", group, q_WB,
-              [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
-      reading("as wxyz under an xyzw header", group, q_WB, from_wxyz),
-      reading("as wxyz under an xyzw header and the inverse", group, q_WB,
-              [](const Quaternion& q) { return from_wxyz(q).conjugate(); }),
-  };
-  add_columns(group, q_WB, all);
-  const auto add = [&](Reading one) {
-    one.by_order = false;
-    all.push_back(std::move(one));
-  };
-  add(reading("against the robot's base instead of the tracker", group, Quaternion::Identity(),
-              as_it_is));
-  add(reading("as the inverse, against the robot's base", group, Quaternion::Identity(), inverse));
-  for (int j = 0; j < robot.size(); ++j) {
-    if (robot.joint(j).type != JointType::kRevolute) continue;
-    Oriented reversed = group;
-    for (std::size_t i = 0; i < group.rows.size(); ++i) {
-      JointVector q = group.rows[i]->context.q;
-      q(j) = -q(j);
-      reversed.X_BF[i] = robot.flange_pose(q);
-    }
-    add(reading(fmt::format("with the other sign of q{}_deg", j + 1), reversed, q_WB, as_it_is));
-  }
-  for (const bool next : {true, false}) {
-    Oriented shifted = group;
-    std::rotate(shifted.X_BF.begin(), next ? shifted.X_BF.begin() + 1 : shifted.X_BF.end() - 1,
-                shifted.X_BF.end());
-    add(reading(next ? "as those of the next row" : "as those of the row before", shifted, q_WB,
-                as_it_is));
-  }
-  add_last_joint(group, q_WB, robot, all);
-  add_three_numbers(group, q_WB, all);
-  return all;
-}
-
 /// The fit of one way of reading, alone or together with the numbers as given.
 struct Judged {
   Quaternion q_FT = Quaternion::Identity();  ///< the rotation that the poses have in common
@@ -454,7 +149,9 @@ std::string deg(double radians) {
 class Question {
  public:
   Question(const Oriented& group, const Quaternion& q_WB, const Cell& cell)
-      : group_(group), X_FT_(cell.tools.at(group.tool)), all_(readings(group, q_WB, cell.robot)) {
+      : group_(group),
+        X_FT_(cell.tools.at(group.tool)),
+        all_(orientations::readings(group, q_WB, cell.robot)) {
     const Quaternions& given = all_.front().q_FT;
     given_ = judged(given, given, X_FT_);
     if (follow()) return;

@@ -2,45 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <functional>
 #include <optional>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/text_lines.h"
+#include "server/robot/three_numbers.h"
 
 namespace trammel::cli {
 
 namespace {
-
-Matrix3 turn(int axis, double angle) { return rotation_exp(angle * Vector3::Unit(axis)); }
-
-/// A meaning of three angles, by the makers that show them so.
-struct Meaning {
-  const char* text;
-  Matrix3 (*rotation)(const Vector3& angles);
-};
-const std::array<Meaning, 5> kMeanings = {{
-    {"turns about z, y and x, in this order, each about the turned axis",
-     [](const Vector3& a) -> Matrix3 { return turn(2, a(0)) * turn(1, a(1)) * turn(0, a(2)); }},
-    {"turns about the fixed axes x, y and z, in this order",
-     [](const Vector3& a) -> Matrix3 { return turn(2, a(2)) * turn(1, a(1)) * turn(0, a(0)); }},
-    {"turns about x, y and z, in this order, each about the turned axis",
-     [](const Vector3& a) -> Matrix3 { return turn(0, a(0)) * turn(1, a(1)) * turn(2, a(2)); }},
-    {"turns about z, y and z, in this order, each about the turned axis",
-     [](const Vector3& a) -> Matrix3 { return turn(2, a(0)) * turn(1, a(1)) * turn(2, a(2)); }},
-    {"a rotation vector", [](const Vector3& a) -> Matrix3 { return rotation_exp(a); }},
-}};
-
-const std::array<std::array<const char*, 3>, 7> kAngleNames = {{{"rx", "ry", "rz"},
-                                                                {"a", "b", "c"},
-                                                                {"w", "p", "r"},
-                                                                {"o", "a", "t"},
-                                                                {"a", "e", "r"},
-                                                                {"r", "p", "y"},
-                                                                {"rvx", "rvy", "rvz"}}};
 
 /// The columns of a table by their names without case, blanks and units.
 class Columns {
@@ -57,7 +29,7 @@ class Columns {
   /// All of `names`, or none.
   template <std::size_t N>
   [[nodiscard]] std::optional<std::array<std::size_t, N>> all(
-      const std::array<const char*, N>& names) const {
+      const std::array<std::string, N>& names) const {
     std::array<std::size_t, N> columns = {};
     for (std::size_t i = 0; i < N; ++i) {
       const auto column = find(names[i]);
@@ -145,13 +117,15 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
   for (const double unit : {from_deg(1), 1.0}) {
     if (said && unit == 1.0) break;
     const std::vector<Vector3> angles = TRY(vectors(columns, three, unit));
-    for (const Meaning& meaning : kMeanings) {
+    for (const ThreeNumbers& way : ways_of_three_numbers()) {
+      if (way.columns.empty()) continue;  // no controller shows it so
       ShownPoses::Orientations read{fmt::format("{} {} {}, {}", columns.table().columns()[three[0]],
                                                 columns.table().columns()[three[1]],
-                                                columns.table().columns()[three[2]], meaning.text),
+                                                columns.table().columns()[three[2]],
+                                                way.meaning.empty() ? way.name : way.meaning),
                                     {}};
       if (!said && unit == 1.0) read.meaning += ", rad";
-      std::transform(angles.begin(), angles.end(), std::back_inserter(read.R), meaning.rotation);
+      for (const Vector3& one : angles) read.R.push_back(way.rotation(one).toRotationMatrix());
       shown.orientations.push_back(std::move(read));
     }
   }
@@ -161,8 +135,9 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
 Status read_orientations(const Columns& columns, ShownPoses& shown) {
   if (const auto wxyz = columns.all<4>({"qw", "qx", "qy", "qz"}))
     return read_quaternions(columns, *wxyz, shown);
-  for (const std::array<const char*, 3>& names : kAngleNames)
-    if (const auto three = columns.all(names)) return read_angles(columns, *three, shown);
+  for (const ThreeNumbers& way : ways_of_three_numbers())
+    for (const std::array<std::string, 3>& names : way.columns)
+      if (const auto three = columns.all(names)) return read_angles(columns, *three, shown);
   return {};
 }
 

@@ -12,6 +12,7 @@
 #include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/text_lines.h"
+#include "server/robot/three_numbers.h"
 
 namespace trammel {
 
@@ -28,8 +29,6 @@ constexpr const char* kNameTheColumns =
     "name the columns in the first line: J1 ... J6, X, Y, Z, and the angles A B C, W P R, O A T, "
     "Rx Ry Rz (deg) or rvx_rad rvy_rad rvz_rad";
 
-enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kOat, kVector, kQuaternion };
-
 /// A column and the factor from its unit to ours: rad if `angle`, else m.
 struct ScaledColumn {
   std::size_t column = 0;
@@ -42,7 +41,7 @@ struct RoboDkColumns {
   std::vector<std::size_t> quaternion, tcp, extra;
   std::vector<std::string> extra_names;
   std::optional<std::size_t> pose_id;
-  Orientation orientation = Orientation::kNone;
+  const ThreeNumbers* way = nullptr;  ///< in which `angles` tell the orientation
 };
 
 /// The column with the unit that its header names, or `unit`.
@@ -168,21 +167,20 @@ class NamedColumns {
   }
 
   [[nodiscard]] Status find_orientation() {
-    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 5> kinds = {
-        {{Orientation::kOat, {"o", "a", "t"}},
-         {Orientation::kAbc, {"a", "b", "c"}},
-         {Orientation::kWpr, {"w", "p", "r"}},
-         {Orientation::kRxRyRz, {"rx", "ry", "rz"}},
-         {Orientation::kVector, {"rvx", "rvy", "rvz"}}}};
-    for (const auto& [kind, names] : kinds) {
-      // The `a` of `o a t` is not that of `a b c`.
-      if (kind == (find_name("o") && find_name("t") ? Orientation::kAbc : Orientation::kOat))
-        continue;
-      std::vector<ScaledColumn> angles;
-      TRY(find_three(names, kind == Orientation::kVector ? "rad" : "deg", angles));
-      if (angles.empty()) continue;
-      TRY(set_orientation(kind));
-      found_.angles = std::move(angles);
+    // A part of three columns is refused, unless it is of others that are all there: `a` of `o a
+    // t`.
+    for (const bool complete : {true, false}) {
+      for (const ThreeNumbers& way : ways_of_three_numbers()) {
+        for (const std::array<std::string, 3>& names : way.columns) {
+          if (has_all(names) != complete || (!complete && found_.way != nullptr)) continue;
+          std::vector<ScaledColumn> angles;
+          TRY(find_three(names, way.is_vector ? "rad" : "deg", angles));
+          if (angles.empty()) continue;
+          if (found_.way != nullptr) return two_orientations();
+          found_.way = &way;
+          found_.angles = std::move(angles);
+        }
+      }
     }
     for (const char* name : {"qw", "qx", "qy", "qz"}) {
       if (const auto column = find_name(name)) found_.quaternion.push_back(*column);
@@ -196,20 +194,21 @@ class NamedColumns {
           .beyond(found_.quaternion.size(), 4);
     }
     used_.insert(used_.end(), found_.quaternion.begin(), found_.quaternion.end());
-    return set_orientation(Orientation::kQuaternion);
+    if (found_.way != nullptr) return two_orientations();
+    return {};
   }
 
-  [[nodiscard]] Status set_orientation(Orientation kind) {
-    if (found_.orientation != Orientation::kNone) {
-      return refused("two orientations")
-          .in(table_.where())
-          .of("orientation")
-          .next(
-              "expected one of A B C, W P R, O A T, Rx Ry Rz, rvx_rad rvy_rad rvz_rad, qw qx qy "
-              "qz");
-    }
-    found_.orientation = kind;
-    return {};
+  [[nodiscard]] bool has_all(const std::array<std::string, 3>& names) const {
+    return std::all_of(names.begin(), names.end(),
+                       [&](const std::string& name) { return find_name(name).has_value(); });
+  }
+
+  [[nodiscard]] Failure two_orientations() const {
+    return refused("two orientations")
+        .in(table_.where())
+        .of("orientation")
+        .next(
+            "expected one of A B C, W P R, O A T, Rx Ry Rz, rvx_rad rvy_rad rvz_rad, qw qx qy qz");
   }
 
   const CsvTable& table_;
@@ -328,27 +327,17 @@ Result<Vector3> read_three(const CsvTable& table, std::size_t row,
   return values;
 }
 
-Matrix3 turn(int axis, double angle) { return rotation_exp(angle * Vector3::Unit(axis)); }
-
 Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t row,
                                              const RoboDkColumns& columns) {
-  if (columns.orientation == Orientation::kNone) return std::optional<Matrix3>();
-  if (columns.orientation == Orientation::kQuaternion) {
+  if (!columns.quaternion.empty()) {
     return table.rotation(row, columns.quaternion).map([](const Matrix3& R) {
       return std::optional(R);
     });
   }
-  return read_three(table, row, columns.angles)
-      .map([&](const Vector3& angles) -> std::optional<Matrix3> {
-        if (columns.orientation == Orientation::kVector) return rotation_exp(angles);
-        if (columns.orientation == Orientation::kAbc)
-          return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
-        if (columns.orientation == Orientation::kOat)
-          return turn(2, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
-        if (columns.orientation == Orientation::kWpr)
-          return turn(2, angles(2)) * turn(1, angles(1)) * turn(0, angles(0));
-        return turn(0, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
-      });
+  if (columns.way == nullptr) return std::optional<Matrix3>();
+  return read_three(table, row, columns.angles).map([&](const Vector3& angles) {
+    return std::optional<Matrix3>(columns.way->rotation(angles).toRotationMatrix());
+  });
 }
 
 Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
