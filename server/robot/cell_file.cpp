@@ -13,90 +13,10 @@
 #include "server/robot/cell_papers.h"
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
-#include "server/robot/gauge.h"
+#include "server/robot/cell_values.h"
 #include "server/robot/robot_confirmation.h"
 
 namespace trammel {
-
-namespace {
-
-constexpr double kFarthestMm = 1e9;  // of any frame or point: no cell is larger
-
-Vector3 read_vector(const YamlMap& map, const std::string& key) {
-  const std::vector<double> v = map.numbers(key, 3);
-  for (const double value : v) {
-    if (std::abs(value) > kFarthestMm)
-      map.refuse(key, refused("{:g}, limit {:g}", value, kFarthestMm).beyond(value, kFarthestMm));
-  }
-  return {v[0], v[1], v[2]};
-}
-
-/// The name of a tool or a payload, as ids in requests have it.
-void check_key(const YamlMap& map, const std::string& name, const char* what) {
-  if (name.empty()) map.refuse(name, refused("a {} without a name", what));
-  if (const Status fine = check_name(name, what); !fine) map.refuse(name, Failure(fine.error()));
-}
-
-void read_link(const YamlMap& map, Joint& joint) {
-  joint.hayati = map.boolean("hayati", false);
-  if (joint.hayati && map.number("d_mm", 0) != 0) map.refuse("d_mm", "a Hayati link has no d");
-  if (!joint.hayati && map.has("beta_deg")) map.refuse("beta_deg", "only a Hayati link has beta");
-  joint.link.theta = from_deg(map.number("theta_deg", 0));
-  joint.link.d = from_mm(map.number("d_mm", 0));
-  joint.link.a = from_mm(map.number("a_mm", 0));
-  joint.link.alpha = from_deg(map.number("alpha_deg", 0));
-  joint.link.beta = from_deg(map.number("beta_deg", 0));
-}
-
-/// Reads the limits and the speed of the joint.
-void read_motion(const YamlMap& map, Joint& joint) {
-  const bool revolute = joint.type == JointType::kRevolute;
-  const std::string limits = revolute ? "limits_deg" : "limits_mm";
-  const char* unit = revolute ? "deg" : "mm";
-  const std::string speed = revolute ? "max_speed_deg_s" : "max_speed_mm_s";
-  const auto si = [&](double value) { return revolute ? from_deg(value) : from_mm(value); };
-  if (map.has(limits)) {
-    const std::vector<double> range = map.numbers(limits, 2);
-    if (!(range[0] < range[1])) {
-      map.refuse(limits, refused("lower limit {:g} {} is not below upper limit {:g} {}", range[0],
-                                 unit, range[1], unit)
-                             .beyond(range[0], range[1])
-                             .next("where nobody commands the joint, write passive: true"));
-    }
-    joint.lower = si(range[0]);
-    joint.upper = si(range[1]);
-  }
-  if (map.has(speed)) joint.max_speed = si(map.number(speed));
-  if (!map.boolean("passive", false)) return;
-  if (map.has(limits)) map.refuse(limits, "a passive joint is never commanded and has no limits");
-  joint.lower = joint.upper = 0;
-}
-
-Joint read_joint(const YamlMap& map) {
-  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
-            "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
-            "max_speed_deg_s", "max_speed_mm_s", "passive"});
-  Joint joint;
-  map.attempt([&] {
-    const std::string type = map.text("type", "revolute");
-    if (type != "revolute" && type != "prismatic")
-      map.refuse("type", refused("'{}', expected revolute or prismatic", type).with_text(type));
-    joint.type = type == "revolute" ? JointType::kRevolute : JointType::kPrismatic;
-  });
-  map.attempt([&] { read_link(map, joint); });
-  map.attempt([&] {
-    joint.sign = map.number("sign", 1);
-    joint.gear_ratio = map.number("gear_ratio", 0);
-    joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
-    joint.mass = map.number("mass_kg", 0);
-    if (joint.mass < 0) map.refuse("mass_kg", refused("below 0").beyond(joint.mass, 0));
-    if (map.has("cog_mm")) joint.p_cog = read_vector(map, "cog_mm") * from_mm(1);
-  });
-  map.attempt([&] { read_motion(map, joint); });
-  return joint;
-}
-
-}  // namespace
 
 Pose read_pose(const YamlMap& map) {
   map.only({"xyz_mm", "q_wxyz"});
@@ -116,39 +36,6 @@ Pose read_pose(const YamlMap& map) {
 }
 
 namespace {
-
-constexpr double kWorstSigma = 5e-3;  // m; no instrument for robots is worse
-
-Tracker read_tracker(const YamlMap& map) {
-  map.only({"sigma_mm", "sigma_deg", "xyz_mm", "aperture_deg", "target_normal"});
-  Tracker tracker;
-  tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
-  tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
-  if (tracker.sigma <= 0)
-    map.refuse("sigma_mm", refused("must be above 0").beyond(to_mm(tracker.sigma), 0));
-  if (tracker.sigma > kWorstSigma) {
-    map.refuse("sigma_mm", refused("{:g}, limit {:g}", to_mm(tracker.sigma), to_mm(kWorstSigma))
-                               .beyond(to_mm(tracker.sigma), to_mm(kWorstSigma))
-                               .next("in micrometres? write it in mm"));
-  }
-  if (tracker.sigma_rotation <= 0)
-    map.refuse("sigma_deg", refused("must be above 0").beyond(to_deg(tracker.sigma_rotation), 0));
-  if (!map.is_null("xyz_mm")) tracker.p_W = read_vector(map, "xyz_mm") * from_mm(1);
-  if (map.has("aperture_deg")) {
-    tracker.aperture = from_deg(map.number("aperture_deg"));
-    if (!(*tracker.aperture > 0 && *tracker.aperture <= kPi))
-      map.refuse("aperture_deg",
-                 refused("must be above 0, at most 180")
-                     .beyond(to_deg(*tracker.aperture), *tracker.aperture > 0 ? 180 : 0));
-  }
-  if (map.has("target_normal")) {
-    tracker.target_normal_T = read_vector(map, "target_normal");
-    if (tracker.target_normal_T.norm() < 1e-9)
-      map.refuse("target_normal", "a direction of length 0");
-    tracker.target_normal_T.normalize();
-  }
-  return tracker;
-}
 
 void read_tools(const YamlMap& map, Cell& cell) {
   if (!map.is_null("tools")) {
@@ -187,72 +74,6 @@ void read_payloads(const YamlMap& map, Cell& cell) {
     });
   }
 }
-
-/// A direction of length 1.
-Vector3 read_direction(const YamlMap& map, const std::string& key) {
-  const Vector3 direction = read_vector(map, key);
-  if (direction.norm() < 1e-9) map.refuse(key, "a direction of length 0");
-  return direction.normalized();
-}
-
-double read_radius(const YamlMap& map, const std::string& key) {
-  const double radius = map.number(key);
-  if (!(radius > 0)) map.refuse(key, refused("must be above 0").beyond(radius, 0));
-  return from_mm(radius);
-}
-
-/// The shape of an anchor: a point, unless a key says that it is a sphere, a plane or a ring.
-void read_shape(const YamlMap& map, Anchor& anchor) {
-  const bool sphere = map.has("sphere_radius_mm"), plane = map.has("plane_normal"),
-             ring = map.has("ring_axis");
-  if (sphere + plane + ring > 1)
-    map.refuse(plane ? "plane_normal" : "ring_axis", "an anchor is one of sphere, plane and ring");
-  if (ring != map.has("ring_radius_mm"))
-    map.refuse("ring_radius_mm", "ring_axis and ring_radius_mm belong together");
-  if (sphere) {
-    anchor.shape = Anchor::Shape::kSphere;
-    anchor.radius = read_radius(map, "sphere_radius_mm");
-  } else if (plane) {
-    anchor.shape = Anchor::Shape::kPlane;
-    anchor.direction_W = read_direction(map, "plane_normal");
-  } else if (ring) {
-    anchor.shape = Anchor::Shape::kRing;
-    anchor.direction_W = read_direction(map, "ring_axis");
-    anchor.radius = read_radius(map, "ring_radius_mm");
-  }
-  if ((plane || ring) && !anchor.p_W)
-    map.refuse("xyz_mm", "where a plane or a ring is must be known");
-}
-
-Anchor read_anchor(const YamlMap& map) {
-  map.only({"xyz_mm", "zero_mm", "sigma_mm", "sphere_radius_mm", "plane_normal", "ring_axis",
-            "ring_radius_mm"});
-  Anchor anchor;
-  if (!map.is_null("xyz_mm")) anchor.p_W = read_vector(map, "xyz_mm") * from_mm(1);
-  if (!map.is_null("zero_mm")) anchor.zero = from_mm(map.number("zero_mm"));
-  anchor.zero_open = map.has("zero_mm") && map.is_null("zero_mm");
-  if (!map.is_null("sigma_mm")) {
-    const double sigma = map.number("sigma_mm");
-    if (!(sigma > 0)) map.refuse("sigma_mm", refused("must be above 0").beyond(sigma, 0));
-    anchor.sigma = from_mm(sigma);
-  }
-  read_shape(map, anchor);
-  return anchor;
-}
-
-Anchors read_anchors(const YamlMap& map) {
-  Anchors all;
-  if (map.is_null("anchors")) return all;
-  const YamlMap anchors = map.map("anchors");
-  for (const std::string& name : anchors.keys()) {
-    anchors.attempt([&] {
-      check_key(anchors, name, "anchor");
-      all[name] = anchors.is_null(name) ? Anchor{} : read_anchor(anchors.map(name));
-    });
-  }
-  return all;
-}
-
 bool says_auto(const YamlMap& model) {
   try {
     return model.text("error_sources") == kAutoSources;
@@ -453,80 +274,7 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
                                .beyond(ranges.keys().size(), cell.robot.size()));
   }
 }
-
 }  // namespace
-
-namespace {
-
-/// The index from 0 of a joint that the file counts from 1. Chain::make() checks that the robot has
-/// it.
-int joint_index(const YamlMap& map, const std::string& key) {
-  const int number = map.integer(key, 0);
-  if (number < 1 || number > kMaxJoints)
-    map.refuse(key, refused("{}, limit 1 to {}", number, kMaxJoints)
-                        .beyond(number, number < 1 ? 1 : kMaxJoints));
-  return number - 1;
-}
-
-CouplingKind coupling_kind(const YamlMap& map) {
-  const std::string text = map.text("kind", to_string(CouplingKind::kController));
-  for (const CouplingKind kind : {CouplingKind::kController, CouplingKind::kParallelogram})
-    if (text == to_string(kind)) return kind;
-  map.refuse("kind", refused("'{}', expected controller or parallelogram", text).with_text(text));
-}
-
-}  // namespace
-
-namespace {
-
-constexpr double kShortestArm = 0.05;  // m, all lengths of its links together; no robot is smaller
-
-/// Refuses an arm that is smaller than any robot.
-void check_lengths(const YamlMap& map, const std::vector<Joint>& joints) {
-  double sum = 0;
-  bool rails = false;
-  for (const Joint& joint : joints) {
-    sum += std::abs(joint.link.a) + std::abs(joint.link.d);
-    rails = rails || joint.type == JointType::kPrismatic;
-  }
-  if (rails || joints.size() < 3 || sum >= kShortestArm) return;
-  map.refuse("joints",
-             refused("all lengths of the links together are {:g} mm, expected {:g} or more",
-                     to_mm(sum), to_mm(kShortestArm))
-                 .beyond(to_mm(sum), to_mm(kShortestArm))
-                 .next("in metres? write them in mm"));
-}
-
-}  // namespace
-
-Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where) {
-  return read_yaml(
-             robot_yaml, where,
-             [&](const YamlMap& map) {
-               map.only({"version", "name", "source", "joints", "coupling"});
-               if (map.integer("version", 0) != 1)
-                 map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
-               std::vector<Joint> joints;
-               for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
-               map.attempt([&] { check_lengths(map, joints); });
-               std::vector<Coupling> couplings;
-               if (!map.is_null("coupling")) {
-                 for (const YamlMap& entry : map.maps("coupling")) {
-                   entry.only({"joint", "follows", "ratio", "kind"});
-                   couplings.push_back({joint_index(entry, "joint"), joint_index(entry, "follows"),
-                                        entry.number("ratio"), coupling_kind(entry)});
-                 }
-               }
-               return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
-             })
-      .and_then([](Result<Chain> chain) { return chain; })
-      .map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
-}
-
-Result<Chain> read_robot(const std::string& path) {
-  return read_text_file(path).and_then(
-      [&](const std::string& text) { return parse_robot(text, path); });
-}
 
 namespace {
 

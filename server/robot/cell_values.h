@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "server/base/yaml_file.h"
+#include "server/robot/gauge.h"
+
+/// The values that cell and robot files are made of. Each refuses by the key that is wrong.
+namespace trammel {
+
+/// Three numbers, none larger than any cell.
+[[nodiscard]] Vector3 read_vector(const YamlMap& map, const std::string& key);
+/// A direction of length 1.
+[[nodiscard]] Vector3 read_direction(const YamlMap& map, const std::string& key);
+/// Refuses what is no name of a tool, a payload or an anchor, as ids in requests have it.
+void check_key(const YamlMap& map, const std::string& name, const char* what);
+
+/// The instruments of the cell: its tracker, and the anchors of others.
+[[nodiscard]] Tracker read_tracker(const YamlMap& map);
+[[nodiscard]] Anchors read_anchors(const YamlMap& map);
+
+}  // namespace trammel
