@@ -323,6 +323,69 @@ TEST(BatchCheck, DistancesInAnotherUnitAreNamedAllOfThemAndSingleRows) {
   }
 }
 
+TEST(BatchCheck, OneWireOfThreeInInchesIsNamedByItsAnchor) {
+  for (const std::uint64_t seed : {3, 4, 5}) {
+    const test::GaugedArm arm = test::gauged_arm(seed, test::three_corners());
+    MeasurementBatch batch = test::gauge_batch(arm, test::wire_rows(arm, 90, seed), 0.05, seed);
+    for (Measurement& m : batch.measurements)
+      if (m.gauge->anchor == "a2") m.gauge->value /= 25.4;
+    const auto said = batch_doubt(batch, *arm.cell);
+    ASSERT_TRUE(said) << seed;
+    EXPECT_EQ(said->text, "in inches") << sentence(*said);
+    EXPECT_NE(said->message.find("anchor 'a2'"), std::string::npos) << sentence(*said);
+  }
+}
+
+TEST(BatchCheck, AnAnchorWhosePlaceIsWrittenWithAnotherSignOrOrderIsNamed) {
+  const std::string kMeant[5][2] = {
+      {"a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, -1700, 400]}, a3: {xyz_mm: [2600, "
+       "200, 2600]}",
+       "anchor 'a2' with the other sign of its y"},
+      {"a1: {xyz_mm: [-1500, 2300, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: [2600, "
+       "200, 2600]}",
+       "anchor 'a1' with its x and y exchanged"},
+      {"a1: {xyz_mm: [1900, 1700, 400]}, a2: {xyz_mm: [2300, -1500, 100]}, a3: {xyz_mm: [2600, "
+       "200, 2600]}",
+       "anchor 'a1' with the place of 'a2'"},
+      {"a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: [2600, "
+       "200, 2300]}",
+       "anchor 'a3' at another place"},
+      {"a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: [2.6, "
+       "0.2, 2.6]}",
+       "anchor 'a3' with its place in metres"}};
+  for (const auto& [anchors, reading] : kMeant) {
+    const test::GaugedArm arm = test::gauged_arm(3, test::three_corners(), "{" + anchors + "}");
+    const auto said =
+        batch_doubt(test::gauge_batch(arm, test::wire_rows(arm, 90, 3), 0.05, 3), *arm.cell);
+    ASSERT_TRUE(said) << reading;
+    EXPECT_EQ(said->text, reading) << sentence(*said);
+  }
+}
+
+TEST(BatchCheck, WiresOfArmsAsTheyAreDeliveredAreNotDoubted) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const test::GaugedArm arm = test::gauged_arm(seed, test::three_corners());
+    const auto said =
+        batch_doubt(test::gauge_batch(arm, test::wire_rows(arm, 60, seed), 0.05, seed), *arm.cell);
+    EXPECT_FALSE(said) << seed << ": " << sentence(*said);
+    const auto with_zero = batch_doubt(
+        test::gauge_batch(arm, test::wire_rows(arm, 60, seed, 40), 0.05, seed), *arm.cell);
+    EXPECT_FALSE(with_zero) << seed << ", zeros of 40 mm: " << sentence(*with_zero);
+  }
+}
+
+TEST(BatchCheck, ATurnOfTheLastJointMayBeOneOfTheToolAndBothAreSaid) {
+  const auto known = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(known), 60, 3, false);
+  auto other = std::make_shared<Cell>(*known);
+  Pose& X_FT = other->tools.at("spindle").value();
+  X_FT = Pose(Eigen::AngleAxisd(kPi, Vector3::UnitZ())) * X_FT;
+  const auto said = test::said_of(batch, *other);
+  ASSERT_TRUE(said);
+  EXPECT_NE(said->message.find("the tool of the cell file turned by"), std::string::npos)
+      << sentence(*said);
+}
+
 TEST(BatchCheck, TouchesThatCountTheOtherWayOrInInchesAreNamed) {
   const test::GaugedArm arm =
       test::gauged_arm(23, {}, "{table: {xyz_mm: [1200, 0, 300], plane_normal: [0, 0, 1]}}");

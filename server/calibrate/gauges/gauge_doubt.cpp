@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
+#include "server/calibrate/gauges/locate_anchors.h"
 #include "server/calibrate/identify/weighting.h"
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/reading_units.h"
@@ -103,6 +106,137 @@ std::optional<Error> doubt_of_distances(const CellPtr& cell, const MeasurementBa
   return std::nullopt;
 }
 
+/// The distances to one anchor, and where the arm as drawn has the tool's point.
+struct Wire {
+  std::vector<Vector3> points_W;
+  std::vector<double> lengths;  ///< m
+  std::optional<Vector3> stated;
+  std::optional<LocatedPoint> found;
+
+  bool is_zero_known = false;
+
+  /// m: median by which a length is off if the anchor stands there, but for an unknown zero.
+  [[nodiscard]] double off_at(const Vector3& place) const {
+    std::vector<double> off, sizes;
+    for (std::size_t i = 0; i < lengths.size(); ++i)
+      off.push_back(lengths[i] - (points_W[i] - place).norm());
+    const double zero = is_zero_known ? 0 : median(off);
+    for (const double one : off) sizes.push_back(std::abs(one - zero));
+    return median(std::move(sizes));
+  }
+  [[nodiscard]] bool fits() const { return found && found->off < kNoModelError; }
+  [[nodiscard]] bool stands_as_stated() const {
+    return fits() && stated && off_at(*stated) < kNoModelError;
+  }
+};
+
+/// By anchor; empty where a tool is unknown.
+std::map<std::string, Wire> wires_of(const Cell& cell, const MeasurementBatch& distances) {
+  std::map<std::string, Wire> all;
+  const Anchors anchors = anchors_of(cell).value_or(Anchors{});
+  for (const Measurement& m : distances.measurements) {
+    const auto& X_FT = cell.tools.at(m.context.tool);
+    const auto anchor = anchors.find(m.gauge->anchor);
+    if (!X_FT || anchor == anchors.end()) return {};
+    if (m.gauge->minus != nullptr) continue;
+    Wire& wire = all[m.gauge->anchor];
+    wire.stated = anchor->second.p_W;
+    wire.is_zero_known = anchor->second.zero.has_value();
+    wire.points_W.push_back(cell.X_WB.value_or(Pose::Identity()) *
+                            (cell.robot.flange_pose(m.context.q) * X_FT->translation()));
+    wire.lengths.push_back(m.gauge->value - anchor->second.zero.value_or(0));
+  }
+  for (auto& [id, wire] : all) wire.found = locate_point(wire.points_W, wire.lengths);
+  return all;
+}
+
+/// A wire that is told in another unit than the others.
+std::optional<Error> doubt_of_wire_unit(const std::string& anchor, const Wire& wire) {
+  if (!wire.found || wire.fits()) return std::nullopt;
+  for (const UnitOfLength& unit : kUnitsOfLength) {
+    std::vector<double> lengths = wire.lengths;
+    for (double& length : lengths) length *= unit.factor;
+    const auto then = locate_point(wire.points_W, lengths);
+    if (!then || then->off > std::min(kNoModelError, kMuchBetter * wire.found->off)) continue;
+    return refused(
+               "the distances to anchor '{}' do not follow the joints, by {:.0f} mm, while others "
+               "do; read in {} they would, to {:.1f} mm of the drawing",
+               anchor, to_mm(wire.found->off), unit.name, to_mm(then->off))
+        .of("distance_mm")
+        .beyond(to_mm(wire.found->off), to_mm(kNoModelError))
+        .with_text(fmt::format("in {}", unit.name))
+        .next(fmt::format("write those to '{}' in mm", anchor))
+        .value();
+  }
+  return std::nullopt;
+}
+
+/// The places that may have been meant where `stated` was written.
+std::vector<std::pair<std::string, Vector3>> meant_places(const Vector3& stated) {
+  std::vector<std::pair<std::string, Vector3>> all;
+  for (int k = 0; k < 3; ++k) {
+    Vector3 p = stated;
+    p(k) = -p(k);
+    all.emplace_back(fmt::format("with the other sign of its {}", "xyz"[k]), p);
+    p = stated;
+    std::swap(p(k), p((k + 1) % 3));
+    all.emplace_back(fmt::format("with its {} and {} exchanged", "xyz"[k], "xyz"[(k + 1) % 3]), p);
+  }
+  for (const UnitOfLength& unit : kUnitsOfLength)
+    all.emplace_back(fmt::format("with its place in {}", unit.name), unit.factor * stated);
+  return all;
+}
+
+/// An anchor that stands elsewhere than the cell file says, and the way in which that was meant.
+std::optional<Error> doubt_of_place(const std::string& anchor,
+                                    const std::map<std::string, Wire>& wires) {
+  const Wire& wire = wires.at(anchor);
+  if (!wire.fits() || !wire.stated || wire.stands_as_stated()) return std::nullopt;
+  const double off = wire.off_at(*wire.stated);
+  auto meant = meant_places(*wire.stated);
+  for (const auto& [other, one] : wires)
+    if (other != anchor && one.stated)
+      meant.emplace_back(fmt::format("with the place of '{}'", other), *one.stated);
+  std::string reading = "at another place", then;
+  for (const auto& [name, place] : meant) {
+    if (wire.off_at(place) > std::min(kNoModelError, kMuchBetter * off)) continue;
+    reading = name;
+    then = fmt::format("; read {} they would fit to {:.1f} mm", name, to_mm(wire.off_at(place)));
+    break;
+  }
+  const Vector3& p = wire.found->p_W;
+  return refused(
+             "the distances to anchor '{}' are {:.0f} mm off from where the cell file has it, "
+             "while those to others fit{}",
+             anchor, to_mm(off), then)
+      .of("anchors")
+      .beyond(to_mm(off), to_mm(kNoModelError))
+      .with_text(fmt::format("anchor '{}' {}", anchor, reading))
+      .next(
+          fmt::format("correct xyz_mm of '{}' in the cell file: the distances put it near [{:.0f}, "
+                      "{:.0f}, {:.0f}]",
+                      anchor, to_mm(p.x()), to_mm(p.y()), to_mm(p.z())))
+      .value();
+}
+
+/// One wire among others that fit.
+std::optional<Error> doubt_of_wires(const Cell& cell, const MeasurementBatch& batch) {
+  const auto wires = wires_of(cell, read_as(batch, Gauge::Kind::kDistance, 1));
+  const auto some = [&](const auto& holds) {
+    return std::any_of(wires.begin(), wires.end(),
+                       [&](const auto& one) { return holds(one.second); });
+  };
+  const bool some_fit = some([](const Wire& wire) { return wire.fits(); });
+  const bool some_stand = some([](const Wire& wire) { return wire.stands_as_stated(); });
+  for (const auto& [anchor, wire] : wires) {
+    if (some_fit)
+      if (auto doubt = doubt_of_wire_unit(anchor, wire)) return doubt;
+    if (some_stand && cell.X_WB)
+      if (auto doubt = doubt_of_place(anchor, wires)) return doubt;
+  }
+  return std::nullopt;
+}
+
 /// A way in which touches may have been meant.
 struct TouchReading {
   std::string name;
@@ -158,6 +292,7 @@ std::optional<Error> doubt_of_touches(const CellPtr& cell, const MeasurementBatc
 
 std::optional<Error> gauge_doubt(const MeasurementBatch& batch, const Cell& cell) {
   const auto shared = std::make_shared<const Cell>(cell);
+  if (auto doubt = doubt_of_wires(cell, batch)) return doubt;
   if (auto doubt = doubt_of_distances(shared, batch)) return doubt;
   return doubt_of_touches(shared, batch);
 }

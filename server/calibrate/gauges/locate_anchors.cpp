@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/error_sources/anchors.h"
@@ -243,6 +244,19 @@ Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch) {
     model.values.segment<3>(placed_anchor(model, id).place) = place_of(of, spread_of(of.points_W));
   }
   return {};
+}
+
+std::optional<LocatedPoint> locate_point(const std::vector<Vector3>& points_W,
+                                         const std::vector<double>& lengths) {
+  const Lengths of{points_W, lengths};
+  if (points_W.size() < kFewest) return std::nullopt;
+  const Spread spread = spread_of(points_W);
+  if (spread.rms(1) < kLeastBeside) return std::nullopt;
+  const Vector3 p_W = place_of(of, spread);
+  std::vector<double> off;
+  for (std::size_t i = 0; i < lengths.size(); ++i)
+    off.push_back(std::abs(lengths[i] - (points_W[i] - p_W).norm()));
+  return LocatedPoint{p_W, median(off)};
 }
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,5 +24,14 @@ namespace trammel {
 /// points of the model. It solves the linear equations of the squared distances and refines the
 /// solution. Refuses an anchor with fewer than 4 values, or one whose tool points lie on one line.
 [[nodiscard]] Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch);
+
+/// The point that is so far from tool points.
+struct LocatedPoint {
+  Vector3 p_W = Vector3::Zero();
+  double off = 0;  ///< m: median of what it leaves of a length
+};
+/// Empty for fewer than 4 points, and for points on one line.
+[[nodiscard]] std::optional<LocatedPoint> locate_point(const std::vector<Vector3>& points_W,
+                                                       const std::vector<double>& lengths);
 
 }  // namespace trammel
