@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "server/base/units.h"
+#include "server/compensate/bias_physics.h"
 
 namespace trammel {
 
@@ -136,6 +137,116 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
           "the controller's, corrected poses land off by the difference, since the controller "
           "solves them with its own arm: compare them (trammel confirm-robot)",
           off.numbers, lacking)};
+}
+
+std::optional<Note> base_elsewhere(const PhysicalModel& model) {
+  constexpr double kSet = 3e-3, kFar = 50e-3;  // m
+  constexpr double kSetTurn = from_deg(0.5), kFarTurn = from_deg(5);
+  const std::optional<Pose>& said = model.cell->X_WB;
+  if (!said) return std::nullopt;
+  const Pose found = served_base(model);
+  const Eigen::Quaterniond q(found.linear());
+  const Vector3 p = found.translation();
+  const double away = (p - said->translation()).norm();
+  const double turned = q.angularDistance(Eigen::Quaterniond(said->linear()));
+  if (away < kSet && turned < kSetTurn) return std::nullopt;
+  const bool far = away >= kFar || turned >= kFarTurn;
+  return Note{
+      "base_elsewhere", far ? Severity::kWarning : Severity::kInfo,
+      fmt::format("the robot's base stands {:.{}f} mm from where the cell file has it, turned by "
+                  "{:.1f} deg, "
+                  "by the measurements, which the model follows: {}; write base: {{xyz_mm: "
+                  "[{:.1f}, {:.1f}, "
+                  "{:.1f}], q_wxyz: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]}}, or null",
+                  to_mm(away), far ? 0 : 1, to_deg(turned),
+                  far ? "was the instrument set up elsewhere, or is `base` of the cell file wrong?"
+                      : "if it was measured and not drawn, the first length of the robot file is "
+                        "off by that",
+                  to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), q.w(), q.x(), q.y(), q.z())};
+}
+
+Note measurements_rounded(const Rounding& rounding) {
+  return {"measurements_rounded", Severity::kWarning,
+          fmt::format("the measured {} are whole multiples of {:g} mm, which alone makes {:.3f} mm "
+                      "{}, and {:.3f} mm is stated: write them with all digits that the instrument "
+                      "has; a controller's display is no instrument",
+                      rounding.is_of_gauges ? "distances and touches" : "positions",
+                      to_mm(rounding.step), to_mm(rounding.stddev()),
+                      rounding.is_of_gauges ? "each" : "an axis", to_mm(rounding.sigma))};
+}
+
+namespace {
+
+/// Lengths of the arm that were identified: as drawn, and by what they are off.
+struct Lengths {
+  std::vector<Eigen::Index> parameters;
+  Eigen::VectorXd drawn, off;  ///< m
+};
+
+Lengths identified_lengths(const PhysicalModel& model,
+                           const std::vector<IdentifiedParameter>& parameters) {
+  Lengths all;
+  std::vector<double> drawn, off;
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const auto end = first + static_cast<Eigen::Index>(source->parameters().size());
+    for (Eigen::Index i = first; i < end && source->cause().part == causes::Part::kLinks; ++i) {
+      const IdentifiedParameter& one = parameters[static_cast<std::size_t>(i)];
+      const Drawing* drawing = drawing_of(one.parameter.name);
+      if (drawing == nullptr || (drawing->symbol[0] != 'd' && drawing->symbol[0] != 'a') ||
+          std::string_view(drawing->unit) != "mm")
+        continue;
+      const LinkGeometry& link =
+          model.cell->robot.joint(std::stoi(one.parameter.name.substr(1)) - 1).link;
+      const double length = drawing->symbol[0] == 'd' ? link.d : link.a;
+      if (length == 0) continue;
+      all.parameters.push_back(i);
+      drawn.push_back(length);
+      off.push_back(one.value);
+    }
+    first = end;
+  }
+  all.drawn = Eigen::VectorXd::Map(drawn.data(), static_cast<Eigen::Index>(drawn.size()));
+  all.off = Eigen::VectorXd::Map(off.data(), static_cast<Eigen::Index>(off.size()));
+  return all;
+}
+
+}  // namespace
+
+std::optional<Note> lengths_scaled(const PhysicalModel& model,
+                                   const std::vector<IdentifiedParameter>& parameters,
+                                   const Eigen::MatrixXd& covariance) {
+  constexpr double kOfMaking = 20e-6;  // m: a length is no better known than that
+  constexpr Eigen::Index kFewest = 3;  // lengths: two agree by chance
+  constexpr double kLeast = 200e-6;    // of a length: an arm that is 17 K warmer than drawn
+  constexpr double kSure = 5;          // standard deviations
+  constexpr double kLeftOver = 0.02;   // of the squares: what one share must leave at most
+  const Lengths lengths = identified_lengths(model, parameters);
+  if (lengths.drawn.size() < kFewest ||
+      covariance.rows() < static_cast<Eigen::Index>(parameters.size()))
+    return std::nullopt;
+  Eigen::MatrixXd C = covariance(lengths.parameters, lengths.parameters);
+  C.diagonal().array() += kOfMaking * kOfMaking;
+  const Eigen::LDLT<Eigen::MatrixXd> solved(C);
+  const Eigen::VectorXd weighed = solved.solve(lengths.drawn);
+  const double precision = weighed.dot(lengths.drawn);
+  const double share = weighed.dot(lengths.off) / precision;
+  const Eigen::VectorXd left = lengths.off - share * lengths.drawn;
+  const double before = lengths.off.dot(solved.solve(lengths.off)),
+               after = left.dot(solved.solve(left));
+  if (std::abs(share) < kLeast || std::abs(share) * std::sqrt(precision) < kSure ||
+      after > kLeftOver * before)
+    return std::nullopt;
+  return Note{
+      "lengths_scaled", Severity::kWarning,
+      fmt::format(
+          "all {} lengths of the arm come out {:.3f} % {} than drawn: one cause is likelier "
+          "than as many errors of making. Is it the instrument's scale (hold it against a "
+          "known length, give it the air's temperature), or an arm that is {:.0f} K {} than "
+          "its drawing? These positions do not tell; where it is the instrument, corrected "
+          "targets land off by that share of their distance",
+          lengths.drawn.size(), 100 * std::abs(share), share > 0 ? "longer" : "shorter",
+          std::abs(share) / 12e-6, share > 0 ? "warmer" : "colder")};
 }
 
 }  // namespace trammel

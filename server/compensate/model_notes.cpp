@@ -172,9 +172,11 @@ double stated_of_gauges(const Cell& cell) {
 /// The residuals of positions or of gauges, whichever exceed their stated sigma more.
 LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   const Cell& cell = *parts.physics.cell;
-  LeftOver worst{0, cell.tracker.sigma};
+  const double stated =
+      parts.measured ? parts.measured->stated.value_or(cell.tracker.sigma) : cell.tracker.sigma;
+  LeftOver worst{0, stated};
   if (parts.training.poses > 0)
-    worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), cell.tracker.sigma);
+    worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), stated);
   if (!parts.training.gauges) return worst;
   LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
   gauges.is_of_gauges = true;
@@ -183,20 +185,46 @@ LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
 
 void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   constexpr double kLeads = 3, kStops = 30;  // times the stated sigma
+  constexpr double kRounded = 0.3;           // of what is left: rounding may be much of it
   const LeftOver worst = worst_left_over(parts);
   const double times = worst.left / worst.stated;
   if (!(times >= kLeads)) return;
+  std::string what = "trammel diagnose";
+  if (worst.is_of_gauges)
+    what =
+        "are the anchors where the cell file says, and their planes not askew? is the tool the one "
+        "that was used?";
+  else if (parts.measured && parts.measured->joint_rounding &&
+           parts.measured->joint_rounding->stddev > kRounded * worst.left)
+    what = fmt::format(
+        "all joints are whole multiples of {:g} deg: where a display rounded them, that alone "
+        "makes "
+        "{:.3f} mm; else trammel diagnose",
+        to_deg(parts.measured->joint_rounding->step),
+        to_mm(parts.measured->joint_rounding->stddev));
   notes.push_back(
       {"left_over_sigma", times >= kStops ? Severity::kStop : Severity::kWarning,
        fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm {}, "
                    "stated {:.3f} mm): the intervals were widened to fit, so their coverage does "
                    "not show that the model is right ({})",
                    times, to_mm(worst.left), worst.is_of_gauges ? "a distance or touch" : "an axis",
-                   to_mm(worst.stated),
-                   worst.is_of_gauges
-                       ? "are the anchors where the cell file says, and their planes not askew? "
-                         "is the tool the one that was used?"
-                       : "trammel diagnose")});
+                   to_mm(worst.stated), what)});
+}
+
+/// Orientations are held against their own sigma, which is often not stated: far above it says so.
+void add_left_of_orientations(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  constexpr double kFar = 10;  // times the stated sigma
+  const double stated = parts.physics.cell->tracker.sigma_rotation;
+  if (!parts.training.orientation) return;
+  const double left = parts.training.orientation->compensated / std::sqrt(3.0);
+  if (!(left >= kFar * stated)) return;
+  notes.push_back(
+      {"orientations_left_over", Severity::kWarning,
+       fmt::format(
+           "{:.0f} times the stated sigma is left of the orientations ({:.4f} deg an axis, "
+           "stated {:.5f} deg): is sigma_deg of the cell file in degrees, and q_wxyz of the "
+           "tool the one that was measured?",
+           left / stated, to_deg(left), to_deg(stated))});
 }
 
 /// The instrument's own error is at most the residual of the physics. If the stated sigma is
@@ -232,6 +260,21 @@ void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& no
 void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
   for (const CellDoubt& doubt : doubts_of(cell))
     notes.push_back({doubt.code, Severity::kWarning, doubt.text});
+}
+
+/// The base by the measurements, unless it was to be found anew.
+void add_base_elsewhere(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const auto is_anew = [](const RefitRecord& refit) {
+    const auto& base = cause_correcting(causes::Part::kBase).spelling;
+    return std::find(refit.sources.begin(), refit.sources.end(), base) != refit.sources.end();
+  };
+  const auto& refits = parts.provenance.refits;
+  if (std::any_of(refits.begin(), refits.end(), is_anew)) return;
+  auto note = base_elsewhere(parts.physics);
+  if (!note) return;
+  // The cell file has the base for one set-up of the instrument, and here are several.
+  if (!parts.sessions.empty()) note->severity = Severity::kInfo;
+  notes.push_back(*std::move(note));
 }
 
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
@@ -328,12 +371,16 @@ void add_sides(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
 
 std::vector<Note> notes_of(const CompensatedModel& model) {
   std::vector<Note> notes;
+  add_base_elsewhere(model.parts(), notes);
+  if (model.parts().measured && model.parts().measured->rounding)
+    notes.push_back(measurements_rounded(*model.parts().measured->rounding));
   add_too_few_poses(model.parts(), notes);
   add_changes(model, notes);
   add_sessions(model.parts(), notes);
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_left_over(model.parts(), notes);
+  add_left_of_orientations(model.parts(), notes);
   add_overstated(model, notes);
   add_computed_positions(model.parts(), notes);
   if (auto rows =
@@ -344,6 +391,9 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters,
                                    model.parts().discrepancy))
     notes.push_back(*std::move(off));
+  if (auto scaled =
+          lengths_scaled(model.parts().physics, model.parts().parameters, model.parts().covariance))
+    notes.push_back(*std::move(scaled));
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);
   add_confirmation(model.cell(), notes);

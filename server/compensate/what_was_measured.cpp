@@ -229,6 +229,30 @@ WhatWasMeasured what_was_measured(const PhysicalModel& physics, const Measuremen
   return measured;
 }
 
+void add_what_is_stated(const PhysicalModel& physics, const MeasurementBatch& batch,
+                        WhatWasMeasured& measured) {
+  constexpr double kSmall = 1e-6;  // rad
+  constexpr std::size_t kAsked = 50;
+  measured.stated = sigma_of_rows(batch);
+  measured.rounding = coarse_rounding(batch, *physics.cell);
+  const auto step = joint_step(batch);
+  if (!step) return;
+  double sum = 0;
+  const std::size_t every = batch.measurements.size() / kAsked + 1;
+  std::size_t asked = 0;
+  for (std::size_t i = 0; i < batch.measurements.size(); i += every, ++asked) {
+    PoseContext context = batch.measurements[i].context;
+    const Vector3 place = physics.nominal_pose_W(context).translation();
+    for (int j = 0; j < context.q.size(); ++j) {
+      if (physics.cell->robot.joint(j).type != JointType::kRevolute) continue;
+      context.q(j) += kSmall;
+      sum += ((physics.nominal_pose_W(context).translation() - place) / kSmall).squaredNorm();
+      context.q(j) -= kSmall;
+    }
+  }
+  measured.joint_rounding = {*step, *step * std::sqrt(sum / (36.0 * static_cast<double>(asked)))};
+}
+
 std::string one_sided(const std::optional<WhatWasMeasured>& measured) {
   return measured ? sides_text(*measured,
                                {{Side::kAbove, "from above"}, {Side::kBelow, "from below"}}, "")

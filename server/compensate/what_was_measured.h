@@ -8,6 +8,7 @@
 
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
+#include "server/measurement/resolution.h"
 
 /// The training poses of a model, as far as its promise rests on them.
 namespace trammel {
@@ -33,6 +34,14 @@ struct WhatWasMeasured {
   /// alone goes round to the robot's other side. Empty without a reach, and in models from before
   /// it was kept.
   Eigen::VectorXd outline;
+  std::optional<double> stated;  ///< m: median sigma of the positions; empty: no row has its own
+  std::optional<Rounding> rounding;  ///< of what was measured, where it is coarse
+  /// Joints that are whole multiples of a step, and what rounding to it would move the tool by.
+  struct JointRounding {
+    double step = 0;    ///< rad
+    double stddev = 0;  ///< m, of one axis
+  };
+  std::optional<JointRounding> joint_rounding;
   static constexpr int kDirections = 16;
 
   /// True if the nominal flange at `q` is within reach of a place where it was measured, and inside
@@ -51,6 +60,10 @@ struct WhatWasMeasured {
 /// place, which is no neighbour of itself.
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics,
                                                 const MeasurementBatch& batch);
+
+/// Adds what the file of `batch` states of its numbers, and how finely they are written.
+void add_what_is_stated(const PhysicalModel& physics, const MeasurementBatch& batch,
+                        WhatWasMeasured& measured);
 
 /// WhatWasMeasured in words for people, in separate parts. Without a record the parts are `not on
 /// record`.

@@ -9,7 +9,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLimitTolerance = 1e-6;  // rad, m: what a file rounds away
+constexpr double kColdest = -60, kHottest = 150;  // degrees Celsius, of any robot
+constexpr double kLimitTolerance = 1e-6;          // rad, m: what a file rounds away
 
 }  // namespace
 
@@ -65,6 +66,12 @@ Status check_pose(PoseContext& context, const Cell& cell) {
             "Else "
             "the limit in that file is another one");
   }
+  if (context.temperature && (*context.temperature < kColdest || *context.temperature > kHottest))
+    return refused("the arm is said to be at {:g} degrees Celsius, limits {:g} and {:g}",
+                   *context.temperature, kColdest, kHottest)
+        .of("temperature_c")
+        .beyond(*context.temperature, *context.temperature < kColdest ? kColdest : kHottest)
+        .next("in kelvin? write degrees Celsius");
   Result<std::string> tool = resolve_tool(cell, context.tool);
   if (!tool) return Failure(tool.error()).as(ErrorCode::kRefused);
   Result<std::string> payload = resolve_payload(cell, context.payload);

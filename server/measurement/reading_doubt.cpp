@@ -11,6 +11,7 @@
 #include "server/measurement/pose_groups.h"
 #include "server/measurement/reading/arm_fit.h"
 #include "server/measurement/reading/catalogue.h"
+#include "server/measurement/reading/several_points.h"
 #include "server/measurement/reading_units.h"
 
 namespace trammel {
@@ -109,7 +110,7 @@ class Look {
     seen.zeros = JointVector::Zero(cell_.robot.size());
     seen.off_drawing = off_drawing_;
     if (!given_) return seen;
-    seen.doubt = of_several_points();
+    seen.doubt = reading::doubt_of_several_points(table_);
     if (seen.doubt) return seen;
     seen.doubt = of_place();
     seen.of_tool = seen.doubt.has_value();
@@ -143,7 +144,6 @@ class Look {
   [[nodiscard]] bool is_much_better(const Tried& tried) const;
   [[nodiscard]] const ArmFit& anywhere();
   void keep_best(std::vector<Tried> tried);
-  [[nodiscard]] std::optional<Error> of_several_points() const;
   [[nodiscard]] std::optional<Error> of_place() const;
   [[nodiscard]] Error of_reading() const;
   [[nodiscard]] std::optional<Error> of_units() const;
@@ -263,50 +263,6 @@ void Look::keep_best(std::vector<Tried> tried) {
   found_ = std::move(tried);
 }
 
-/// Doubts rows at one joint vector with places far apart, if most such vectors have this: several
-/// reflectors share a name, or something changed in between. Their average would be a place where
-/// nothing is. If such rows do not follow each other and are few, they may be a check for changes.
-std::optional<Error> Look::of_several_points() const {
-  struct Apart {
-    std::size_t repeated = 0, apart = 0;
-    double worst = 0;
-    int first = 0, second = 0;
-    [[nodiscard]] bool is_told() const { return apart >= kFewestBadRows && 2 * apart > repeated; }
-  };
-  Apart next, any;
-  for (const PoseGroup& rows : pose_groups(table_.q.transpose())) {
-    double far = -1, far_next = -1;
-    for (std::size_t k = 1; k < rows.size(); ++k) {
-      const Measurement &before = *table_.from[static_cast<std::size_t>(rows[k - 1])],
-                        &row = *table_.from[static_cast<std::size_t>(rows[k])];
-      if (row.context.tool != before.context.tool) continue;
-      const double distance = (row.p_W - before.p_W).norm();
-      far = std::max(far, distance);
-      if (rows[k] == rows[k - 1] + 1) far_next = std::max(far_next, distance);
-      if (distance > any.worst) any.worst = distance, any.first = before.row, any.second = row.row;
-    }
-    for (auto& [all, farthest] : {std::pair(&next, far_next), std::pair(&any, far)}) {
-      all->repeated += farthest >= 0 ? 1 : 0;
-      all->apart += farthest > kBadRow ? 1 : 0;
-    }
-  }
-  const bool are_most_repeated = 3 * any.repeated > table_.size();
-  if (!next.is_told() && !(are_most_repeated && any.is_told())) return std::nullopt;
-  return refused(
-             "at {} of {} joint vectors that several rows have, their positions are far apart, by "
-             "up to {} in rows {} and {}: they would be several points of the tool",
-             any.apart, any.repeated, mm(any.worst), any.first, any.second)
-      .of("tool_id")
-      .at_row(any.first)
-      .beyond(to_mm(any.worst), to_mm(kBadRow))
-      .with_text("several points of the tool")
-      .next(
-          "several reflectors? name in tool_id which one each row is of, and in the cell file "
-          "each of them as a tool (null: unknown). Was the tracker moved in between? name each "
-          "set-up in session_id")
-      .value();
-}
-
 /// Doubts positions at one fixed point that the cell's base contradicts. They do not determine
 /// another base, and a fit would bend the arm until it reached the point.
 std::optional<Error> Look::of_place() const {
@@ -356,6 +312,7 @@ Error Look::of_reading() const {
     // Other readings of rows are the same with a few rows more.
     if (!best.reading->of_rows) others.push_back(found_[k].reading->name);
   }
+  if (!best.reading->the_same.empty()) others.insert(others.begin(), best.reading->the_same);
   if (!others.empty()) {
     text += fmt::format(" (or {})", fmt::join(others, ", or "));
   }

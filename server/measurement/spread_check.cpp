@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/measurement/reading_units.h"
 
@@ -30,6 +31,23 @@ double spread_of(const std::vector<Vector3>& points) {
   double sum = 0;
   for (const Vector3& p : points) sum += (p - centroid).squaredNorm();
   return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+/// The spread of the nine points of ten that are nearest to the middle. A number that an instrument
+/// writes where it saw nothing (-9999) is a bad row and no other unit.
+double spread_of_most(std::vector<Vector3> points) {
+  constexpr double kMost = 0.9;
+  Vector3 middle;
+  for (int k = 0; k < 3; ++k) {
+    std::vector<double> values;
+    for (const Vector3& p : points) values.push_back(p(k));
+    middle(k) = median(std::move(values));
+  }
+  std::sort(points.begin(), points.end(), [&](const Vector3& a, const Vector3& b) {
+    return (a - middle).squaredNorm() < (b - middle).squaredNorm();
+  });
+  points.resize(static_cast<std::size_t>(std::ceil(kMost * static_cast<double>(points.size()))));
+  return spread_of(points);
 }
 
 /// With the tool point t in F unknown, the squared spread is c + 2 bᵀt + tᵀAt; its least and
@@ -101,8 +119,9 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
     const NominalSpread nominal = nominal_spread(group.flanges, cell.tools.at(tool));
     const double measured = spread_of(group.measured_W);
     const bool small_angles = group.largest_angle_deg <= kMostRadians;
+    const double most = spread_of_most(group.measured_W);
     const double upper = kRatio * nominal.largest + (small_angles ? kSlackOfSmallAngles : kSlack);
-    if (measured > upper && small_angles) {
+    if (most > upper && small_angles) {
       return refused(
                  "measured positions spread over {:.1f} mm (rms from their centroid), but the "
                  "commanded joints, all within {:.2f} deg, move the tool over {:.1f} mm at most",
@@ -112,7 +131,7 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
           .beyond(to_mm(measured), to_mm(upper))
           .next("are the joints radians? They must be degrees");
     }
-    if (measured > upper || kRatio * measured + kSlack < nominal.smallest) {
+    if (most > upper || kRatio * measured + kSlack < nominal.smallest) {
       return refused(
                  "measured positions spread over {:.1f} mm (rms from their centroid), the "
                  "commanded joints move tool '{}' over {:.1f} mm, limit: a factor of {:g} and {:g} "

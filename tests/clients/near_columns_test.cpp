@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/measurement/files/batch_file.h"
+
 namespace trammel::cli {
 namespace {
 
@@ -28,6 +30,20 @@ TEST(NearColumns, ThatAUserHasForHimselfAreNotTold) {
   EXPECT_EQ(near({"seq", "hole_id", "node_id", "probe_id", "pass_id", "row", "comment"}), 0u);
   EXPECT_EQ(near({"pose_ids", "tool_idx"}, TableKind::kTargets), 0u) << "targets have none";
   EXPECT_EQ(near({"pose_ids"}, TableKind::kJoints), 1u);
+}
+
+TEST(NearColumns, AndAllOtherColumnsOfNumbersAreToldOnceEach) {
+  const std::string text =
+      "q1_deg,x_mm,y_mm,z_mm,temprature_c,roll,pitch,yaw,note\n10,1,2,3,20.5,1,2,3,a\n"
+      "20,4,5,6,21.5,4,5,6,b\n";
+  const auto batch = parse_batch(text, "b.csv");
+  ASSERT_TRUE(batch);
+  testing::internal::CaptureStderr();
+  tell_columns_left_aside(*batch, text, "b.csv");
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("b.csv: columns roll, pitch, yaw hold numbers"), std::string::npos) << said;
+  EXPECT_EQ(said.find("temprature_c"), said.rfind("temprature_c")) << said;
+  EXPECT_EQ(said.find("note,"), std::string::npos) << said;
 }
 
 }  // namespace

@@ -221,6 +221,120 @@ TEST(ModelNotes, ABaseWhoseTurnThePosesDoNotTellWaitsForAPerson) {
   EXPECT_EQ(stop->code, "base_turn_untold");
 }
 
+std::optional<Note> note_of(const CompensatedModel::Parts& parts, const std::string& code) {
+  for (Note& note : notes_of(test::demand(CompensatedModel::make(parts))))
+    if (note.code == code) return std::move(note);
+  return std::nullopt;
+}
+
+TEST(ModelNotes, ABaseThatStandsElsewhereThanTheCellFileHasItLeadsWithItsPlace) {
+  const auto moved = [](double metres, double turn) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.physics.values.head<6>() << 0, metres, 0, turn, 0, 0;
+    return parts;
+  };
+  const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(moved(3, kPi))));
+  ASSERT_FALSE(notes.empty());
+  EXPECT_EQ(notes.front().code, "base_elsewhere");
+  EXPECT_EQ(notes.front().severity, Note::Severity::kWarning);
+  const std::string& text = notes.front().text;
+  EXPECT_NE(text.find("stands 3000 mm from where the cell file has it, turned by 180.0 deg"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("xyz_mm: [0.0, 3000.0, 0.0]"), std::string::npos) << text;
+  EXPECT_TRUE(note_of(moved(0, kPi), "base_elsewhere")) << "turned where it stands";
+  const auto near = note_of(moved(0.02, 0), "base_elsewhere");
+  ASSERT_TRUE(near) << "a measured base, and 20 mm too much in the robot file's first length";
+  EXPECT_EQ(near->severity, Note::Severity::kInfo);
+  EXPECT_FALSE(note_of(moved(0.002, 0), "base_elsewhere"));
+  CompensatedModel::Parts anew = moved(3, 0);
+  anew.provenance.refits.push_back({"m", {"base"}, "b", "h", 10});
+  EXPECT_FALSE(note_of(anew, "base_elsewhere")) << "somebody asked for it to be found anew";
+}
+
+TEST(ModelNotes, RoundedMeasurementsAreHeldAgainstTheStatedSigma) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  parts.measured.emplace().approaches.resize(6);
+  parts.measured->flange_B = Eigen::Matrix3Xd::Zero(3, 1);
+  EXPECT_FALSE(note_of(parts, "measurements_rounded"));
+  parts.measured->rounding = Rounding{0.1e-3, 0.013e-3, false};
+  const auto note = note_of(parts, "measurements_rounded");
+  ASSERT_TRUE(note);
+  EXPECT_NE(note->text.find("positions are whole multiples of 0.1 mm, which alone makes 0.029 mm"),
+            std::string::npos)
+      << note->text;
+}
+
+TEST(ModelNotes, JointsThatADisplayRoundedAreNamedWhereMuchIsLeft) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  parts.measured.emplace().approaches.resize(6);
+  parts.measured->flange_B = Eigen::Matrix3Xd::Zero(3, 1);
+  parts.training.poses = 60;
+  parts.discrepancy = 0.4e-3;
+  parts.training.compensated.rms = 0.7e-3;
+  parts.measured->joint_rounding = {from_deg(0.1), 0.35e-3};
+  auto note = note_of(parts, "left_over_sigma");
+  ASSERT_TRUE(note);
+  EXPECT_NE(note->text.find("whole multiples of 0.1 deg"), std::string::npos) << note->text;
+  parts.measured->joint_rounding->stddev = 0.01e-3;
+  EXPECT_EQ(note_of(parts, "left_over_sigma")->text.find("whole multiples"), std::string::npos);
+}
+
+TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheSigmaThatTheRowsState) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  parts.training.poses = 60;
+  parts.training.compensated.rms = std::sqrt(3.0) * parts.physics.cell->tracker.sigma;
+  parts.discrepancy = parts.physics.cell->tracker.sigma;
+  parts.measured.emplace().approaches.resize(6);
+  parts.measured->flange_B = Eigen::Matrix3Xd::Zero(3, 1);
+  EXPECT_FALSE(note_of(parts, "left_over_sigma"));
+  parts.measured->stated = 0.02e-6;
+  const auto note = note_of(parts, "left_over_sigma");
+  ASSERT_TRUE(note) << "sigma_mm in metres";
+  EXPECT_EQ(note->severity, Note::Severity::kStop);
+}
+
+TEST(ModelNotes, OrientationsFarBeyondTheirStatedSigmaAreSaid) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  const double sigma = parts.physics.cell->tracker.sigma_rotation;
+  parts.training.orientation.emplace().poses = 60;
+  parts.training.orientation->compensated = 3 * std::sqrt(3.0) * sigma;
+  EXPECT_FALSE(note_of(parts, "orientations_left_over"));
+  parts.training.orientation->compensated = 57 * std::sqrt(3.0) * sigma;
+  const auto note = note_of(parts, "orientations_left_over");
+  ASSERT_TRUE(note) << "sigma_deg in radians";
+  EXPECT_NE(note->text.find("57 times"), std::string::npos) << note->text;
+}
+
+TEST(ModelNotes, LengthsThatAreAllOffByOneShareAreSaidWithWhatMayMakeThemSo) {
+  const auto scaled = [](double share, double scatter) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    const Chain& robot = parts.physics.cell->robot;
+    double sign = 1;
+    for (std::size_t i = 0; i < parts.parameters.size(); ++i) {
+      IdentifiedParameter& one = parts.parameters[i];
+      const std::string& name = one.parameter.name;
+      if (name.size() != 2 || (name[0] != 'a' && name[0] != 'd')) continue;
+      const LinkGeometry& link = robot.joint(name[1] - '1').link;
+      one.value = share * (name[0] == 'a' ? link.a : link.d) + (sign *= -1) * scatter;
+      parts.physics.values(static_cast<Eigen::Index>(i)) = one.value;
+      one.stddev = 30e-6;
+      parts.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) = 1e-9;
+    }
+    return parts;
+  };
+  const auto note = note_of(scaled(1e-3, 0), "lengths_scaled");
+  ASSERT_TRUE(note);
+  EXPECT_EQ(note->severity, Note::Severity::kWarning);
+  EXPECT_NE(note->text.find("0.100 % longer than drawn"), std::string::npos) << note->text;
+  EXPECT_NE(note->text.find("the instrument's scale"), std::string::npos) << note->text;
+  EXPECT_NE(note->text.find("83 K warmer"), std::string::npos) << note->text;
+  EXPECT_TRUE(note_of(scaled(1e-3, 20e-6), "lengths_scaled"));
+  EXPECT_TRUE(note_of(scaled(-5e-4, 10e-6), "lengths_scaled"));
+  EXPECT_FALSE(note_of(scaled(0, 0.3e-3), "lengths_scaled")) << "errors of making";
+  EXPECT_FALSE(note_of(scaled(1e-4, 0), "lengths_scaled")) << "as warm as arms are";
+}
+
 TEST(ModelNotes, ASourceThatActsIsNot) {
   const std::vector<std::string> all = {"base",
                                         "geometry",

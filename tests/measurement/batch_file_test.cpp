@@ -146,6 +146,18 @@ TEST(RoboDkCsv, ReadsARotationVectorByItsOwnNames) {
             Refusal("ur.csv", {}, "rvx_rad"));
 }
 
+TEST(BatchTable, AFirstLineOfNamesCountsForNothingBesideColumnsThatAreTold) {
+  const std::vector<std::string> columns = {"q1_deg",   "x_mm",      "y_mm",   "z_mm",
+                                            "roll_deg", "pitch_deg", "yaw_deg"};
+  const auto batch = parse_batch_table("J1;X;Y;Z;roll;pitch;yaw\n5;1,5;2;3;30;0;0\n6;1;2;3;0;0;0\n",
+                                       columns, "own.csv");
+  ASSERT_TRUE(batch) << sentence(batch.error());
+  ASSERT_EQ(batch->measurements.size(), 2U);
+  EXPECT_NEAR(batch->measurements[0].p_W.x(), 1.5e-3, 1e-12);
+  EXPECT_LT((*batch->measurements[0].R_WT - rotation_exp(Vector3(from_deg(30), 0, 0))).norm(),
+            1e-12);
+}
+
 TEST(RoboDkCsv, WhatWasTakenByItsPlaceIsToldAndATcpOfEachRowIsNone) {
   const auto next_of = [](const std::string& text) {
     const auto batch = parse_robodk_csv(text, "own.csv");

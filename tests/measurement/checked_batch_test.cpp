@@ -54,6 +54,26 @@ TEST(CheckedBatch, IsSplitByItsSetColumnWhereItHasOneAndKeepsWhatThatSaid) {
   EXPECT_EQ(batch.rows().measurements[0].set, MeasurementSet::kUnassigned);
 }
 
+TEST(CheckedBatch, ATemperatureInKelvinIsRefusedWithItsUnit) {
+  MeasurementBatch batch = measured(20);
+  batch.measurements[7].context.temperature = 80;
+  EXPECT_TRUE(check_against_cell(batch, *test::cell_7()));
+  batch.measurements[7].context.temperature = 295.1;
+  const auto refused = check_against_cell(batch, *test::cell_7());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "temperature_c");
+  EXPECT_EQ(refused.error().row, batch.measurements[7].row);
+  EXPECT_NE(refused.error().next.find("kelvin"), std::string::npos);
+}
+
+TEST(CheckedBatch, APlaceholderInAFewRowsIsNoOtherUnitOfAllPositions) {
+  MeasurementBatch batch = measured(60);
+  for (const std::size_t row : {3U, 17U, 40U}) batch.measurements[row].p_W.setConstant(-99.99);
+  EXPECT_TRUE(check_against_cell(batch, *test::cell_7()));
+  for (Measurement& m : batch.measurements) m.p_W *= 1000;
+  EXPECT_FALSE(check_against_cell(batch, *test::cell_7())) << "all in another unit";
+}
+
 TEST(CheckedBatch, IsKnownByTheHashOfWhatCame) {
   MeasurementBatch batch = measured(20);
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {

@@ -4,6 +4,7 @@
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
+#include "clients/cli/files/near_columns.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/units.h"
@@ -87,6 +88,10 @@ Status convert(const ConvertArguments& arguments) {
     if (m.context.tool.empty()) m.context.tool = arguments.tool;
     if (m.context.payload.empty()) m.context.payload = arguments.payload;
   }
+  const std::string& from = !arguments.robodk.empty()  ? arguments.robodk
+                            : !arguments.table.empty() ? arguments.table
+                                                       : arguments.points;
+  tell_columns_left_aside(converted.batch, "", from);
   const std::size_t count = converted.batch.measurements.size();
   TRY(write_output(arguments.output, to_csv(converted.batch)));
   tell(fmt::format("{} measurements in {}{}\n", count, arguments.output,
@@ -208,8 +213,9 @@ void add_convert(CLI::App& app, Action& chosen) {
                                          "Leica Tracker Pilot (CSV), with --joints");
   what->add_option("--robodk", arguments->robodk,
                    "Measurements exported by a RoboDK calibration project (CSV)");
-  CLI::Option* table = what->add_option("--table", arguments->table,
-                                        "A table without a header line, whose --columns you tell");
+  CLI::Option* table = what->add_option(
+      "--table", arguments->table,
+      "A table whose --columns you tell; a first line of names counts for nothing");
   what->require_option(1);
   CLI::Option* columns =
       command

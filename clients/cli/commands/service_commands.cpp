@@ -99,8 +99,8 @@ Result<Extent> started(client::Session& session, std::int64_t job,
 Result<Extent> submit(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const std::string csv = TRY(read_text_file(arguments.batch));
-  if (recognise_batch(csv) == BatchKind::kTrammel)
-    tell_near_columns(csv, TableKind::kBatch, arguments.batch);
+  if (const auto batch = parse_batch(csv, arguments.batch))
+    tell_columns_left_aside(*batch, csv, arguments.batch);
   const std::string id = arguments.batch_id.empty()
                              ? std::filesystem::path(arguments.batch).stem().string()
                              : arguments.batch_id;

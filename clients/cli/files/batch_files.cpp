@@ -29,7 +29,7 @@ Result<MeasurementBatch> read_batch_file(const std::string& path) {
   const std::string text = TRY(read_text_file(path));
   if (is_model(text)) return refused("this is a model file, not a batch").in(path);
   Result<MeasurementBatch> batch = parse_batch(text, path);
-  if (batch && !batch->extra_columns.empty()) tell_near_columns(text, TableKind::kBatch, path);
+  if (batch) tell_columns_left_aside(*batch, text, path);
   return std::move(batch).map(
       [&](MeasurementBatch read) { return dated(std::move(read), written_at(path)); });
 }

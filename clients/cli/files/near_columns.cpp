@@ -7,6 +7,7 @@
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
 #include "server/measurement/files/text_lines.h"
+#include "server/measurement/unread_columns.h"
 
 namespace trammel::cli {
 
@@ -34,31 +35,60 @@ bool differ_by_one(std::string_view a, std::string_view b) {
   return swapped || (a.size() <= 1 && b.size() <= 1);
 }
 
-}  // namespace
+/// A column that is nearly another one.
+struct NearColumn {
+  std::string column, meant;
+};
 
-std::vector<std::string> near_columns(const std::vector<std::string>& columns, TableKind kind,
-                                      const std::string& where) {
-  std::vector<std::string> missing = optional_columns(kind), said;
+std::vector<NearColumn> near_among(const std::vector<std::string>& columns, TableKind kind) {
+  std::vector<std::string> missing = optional_columns(kind);
   const std::vector<std::string> known = missing;
   for (const std::string& column : columns) std::erase(missing, lower(column));
+  std::vector<NearColumn> all;
   for (const std::string& column : columns) {
     const std::string word = lower(column);
     if (word.size() < kShortest || std::find(known.begin(), known.end(), word) != known.end())
       continue;
     const std::string meant = near_miss(word, missing);
     if (meant.empty() || (word.size() < kLong && !differ_by_one(word, meant))) continue;
-    said.push_back(fmt::format("{}: column {} is not known and is left aside; {} was meant?", where,
-                               column, meant));
+    all.push_back({column, meant});
   }
+  return all;
+}
+
+std::string near_sentence(const NearColumn& one, const std::string& where) {
+  return fmt::format("{}: column {} is not known and is left aside; {} was meant?", where,
+                     one.column, one.meant);
+}
+
+}  // namespace
+
+std::vector<std::string> near_columns(const std::vector<std::string>& columns, TableKind kind,
+                                      const std::string& where) {
+  std::vector<std::string> said;
+  for (const NearColumn& one : near_among(columns, kind)) said.push_back(near_sentence(one, where));
   return said;
 }
 
-void tell_near_columns(const std::string& text, TableKind kind, const std::string& where) {
+std::vector<std::string> tell_near_columns(const std::string& text, TableKind kind,
+                                           const std::string& where) {
   const std::vector<TextLine> lines = first_lines(text, 1);
-  if (lines.empty() || lines[0].text.size() > kLongestLine) return;
+  if (lines.empty() || lines[0].text.size() > kLongestLine) return {};
   const std::vector<std::string> header = split_fields(lines[0].text, separator_of(lines[0].text));
-  for (const std::string& one : near_columns(header, kind, where))
-    fmt::print(stderr, "{}\n", shown(one));
+  std::vector<std::string> told;
+  for (const NearColumn& one : near_among(header, kind)) {
+    fmt::print(stderr, "{}\n", shown(near_sentence(one, where)));
+    told.push_back(one.column);
+  }
+  return told;
+}
+
+void tell_columns_left_aside(const MeasurementBatch& batch, const std::string& text,
+                             const std::string& where) {
+  if (batch.extra_columns.empty()) return;
+  const auto told = tell_near_columns(text, TableKind::kBatch, where);
+  const std::string unread = unread_columns(batch, told);
+  if (!unread.empty()) fmt::print(stderr, "note: {}: {}\n", where, shown(unread));
 }
 
 }  // namespace trammel::cli

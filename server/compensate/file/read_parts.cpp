@@ -258,6 +258,17 @@ WhatWasMeasured measured_from(const Json& json) {
   measured.flange_B = places.transpose();
   measured.reach = number_if(json, "reach_m");
   if (json.contains("outline_m")) measured.outline = vector_from(json.at("outline_m"));
+  measured.stated = number_if(json, "stated_m");
+  if (json.contains("rounding")) {
+    const Json& rounding = json.at("rounding");
+    measured.rounding = {number_from(rounding, "step_m"), number_from(rounding, "sigma_m"),
+                         truth_from(rounding.at("is_of_gauges"))};
+  }
+  if (json.contains("joint_rounding")) {
+    const Json& rounding = json.at("joint_rounding");
+    measured.joint_rounding = {number_from(rounding, "step_rad"),
+                               number_from(rounding, "stddev_m")};
+  }
   if (!json.contains("temperature_c")) return measured;
   const Json& temperature = json.at("temperature_c");
   measured.temperature = {number_from(temperature, "least"), number_from(temperature, "most")};

@@ -238,6 +238,14 @@ Json json_of(const WhatWasMeasured& measured) {
                              {"most", measured.temperature->second}};
   if (measured.reach) json["reach_m"] = *measured.reach;
   if (measured.outline.size() > 0) json["outline_m"] = matrix_json(measured.outline);
+  if (measured.stated) json["stated_m"] = *measured.stated;
+  if (measured.rounding)
+    json["rounding"] = {{"step_m", measured.rounding->step},
+                        {"sigma_m", measured.rounding->sigma},
+                        {"is_of_gauges", measured.rounding->is_of_gauges}};
+  if (measured.joint_rounding)
+    json["joint_rounding"] = {{"step_rad", measured.joint_rounding->step},
+                              {"stddev_m", measured.joint_rounding->stddev}};
   return json;
 }
 

@@ -5,6 +5,8 @@
 #include "server/calibrate/calibrate.h"
 #include "server/compensate/file_doubts.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/measurement/resolution.h"
+#include "server/measurement/sessions.h"
 #include "server/robot/cell_doubts.h"
 
 namespace trammel::cause_search {
@@ -48,9 +50,16 @@ void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
                       Diagnosis& diagnosis) {
   const Result<CalibrationResult> found =
       calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
-  auto off =
-      found ? robot_off_drawing(found->model, found->parameters, found->discrepancy) : std::nullopt;
-  if (off) diagnosis.notes.push_back(*std::move(off));
+  const auto add = [&](std::optional<Note> note) {
+    if (note && note->severity != Note::Severity::kInfo)
+      diagnosis.notes.push_back(*std::move(note));
+  };
+  if (found) {
+    if (!has_sessions(batch)) add(base_elsewhere(found->model));
+    add(robot_off_drawing(found->model, found->parameters, found->discrepancy));
+    add(lengths_scaled(found->model, found->parameters, found->covariance));
+  }
+  if (const auto rounding = coarse_rounding(batch, *cell)) add(measurements_rounded(*rounding));
   for (const CellDoubt& doubt : doubts_of(*cell))
     if (doubt.of_robot_file)
       diagnosis.notes.push_back({doubt.code, Note::Severity::kWarning, doubt.text});

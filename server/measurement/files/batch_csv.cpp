@@ -1,17 +1,18 @@
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <map>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/measurement/files/batch_columns.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/text_lines.h"
 #include "server/measurement/measurement.h"
 #include "server/measurement/pose_columns.h"
+#include "server/robot/three_numbers.h"
 
 namespace trammel {
 
@@ -23,14 +24,18 @@ constexpr double kSigmaLimitMm =
 constexpr std::size_t kMostMeasurements =
     100'000;  // rows of one file: five times the limit of one training
 
-const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
-const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
-const std::vector<std::string> kVectorColumns = {"rvx_rad", "rvy_rad", "rvz_rad"};
+/// The columns of an orientation told by three numbers: `a_deg`, `b_deg`, `c_deg`.
+struct ThreeColumns {
+  const ThreeNumbers* way = nullptr;
+  std::vector<std::size_t> columns;
+  double per_unit = 1;  ///< rad
+};
 
 /// The columns of one batch file.
 struct BatchColumns {
   PoseColumns pose;
-  std::vector<std::size_t> position, quaternion, vector, extra;  // the orientation by one of two
+  std::vector<std::size_t> position, quaternion, extra;
+  ThreeColumns three;  // the orientation by these or the quaternion
   std::optional<std::size_t> sigma, set, session;
   std::optional<std::size_t> distance, touch, anchor, minus_pose;
 
@@ -51,6 +56,32 @@ Status find_position(const CsvTable& table, BatchColumns& columns) {
   return {};
 }
 
+/// The orientation by three columns whose names say the way and the unit. Refuses two of them, and
+/// a part of a rotation vector.
+Result<ThreeColumns> find_three(const CsvTable& table) {
+  ThreeColumns found;
+  for (const ThreeNumbers& way : ways_of_three_numbers()) {
+    for (const auto& names : way.columns) {
+      for (const auto& [unit, per_unit] : {std::pair("deg", from_deg(1)), std::pair("rad", 1.0)}) {
+        std::vector<std::string> wanted;
+        for (const std::string& name : names) wanted.push_back(fmt::format("{}_{}", name, unit));
+        const bool all = std::all_of(wanted.begin(), wanted.end(), [&](const std::string& name) {
+          return table.find(name).has_value();
+        });
+        if (!all && !way.is_vector) continue;
+        std::vector<std::size_t> columns = TRY(table.all_or_none(wanted));
+        if (columns.empty()) continue;
+        if (found.way != nullptr)
+          return refused("two orientations, {} and {}", found.way->name, way.name)
+              .in(table.where())
+              .of(wanted.front());
+        found = {&way, std::move(columns), per_unit};
+      }
+    }
+  }
+  return found;
+}
+
 Result<BatchColumns> find_columns(const CsvTable& table) {
   PoseColumns pose = TRY(PoseColumns::find(table));
   TRY(pose.require_joints(table));
@@ -69,18 +100,18 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   TRY(find_position(table, columns));
   std::vector<std::size_t> quaternion = TRY(table.all_or_none(kQuaternionColumns));
   columns.quaternion = std::move(quaternion);
-  std::vector<std::size_t> vector = TRY(table.all_or_none(kVectorColumns));
-  columns.vector = std::move(vector);
-  if (!columns.quaternion.empty() && !columns.vector.empty())
-    return refused("two orientations, a quaternion and a rotation vector")
+  ThreeColumns three = TRY(find_three(table));
+  columns.three = std::move(three);
+  if (!columns.quaternion.empty() && columns.three.way != nullptr)
+    return refused("two orientations, a quaternion and {}", columns.three.way->name)
         .in(table.where())
-        .of(kVectorColumns.front());
+        .of(table.columns()[columns.three.columns.front()]);
 
   std::vector<bool> used(table.columns().size(), false);
   for (const std::size_t column : columns.pose.used()) used[column] = true;
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
-  for (const std::size_t column : columns.vector) used[column] = true;
+  for (const std::size_t column : columns.three.columns) used[column] = true;
   for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance,
                              columns.touch, columns.anchor, columns.minus_pose}) {
     if (column) used[*column] = true;
@@ -111,13 +142,15 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
     const Matrix3 R_WT = TRY(table.rotation(row, columns.quaternion));
     measurement.R_WT = R_WT;
   }
-  if (!says(table, row, columns.vector)) return {};
-  Vector3 vector;
+  if (!says(table, row, columns.three.columns)) return {};
+  constexpr double kMost = 4 * kPi;
+  const double per_unit = columns.three.per_unit;
+  Vector3 rad;
   for (std::size_t k = 0; k < 3; ++k) {
-    const double value = TRY(table.number(row, columns.vector[k], 2 * kPi));
-    vector(static_cast<Eigen::Index>(k)) = value;
+    const double value = TRY(table.number(row, columns.three.columns[k], kMost / per_unit));
+    rad(static_cast<Eigen::Index>(k)) = value * per_unit;
   }
-  measurement.R_WT = rotation_exp(vector);
+  measurement.R_WT = columns.three.way->rotation(rad).toRotationMatrix();
   return {};
 }
 
@@ -130,7 +163,7 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
         .of("touch_mm")
         .next("write a row for each");
   if (says(table, row, columns.position) || says(table, row, columns.quaternion) ||
-      says(table, row, columns.vector))
+      says(table, row, columns.three.columns))
     return table.refuse(row, "{} beside a position", name).of(name).next("write a row for each");
   Gauge gauge;
   gauge.kind = distance ? Gauge::Kind::kDistance : Gauge::Kind::kTouch;
@@ -297,8 +330,7 @@ struct ToldColumn {
 /// `q1_rad` is `q1_deg` in another unit, and `x_m` `x_mm`.
 ToldColumn told_column(const std::string& name) {
   if (name == "skip" || name == "-" || name.empty()) return {};
-  if (std::find(kVectorColumns.begin(), kVectorColumns.end(), name) != kVectorColumns.end())
-    return {name, 1};
+  if (name.starts_with("rv") && name.ends_with("_rad")) return {name, 1};
   const auto in = [&](std::string_view unit) {
     return name.size() > unit.size() && name.ends_with(unit)
                ? name.substr(0, name.size() - unit.size())
@@ -348,7 +380,14 @@ Result<MeasurementBatch> parse_batch_table(const std::string& text,
   const std::vector<TextLine> lines = TRY(text_lines(text, where));
   const std::vector<TextLine> first = first_lines(text, 1);
   const char separator = first.empty() ? ',' : separator_of(first.front().text);
-  const std::vector<CsvTable::Row> rows = TRY(data_rows(lines, separator, where));
+  std::vector<CsvTable::Row> rows = TRY(data_rows(lines, separator, where));
+  const auto is_word = [](const std::string& field) {
+    return !is_number(with_decimal_point(field));
+  };
+  // A first line of names counts for nothing: the columns are told.
+  if (rows.size() > 1 &&
+      std::all_of(rows.front().fields.begin(), rows.front().fields.end(), is_word))
+    rows.erase(rows.begin());
   std::vector<ToldColumn> told;
   CsvTable::Row header{1, {}};
   for (const std::string& column : columns) {
@@ -374,147 +413,6 @@ Result<MeasurementBatch> read_batch_csv(const std::string& path) {
   return read_text_file(path)
       .and_then([&](const std::string& text) { return parse_batch_csv(text, path); })
       .map([&](MeasurementBatch batch) { return dated(std::move(batch), written_at(path)); });
-}
-
-namespace {
-
-/// One column of a written batch: its name and its field for a measurement.
-struct WrittenColumn {
-  std::string name;
-  std::function<std::string(const Measurement&)> field;
-};
-
-std::string optional_field(const std::optional<double>& value, double scale = 1) {
-  return value ? csv_number(*value * scale) : "";
-}
-
-void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
-  columns.push_back({"pose_id", [](const Measurement& m) { return csv_field(m.pose_id); }});
-  const Eigen::Index joints =
-      batch.measurements.empty() ? 0 : batch.measurements.front().context.q.size();
-  for (Eigen::Index j = 0; j < joints; ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    const JointType type =
-        at < batch.joint_types.size() ? batch.joint_types[at] : JointType::kRevolute;
-    columns.push_back({joint_column(static_cast<int>(j), type), [j, type](const Measurement& m) {
-                         return csv_number(joint_to_column(m.context.q(j), type));
-                       }});
-  }
-  for (int k = 0; k < 3; ++k) {
-    columns.push_back({kPositionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) {
-                         return m.p_W.allFinite() && !m.gauge ? csv_number(to_mm(m.p_W(k))) : "";
-                       }});
-  }
-  for (int k = 0; k < 4; ++k) {
-    columns.push_back(
-        {kQuaternionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) -> std::string {
-           if (!m.R_WT) return "";
-           const Eigen::Quaterniond R(*m.R_WT);
-           return csv_number(k == 0 ? R.w() : R.vec()(k - 1));
-         }});
-  }
-}
-
-void add_gauge_columns(std::vector<WrittenColumn>& columns) {
-  const auto add = [&](const char* name, Gauge::Kind kind) {
-    columns.push_back({name, [kind](const Measurement& m) {
-                         return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value))
-                                                                 : "";
-                       }});
-  };
-  add("distance_mm", Gauge::Kind::kDistance);
-  add("touch_mm", Gauge::Kind::kTouch);
-  columns.push_back({"anchor_id", [](const Measurement& m) {
-                       return m.gauge ? csv_field(m.gauge->anchor) : "";
-                     }});
-  columns.push_back({"minus_pose_id", [](const Measurement& m) {
-                       return m.gauge ? csv_field(m.gauge->minus_pose) : "";
-                     }});
-}
-
-void add_circumstance_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
-  columns.push_back(
-      {"sigma_mm", [](const Measurement& m) { return optional_field(m.sigma, to_mm(1)); }});
-  columns.push_back({"time_s", [](const Measurement& m) {
-                       return m.context.time ? fmt::format("{:.15g}", *m.context.time) : "";
-                     }});
-  columns.push_back({"temperature_c",
-                     [](const Measurement& m) { return optional_field(m.context.temperature); }});
-  columns.push_back({"tool_id", [](const Measurement& m) { return csv_field(m.context.tool); }});
-  columns.push_back(
-      {"payload_id", [](const Measurement& m) { return csv_field(m.context.payload); }});
-  std::size_t directions = 0;
-  for (const Measurement& m : batch.measurements)
-    directions = std::max(directions, m.context.direction.size());
-  for (std::size_t j = 0; j < directions; ++j) {
-    columns.push_back({fmt::format("dir{}", j + 1), [j](const Measurement& m) {
-                         return j < m.context.direction.size()
-                                    ? fmt::format("{}", m.context.direction[j])
-                                    : "";
-                       }});
-  }
-  columns.push_back({"session_id", [](const Measurement& m) { return csv_field(m.session_id); }});
-  columns.push_back({"set", [](const Measurement& m) {
-                       return m.set == MeasurementSet::kUnassigned ? ""
-                              : m.set == MeasurementSet::kTrain    ? "train"
-                                                                   : "validation";
-                     }});
-  for (std::size_t k = 0; k < batch.extra_columns.size(); ++k) {
-    columns.push_back({batch.extra_columns[k], [k](const Measurement& m) {
-                         return k < m.extra.size() ? csv_field(m.extra[k]) : "";
-                       }});
-  }
-}
-
-}  // namespace
-
-namespace {
-
-/// Adds the reference poses of gauges to the batch as rows. Rows without a value are not
-/// measurements.
-MeasurementBatch with_named_poses(MeasurementBatch batch) {
-  std::map<std::string, const PoseContext*> missing;
-  for (const Measurement& m : batch.measurements) {
-    if (m.gauge && m.gauge->minus != nullptr) missing[m.gauge->minus_pose] = m.gauge->minus.get();
-  }
-  for (const Measurement& m : batch.measurements) missing.erase(m.pose_id);
-  std::vector<Measurement> named;
-  for (const auto& [id, context] : missing) {
-    Measurement& one = named.emplace_back();
-    one.pose_id = id;
-    one.context = *context;
-    one.p_W.setConstant(std::numeric_limits<double>::quiet_NaN());
-  }
-  batch.measurements.insert(batch.measurements.begin(), named.begin(), named.end());
-  return batch;
-}
-
-}  // namespace
-
-std::string to_csv(const MeasurementBatch& given) {
-  const MeasurementBatch batch = with_named_poses(given);
-  std::vector<WrittenColumn> columns;
-  add_pose_columns(batch, columns);
-  add_gauge_columns(columns);
-  add_circumstance_columns(batch, columns);
-  std::erase_if(columns, [&](const WrittenColumn& column) {
-    return std::all_of(batch.measurements.begin(), batch.measurements.end(),
-                       [&](const Measurement& m) { return column.field(m).empty(); });
-  });
-  std::string text;
-  for (const WrittenColumn& column : columns) {
-    if (!text.empty()) text += ',';
-    text += csv_field(column.name);
-  }
-  text += '\n';
-  for (const Measurement& measurement : batch.measurements) {
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      if (k > 0) text += ',';
-      text += columns[k].field(measurement);
-    }
-    text += '\n';
-  }
-  return text;
 }
 
 }  // namespace trammel

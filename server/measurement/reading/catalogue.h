@@ -18,6 +18,7 @@ struct Reading {
   bool of_rows = false;  ///< other rows belong together: it needs the whole table
   std::function<NumberTable(NumberTable)> apply;
   std::optional<Chain> robot = {};  ///< the robot file is read in another way, the numbers are not
+  std::string the_same = {};        ///< what would look the same, after "or "; empty: nothing
 };
 
 /// All mistakes in joint columns that are tried: two columns exchanged, another sign, unit or zero,

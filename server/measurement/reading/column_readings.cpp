@@ -147,6 +147,9 @@ class JointReadings {
     for (const double turn : kTurns) {
       add(fmt::format("with {:g} deg added to {}", turn, name(j)), name(j),
           [j, turn](Eigen::MatrixXd& q) { q.row(j).array() += from_deg(turn); });
+      if (j + 1 == robot_.size())
+        all_.back().the_same =
+            fmt::format("with the tool of the cell file turned by {:g} deg about its axis", turn);
     }
   }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/error_sources/physical_model.h"
+#include "server/measurement/unread_columns.h"
 #include "server/robot/cell_rules.h"
 
 namespace trammel {
@@ -40,12 +41,14 @@ std::vector<Note> ToldByTraining::notes() const {
 
 std::vector<Note> ToldByTraining::beside(std::vector<Note> of_model) const {
   for (const Note& note : notes()) of_model.push_back(note);
+  if (!unread.empty()) of_model.push_back({"columns_not_read", Note::Severity::kInfo, unread});
   return gravest_first(std::move(of_model));
 }
 
 ToldByTraining told_by_training(const CompensatedModel& model, const CheckedBatch& batch,
                                 const TrainOptions& options) {
   ToldByTraining told;
+  told.unread = unread_columns(batch.rows());
   if (options.looked_at && !options.from) told.jump = jump_beside(model, batch);
   if (options.fleet) told.unlike = unlike_twins(model.parts(), *options.fleet);
   return told;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/base/note.h"
@@ -16,10 +17,12 @@ namespace trammel {
 struct ToldByTraining {
   std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from anyhow
   std::vector<Unlike> unlike;  ///< in what the robot is unlike its twins; empty without twins
+  std::string
+      unread;  ///< unread_columns() of the batch, which a terminal tells as it reads the file
 
   /// `changed_within_batch` and `unlike_twins`, warnings.
   [[nodiscard]] std::vector<Note> notes() const;
-  /// Together with those of the model, the gravest first.
+  /// Together with those of the model and `columns_not_read`, the gravest first.
   [[nodiscard]] std::vector<Note> beside(std::vector<Note> of_model) const;
 };
 

@@ -108,6 +108,7 @@ void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch,
 void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch,
                      const MeasurementBatch& trained, const TrainOptions& options) {
   record_domain(parts, trained);
+  add_what_is_stated(parts.physics, batch.rows(), *parts.measured);
   for (const Measurement& m : trained.measurements)
     parts.trained_with.emplace(m.context.tool, m.context.payload);
   record_temperature(parts, trained);
