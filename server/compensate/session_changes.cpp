@@ -5,19 +5,21 @@
 #include <cstdlib>
 
 #include "server/base/coverage.h"
+#include "server/base/shown_value.h"
+#include "server/base/units.h"
 #include "server/calibrate/one_session.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kMilli = 1e3;  // angles are told in mrad
 constexpr const char* kRestsOnOrder = "; this rests on the order in which the sessions were given";
 
 /// The factor and the unit in which a parameter is shown.
-std::pair<double, std::string> shown(const Parameter& parameter) {
-  if (parameter.unit == "rad") return {parameter.scale * kMilli, "mrad"};
-  return {parameter.scale, parameter.unit};
+Reading shown(const Parameter& parameter) {
+  Reading reading = reading_of(parameter.unit);
+  reading.scale *= parameter.scale;
+  return reading;
 }
 
 /// Without the row at which it began: `slip3`.
@@ -64,7 +66,8 @@ std::vector<SessionChange::Size> sum_of_steps(const IdentifiedTogether& found,
 }
 
 std::string number_of(const SessionChange::Size& one) {
-  return fmt::format("{:.4f} ± {:.4f} {}", one.value, one.u95, one.unit);
+  const ShownValue read = show_read(one.value, one.u95, {1, one.unit});
+  return fmt::format("{} ± {} {}", read.value, read.expanded, one.unit);
 }
 
 std::string numbers_of(const std::vector<SessionChange::Size>& sizes) {
@@ -77,7 +80,7 @@ std::string what_changed(const SessionChange& change) {
   switch (change.course) {
     case SessionChange::Course::kWanders:
       return fmt::format(
-          "slow drift: {}, {:.4f} mrad from session to session (a random walk); since session {} "
+          "slow drift: {}, {:.2g} deg from session to session (a random walk); since session {} "
           "it has moved by {} (U, k=2)",
           cause_in_words(change.source), change.rate, change.session_id,
           change.sizes.empty() ? "an unknown amount" : number_of(change.sizes.front()));
@@ -106,7 +109,7 @@ SessionChange told(const IdentifiedTogether& found, const Change& change) {
                                            : SessionChange::Course::kSince;
   one.session_id = since.id;
   one.pose_id = since.first_pose;
-  one.rate = kMilli * change.rate;
+  one.rate = to_deg(change.rate);
   one.sizes = wanders ? sum_of_steps(found, change) : sizes_of(found, change);
   one.strength = change.gain;
   one.p_value = change.p_value;

@@ -10,7 +10,7 @@ namespace trammel {
 
 /// The change of the arm between two sessions that a model was made from.
 struct SessionChange {
-  /// A number of the change, in the unit that people read: an angle in mrad, a length in mm.
+  /// A number of the change, in the unit that people read: an angle in degrees, a length in mm.
   struct Size {
     std::string name, unit;
     double value = 0, u95 = 0;  ///< U(k = 2)
@@ -25,7 +25,7 @@ struct SessionChange {
   std::optional<int> joint;
   Course course = Course::kSince;
   std::string session_id, pose_id;  ///< since when
-  double rate = 0;                  ///< mrad per session, for a wandering zero
+  double rate = 0;                  ///< deg per session, for a wandering zero
   std::vector<Size> sizes;
   double strength = 0;  ///< twice the log likelihood that it adds
   double p_value = 1;
@@ -45,8 +45,8 @@ struct IdentifiedTogether {
 [[nodiscard]] std::vector<SessionChange> session_changes(const IdentifiedTogether& found);
 [[nodiscard]] std::vector<SessionChange> session_changes(const CompensatedModel& model);
 
-/// For people: `since session lt-08 (pose p1): lost zero in joint 3 (q3 -0.2000 ± 0.0040 mrad; U,
-/// k=2)`.
+/// For people: `since session lt-08 (pose p1): lost zero in joint 3 (q3 -0.01146 ± 0.00023 deg;
+/// U, k=2)`.
 [[nodiscard]] std::string sentence(const SessionChange& change);
 
 /// The note that the order of the sessions decides which are before a change, which are after it,

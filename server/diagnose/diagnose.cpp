@@ -302,7 +302,13 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const SearchResult& se
     sources.push_back(geometry);
   const Result<CalibrationResult> found =
       calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
-  if (found && tells_a_budget(batch)) diagnosis.budget = error_budget(*found, batch);
+  if (!found || !tells_a_budget(batch)) return;
+  Since since;
+  for (const Accepted& one : searched.accepted)
+    for (const Finding& finding : diagnosis.findings)
+      if (!one.is_outlier() && finding.cause == one.cause && !finding.since_session.empty())
+        since[one.in_model] = finding.since_session;
+  diagnosis.budget = error_budget(*found, batch, since);
 }
 
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,

@@ -25,6 +25,12 @@ std::string named(const BudgetLine& line) {
   return text;
 }
 
+/// `47.9 %`; a share that rounds to nothing has no sign.
+std::string in_percent(double share) {
+  const double tenths = std::round(1e3 * share);
+  return fmt::format("{:.1f} %", tenths == 0 ? 0.0 : tenths / 10);
+}
+
 double share_of(const BudgetLine& line) { return std::isfinite(line.share) ? line.share : 0; }
 
 /// The steps from the drawing (nothing explained) to the whole error, each where the one before it
@@ -65,9 +71,8 @@ std::map<std::string, double> shares_of(const BudgetView& view) {
 HtmlRow row_of(const BudgetLine& line, Waterfall& waterfall,
                const std::map<std::string, double>& beyond_frames) {
   const auto beyond = beyond_frames.find(line.line);
-  return {{named(line), value_html(line), waterfall.step(share_of(line)),
-           fmt::format("{:.1f} %", 100 * line.share),
-           beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
+  return {{named(line), value_html(line), waterfall.step(share_of(line)), in_percent(line.share),
+           beyond == beyond_frames.end() ? "" : in_percent(beyond->second),
            fmt::format("{:.4f}", to_mm(line.alone_rms)),
            fmt::format("{:.4f}", to_mm(line.left_if_right)),
            line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : ""},
@@ -77,7 +82,7 @@ HtmlRow row_of(const BudgetLine& line, Waterfall& waterfall,
 /// Lines whose bars are not seen, in one row, so that the steps lead to the whole.
 HtmlRow row_of_small(int count, double share, Waterfall& waterfall) {
   return {{fmt::format("{} lines of less than {:g} % each", count, 100 * kWorthARow), "",
-           waterfall.step(share), fmt::format("{:.1f} %", 100 * share), "", "", "", ""}};
+           waterfall.step(share), in_percent(share), "", "", "", ""}};
 }
 
 }  // namespace
@@ -124,7 +129,7 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
     text += "<p class=\"verdict\">" + html_text(doubt) + "</p>";
   for (const BudgetLine& line : budget->between_sessions)
     text += "<p>" +
-            html_text(fmt::format("Since session {}, at its poses: {}", line.since_session,
+            html_text(fmt::format("At the poses since session {}: {}", line.since_session,
                                   sentence(line))) +
             "</p>";
   const auto stands_out = [](const BudgetLine& line) { return !line.action.empty(); };

@@ -36,7 +36,7 @@ ordered_json change_json(const SessionChange& change) {
   for (const SessionChange::Size& one : change.sizes)
     json["parameters"][one.name] = {{"value", one.value}, {"u95", one.u95}, {"unit", one.unit}};
   if (change.course == SessionChange::Course::kWanders)
-    json["wanders_mrad_per_session"] = change.rate;
+    json["wanders_deg_per_session"] = change.rate;
   json["strength"] = change.strength;
   json["p_value"] = change.p_value;
   json["could_also_be"] = ordered_json::array();
@@ -58,7 +58,7 @@ std::string others_words(const SessionChange& change) {
   for (const std::string& other : change.could_also_be)
     words.push_back(html_text(cause_in_words(other)));
   if (change.course == SessionChange::Course::kWanders)
-    words.push_back(fmt::format("wanders, {:.4f} mrad a session", change.rate));
+    words.push_back(fmt::format("wanders, {:.2g} deg a session", change.rate));
   return fmt::format("{}", fmt::join(words, ", or "));
 }
 

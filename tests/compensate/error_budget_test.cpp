@@ -17,6 +17,8 @@
 #include "server/compensate/model_file.h"
 #include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
+#include "tests/support/learning_cell.h"
+#include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
@@ -291,6 +293,27 @@ TEST(ErrorBudget, TwoNumbersThatThePosesTellTogetherOnlyNameEachOther) {
   EXPECT_TRUE(names(together.line("length:6"), "tool"));
   ASSERT_NE(apart.line("length:6"), nullptr);
   EXPECT_FALSE(names(apart.line("length:6"), "tool"));
+}
+
+TEST(ErrorBudget, OfAGearboxFarSofterThanOnesOfItsSizeAsksForThePayloadThenForTheGearbox) {
+  const auto cell = test::cell_7();
+  for (const double times : {1.0, 6.0}) {
+    VirtualRobot robot = test::chapter_5_robot(cell);
+    const std::vector<Parameter> parameters = robot.truth.parameters();
+    for (std::size_t k = 0; k < parameters.size(); ++k)
+      if (parameters[k].name == "C3") robot.truth.values(static_cast<Eigen::Index>(k)) *= times;
+    TrainOptions options;
+    options.bias = "none";
+    const CompensatedModel model = test::demand(train(
+        cell, test::demand(check_against_cell(test::measured(robot, 120, 5), *cell, drawn(0, 1))),
+        options));
+    const BudgetLine* gear = budget_of(model).line("compliance:3");
+    ASSERT_NE(gear, nullptr);
+    ASSERT_TRUE(gear->times_usual);
+    EXPECT_NEAR(*gear->times_usual, times * 0.23 / 0.15, 0.2 * times)
+        << "4e-9 rad/Nmm are 0.23 deg/kNm; joints of large arms show 0.15";
+    EXPECT_EQ(gear->action.empty(), times < 2) << gear->action;
+  }
 }
 
 TEST(ErrorBudget, TellsAHealthyArmThatNothingStandsOut) {

@@ -51,8 +51,8 @@ TEST(BetweenSessions, AZeroThatWasLostIsToldWithItsSessionAndIsNoNoise) {
   EXPECT_EQ(json.at("joint"), 3);
   EXPECT_EQ(json.at("since").at("session_id"), "day-2");
   const auto& zero = json.at("parameters").begin().value();
-  EXPECT_NEAR(zero.at("value").get<double>(), 0.5, 2 * zero.at("u95").get<double>());
-  EXPECT_EQ(zero.at("unit"), "mrad");
+  EXPECT_NEAR(zero.at("value").get<double>(), to_deg(5e-4), 2 * zero.at("u95").get<double>());
+  EXPECT_EQ(zero.at("unit"), "deg");
   EXPECT_TRUE(json.at("rests_on_order").get<bool>()) << "no row has a time";
   EXPECT_TRUE(
       std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), [](const std::string& limit) {
@@ -60,6 +60,24 @@ TEST(BetweenSessions, AZeroThatWasLostIsToldWithItsSessionAndIsNoNoise) {
       }));
   EXPECT_TRUE(good.between_sessions.empty());
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
+}
+
+TEST(BetweenSessions, AZeroLostByDegreesIsNamedAsSurelyAsASmallOneAndHasItsLineInTheBudget) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  for (const int joint : {3, 4, 5}) {
+    for (const double deg : {0.6, 2.0}) {
+      const VirtualRobot after = test::with_zero_off(robot, joint, from_deg(deg));
+      const Diagnosis diagnosis = diagnosis_of({robot, after}, 20);
+      EXPECT_EQ(to_string(diagnosis.verdict), "named") << diagnosis.sentence;
+      ASSERT_EQ(diagnosis.findings.size(), 1u) << diagnosis.sentence;
+      EXPECT_EQ(diagnosis.findings.front().cause.joint, joint - 1);
+      ASSERT_TRUE(diagnosis.budget);
+      ASSERT_EQ(diagnosis.budget->between_sessions.size(), 1u);
+      const BudgetLine& lost = diagnosis.budget->between_sessions.front();
+      EXPECT_EQ(lost.since_session, "day-2");
+      EXPECT_NEAR(lost.value->value, deg, std::max(2 * lost.value->u95, 0.01)) << joint;
+    }
+  }
 }
 
 TEST(BetweenSessions, AReflectorThatSatElsewhereForADayIsToldAndIsNoNoise) {

@@ -28,7 +28,10 @@ TEST(BudgetPage, StepsLeadFromTheDrawingToTheWholeErrorEachFromWhereTheOneBefore
         line_of_share(static_cast<int>(budget.as_it_stands.lines.size()) + 1, share));
   budget.as_it_stands.lines.front().action = "re-master joint 1";
   budget.as_it_stands.lines.front().with = {"length:6"};
+  budget.beyond_frames.lines = {line_of_share(2, -1e-5)};
   const std::string page = budget_section(budget);
+  EXPECT_EQ(page.find("-0.0 %"), std::string::npos) << "nothing has no sign";
+  EXPECT_NE(page.find("0.0 %"), std::string::npos) << page;
   const std::regex rect("rect x=\"([0-9.]+)\" width=\"([0-9.]+)\"");
   std::vector<std::pair<double, double>> bars;
   for (std::sregex_iterator at(page.begin(), page.end(), rect), end; at != end; ++at)

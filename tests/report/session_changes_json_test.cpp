@@ -12,7 +12,7 @@ SessionChange lost_zero() {
   change.joint = 3;
   change.session_id = "day-<3>";
   change.pose_id = "p1";
-  change.sizes = {{"slip3", "mrad", -0.2, 0.004}};
+  change.sizes = {{"slip3", "deg", -0.2, 0.004}};
   change.could_also_be = {"tool_changed@121"};
   return change;
 }
@@ -27,7 +27,7 @@ TEST(SessionChanges, AreTheSameForProgramsAndOnThePage) {
   EXPECT_TRUE(json.at("could_also_be").at(0).at("joint").is_null());
   const std::string html = session_changes_html({lost_zero()});
   for (const char* part : {"day-&lt;3&gt; (pose p1)", "lost zero in joint 3", "-0.2000", "0.0040",
-                           "mrad", "the tool was changed"})
+                           "deg", "the tool was changed"})
     EXPECT_NE(html.find(part), std::string::npos) << part << " is not in " << html;
   EXPECT_EQ(session_changes_html({}), "");
 }

@@ -5,11 +5,13 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/one_session.h"
+#include "server/compensate/budget/remedies.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/session_changes.h"
 #include "server/compensate/world.h"
 #include "server/robot/rigid_fit.h"
+#include "server/tasks/train/did_it_help.h"
 #include "server/tasks/train/lasting_sources.h"
 #include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
@@ -96,14 +98,16 @@ TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
   EXPECT_EQ(change.session_id, "day-3");
   EXPECT_EQ(change.pose_id, "day-3/1");
   ASSERT_EQ(change.sizes.size(), 1u);
-  EXPECT_EQ(change.sizes.front().unit, "mrad");
-  EXPECT_LT(change.sizes.front().u95, 0.05);
-  EXPECT_NEAR(change.sizes.front().value, 0.2, 2 * change.sizes.front().u95);
+  EXPECT_EQ(change.sizes.front().unit, "deg") << "people read degrees";
+  EXPECT_LT(change.sizes.front().u95, 0.003);
+  EXPECT_NEAR(change.sizes.front().value, to_deg(2e-4), 2 * change.sizes.front().u95);
   ASSERT_TRUE(model.parts().budget);
   const std::vector<BudgetLine>& between = model.parts().budget->between_sessions;
   ASSERT_EQ(between.size(), 1u) << "what changed has a budget of its own";
   EXPECT_EQ(between.front().since_session, "day-3");
   EXPECT_EQ(between.front().joint, 2);
+  EXPECT_EQ(between.front().name, "lost zero in joint 3 since session day-3");
+  EXPECT_EQ(between.front().action, "") << "it is no farther off than mastering leaves a zero";
   // Half of the poses are of sessions since: over all poses the line is smaller by sqrt(2).
   const BudgetLine* of_all = model.parts().budget->line(between.front().line);
   ASSERT_NE(of_all, nullptr);
@@ -111,6 +115,49 @@ TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
   const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
   ASSERT_EQ(again.parts().budget->between_sessions.size(), 1u);
   EXPECT_EQ(again.parts().budget->between_sessions.front().since_session, "day-3");
+}
+
+TEST(Sessions, AZeroThatWasLostByADegreeStandsOutInTheBudgetAndHasAnAction) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const VirtualRobot after = test::with_zero_off(robot, 4, from_deg(1));
+  const CompensatedModel model =
+      test::demand(train(cell, sessions_of(robot, after, 2, 1, 1004), kPhysics));
+  ASSERT_TRUE(model.parts().budget);
+  const ErrorBudget& budget = *model.parts().budget;
+  ASSERT_EQ(budget.between_sessions.size(), 1u);
+  const BudgetLine& lost = budget.between_sessions.front();
+  ASSERT_TRUE(lost.value);
+  EXPECT_NEAR(lost.value->value, 1, 2 * lost.value->u95);
+  EXPECT_GT(lost.times_usual.value_or(0), 10);
+  EXPECT_NE(lost.action.find("revolution counter"), std::string::npos) << lost.action;
+  EXPECT_EQ(budget.as_it_stands.lines.front().line, lost.line) << "what stands out leads";
+}
+
+TEST(Sessions, WhetherAZeroThatWasLostBetweenThemWasPutRightIsToldByNewPoses) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const VirtualRobot after = test::with_zero_off(robot, 4, from_deg(1));
+  const CompensatedModel model =
+      test::demand(train(cell, sessions_of(robot, after, 2, 1, 1004), kPhysics));
+  const std::vector<ZeroRemedy> zeros = zero_remedies(*model.parts().budget);
+  const auto zero = std::find_if(zeros.begin(), zeros.end(),
+                                 [](const ZeroRemedy& one) { return one.joint == 3; });
+  ASSERT_NE(zero, zeros.end());
+  EXPECT_NEAR(zero->add, 1 + to_deg(-2.6e-4), 0.02) << "what was off before, and what was lost";
+  for (const bool repaired : {true, false}) {
+    const CheckedBatch poses =
+        checked(measured_on(repaired ? robot : after, {.poses = 60, .seed = 77}), "new", *cell);
+    const AfterRepair told = test::demand(did_it_help(model, cell, poses));
+    ASSERT_FALSE(told.lines.empty());
+    const LineOutcome& lost = told.lines.front();
+    EXPECT_EQ(lost.line, "zero:4");
+    EXPECT_NEAR(lost.before.value, 1, 0.03);
+    EXPECT_EQ(to_string(lost.helped), repaired ? "put_right" : "not_moved");
+    EXPECT_NEAR(lost.moved.value, repaired ? -1 : 0, std::max(2 * lost.moved.u95, 0.01));
+    for (const BudgetLine& line : told.difference.budget.beyond_frames.lines)
+      EXPECT_EQ(line.line.find("slip"), std::string::npos) << line.line;
+  }
 }
 
 TEST(Sessions, WhereNoClockTellsTheirOrderTheModelSaysOnWhatItRests) {

@@ -32,7 +32,7 @@ std::vector<Eigen::Index> places_in(const PhysicalModel& all, const PhysicalMode
 }
 
 /// `sign`: 1 of the newer model, -1 of the older one.
-void add(const ModelParts& parts, double sign, CalibrationResult& between) {
+void add(const ArmOfNow& parts, double sign, CalibrationResult& between) {
   const std::vector<Eigen::Index> places = places_in(between.model, parts.physics);
   const std::vector<Parameter> parameters = parts.physics.parameters();
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -49,7 +49,7 @@ void add(const ModelParts& parts, double sign, CalibrationResult& between) {
 }
 
 /// An arm whose errors are the difference between the two models.
-CalibrationResult between(const ModelParts& before, const ModelParts& now) {
+CalibrationResult between(const ArmOfNow& before, const ArmOfNow& now) {
   CalibrationResult result;
   result.model = now.physics;
   for (const ErrorSourcePtr& source : before.physics.sources)
@@ -128,9 +128,10 @@ ModelDifference difference_between(const CompensatedModel& before, const Compens
   for (PoseContext& pose : poses)
     pose.served = true;  // changes that began at a training pose have
                          // happened
-  const CalibrationResult found = between(before.parts(), now.parts());
+  const ArmOfNow old_arm = arm_of_now(before.parts()), new_arm = arm_of_now(now.parts());
+  const CalibrationResult found = between(old_arm, new_arm);
   ModelDifference difference;
-  difference.parameters = parameters_of(found, before.parts().physics, now.parts().physics);
+  difference.parameters = parameters_of(found, old_arm.physics, new_arm.physics);
   const std::vector<ErrorPrediction> old_poses = before.predict_all(poses),
                                      new_poses = now.predict_all(poses);
   PredictedDifference predicted{poses,

@@ -8,6 +8,7 @@
 
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
+#include "server/error_sources/catalogue.h"
 #include "server/error_sources/spelling.h"
 
 namespace trammel {
@@ -41,6 +42,13 @@ std::optional<BudgetNumber> turn_of(const BudgetLine& line) {
 }
 
 bool stands_out(const BudgetLine& line) { return !line.action.empty(); }
+
+/// True of what began while the poses were measured. It is no error of the drawing, and is told as
+/// a finding.
+bool is_a_change(const BudgetLine& line) {
+  const CauseRecord* record = find_cause(line.cause);
+  return record != nullptr && record->lasting == causes::Lasting::kFromAPose;
+}
 
 /// The details behind the name, in brackets.
 std::string detail(const BudgetLine& line) {
@@ -115,7 +123,7 @@ std::string doubt_of_file(const ErrorBudget& budget) {
 std::string lead_of(const ErrorBudget& budget) {
   std::vector<std::string> largest, actions;
   for (const BudgetLine& line : budget.as_it_stands.lines) {
-    if (!stands_out(line) || std::ssize(largest) == kMostToLead) continue;
+    if (!stands_out(line) || is_a_change(line) || std::ssize(largest) == kMostToLead) continue;
     largest.push_back(fmt::format("{}, {}: {:.3f} mm alone", line.name, value_in_words(line),
                                   to_mm(line.alone_rms)));
     actions.push_back(line.action);
@@ -144,7 +152,7 @@ std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   }
   for (const BudgetLine& line : budget.between_sessions)
     text.push_back(
-        fmt::format("since session {}, at its poses: {}", line.since_session, sentence(line)));
+        fmt::format("at the poses since session {}: {}", line.since_session, sentence(line)));
   return text;
 }
 

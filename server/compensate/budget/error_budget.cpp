@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <set>
 
 #include "server/base/shown_value.h"
@@ -15,6 +14,7 @@
 #include "server/compensate/budget/remedies.h"
 #include "server/compensate/budget/usual.h"
 #include "server/error_sources/catalogue.h"
+#include "server/error_sources/spelling.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/one_place.h"
 
@@ -289,9 +289,6 @@ std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<Bu
   return steps;
 }
 
-/// Since which session what changed on the arm acts, by the name of the source.
-using Since = std::map<std::string, std::string>;
-
 Since since_of(const ModelParts& parts) {
   Since since;
   for (const Change& change : parts.changes) {
@@ -312,17 +309,24 @@ std::vector<Eigen::Index> where_it_acts(const Eigen::Matrix3Xd& effect) {
   return columns;
 }
 
-std::vector<BudgetLine> between_sessions(const PhysicalModel& model,
-                                         const std::vector<BudgetItem>& items,
-                                         const Effects& effects, const Since& since) {
+/// A change between sessions is named by its session: rows of several files say nothing to people.
+void tell_since(const Since& since, const ErrorSource& source, BudgetLine& line) {
+  const auto found = since.find(source.name());
+  if (found == since.end()) return;
+  line.since_session = found->second;
+  line.name =
+      fmt::format("{} since session {}", in_words(source.name().substr(0, source.name().find('@'))),
+                  line.since_session);
+}
+
+std::vector<BudgetLine> between_sessions(const std::vector<BudgetItem>& items,
+                                         const Effects& effects) {
   std::vector<BudgetLine> lines;
   for (std::size_t k = 0; k < items.size(); ++k) {
-    const auto found = since.find(model.sources[items[k].source]->name());
     const std::vector<Eigen::Index> at = where_it_acts(effects.lines[k]);
-    if (found == since.end() || at.empty()) continue;
+    if (items[k].line.since_session.empty() || at.empty()) continue;
     lines.push_back(
         sized(items[k].line, effects.lines[k](Eigen::all, at), effects.total(Eigen::all, at)));
-    lines.back().since_session = found->second;
   }
   std::stable_sort(lines.begin(), lines.end(), [](const BudgetLine& one, const BudgetLine& other) {
     return one.alone_rms > other.alone_rms;
@@ -369,11 +373,12 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left,
   fold(datum, items, untold);
   const std::vector<Parameter> parameters = datum.model.parameters();
   for (BudgetItem& item : items) {
+    tell_since(beside.since, *datum.model.sources[item.source], item.line);
     add_values(datum, parameters, item);
     judge(datum, item);
   }
   Effects effects = effects_of(left, datum, items, positions);
-  budget.between_sessions = between_sessions(datum.model, items, effects, beside.since);
+  budget.between_sessions = between_sessions(items, effects);
   if (beside.difference != nullptr && beside.difference->load.cols() > 0)
     add_load(*beside.difference, datum.model, items, effects);
   const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell),
@@ -401,16 +406,21 @@ ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& 
 
 ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseContext>& targets) {
   MeasurementBatch as_predicted;
-  const std::vector<ErrorPrediction> predictions = model.predict_all(targets);
-  for (std::size_t i = 0; i < targets.size(); ++i) {
+  std::vector<PoseContext> at = targets;
+  for (PoseContext& one : at) one.served = true;  // what began at a training pose has happened
+  const std::vector<ErrorPrediction> predictions = model.predict_all(at);
+  for (std::size_t i = 0; i < at.size(); ++i) {
     Measurement m;
-    m.context = targets[i];
-    m.context.served = true;
+    m.context = at[i];
     m.p_W = model.parts().physics.X_WB * predictions[i].X_BT_predicted.translation();
     m.sigma = 0;
     as_predicted.measurements.push_back(std::move(m));
   }
-  return error_budget(model, as_predicted);
+  const MeasurementBatch positions = positions_of(as_predicted);
+  if (positions.measurements.empty()) return {};
+  const ArmOfNow arm = arm_of_now(model.parts());
+  return budget_of({arm.physics, arm.parameters, arm.covariance}, left_by(model, positions),
+                   positions, {model.bias().has_value()});
 }
 
 ErrorBudget error_budget(const CalibrationResult& between, const PredictedDifference& predicted) {
@@ -428,11 +438,12 @@ ErrorBudget error_budget(const CalibrationResult& between, const PredictedDiffer
                    {!predicted.learned.isZero(0), {}, &predicted});
 }
 
-ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {
+ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured,
+                         const Since& since) {
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return {};
   return budget_of({calibration.model, calibration.parameters, calibration.covariance},
-                   left_by(calibration.model, positions), positions, {});
+                   left_by(calibration.model, positions), positions, {false, since});
 }
 
 double alone_of_zero(const CompensatedModel& model, int joint, double by,

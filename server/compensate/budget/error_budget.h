@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 
 #include "server/compensate/budget/budget.h"
 #include "server/compensate/compensated_model.h"
@@ -18,9 +20,11 @@ namespace trammel {
 /// The budget at targets, where the error is the predicted one: nothing is left beyond the model.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const std::vector<PoseContext>& targets);
+/// The session since which a change of the arm acts, by the name of its error source.
+using Since = std::map<std::string, std::string>;
 /// The budget of a calibration, at its own poses; no bias is learned beside it.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& calibration,
-                                       const MeasurementBatch& measured);
+                                       const MeasurementBatch& measured, const Since& since = {});
 
 /// The difference between two models' predictions, 3 x N, m, in W. `learned` is the part of their
 /// biases.

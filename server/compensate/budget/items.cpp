@@ -152,6 +152,44 @@ PhysicalModel without_sources(const PhysicalModel& model, const Goes& goes) {
 
 }  // namespace
 
+bool is_lost_zero(const CauseRecord& cause) {
+  return cause.search == causes::SearchFamily::kZeroStep;
+}
+
+ArmOfNow arm_of_now(const ModelParts& parts) {
+  const PhysicalModel& physics = parts.physics;
+  const std::vector<Parameter> all = physics.parameters();
+  const auto count = std::ssize(all);
+  Eigen::MatrixXd counts_as = Eigen::MatrixXd::Identity(count, count);
+  std::vector<bool> goes(physics.sources.size());
+  std::vector<Eigen::Index> kept;
+  Eigen::Index place = 0;
+  for (std::size_t k = 0; k < physics.sources.size(); ++k) {
+    const ErrorSource& source = *physics.sources[k];
+    const std::string zero = fmt::format("q{}", source.joint() + 1);
+    const auto own = std::find_if(all.begin(), all.end(),
+                                  [&](const Parameter& one) { return one.name == zero; });
+    goes[k] = is_lost_zero(source.cause()) && own != all.end();
+    if (goes[k])
+      counts_as(own - all.begin(), place) = physics.cell->robot.joint(source.joint()).sign;
+    for (std::size_t i = 0; i < source.parameters().size(); ++i, ++place)
+      if (!goes[k]) kept.push_back(place);
+  }
+  const Eigen::MatrixXd taken = counts_as(kept, Eigen::all);
+  const Eigen::VectorXd values = taken * physics.values;
+  ArmOfNow now{without_sources(physics, [&](std::size_t k) { return goes[k]; }),
+               {},
+               taken * parts.covariance * taken.transpose()};
+  now.physics.values = values;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const auto own = static_cast<Eigen::Index>(i);
+    now.parameters.push_back(parts.parameters[static_cast<std::size_t>(kept[i])]);
+    now.parameters.back().value = values(own);
+    now.parameters.back().stddev = std::sqrt(std::max(now.covariance(own, own), 0.0));
+  }
+  return now;
+}
+
 std::string name_of_link_parameter(const std::string& parameter, const Chain& robot) {
   const auto [letters, joint] = symbol_of(parameter);
   const int n = joint + 1;

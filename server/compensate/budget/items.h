@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "server/compensate/budget/budget.h"
+#include "server/compensate/model_parts.h"
 #include "server/error_sources/physical_model.h"
 
 /// Inside of the room: the lines that a physical model has, and where their numbers stand among its
@@ -36,6 +37,17 @@ struct BudgetItem {
 /// The model with the load of another model's arm: the payloads of its cell, and its sources that
 /// change the load.
 [[nodiscard]] PhysicalModel with_load_of(const PhysicalModel& model, const PhysicalModel& other);
+/// The arm as it is now: zeros that were lost while it was measured count as zeros of its links,
+/// where it has these. For poses to come it predicts the same.
+struct ArmOfNow {
+  PhysicalModel physics;
+  std::vector<IdentifiedParameter> parameters;
+  Eigen::MatrixXd covariance;  ///< P x P, SI
+};
+[[nodiscard]] ArmOfNow arm_of_now(const ModelParts& parts);
+/// True of a zero that a joint lost while it was measured.
+[[nodiscard]] bool is_lost_zero(const CauseRecord& cause);
+
 /// The place of `item` in with_told_load().
 [[nodiscard]] BudgetItem in_told_load(const PhysicalModel& model, const BudgetItem& item);
 

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "server/base/letters.h"
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
+#include "server/compensate/budget/items.h"
 #include "server/error_sources/catalogue.h"
 
 namespace trammel {
@@ -49,7 +51,8 @@ const std::vector<Maker>& makers() {
         {"S", "L", "U", "R", "B", "T"}}},
       {"universal robots",
        {"Universal Robots",
-        "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
+        "calibration.conf: delta_theta of the joint (the file counts in rad, 1 deg is 0.0174533), "
+        "or joint zeroing in Expert Mode",
         "calibration.conf: delta_a, delta_d, delta_alpha",
         "Payload: mass and centre of gravity (set_target_payload)",
         {"Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3"}}},
@@ -66,6 +69,11 @@ std::string joint_and_axis(int joint, const MakersWords& words) {
   return axis == plain ? plain : fmt::format("{} ({})", plain, axis);
 }
 
+bool lost_a_zero(const BudgetLine& line) {
+  const CauseRecord* cause = find_cause(line.cause);
+  return cause != nullptr && is_lost_zero(*cause);
+}
+
 std::string signed_value(double value, double u95, const std::string& unit) {
   const ShownValue read = show_read(value, u95, {1, unit});
   return fmt::format("{}{} ± {} {}", value > 0 ? "+" : "", read.value, read.expanded, unit);
@@ -74,21 +82,23 @@ std::string signed_value(double value, double u95, const std::string& unit) {
 }  // namespace
 
 std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget) {
-  std::vector<ZeroRemedy> zeros;
+  // What a joint lost while it was measured is added to what it was off before.
+  std::map<int, ZeroRemedy> by_joint;
   for (const BudgetLine& line : budget.as_it_stands.lines) {
-    if (line.kind != LineKind::kJointZero || !line.value ||
-        std::abs(line.value->value) <= line.value->u95)
-      continue;
-    zeros.push_back({line.joint, line.value->value, line.value->u95, line.value->unit});
+    if (!is_of_step(line, "zeros") || !line.value) continue;
+    ZeroRemedy& zero = by_joint[line.joint];
+    zero = {line.joint, zero.add + line.value->value, std::hypot(zero.u95, line.value->u95),
+            line.value->unit};
   }
-  std::sort(zeros.begin(), zeros.end(),
-            [](const ZeroRemedy& one, const ZeroRemedy& other) { return one.joint < other.joint; });
+  std::vector<ZeroRemedy> zeros;
+  for (const auto& [joint, zero] : by_joint)
+    if (std::abs(zero.add) > zero.u95) zeros.push_back(zero);
   return zeros;
 }
 
 bool is_of_step(const BudgetLine& line, std::string_view step) {
   if (step == "frames") return line.kind == LineKind::kBase || line.kind == LineKind::kTool;
-  if (step == "zeros") return line.kind == LineKind::kJointZero;
+  if (step == "zeros") return line.kind == LineKind::kJointZero || lost_a_zero(line);
   if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
   if (step != "loads") return false;
   const CauseRecord* cause = find_cause(line.cause);
@@ -98,15 +108,18 @@ bool is_of_step(const BudgetLine& line, std::string_view step) {
 
 std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_view step) {
   std::vector<RemedyValue> values;
+  if (step == "zeros") {
+    for (const ZeroRemedy& zero : zero_remedies(budget))
+      values.push_back({fmt::format("joint {}", zero.joint + 1), zero.add, zero.u95, zero.unit});
+    return values;
+  }
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     if (!is_of_step(line, step)) continue;
     std::vector<BudgetNumber> numbers = line.numbers;
     if (numbers.empty() && line.value) numbers = {*line.value};
     for (const BudgetNumber& number : numbers) {
       if (std::abs(number.value) <= number.u95) continue;
-      const bool zero = line.kind == LineKind::kJointZero;
-      values.push_back({zero ? fmt::format("joint {}", line.joint + 1) : number.name, number.value,
-                        number.u95, number.unit});
+      values.push_back({number.name, number.value, number.u95, number.unit});
     }
   }
   return values;

@@ -1,5 +1,10 @@
 #include "server/compensate/budget/usual.h"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
 #include "server/base/units.h"
 #include "server/error_sources/catalogue.h"
 
@@ -7,6 +12,7 @@ namespace trammel {
 
 namespace {
 
+constexpr double kKilo = 1e3;        // a gearbox is told in deg/kNm
 constexpr double kFrameShift = 0.1;  // m
 constexpr double kFrameTurn = 0.1;   // rad
 constexpr double kToolShift = 0.02;  // m
@@ -19,6 +25,16 @@ double reach_of(const Chain& robot) {
     reach += std::hypot(robot.joint(j).link.a, robot.joint(j).link.d);
   return reach;
 }
+
+/// What the joints of an arm give way by, with the bearings and links that give way beside their
+/// gears; by the stretch of its links. The README of the room has the gears behind the numbers.
+struct GearsOfSize {
+  double up_to;        // m
+  double gear, wrist;  // deg/kNm
+};
+constexpr GearsOfSize kGears[] = {
+    {1.3, 4, 12}, {2, 2, 6}, {3, 0.4, 3}, {std::numeric_limits<double>::infinity(), 0.15, 0.5}};
+constexpr int kWristJoints = 3;
 
 bool is_length(const Parameter& parameter) { return parameter.unit == "mm"; }
 
@@ -34,16 +50,28 @@ UsualSizes usual_sizes(const Chain& robot) {
   usual.twist = from_deg(0.06);
   usual.length = from_mm(0.5 + 0.2 * reach_of(robot));
   usual.tool = from_mm(2.0);
+  const double reach = reach_of(robot);
+  const auto* gears = std::find_if(std::begin(kGears), std::end(kGears),
+                                   [&](const GearsOfSize& one) { return reach <= one.up_to; });
+  usual.gear = from_deg(gears->gear) / kKilo;
+  usual.wrist = from_deg(gears->wrist) / kKilo;
   return usual;
 }
 
 std::optional<double> usual_value(const BudgetItem& item, const PhysicalModel& model) {
-  const UsualSizes usual = usual_sizes(model.cell->robot);
+  const Chain& robot = model.cell->robot;
+  const UsualSizes usual = usual_sizes(robot);
+  const int joint = item.line.joint;
+  const bool turns = joint >= 0 && robot.joint(joint).type == JointType::kRevolute;
   switch (item.line.kind) {
+    case LineKind::kCause:
+      if (joint < 0 || !is_lost_zero(model.sources[item.source]->cause())) return std::nullopt;
+      [[fallthrough]];
     case LineKind::kJointZero:
-      return model.cell->robot.joint(item.line.joint).type == JointType::kRevolute
-                 ? to_deg(usual.zero)
-                 : to_mm(usual.rail_zero);
+      return turns ? to_deg(usual.zero) : to_mm(usual.rail_zero);
+    case LineKind::kJointCompliance:
+      if (!turns) return std::nullopt;
+      return kKilo * to_deg(joint < robot.size() - kWristJoints ? usual.gear : usual.wrist);
     case LineKind::kTwist:
       return to_deg(usual.twist);
     case LineKind::kLength:

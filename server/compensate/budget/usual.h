@@ -12,6 +12,7 @@ struct UsualSizes {
   double rail_zero = 0;        ///< m
   double length = 0;           ///< m
   double tool = 0;             ///< m, of its point
+  double gear = 0, wrist = 0;  ///< rad/Nm, of a joint that gives way: up to the wrist, of the wrist
 };
 [[nodiscard]] UsualSizes usual_sizes(const Chain& robot);
 

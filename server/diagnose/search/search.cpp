@@ -95,6 +95,8 @@ class Search {
   [[nodiscard]] double named_path_score(const Standing& standing, const Admitted& open) const;
   [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice,
                                     std::size_t place) const;
+  [[nodiscard]] std::optional<SlowRival> slow_instead(const Standing& standing, const Scan& seen,
+                                                      std::size_t place) const;
   [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen,
                                   std::size_t place) const;
 
@@ -270,6 +272,26 @@ bool Search::holds_in_folds(const Standing& standing, const Choice& choice,
   return gain.after < gain.before;
 }
 
+/// The slow rival of the family at `place`. Both are judged to first order, of which a large step
+/// falls short; so the step is refined, and its gain by that counts for it.
+std::optional<SlowRival> Search::slow_instead(const Standing& standing, const Scan& seen,
+                                              std::size_t place) const {
+  std::optional<SlowRival> slow = slow_rival(standing, seen, place);
+  SearchResult with = result_;
+  if (!slow || !add_to(with.after, standing.families[place]->source(seen.best[place]))) return slow;
+  refine(with.after, with.batch, with.unnamed);
+  const LinearProblem refined(with.after.model, with.batch, with.after.priors, {});
+  const Background all(background_columns(refined, with.unnamed));
+  const auto square_of = [](const LinearProblem& problem, const Background& background) {
+    const VectorXd projected = background.project(problem.residual());
+    return problem.residual().dot(projected);
+  };
+  const double explained =
+      square_of(standing.problem, standing.background) - square_of(refined, all);
+  slow->gap -= std::max(0.0, 0.5 * (explained - seen.best[place].strength));
+  return slow;
+}
+
 /// The cause at `place`, and how sure its name is.
 Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_t place) const {
   const Family& family = *standing.families[place];
@@ -284,7 +306,7 @@ Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_
                                 chance_, place, options_.seed + kNamingDraw);
   one.naming_frequency = naming.frequency;
   one.could_also_be = std::move(naming.could_also_be);
-  const auto slow = slow_rival(standing, seen, place);
+  const auto slow = slow_instead(standing, seen, place);
   const double ahead =
       std::max(0.0, thresholds::kStepShare * one.best.strength - thresholds::kStepChance);
   if (slow && slow->gap > -ahead) one.could_also_be.push_back(unknown_cause(one.cause.joint));
@@ -309,7 +331,7 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
     closed_.push_back(standing.families[place]->cause(choice.seen.best[place]));
     return {};
   }
-  const auto slow = slow_rival(standing, choice.seen, place);
+  const auto slow = slow_instead(standing, choice.seen, place);
   if (slow && slow->gap > thresholds::kSlowInstead) {
     take_function(standing.problem, slow->columns, slow->depends_on, slow->wanderer,
                   choice.seen.score[place] + slow->gap);
