@@ -72,7 +72,7 @@ std::optional<LineAmongSisters> farthest_of(const BudgetLine& line,
     for (const ErrorBudget* sister : sisters)
       if (const BudgetNumber* one = same_number(*sister, line.line, number.name))
         theirs.push_back(*one);
-    if (std::ssize(theirs) < kFewestTwins) continue;
+    if (std::ssize(theirs) < kFewestSisters) continue;
     LineAmongSisters one = held_against(number, theirs, usual);
     if (!farthest || std::abs(one.z) > std::abs(farthest->z)) farthest = one;
   }

@@ -19,7 +19,10 @@ struct LineAmongSisters {
   bool differs = false;       ///< beyond what the next sister would show by chance
 };
 
-/// Each line of the arm itself that at least kFewestTwins sisters have, of a line with several
+/// The fewest sisters by which a robot is judged: of two robots nobody knows which of them is odd.
+inline constexpr int kFewestSisters = 2;
+
+/// Each line of the arm itself that at least kFewestSisters sisters have, of a line with several
 /// numbers the one that is farthest from theirs; what does most comes first. The spread from sister
 /// to sister is drawn to what is usual for the line, as if three more robots had that. A line
 /// differs where a fleet of equal robots shows as much in at most kFalseFleets of fleets (Student's

@@ -6,6 +6,7 @@
 #include <set>
 #include <unsupported/Eigen/SpecialFunctions>
 
+#include "server/base/shown_value.h"
 #include "server/fleet/student.h"
 
 namespace trammel {
@@ -260,10 +261,10 @@ std::vector<Unlike> unlike_twins(const ModelParts& parts, const FleetPrior& flee
 }
 
 std::string to_string(const Unlike& unlike) {
-  return fmt::format(
-      "{} is {:.4g} {}, its twins have {:.4g} +- {:.2g} ({:.1f} standard deviations)",
-      unlike.parameter, unlike.value, unlike.unit, unlike.fleet_mean, 2 * unlike.fleet_stddev,
-      unlike.z);
+  const auto [scale, unit] = reading_of(unlike.unit);
+  return fmt::format("{} is {:.4g} {}, its twins have {:.4g} ± {:.2g} ({:.1f} standard deviations)",
+                     unlike.parameter, scale * unlike.value, unit, scale * unlike.fleet_mean,
+                     2 * scale * unlike.fleet_stddev, unlike.z);
 }
 
 }  // namespace trammel

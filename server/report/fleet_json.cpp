@@ -59,7 +59,7 @@ std::vector<const ErrorBudget*> sisters_of(const std::vector<FleetEntry>& cells,
 ordered_json lines_of(const std::vector<FleetEntry>& cells, std::size_t which) {
   const auto& budget = cells[which].model->parts().budget;
   const std::vector<const ErrorBudget*> sisters = sisters_of(cells, which);
-  if (!budget || std::ssize(sisters) < kFewestTwins) return nullptr;
+  if (!budget || std::ssize(sisters) < kFewestSisters) return nullptr;
   ordered_json all = ordered_json::array();
   for (const LineAmongSisters& line : lines_among_sisters(*budget, sisters))
     all.push_back(
@@ -162,7 +162,7 @@ std::string fleet_text(const ordered_json& fleet) {
     if (!cell.contains("unlike_twins")) {
       text += "  no model in force\n";
     } else if (cell["unlike_twins"].is_null()) {
-      text += "  too few robots of its type to compare it with\n";
+      text += "  too few robots of its type to compare each of its parameters\n";
     } else if (cell["unlike_twins"].empty()) {
       text += "  like its twins\n";
     } else {

@@ -34,7 +34,7 @@ std::string verdict_of(const ordered_json& cell) {
 std::string twins_of(const ordered_json& cell) {
   if (!cell.is_object() || !cell.contains("unlike_twins")) return "no model in force";
   const ordered_json& unlike = cell["unlike_twins"];
-  if (!unlike.is_array()) return "too few robots of its type to compare it with";
+  if (!unlike.is_array()) return "too few robots of its type to compare each of its parameters";
   if (unlike.empty()) return "like its twins";
   std::string list;
   for (const ordered_json& one : unlike)

@@ -58,7 +58,7 @@ TEST(FleetLines, OfEqualRobotsHardlyAFleetHasOneThatDiffers) {
   constexpr int kFleets = 200;
   for (int k = 0; k < kFleets; ++k) {
     std::vector<ErrorBudget> robots;
-    for (int r = 0; r < 5; ++r) robots.push_back(arm(random));
+    for (int r = 0; r < (k % 2 == 0 ? 3 : 5); ++r) robots.push_back(arm(random));
     bool any = false;
     for (std::size_t r = 0; r < robots.size(); ++r) {
       std::vector<const ErrorBudget*> sisters;
@@ -72,10 +72,22 @@ TEST(FleetLines, OfEqualRobotsHardlyAFleetHasOneThatDiffers) {
   EXPECT_LE(fleets, 0.08 * kFleets);
 }
 
-TEST(FleetLines, SayNothingByTwoSisters) {
+TEST(FleetLines, OfThreeRobotsNameTheOddOneAndOfTwoNone) {
   std::mt19937_64 random(7);
-  const std::vector<ErrorBudget> sisters = {arm(random), arm(random)};
-  EXPECT_TRUE(lines_among_sisters(arm(random, 1.0), all_of(sisters)).empty());
+  const std::vector<ErrorBudget> robots = {arm(random), arm(random, 1.0), arm(random)};
+  for (std::size_t own = 0; own < robots.size(); ++own) {
+    std::vector<const ErrorBudget*> sisters = all_of(robots);
+    sisters.erase(sisters.begin() + static_cast<std::ptrdiff_t>(own));
+    const auto lines = lines_among_sisters(robots[own], sisters);
+    ASSERT_EQ(lines.size(), 6u);
+    EXPECT_EQ(lines.front().differs, own == 1) << own;
+    if (own == 1) {
+      EXPECT_EQ(lines.front().line, "zero:4");
+    }
+    EXPECT_FALSE(lines[1].differs) << own;
+    sisters.pop_back();
+    EXPECT_TRUE(lines_among_sisters(robots[own], sisters).empty()) << "which of two is odd?";
+  }
 }
 
 }  // namespace

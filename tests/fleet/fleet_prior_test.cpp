@@ -79,6 +79,8 @@ TEST_F(FleetTest, AnOddRobotIsNamedAndWidensNoSpread) {
   ASSERT_EQ(unlike.size(), 1u);
   EXPECT_EQ(unlike.front().parameter, "C3");
   EXPECT_GT(unlike.front().z, 4);
+  EXPECT_NE(to_string(unlike.front()).find(" deg/kNm, its twins have "), std::string::npos)
+      << to_string(unlike.front());
   EXPECT_TRUE(unlike_twins(member(50).model.parts(), with_odd).empty());
 }
 
