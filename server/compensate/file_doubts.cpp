@@ -27,8 +27,8 @@ struct Drawing {
 const Drawing kDrawing[] = {{"q", from_deg(1), "deg", to_deg(1)},
                             {"d", from_mm(3), "mm", to_mm(1)},
                             {"a", from_mm(3), "mm", to_mm(1)},
-                            {"alpha", 3e-3, "mrad", 1e3},
-                            {"beta", 3e-3, "mrad", 1e3}};
+                            {"alpha", 3e-3, "deg", to_deg(1)},
+                            {"beta", 3e-3, "deg", to_deg(1)}};
 
 /// The kind of `d4`; none of `theta7` (of a rail, which stands as it was mounted) or `C2`.
 const Drawing* drawing_of(const std::string& name) {
@@ -123,8 +123,8 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
   if (off.zeros_alone && lacking.empty())
     return Note{
         kOffDrawing, Severity::kStop,
-        fmt::format("no mastered joint is so far off its zero: {}; re-master it and measure "
-                    "again. Where it is mastered, the robot file counts from another zero "
+        fmt::format("zeros are far off: {}; no mastered joint is. Re-master them and measure "
+                    "again. Where they are mastered, the robot file counts from another zero "
                     "than the controller: compare them (trammel confirm-robot)",
                     off.numbers)};
   // A model of the wrong robot file fits positions and is of no use for corrected poses.

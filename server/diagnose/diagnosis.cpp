@@ -62,6 +62,11 @@ Cause unknown_cause(int joint) {
   return cause_at(cause_that_stands_for(causes::StandsFor::kNoKnownCause), joint);
 }
 
+std::string verdict_in_words(std::string_view verdict) {
+  const std::string beyond = verdict == to_string(Verdict::kNothing) ? " beyond the model" : "";
+  return std::string(verdict) + beyond;
+}
+
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {
     case Verdict::kNamed:

@@ -93,6 +93,9 @@ struct Finding {
 
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };
 [[nodiscard]] std::string_view to_string(Verdict verdict);
+/// For people, from its spelling: `nothing` is told as `nothing beyond the model`, since the
+/// drawing may be wrong by much.
+[[nodiscard]] std::string verdict_in_words(std::string_view verdict);
 
 /// The rest that is more than noise.
 struct Unexplained {

@@ -153,12 +153,29 @@ TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
   EXPECT_NE(told.at("budget").at("sentences").at(0).get<std::string>().find("mm alone"),
             std::string::npos);
   EXPECT_EQ(told.at("notes").back().at("code"), "robot_not_confirmed");
+  testing::internal::CaptureStdout();
+  trammel({"check", "--model", file("before.model"), "--batch", file("fresh.csv")});
+  const std::string said = testing::internal::GetCapturedStdout();
+  EXPECT_NE(said.find("what to do: re-master joint 4\n"), std::string::npos) << said;
+  EXPECT_EQ(said.find("the zero of joint 4 ("), std::string::npos)
+      << "the millimetres of a zero stand there once: " << said;
   std::vector<std::string> strictly = changed;
   strictly.emplace_back("--strict");
   EXPECT_EQ(trammel(strictly), 1);
   EXPECT_EQ(
       trammel({"check", "--model", file("now.model"), "--batch", file("fresh.csv"), "--strict"}),
       0);
+}
+
+TEST_F(Compare, ADiagnosisAtAServiceSaysWhyItTakesNoModelFromBeforeARepair) {
+  testing::internal::CaptureStderr();
+  const int code =
+      trammel({"diagnose", "--cell", TRAMMEL_SOURCE_DIR "/config/cell-7.yaml", "--batch",
+               file("fresh.csv"), "--since", file("before.model"), "--service"});
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(code, 2);
+  for (const char* part : {"a service diagnoses by its own model", "trammel export"})
+    EXPECT_NE(said.find(part), std::string::npos) << said;
 }
 
 TEST_F(Compare, RemediesTellEachStepWhatItSetsAndWhatItLeaves) {

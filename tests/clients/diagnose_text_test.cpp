@@ -25,6 +25,14 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
   EXPECT_EQ(text.find(" rad"), std::string::npos) << text;
 }
 
+TEST(DiagnoseText, WhereNothingIsMissingSaysThatThisIsBeyondTheModel) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  diagnosis.verdict = Verdict::kNothing;
+  diagnosis.sentence = "The drawing is off by 21.1 mm rms.";
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  EXPECT_TRUE(text.starts_with("nothing beyond the model: The drawing is off by 21.1 mm")) << text;
+}
+
 TEST(DiagnoseText, ALongListOfParametersIsNoLineThatNobodyReads) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   for (int k = 1; k <= 24; ++k)

@@ -116,6 +116,20 @@ TEST(ServiceText, AModelsGraveNotesStandUnderTheTableAndProgramsGetAllOfThem) {
   EXPECT_EQ(notes[1]["code"], "robot_not_confirmed");
 }
 
+TEST(ServiceText, OfAModelInForceTheWholeErrorOfTheDrawingAndWhereTheRestOfTheBudgetStands) {
+  exchange::ModelInfo model;
+  model.cell = "cell-7";
+  model.version = 2;
+  model.budget = {"the drawing is off by 21.100 mm rms at 120 poses", "the zero of joint 4"};
+  EXPECT_EQ(models_text({model}).find("21.100"), std::string::npos) << "it is not in force";
+  model.in_force = true;
+  EXPECT_TRUE(
+      models_text({model}).ends_with("cell-7@2: the drawing is off by 21.100 mm rms at 120 "
+                                     "poses (trammel show --model cell-7)\n"))
+      << models_text({model});
+  EXPECT_EQ(models_json({model})[0]["budget"]["sentences"].size(), 2u);
+}
+
 TEST(ServiceText, AnActivationSaysBeforeAfterLimitWhyAndTheNextCommand) {
   const nlohmann::ordered_json said = {
       {"version", 2},

@@ -36,6 +36,11 @@ TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
   }
 }
 
+TEST_F(DiagnosisPage, WhereNothingIsMissingSaysThatThisIsBeyondTheModel) {
+  diagnosis_.verdict = Verdict::kNothing;
+  EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_), ">nothing beyond the model<"));
+}
+
 TEST_F(DiagnosisPage, CallsErrorSourcesByTheirPlainNames) {
   diagnosis_.sources_after.emplace_back("gear_transmission:3@48.5");
   const std::string page = diagnosis_page(diagnosis_, *cell_);

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -80,23 +81,27 @@ std::string due_text(const nlohmann::ordered_json& check) {
   return fmt::format("next check: {}{}{}\n", due, due.empty() ? "" : "; ", because);
 }
 
-/// The lines of what changed, with what each does alone; empty where nothing did, and of a server
-/// that does not say it.
-std::string lines_text(const nlohmann::ordered_json& check) {
+/// The actions for what changed, each once; what it does in millimetres stands in `why`. Empty
+/// where nothing changed, and of a server that does not say it.
+std::string actions_text(const nlohmann::ordered_json& check) {
   const auto budget = check.find("budget");
-  if (budget == check.end() || !budget->is_object() || !budget->contains("sentences") ||
-      !(*budget)["sentences"].is_array())
+  if (budget == check.end() || !budget->is_object() || !budget->contains("lines") ||
+      !(*budget)["lines"].is_array())
     return "";
-  std::string text;
-  for (const auto& line : (*budget)["sentences"])
-    if (line.is_string()) text += "  " + line.get<std::string>() + "\n";
-  return text.empty() ? "" : "what changed, line by line:\n" + text;
+  std::vector<std::string> actions;
+  for (const auto& line : (*budget)["lines"]) {
+    if (!line.is_object() || !line.contains("action") || !line["action"].is_string()) continue;
+    const auto action = line["action"].get<std::string>();
+    if (!action.empty() && std::find(actions.begin(), actions.end(), action) == actions.end())
+      actions.push_back(action);
+  }
+  return actions.empty() ? "" : fmt::format("what to do: {}\n", fmt::join(actions, "; "));
 }
 
 std::string check_text(const nlohmann::ordered_json& check) {
   return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(),
                      check.at("why").get<std::string>()) +
-         lines_text(check) + due_text(check);
+         actions_text(check) + due_text(check);
 }
 
 /// The notes of the model that a service checked against, as warn_of_notes() tells them.
@@ -210,7 +215,7 @@ Result<Extent> check(const CheckArguments& arguments) {
   const HealthCheck health = TRY(check_robot(model, model.cell(), batch, std::move(asked)));
   const auto json = check_json(health, batch, model);
   warn_of_notes(notes_of(model));
-  tell(health_text(health) + lines_text(json), {arguments.json, arguments.report});
+  tell(health_text(health) + actions_text(json), {arguments.json, arguments.report});
   TRY(write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments));
   TRY(write_json(arguments.json, json));
   return extent_of(json, arguments);

@@ -236,7 +236,11 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
       if (!arguments->since.empty())
-        return failure(ErrorCode::kUsage, "--since is for files").of("--since").next(kSinceOnFiles);
+        return failure(ErrorCode::kUsage,
+                       "a service diagnoses by its own model and takes no model file to compare "
+                       "with")
+            .of("--since")
+            .next(kSinceOnFiles);
       return diagnose_at_service(*arguments).map([](bool all) {
         return all ? Extent::kAll : Extent::kPart;
       });

@@ -287,7 +287,7 @@ std::string budget_text(const ordered_json& budget) {
 }  // namespace
 
 std::string diagnosis_text(const ordered_json& diagnosis) {
-  return fmt::format("{}: {}\n", diagnosis.at("verdict").get<std::string>(),
+  return fmt::format("{}: {}\n", verdict_in_words(diagnosis.at("verdict").get<std::string>()),
                      diagnosis.at("sentence").get<std::string>()) +
          noise_line(diagnosis) + findings_table(diagnosis.at("findings")) +
          figures_table(diagnosis) + unexplained_text(diagnosis.at("unexplained")) +

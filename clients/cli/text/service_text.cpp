@@ -147,6 +147,9 @@ std::string models_text(const std::vector<exchange::ModelInfo>& models) {
   for (const exchange::ModelInfo& model : models) {
     for (const Note& note : grave(model.notes))
       text += fmt::format("{}@{}: {}", model.cell, model.version, notes_text({note}));
+    if (model.in_force && !model.budget.empty())
+      text += fmt::format("{}@{}: {} (trammel show --model {})\n", model.cell, model.version,
+                          model.budget.front(), model.cell);
   }
   return text;
 }

@@ -405,7 +405,7 @@ class Model:
 
     def budget(self) -> Optional[Dict[str, Any]]:
         """Where the millimetres come from, as `budget` of `trammel train --json`: `nominal_rms_mm`, `lines` (each with
-        `line`, `value`, `u95`, `unit`, `alone_rms_mm`, `share`, `action`, ...), `remedies` and `beyond_frames`. None where
+        `line`, `value`, `u95`, `unit`, `alone_rms_mm`, `share`, `action`, ...), `poses`, `beyond_frames`, `sentences` for people. None where
         no training pose has a position."""
         found: Optional[Dict[str, Any]] = json.loads(self._inside.budget_json())
         return found

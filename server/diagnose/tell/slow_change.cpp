@@ -87,7 +87,7 @@ double size_of(const LinearProblem& problem, const Mover& mover, const VectorXd&
 
 std::string size_said(const Mover& mover, double size) {
   return mover.joint < 0 ? fmt::format("{:.2g} mm", to_mm(size))
-                         : fmt::format("{:.2g} mrad", 1e3 * size);
+                         : fmt::format("{:.2g} deg", to_deg(size));
 }
 
 bool is_more_than_warmth(const Mover& mover, double size) {
