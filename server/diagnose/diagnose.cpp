@@ -15,6 +15,7 @@
 #include "server/compensate/budget/error_budget.h"
 #include "server/compensate/file_doubts.h"
 #include "server/diagnose/families/candidates.h"
+#include "server/diagnose/prove/prove.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/between_sessions.h"
@@ -311,21 +312,30 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const SearchResult& se
   diagnosis.budget = error_budget(*found, batch, since);
 }
 
-Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                            const DiagnoseOptions& options) {
-  const Placed together = TRY(placed(cell, batch, options));
-  PreparedBatch prepared = TRY(prepare(*cell, batch, together.sessions()));
-  Diagnosis diagnosis;
-  Result<SearchResult> result = searched(cell, prepared, together, options, diagnosis);
-  if (!result && result.error().code == ErrorCode::kRefused &&
-      set_aside(cell, together, result.error(), prepared, diagnosis))
-    result = searched(cell, prepared, together, options, diagnosis);
-  if (!result) return tl::make_unexpected(result.error());
-  const Explained explained(*cell, std::move(*result));
-  const SearchResult& found = explained.found;
-  const std::vector<FamilyPtr> families = make_families(explained.after);
+/// The findings of a batch, with all that the rest of its diagnosis is asked of.
+struct Answered {
+  Placed together;
+  PreparedBatch prepared;
+  std::unique_ptr<const Explained> explained;
+  Diagnosis diagnosis;  ///< as far as findings and verdict
+};
 
-  diagnosis.batch = as_recorded(prepared.surrogates, found.batch);
+Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                          const DiagnoseOptions& options) {
+  Answered all;
+  Diagnosis& diagnosis = all.diagnosis;
+  all.together = TRY(placed(cell, batch, options));
+  all.prepared = TRY(prepare(*cell, batch, all.together.sessions()));
+  Result<SearchResult> result = searched(cell, all.prepared, all.together, options, diagnosis);
+  if (!result && result.error().code == ErrorCode::kRefused &&
+      set_aside(cell, all.together, result.error(), all.prepared, diagnosis))
+    result = searched(cell, all.prepared, all.together, options, diagnosis);
+  if (!result) return tl::make_unexpected(result.error());
+  all.explained = std::make_unique<const Explained>(*cell, std::move(*result));
+  const Explained& explained = *all.explained;
+  const PreparedBatch& prepared = all.prepared;
+
+  diagnosis.batch = as_recorded(prepared.surrogates, explained.found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, prepared, diagnosis);
   tell_held_out(explained, prepared, diagnosis);
@@ -336,8 +346,36 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   tell_noise(explained, prepared, diagnosis);
   tell_verdict(diagnosis);
   tell_row_mistakes(explained, prepared.sorted ? batch.rows() : MeasurementBatch(), diagnosis);
-  tell_sources(found, prepared.sorted, diagnosis);
+  tell_sources(explained.found, prepared.sorted, diagnosis);
   tell_largest_first(diagnosis);
+  return all;
+}
+
+/// The sizes from which effects are named: proved in the batch's own residuals, or in simulated
+/// noise.
+void tell_sizes(const std::shared_ptr<const Cell>& cell, const Explained& explained,
+                const std::vector<FamilyPtr>& families, const PreparedBatch& prepared,
+                const DiagnoseOptions& options, Diagnosis& diagnosis) {
+  if (!options.prove)
+    return tell_recovery(explained, families, options.seed + kRecoveryDraw, diagnosis);
+  const std::vector<std::string> best = with_all_found(diagnosis.sources_after, explained.found);
+  const auto answer = [](const std::shared_ptr<const Cell>& one, const CheckedBatch& rows,
+                         const DiagnoseOptions& own) {
+    return answered(one, rows, own).map([](Answered all) { return std::move(all.diagnosis); });
+  };
+  diagnosis.proof = proof_of(
+      {cell, explained, families, best, prepared.surrogates, diagnosis.could_not_have_seen, answer},
+      options);
+}
+
+Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                            const DiagnoseOptions& options) {
+  Answered all = TRY(answered(cell, batch, options));
+  Diagnosis& diagnosis = all.diagnosis;
+  const PreparedBatch& prepared = all.prepared;
+  const Explained& explained = *all.explained;
+  const SearchResult& found = explained.found;
+  const std::vector<FamilyPtr> families = make_families(explained.after);
 
   std::vector<Step> steps;
   steps.push_back({"asking what could not have been seen", 0.72, [&] {
@@ -347,10 +385,9 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                    }});
   steps.push_back(
       {"planning the next poses", 0.8, [&] { tell_next_poses(explained, options, diagnosis); }});
-  if (options.recovery) {
-    steps.push_back({"hiding effects in the poses", 0.85, [&] {
-                       tell_recovery(explained, families, options.seed + kRecoveryDraw, diagnosis);
-                     }});
+  if (options.recovery || options.prove) {
+    steps.push_back({"hiding effects in the poses", 0.85,
+                     [&] { tell_sizes(cell, explained, families, prepared, options, diagnosis); }});
   }
   steps.push_back({"looking at what is left", 0.95, [&] {
                      tell_left_over(explained, options.seed, diagnosis);
@@ -361,11 +398,11 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                                       prepared.train, diagnosis);
                    }});
   TRY(run(steps, options));
-  tell_sessions(together, diagnosis);
+  tell_sessions(all.together, diagnosis);
   doubt_changes(batch.rows(), diagnosis);
   diagnosis.sentence = file_doubts_said(diagnosis) + sentence_for(diagnosis) +
                        told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
-  return diagnosis;
+  return std::move(diagnosis);
 }
 
 }  // namespace

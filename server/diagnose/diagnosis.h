@@ -120,7 +120,8 @@ struct Unseen {
   std::optional<double> detectable;    ///< m rms over the poses: smallest effect that would be
                                        ///< noticed; empty: none would
   std::optional<double> identifiable;  ///< m rms: smallest that would be named
-  std::string needs;  ///< what would show it: `approach from both sides`, ...; empty: nothing
+  std::string needs;        ///< what would show it: `approach from both sides`, ...; empty: nothing
+  double size_of_unit = 0;  ///< m rms: its average effect of strength 1; 0 where it does not show
 };
 
 /// Causes that these poses cannot tell apart.
@@ -170,6 +171,40 @@ struct Recovery {
   Eigen::VectorXd named;       ///< share of repetitions that were named rightly
 };
 
+/// Effects of one size that were put into what the best model leaves over, and what their diagnoses
+/// said.
+struct PutIn {
+  double effect_rms = 0;  ///< m: average effect of that strength; 0: nothing was put in
+  int tried = 0;
+  int found = 0;     ///< the cause stands among the findings, for sure or in doubt
+  int named = 0;     ///< the cause was named, rightly and for sure
+  int misnamed = 0;  ///< another cause was named for sure
+};
+
+/// The size that an effect must have to be named, measured in the batch's own residuals
+/// (prove/prove.h).
+struct ProvedCause {
+  Cause cause;
+  std::vector<PutIn> sizes = {};         ///< those tried, the smallest first
+  std::optional<double> predicted = {};  ///< m rms: Unseen::identifiable
+  /// m rms: size that is named with kProvedShare, the median of what the counts allow, and its 95 %
+  /// interval. Empty: no size is, as far as sizes were tried.
+  std::optional<double> smallest = {}, from = {}, to = {};
+  bool never = false;  ///< no size is, by more than chance (95 %)
+
+  /// The counts tell a size.
+  [[nodiscard]] bool is_proved() const { return smallest && from && to; }
+};
+/// Share of the effects of its smallest size that a cause must be named in.
+inline constexpr double kProvedShare = 0.9;
+
+/// The sizes that these poses name among the batch's own residuals.
+struct Proof {
+  std::vector<ProvedCause> causes;
+  PutIn healthy;    ///< residuals into which nothing was put: `misnamed` are false names
+  int refused = 0;  ///< diagnoses that refused their batch, counted as naming nothing
+};
+
 /// The dependence of what is left on something, by permutation.
 struct Dependence {
   std::string on;        ///< `q3`, `torque`, `time`
@@ -211,6 +246,7 @@ struct Diagnosis {
   std::vector<Periodogram> periodograms;
   std::vector<WaterfallStep> waterfall;
   std::vector<Recovery> recovery;
+  std::optional<Proof> proof;          ///< where DiagnoseOptions::prove asks for it
   MeasurementBatch batch;              ///< as used
   Eigen::Matrix3Xd residual_before_B;  ///< 3 x poses, m: measured - calibrated
   Eigen::Matrix3Xd residual_after_B;

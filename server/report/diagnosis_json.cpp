@@ -109,6 +109,32 @@ ordered_json unseen_json(const Diagnosis& diagnosis) {
   return list;
 }
 
+ordered_json put_in_json(const PutIn& size) {
+  return {{"effect_rms_mm", to_mm(size.effect_rms)},
+          {"tried", size.tried},
+          {"found", size.found},
+          {"named", size.named},
+          {"misnamed", size.misnamed}};
+}
+
+ordered_json proof_json(const Proof& proof) {
+  ordered_json causes = ordered_json::array();
+  for (const ProvedCause& one : proof.causes) {
+    ordered_json json = cause_json(one.cause);
+    json["outcome"] = one.never ? "never_named" : one.is_proved() ? "proved" : "open";
+    json["predicted_mm"] = length_json(one.predicted);
+    json["smallest_mm"] = length_json(one.smallest);
+    json["smallest_95_mm"] = {length_json(one.from), length_json(one.to)};
+    json["sizes"] = ordered_json::array();
+    for (const PutIn& size : one.sizes) json["sizes"].push_back(put_in_json(size));
+    causes.push_back(std::move(json));
+  }
+  return {{"named_share", kProvedShare},
+          {"nothing_put_in", put_in_json(proof.healthy)},
+          {"refused", proof.refused},
+          {"causes", causes}};
+}
+
 ordered_json suspects_json(const std::vector<SuspectedPose>& suspects) {
   ordered_json list = ordered_json::array();
   for (const SuspectedPose& pose : suspects) {
@@ -206,6 +232,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>&
           {"next_poses", next_poses_json(diagnosis)},
           {"next_poses_for", next_poses_worth_json(diagnosis)},
           {"leftover", leftover_json(diagnosis.leftover)},
+          {"proof", diagnosis.proof ? proof_json(*diagnosis.proof) : ordered_json(nullptr)},
           {"limits", diagnosis.limits},
           {"budget", diagnosis.budget ? budget_json(*diagnosis.budget) : ordered_json(nullptr)},
           {"notes", notes_json(together(diagnosis.notes, notes))},

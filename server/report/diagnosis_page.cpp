@@ -15,6 +15,7 @@
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/report/pages_beside.h"
+#include "server/report/proof_page.h"
 #include "server/robot/cell_papers.h"
 
 namespace trammel {
@@ -22,6 +23,12 @@ namespace trammel {
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
+constexpr const char* kRecovery =
+    "<section class=\"screen\">\n<h2>How large an effect must be</h2>\n<p class=\"note\">Effects "
+    "of "
+    "known size hidden in these very poses with noise as found: how often they were named "
+    "rightly.</p>\n<div class=\"charts one\"><div class=\"chart\" "
+    "id=\"recovery\"></div></div>\n</section>\n";
 constexpr double kBeyondDoubt = 1e6;  // a strength of which the digits say nothing more
 constexpr double kDepends =
     0.01;  // p-value below which the table says yes: 1 of 100 batches by chance
@@ -379,6 +386,7 @@ std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell,
                   {"confusion", not_separable_text(diagnosis)},
                   {"next_poses", next_poses_text(diagnosis, cell)},
                   {"unseen", unseen_text(diagnosis)},
+                  {"proof", diagnosis.proof ? proof_section(*diagnosis.proof) : kRecovery},
                   {"suspects", suspects_text(diagnosis)},
                   {"leftover", leftover_text(diagnosis)},
                   {"provenance", provenance_rows(diagnosis, cell)},

@@ -1,4 +1,6 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
@@ -8,6 +10,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
 #include "clients/cli/text/notes_text.h"
+#include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
@@ -31,12 +34,32 @@ constexpr const char* kCellOption = "--cell-out";
 constexpr const char* kSinceOnFiles =
     "write the service's model with trammel export --model CELL@VERSION, then diagnose without "
     "--service";
+constexpr const char* kProveOnFiles =
+    "give the cell file and the batch's file, and diagnose without --service";
+
+/// Proves for `minutes` from now, on all processors, shown as the share of that time.
+ProveOptions proving(double minutes, ProgressLine& progress) {
+  using Clock = std::chrono::steady_clock;
+  const auto began = Clock::now();
+  const auto used = [began, minutes] {
+    return std::chrono::duration<double, std::ratio<60>>(Clock::now() - began).count() / minutes;
+  };
+  const auto show = [&progress, used](double) {
+    progress.show("putting effects into the residuals", std::min(1.0, used()));
+  };
+  return {.has_time = [used](int) { return used() < 1; },
+          .for_each =
+              [show](std::size_t count, const std::function<void(std::size_t)>& work) {
+                in_parallel(count, work, show, 1);
+              }};
+}
 
 Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                                std::uint64_t seed) {
+                                const DiagnoseArguments& arguments) {
   ProgressLine progress;
   DiagnoseOptions options;
-  options.seed = seed;
+  options.seed = arguments.seed;
+  if (arguments.prove) options.prove = proving(arguments.prove_minutes, progress);
   options.progress = [&](const std::string& stage, double share) {
     progress.show(stage, share);
     return true;
@@ -143,7 +166,7 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   Cell read = TRY(read_cell_to_train(arguments.cell));
   const auto cell = std::make_shared<const Cell>(std::move(read));
   const CheckedBatch batch = TRY(batch_to_diagnose(arguments, *cell));
-  const Result<Diagnosis> diagnosis = run_diagnosis(cell, batch, arguments.seed);
+  const Result<Diagnosis> diagnosis = run_diagnosis(cell, batch, arguments);
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), batch));
   const std::vector<Note> notes = notes_of(*cell);
   warn_of_notes(notes);
@@ -156,6 +179,21 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   if (!applied) return leaves_open(json, arguments) ? Extent::kPart : Extent::kAll;
   if (!*applied) return tl::make_unexpected(applied->error());
   return tell_applied(**applied, arguments);
+}
+
+void add_prove_options(CLI::App& command, DiagnoseArguments& arguments) {
+  CLI::Option* prove = command.add_flag(
+      "--prove", arguments.prove,
+      "On files: put effects of several sizes into what the best model leaves over of this batch, "
+      "diagnose them, and tell from which size on each cause is named");
+  command
+      .add_option("--prove-minutes", arguments.prove_minutes,
+                  "With --prove: time to take, on all processors; what is not decided by then says "
+                  "so")
+      ->type_name("MINUTES")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->needs(prove);
 }
 
 }  // namespace
@@ -230,11 +268,14 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
           "On files: model file from before a repair; tells whether the repair helped, line "
           "by line of its error budget")
       ->type_name("FILE");
+  add_prove_options(*command, *arguments);
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
+      if (arguments->prove)
+        return failure(ErrorCode::kUsage, "--prove is for files").of("--prove").next(kProveOnFiles);
       if (!arguments->since.empty())
         return failure(ErrorCode::kUsage,
                        "a service diagnoses by its own model and takes no model file to compare "

@@ -14,7 +14,8 @@ struct DiagnoseArguments {
   std::string cell, report, next_poses, json, model, cell_out, since;
   std::vector<std::string> batches;  ///< at a service one at most
   std::uint64_t seed = 1;
-  bool apply = false, strict = false;
+  bool apply = false, strict = false, prove = false;
+  double prove_minutes = 10;
   ServiceOptions service;
 };
 

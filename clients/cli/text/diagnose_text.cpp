@@ -246,6 +246,48 @@ std::string limits_text(const ordered_json& diagnosis) {
              : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
 }
 
+/// The size that a cause is named from, with its interval; or how far it is known.
+std::string proved_size(const ordered_json& cause) {
+  const ordered_json& sizes = cause.at("sizes");
+  if (sizes.empty()) return "not tried";
+  if (cause.at("outcome") == "never_named")
+    return fmt::format("not named up to {}, found {} of {}",
+                       micrometres(sizes.back().at("effect_rms_mm")),
+                       sizes.back().at("found").get<int>(), sizes.back().at("tried").get<int>());
+  const ordered_json& interval = cause.at("smallest_95_mm");
+  if (cause.at("outcome") == "proved")
+    return fmt::format("{} ({} to {})", micrometres(cause.at("smallest_mm")),
+                       micrometres(interval.at(0)), micrometres(interval.at(1)));
+  return interval.at(0).is_null() ? "not known yet" : micrometres(interval.at(0)) + " or more";
+}
+
+std::string proof_table(const ordered_json& diagnosis) {
+  if (!diagnosis.contains("proof") || diagnosis.at("proof").is_null()) return "";
+  const ordered_json& proof = diagnosis.at("proof");
+  const ordered_json& nothing = proof.at("nothing_put_in");
+  std::string text = fmt::format(
+      "\nProved in the residuals of this batch: named with {:.0f} % from this size on (rms; in "
+      "brackets 95 %)\n  {:<40}{:<40}{}\n",
+      100 * proof.at("named_share").get<double>(), "cause", "proved", "predicted");
+  int open = 0, tried = 0, misnamed = 0;
+  for (const ordered_json& cause : proof.at("causes")) {
+    open += cause.at("outcome") == "open" ? 1 : 0;
+    for (const ordered_json& size : cause.at("sizes")) {
+      tried += size.at("tried").get<int>();
+      misnamed += size.at("misnamed").get<int>();
+    }
+    text += fmt::format("  {:<40}{:<40}{}\n", cause_text(cause), proved_size(cause),
+                        micrometres(cause.at("predicted_mm")));
+  }
+  text += fmt::format(
+      "  (another cause named for sure: {} of {} diagnoses; with nothing put in: {} of {})\n",
+      misnamed, tried, nothing.at("misnamed").get<int>(), nothing.at("tried").get<int>());
+  if (open > 0)
+    text += fmt::format("  ({} of {} causes are not decided: more --prove-minutes decide them)\n",
+                        open, proof.at("causes").size());
+  return text;
+}
+
 std::string next_poses_text(const ordered_json& diagnosis) {
   if (diagnosis.at("next_poses").empty()) return "";
   const ordered_json& worth = diagnosis.at("next_poses_for");
@@ -293,7 +335,7 @@ std::string diagnosis_text(const ordered_json& diagnosis) {
          figures_table(diagnosis) + unexplained_text(diagnosis.at("unexplained")) +
          suspects_text(diagnosis.at("suspect_poses")) +
          budget_text(diagnosis.value("budget", ordered_json())) + limits_text(diagnosis) +
-         next_poses_text(diagnosis);
+         proof_table(diagnosis) + next_poses_text(diagnosis);
 }
 
 std::string next_poses_csv(const ordered_json& diagnosis) {

@@ -125,7 +125,8 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"check", "  trammel check --model cell.model --batch few.csv --json health.json"},
     {"diagnose",
      "  trammel diagnose --cell cell.yaml --batch batch.csv --report page.html\n"
-     "  trammel diagnose --cell cell.yaml --batch b.csv --next-poses next.csv"},
+     "  trammel diagnose --cell cell.yaml --batch b.csv --next-poses next.csv\n"
+     "  trammel diagnose --cell cell.yaml --batch b.csv --prove --report page.html"},
     {"remedies", "  trammel remedies --model cell.model -o remedies.html"},
     {"compare", "  trammel compare a.model b.model --batch fresh.csv --report page.html"},
     {"study", "  trammel study drilling --json -"},

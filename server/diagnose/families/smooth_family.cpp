@@ -66,7 +66,7 @@ class SmoothFamily : public Family {
   explicit SmoothFamily(const LinearProblem& problem) : problem_(problem) {}
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const final {
-    const std::size_t scales = looked_for_ > 0 ? looked_for_ : deviations_.size();
+    const std::size_t scales = scales_looked_for();
     const Index each = deviations_[scales - 1].size();
     const Index count = static_cast<Index>(g_.size()) * each;
     const MatrixXd functions = functions_.leftCols(each);
@@ -106,7 +106,7 @@ class SmoothFamily : public Family {
     return all;
   }
   Best typical() const final {
-    return {.freedom = 1, .length_scale = deviations_.size() - 1, .size = typical_};
+    return {.freedom = 1, .length_scale = scales_looked_for() - 1, .size = typical_};
   }
 
  protected:
@@ -122,6 +122,9 @@ class SmoothFamily : public Family {
   bool pose_by_pose_ = true;  // g is shared with other families, or there are many functions
 
  private:
+  [[nodiscard]] std::size_t scales_looked_for() const {
+    return looked_for_ > 0 ? looked_for_ : deviations_.size();
+  }
   /// R x functions: g(row) f(pose).
   MatrixXd times_functions(const VectorXd& g, const MatrixXd& functions) const {
     MatrixXd all(problem_.rows(), functions.cols());

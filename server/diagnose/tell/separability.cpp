@@ -145,6 +145,7 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
     const auto size_for = [&](double strength) {
       return own.rms * std::sqrt(strength / own.strength);
     };
+    unseen.size_of_unit = size_for(1);
     unseen.detectable = size_for(needed);
     if (imitated < thresholds::kSameEffect)
       unseen.identifiable =
