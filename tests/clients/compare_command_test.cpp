@@ -230,6 +230,34 @@ TEST_F(Compare, AfterARepairDiagnoseSaysOfEachLineWhetherItHelped) {
   EXPECT_EQ(zero_4(since("fresh")).at("helped"), "not_moved") << "nobody repaired it";
 }
 
+TEST_F(Compare, DiagnoseProvesNoLongerThanItMayAndSaysWhatIsOpen) {
+  const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
+  ASSERT_EQ(
+      trammel({"diagnose", "--cell", cell, "--batch", file("fresh.csv"), "--prove",
+               "--prove-minutes", "0.0001", "--json", file("p.json"), "--report", file("p.html")}),
+      0);
+  const json proof = json_in("p.json").at("proof");
+  ASSERT_GT(proof.at("causes").size(), 10u);
+  for (const json& cause : proof.at("causes")) {
+    EXPECT_EQ(cause.at("outcome"), "open");
+    EXPECT_TRUE(cause.at("sizes").empty()) << "the diagnosis itself took all of the time";
+  }
+  EXPECT_NE(text_of(file("p.html")).find("proved in these residuals"), std::string::npos);
+}
+
+TEST_F(Compare, DiagnoseRefusesToProveWhereItCannot) {
+  const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
+  const std::vector<std::string> on_files = {"diagnose", "--cell", cell, "--batch",
+                                             file("fresh.csv")};
+  const auto with = [&](std::vector<std::string> arguments, const std::vector<std::string>& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return trammel(arguments);
+  };
+  EXPECT_EQ(with(on_files, {"--prove-minutes", "1"}), 2) << "minutes for what?";
+  EXPECT_EQ(with(on_files, {"--prove", "--prove-minutes", "0"}), 2);
+  EXPECT_EQ(trammel({"diagnose", "--service", "--cell", "cell-7", "--prove"}), 2);
+}
+
 TEST_F(Compare, RemediesPlanThePosesThatProveThemAfterwards) {
   ASSERT_EQ(trammel({"remedies", "--model", file("now.model"), "--json", file("r.json"),
                      "--check-poses", file("prove.csv")}),

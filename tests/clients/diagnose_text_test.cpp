@@ -33,6 +33,18 @@ TEST(DiagnoseText, WhereNothingIsMissingSaysThatThisIsBeyondTheModel) {
   EXPECT_TRUE(text.starts_with("nothing beyond the model: The drawing is off by 21.1 mm")) << text;
 }
 
+TEST(DiagnoseText, TellsTheSizeProvedBesideThePredictedOneAndHowFarTheOthersAreKnown) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  EXPECT_EQ(diagnosis_text(diagnosis_json(diagnosis)).find("Proved"), std::string::npos);
+  diagnosis.proof = test::made_up_proof();
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  for (const char* part :
+       {"Proved in the residuals of this batch: named with 90 %", "27 um (24 um to 31 um)",
+        "not named up to 90 um, found 9 of 9", "9 um or more", "for sure: 1 of 28 diagnoses",
+        "nothing put in: 1 of 12", "1 of 3 causes are not decided"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+}
+
 TEST(DiagnoseText, ALongListOfParametersIsNoLineThatNobodyReads) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   for (int k = 1; k <= 24; ++k)

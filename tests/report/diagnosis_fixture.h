@@ -101,6 +101,24 @@ inline std::vector<Finding> made_up_findings(const Diagnosis& diagnosis) {
   return {gear, tool};
 }
 
+/// A cause that is proved, one that no size names, and one that is not decided yet.
+inline Proof made_up_proof() {
+  return {.causes = {{.cause = {"gear_transmission", 2},
+                      .sizes = {{10e-6, 4, 1, 0, 1}, {20e-6, 8, 8, 6, 0}, {40e-6, 6, 6, 6, 0}},
+                      .predicted = 24e-6,
+                      .smallest = 27e-6,
+                      .from = 24e-6,
+                      .to = 31e-6},
+                     {.cause = {"tool"}, .sizes = {{90e-6, 9, 9, 0, 0}}, .never = true},
+                     {.cause = {"backlash", 1},
+                      .sizes = {{15e-6, 1, 0, 0, 0}},
+                      .predicted = 12e-6,
+                      .smallest = 21e-6,
+                      .from = 9e-6}},
+          .healthy = {0, 12, 1, 0, 1},
+          .refused = 2};
+}
+
 inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
   Diagnosis diagnosis;
   diagnosis.verdict = Verdict::kAmbiguous;

@@ -23,6 +23,30 @@ TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
   EXPECT_TRUE(json["unexplained"]["present"].get<bool>());
 }
 
+TEST(DiagnosisJson, HasTheProofOnlyWhereOneWasMade) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  EXPECT_TRUE(diagnosis_json(diagnosis)["proof"].is_null());
+  diagnosis.proof = test::made_up_proof();
+  const auto proof = diagnosis_json(diagnosis)["proof"];
+  EXPECT_DOUBLE_EQ(proof["named_share"], 0.9);
+  EXPECT_EQ(proof["nothing_put_in"]["tried"], 12);
+  EXPECT_EQ(proof["nothing_put_in"]["misnamed"], 1);
+  EXPECT_EQ(proof["refused"], 2);
+  const auto& gear = proof["causes"][0];
+  EXPECT_EQ(gear["cause"], "gear_transmission");
+  EXPECT_EQ(gear["joint"], 3);
+  EXPECT_EQ(gear["outcome"], "proved");
+  EXPECT_DOUBLE_EQ(gear["predicted_mm"], 0.024);
+  EXPECT_DOUBLE_EQ(gear["smallest_mm"], 0.027);
+  EXPECT_DOUBLE_EQ(gear["smallest_95_mm"][1], 0.031);
+  EXPECT_EQ(gear["sizes"].size(), 3U);
+  EXPECT_EQ(gear["sizes"][1]["named"], 6);
+  EXPECT_EQ(proof["causes"][1]["outcome"], "never_named");
+  EXPECT_TRUE(proof["causes"][1]["smallest_mm"].is_null());
+  EXPECT_EQ(proof["causes"][2]["outcome"], "open");
+  EXPECT_TRUE(proof["causes"][2]["smallest_95_mm"][1].is_null());
+}
+
 TEST(DiagnosisJson, HasTheNotesOfItsCellAsObjects) {
   const auto note = diagnosis_json(
       test::made_up_diagnosis(test::cell_7()),

@@ -41,6 +41,24 @@ TEST_F(DiagnosisPage, WhereNothingIsMissingSaysThatThisIsBeyondTheModel) {
   EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_), ">nothing beyond the model<"));
 }
 
+TEST_F(DiagnosisPage, ShowsAPlotACauseOfWhatWasProvedInPlaceOfWhatWasSimulated) {
+  EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_), "id=\"recovery\""));
+  diagnosis_.recovery.clear();
+  diagnosis_.proof = test::made_up_proof();
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_FALSE(test::has(page, "id=\"recovery\""));
+  for (const char* part :
+       {"<b>27</b> (24 to 31)", "not named up to 90; found in doubt 9 of 9", "9 or more",
+        "named for sure in 1 of 28 diagnoses", "with nothing put in, a cause was named in 1 of 12",
+        "2 diagnoses refused their batch", ">10</text>", ">40</text>"})
+    EXPECT_TRUE(test::has(page, part)) << part;
+  std::size_t plots = 0;
+  for (std::size_t at = page.find("<svg class=\"proved\""); at != std::string::npos;
+       at = page.find("<svg class=\"proved\"", at + 1))
+    ++plots;
+  EXPECT_EQ(plots, diagnosis_.proof->causes.size());
+}
+
 TEST_F(DiagnosisPage, CallsErrorSourcesByTheirPlainNames) {
   diagnosis_.sources_after.emplace_back("gear_transmission:3@48.5");
   const std::string page = diagnosis_page(diagnosis_, *cell_);
