@@ -11,7 +11,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kMostObservations = 200;  // of more the hyperparameters are known well enough
+constexpr Index kFewObservations = 200;  // of more the hyperparameters stay: they are known well
+constexpr Index kMostAsked = 1000;       // more say no more of one number
 constexpr Index kFolds = 5;
 constexpr int kStarts = 5;            // of each search: the poses that are left are much like all
 constexpr double kPriorSpread = 0.3;  // of log f: what is usual of kernels that fit
@@ -41,10 +42,23 @@ double uncertain(const BiasPrediction& bias, double instrument, double identifie
          3 * bias.prior_share * identified;
 }
 
+/// The bias of these observations; of many the hyperparameters of `all` stay.
+Result<BiasModel> learned_from(const BiasProblem& fewer, const BiasModel& all, Index of,
+                               const BiasOptions& options) {
+  if (of <= kFewObservations) return BiasModel::fit(fewer, options);
+  BiasState state = all.state();
+  state.q = fewer.q;
+  state.residual_B = fewer.residual_B;
+  state.sigma = fewer.sigma;
+  state.features = fewer.features;
+  return BiasModel::restore(std::move(state));
+}
+
 /// Adds every fifth pose from `first` on, with all rows of its joint vector; false where nothing
 /// can be said without them.
-bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_parameters,
+bool add_fold(const BiasProblem& problem, const BiasModel& all, const BiasOptions& options,
               const LeftOut& left_out, Index first, Missed& missed) {
+  const bool has_parameters = spelled_bias(all.state().kernel)->has("parameters");
   std::vector<Index> block, rest;
   const std::vector<PoseGroup> poses = pose_groups(problem.q);
   for (Index p = 0; p < std::ssize(poses); ++p) {
@@ -56,7 +70,7 @@ bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_p
   if (!without) return false;
   const BiasProblem fewer{problem.q(rest, Eigen::all), without->residual_B(rest, Eigen::all),
                           problem.sigma(rest), at(problem.features, rest)};
-  const Result<BiasModel> bias = BiasModel::fit(fewer, options);
+  const Result<BiasModel> bias = learned_from(fewer, all, problem.q.rows(), options);
   if (!bias) return false;
   const auto said = bias->predict_all(problem.q(block, Eigen::all), at(problem.features, block));
   for (std::size_t k = 0; k < block.size(); ++k) {
@@ -99,7 +113,7 @@ double likeliest_spread(const Missed& missed) {
 
 double bias_spread(const BiasProblem& problem, const BiasModel& bias, const LeftOut& left_out,
                    std::uint64_t seed, const std::function<bool(double)>& progress) {
-  if (problem.q.rows() > kMostObservations || left_out.size() != problem.q.rows()) return 1;
+  if (left_out.size() != problem.q.rows()) return 1;
   BiasOptions options;
   options.kernel = bias.state().kernel;
   options.starts = kStarts;
@@ -109,9 +123,8 @@ double bias_spread(const BiasProblem& problem, const BiasModel& bias, const Left
     options.progress = [&](double share) {
       return progress((static_cast<double>(fold) + share) / kFolds);
     };
-    if (!add_fold(problem, options, spelled_bias(bias.state().kernel)->has("parameters"), left_out,
-                  fold, missed))
-      return 1;
+    if (!add_fold(problem, bias, options, left_out, fold, missed)) return 1;
+    if (std::ssize(missed.square) >= kMostAsked) break;
   }
   return likeliest_spread(missed);
 }

@@ -9,10 +9,10 @@
 namespace trammel {
 
 /// The factor by which a bias misses poses that it was not learned from farther than its covariance
-/// says; at least 1, and 1 of more than 200 observations. Hyperparameters that were found from few
-/// poses are taken for exact by every prediction, and fit these poses better than others. Fifths of
-/// the poses are left out by turns, the physics and the hyperparameters found without them (Stone
-/// 1974).
+/// says; at least 1. Hyperparameters that were found from few poses are taken for exact by every
+/// prediction, and fit these poses better than others; and what the physics fitted of the noise is
+/// missing in what the bias is learned from. Fifths of the poses are left out by turns, the physics
+/// found without them (Stone 1974); of up to 200 observations the hyperparameters, too.
 ///
 /// Model: what is missed of a coordinate is normal with the variance f² v + sigma², v what bias and
 /// parameters leave uncertain, sigma the instrument's. f is as large as makes the sum of squares
