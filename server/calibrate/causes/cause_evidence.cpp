@@ -167,16 +167,17 @@ CauseEvidence::Gain CauseEvidence::gain_of(const ColumnGroup& group) const {
           static_cast<double>(group.count) - inverse.trace()};
 }
 
-double CauseEvidence::left_out(const ColumnGroup& group) const {
+VectorXd CauseEvidence::left_out(const ColumnGroup& group) const {
   std::vector<Index> free = free_;
   for (Index k = 0; k < group.count; ++k) free.push_back(group.first + k);
   return left_out_with(free);
 }
 
-double CauseEvidence::left_out_with(const std::vector<Index>& free) const {
+VectorXd CauseEvidence::left_out_with(const std::vector<Index>& free) const {
   const auto P = static_cast<Index>(free.size());
-  double square = 0, count = 0;
-  for (const LinearArm& block : blocks_) {
+  VectorXd square = VectorXd::Zero(std::ssize(blocks_));
+  for (Index b = 0; b < square.size(); ++b) {
+    const LinearArm& block = blocks_[static_cast<std::size_t>(b)];
     MatrixXd curvature = MatrixXd::Identity(P, P);
     VectorXd downhill = VectorXd::Zero(P);
     for (std::size_t k = 0; k < block.kinds.size(); ++k) {
@@ -189,15 +190,15 @@ double CauseEvidence::left_out_with(const std::vector<Index>& free) const {
       downhill -= at * block.kinds[k].downhill(free);
     }
     const Eigen::LLT<MatrixXd> factor(curvature);
-    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+    if (factor.info() != Eigen::Success)
+      return VectorXd::Constant(square.size(), std::numeric_limits<double>::infinity());
     if (block.kinds.front().count == 0) continue;
     VectorXd d = VectorXd::Zero(all_.scaled.scale.size());
     const VectorXd of_free = factor.solve(downhill);
     d(free) = of_free;
-    square += residual_square(block.kinds.front(), d);
-    count += block.kinds.front().count;
+    square(b) = residual_square(block.kinds.front(), d);
   }
-  return square / std::max(count, 1.0);
+  return square / std::max(all_.kinds.front().count, 1.0);
 }
 
 }  // namespace trammel

@@ -34,15 +34,15 @@ class CauseEvidence {
   [[nodiscard]] Gain gain_of(const ColumnGroup& group) const;
   /// Frees the group.
   void take(const ColumnGroup& group);
-  /// Mean square of the residuals of positions, an axis, in units of their sigmas: each block
-  /// predicted by the others with the free groups.
-  [[nodiscard]] double left_out() const { return left_out_with(free_); }
+  /// Squares of the residuals of positions, in units of their sigmas: each block predicted by the
+  /// others with the free groups. A number a block; their sum is the mean square of an axis.
+  [[nodiscard]] Eigen::VectorXd left_out() const { return left_out_with(free_); }
   /// left_out() with `group` free, too.
-  [[nodiscard]] double left_out(const ColumnGroup& group) const;
+  [[nodiscard]] Eigen::VectorXd left_out(const ColumnGroup& group) const;
 
  private:
   void add_free(const ColumnGroup& group);
-  [[nodiscard]] double left_out_with(const std::vector<Eigen::Index>& free) const;
+  [[nodiscard]] Eigen::VectorXd left_out_with(const std::vector<Eigen::Index>& free) const;
   /// Learns the noise beside the groups that are free, and integrates these out.
   void free_anew();
   void learn_precision();

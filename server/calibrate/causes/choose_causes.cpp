@@ -21,8 +21,12 @@ using causes::SearchFamily;
 
 constexpr int kHarmonics = 60;  // of a map: waves of 6 degrees; finer ones cost and bring little
 constexpr double kWorth = 3;    // nat: so much likelier must the batch be with one cause
+constexpr double kSure = 20;    // nat: then blocks left out refuse it by harm beyond chance only
+constexpr double kStandardErrors = 2;  // chance alone exceeds them in 1 of 40 cases
 
 constexpr const char* kTaken = "the poses show it, and it predicts poses that were left out";
+constexpr const char* kHarmless =
+    "the poses show it clearly, and it harms none that were left out beyond chance";
 constexpr const char* kPredictsNothing = "it does not predict poses that were left out";
 constexpr const char* kNotShown = "the poses do not show it";
 
@@ -77,19 +81,31 @@ ColumnGroup columns_of_source(const PhysicalModel& model, const std::string& nam
   return {};
 }
 
-/// m: of one axis, where residuals are 1 in units of their sigmas.
+/// m: of one axis, of a row alone.
 double mean_sigma(const CalibrationResult& found, const MeasurementBatch& batch) {
   const Weights weights = weights_of(found, batch);
   double square = 0;
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
-    const Measurement& m = batch.measurements[i];
-    square += std::pow(position_sigma(m, *found.model.cell), 2) + std::pow(weights.beside(m, i), 2);
+  for (const Measurement& m : batch.measurements) {
+    square +=
+        std::pow(position_sigma(m, *found.model.cell), 2) + std::pow(weights.beside_alone(m), 2);
   }
   return std::sqrt(square / static_cast<double>(batch.measurements.size()));
 }
 
-/// m: Euclidean rms of three axes whose mean square is that, in units of sigma.
-double in_space(double sigma, double mean_square) { return sigma * std::sqrt(3 * mean_square); }
+/// How far blocks are missed that are left out, m²: a number a block, which sum up to the mean
+/// square of Euclidean errors.
+using Missed = Eigen::VectorXd;
+
+double rms(const Missed& missed) { return std::sqrt(missed.sum()); }
+
+/// Less is missed, or not more than by chance as the blocks differ, where the cause is `sure`.
+bool predicts(const Missed& before, const Missed& after, bool sure) {
+  const Eigen::ArrayXd gain = before - after;
+  if (gain.sum() > 0 || !sure) return gain.sum() > 0;
+  const auto n = static_cast<double>(gain.size());
+  const double scatter = (gain - gain.mean()).square().sum() / std::max(n - 1, 1.0);
+  return gain.sum() >= -kStandardErrors * std::sqrt(n * scatter);
+}
 
 /// A cause that is tried: its columns in the linear arm.
 struct Candidate {
@@ -106,10 +122,11 @@ class CauseSearch {
   Result<ChosenCauses> run(const std::vector<std::string>& kept) {
     chosen_.sources = always_identified(*cell_, kept);
     base_ = TRY(calibrate_with_maps(cell_, chosen_.sources, batch_, {}));
-    chosen_.choice.held_out = missed(base_);
+    held_out_ = missed(base_);
     try_load();
     add_candidates();
     if (!candidates_.empty()) try_others();
+    chosen_.choice.held_out = rms(held_out_);
     return std::move(chosen_);
   }
 
@@ -132,20 +149,22 @@ class CauseSearch {
     specs.insert(specs.end(), load.begin(), load.end());
     Result<CalibrationResult> loaded = calibrate_with_maps(cell_, specs, batch_, {});
     if (!loaded) return;
-    const double after = missed(*loaded);
     const double gain = loaded->log_evidence - base_.log_evidence;
     const double freedom = loaded->rank - base_.rank;
-    if (!judged({load, chosen_.choice.held_out, after, gain, freedom, false, {}})) return;
+    if (!judged({load, 0, 0, gain, freedom, false, {}}, missed(*loaded))) return;
     chosen_.sources = std::move(specs);
     base_ = std::move(*loaded);
   }
 
-  /// Adds the cause to the table; returns true if it is taken.
-  bool judged(TriedCause tried) {
+  /// Adds the cause, with which `after` is missed, to the table; returns true if it is taken.
+  bool judged(TriedCause tried, const Missed& after) {
     const bool shown = tried.gain > worth_;
-    tried.taken = shown && tried.held_out_after < tried.held_out_before;
-    tried.why = tried.taken ? kTaken : shown ? kPredictsNothing : kNotShown;
-    if (tried.taken) chosen_.choice.held_out = tried.held_out_after;
+    tried.held_out_before = rms(held_out_);
+    tried.held_out_after = rms(after);
+    tried.taken = shown && predicts(held_out_, after, tried.gain > kSure);
+    const bool gains = tried.held_out_after < tried.held_out_before;
+    tried.why = !shown ? kNotShown : !tried.taken ? kPredictsNothing : gains ? kTaken : kHarmless;
+    if (tried.taken) held_out_ = after;
     chosen_.choice.tried.push_back(std::move(tried));
     return chosen_.choice.tried.back().taken;
   }
@@ -199,21 +218,19 @@ class CauseSearch {
     for (const ErrorSourcePtr& source : base_.model.sources)
       present.push_back(columns_of_source(model_, source->name()));
     CauseEvidence evidence = evidence_of(base_, model_, present);
-    const double sigma = mean_sigma(base_, batch_);
-    double before = in_space(sigma, evidence.left_out());
-    chosen_.choice.held_out = before;
+    const double in_space = 3 * std::pow(mean_sigma(base_, batch_), 2);
+    held_out_ = in_space * evidence.left_out();
     while (!candidates_.empty()) {
       std::vector<CauseEvidence::Gain> gains;
       for (const Candidate& one : candidates_) gains.push_back(evidence.gain_of(one.columns));
       const auto largest = std::max_element(gains.begin(), gains.end(),
                                             [](auto& a, auto& b) { return a.nat < b.nat; });
       const auto one = candidates_.begin() + (largest - gains.begin());
-      const double after =
-          largest->nat > worth_ ? in_space(sigma, evidence.left_out(one->columns)) : before;
-      if (judged({{one->named}, before, after, largest->nat, largest->freedom, false, {}})) {
+      const Missed after =
+          largest->nat > worth_ ? in_space * evidence.left_out(one->columns) : held_out_;
+      if (judged({{one->named}, 0, 0, largest->nat, largest->freedom, false, {}}, after)) {
         evidence.take(one->columns);
         chosen_.sources.push_back(one->source);
-        before = after;
       }
       candidates_.erase(one);
     }
@@ -229,10 +246,11 @@ class CauseSearch {
             present};
   }
 
-  /// m: the error at blocks left out, with the sources of `found`.
-  [[nodiscard]] double missed(const CalibrationResult& found) const {
+  /// With the sources of `found`.
+  [[nodiscard]] Missed missed(const CalibrationResult& found) const {
     const ColumnGroup all{0, found.model.values.size()};
-    return in_space(mean_sigma(found, batch_), evidence_of(found, found.model, {all}).left_out());
+    return 3 * std::pow(mean_sigma(found, batch_), 2) *
+           evidence_of(found, found.model, {all}).left_out();
   }
 
   std::shared_ptr<const Cell> cell_;
@@ -242,6 +260,7 @@ class CauseSearch {
   PhysicalModel model_;  // with all candidates
   std::vector<Candidate> candidates_;
   double worth_ = kWorth;  // nat: so much likelier must the batch be with a cause
+  Missed held_out_;        // with what was taken
   ChosenCauses chosen_;
 };
 

@@ -156,8 +156,12 @@ double rotation_sigma(const Measurement& m, const Cell& cell) {
   return m.sigma_rotation.value_or(cell.tracker.sigma_rotation);
 }
 
+double Weights::beside_alone(const Measurement& m) const {
+  return std::sqrt(gauged_poses(m)) * discrepancy;
+}
+
 double Weights::beside(const Measurement& m, std::size_t row) const {
-  const double alone = std::sqrt(gauged_poses(m)) * discrepancy;
+  const double alone = beside_alone(m);
   const int count = row < together.size() ? together[row] : 1;
   return count > 1 ? std::max(alone, std::sqrt(count) * of_pose) : alone;
 }

@@ -22,6 +22,9 @@ struct Weights {
   /// sigma. A gauge that is read against another pose has twice the variance. Positions at one
   /// joint vector weigh as one pose, as far as they share the error.
   [[nodiscard]] double beside(const Measurement& m, std::size_t row) const;
+  /// m per axis: what `m` alone is off by beside its own sigma; less than beside() where it shares
+  /// its error with others.
+  [[nodiscard]] double beside_alone(const Measurement& m) const;
 };
 /// Those under which `found` was found, for the rows of `batch`.
 [[nodiscard]] Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch);

@@ -21,8 +21,10 @@ class Rows {
     into_.information = Eigen::MatrixXd::Zero(parameters, parameters);
     into_.downhill = Eigen::VectorXd::Zero(parameters);
   }
-  /// `J`: one column an equation.
-  void add(const Eigen::Ref<const Eigen::VectorXd>& r, const Eigen::Ref<const Eigen::MatrixXd>& J) {
+  /// `J`: one column an equation. `square`: what is expected of the square of each.
+  void add(const Eigen::Ref<const Eigen::VectorXd>& r, const Eigen::Ref<const Eigen::MatrixXd>& J,
+           double square) {
+    into_.count += square * static_cast<double>(r.size());
     if (filled_ + r.size() > kRowsAtATime) add_filled();
     r_.segment(filled_, r.size()) = r;
     J_.middleRows(filled_, r.size()) = J.transpose();
@@ -34,7 +36,6 @@ class Rows {
     into_.information += gram(J_);
     into_.downhill.noalias() -= J_.transpose() * r_;
     into_.square += r_.squaredNorm();
-    into_.count += static_cast<double>(filled_);
     filled_ = 0;
   }
 
@@ -44,6 +45,16 @@ class Rows {
   Eigen::VectorXd r_;
   Index filled_ = 0;
 };
+
+/// The square of a coordinate of this position that its weight lets expect: less than 1 where rows
+/// at one joint vector share an error, and weigh together as one pose.
+double expected_square(const CalibrationProblem& problem, const Weights& weights, std::size_t row) {
+  const Measurement& m = problem.batch.measurements[row];
+  const double sigma = position_sigma(m, *problem.model.cell);
+  return std::pow(std::hypot(sigma, weights.beside_alone(m)) /
+                      std::hypot(sigma, weights.beside(m, row)),
+                  2);
+}
 
 }  // namespace
 
@@ -62,8 +73,9 @@ LinearArm linear_arm(const CalibrationProblem& problem, const Weights& weights) 
     const Index of_place = std::min<Index>(size, 3);
     const double norm = r.head(size).norm();
     const double root_weight = norm > pose.huber_limit() ? std::sqrt(pose.huber_limit() / norm) : 1;
-    places.add(root_weight * r.head(of_place), root_weight * J.leftCols(of_place));
-    if (size > 3) turns.add(root_weight * r.tail(3), root_weight * J.rightCols(3));
+    places.add(root_weight * r.head(of_place), root_weight * J.leftCols(of_place),
+               expected_square(problem, weights, row));
+    if (size > 3) turns.add(root_weight * r.tail(3), root_weight * J.rightCols(3), 1);
   }
   places.add_filled();
   turns.add_filled();

@@ -14,7 +14,7 @@ struct LinearEquations {
   Eigen::MatrixXd information;  ///< P x P, JᵀJ
   Eigen::VectorXd downhill;     ///< P, -Jᵀr
   double square = 0;            ///< rᵀr
-  double count = 0;
+  double count = 0;  ///< of equations; rows at one joint vector that share an error count together
 };
 
 /// The information of a batch about small changes of all parameters, in units of `scaled.scale`.
