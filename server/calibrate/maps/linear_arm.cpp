@@ -51,9 +51,8 @@ class Rows {
 double expected_square(const CalibrationProblem& problem, const Weights& weights, std::size_t row) {
   const Measurement& m = problem.batch.measurements[row];
   const double sigma = position_sigma(m, *problem.model.cell);
-  return std::pow(std::hypot(sigma, weights.beside_alone(m)) /
-                      std::hypot(sigma, weights.beside(m, row)),
-                  2);
+  return std::pow(
+      std::hypot(sigma, weights.beside_alone(m)) / std::hypot(sigma, weights.beside(m, row)), 2);
 }
 
 }  // namespace
