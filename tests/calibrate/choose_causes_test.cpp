@@ -78,6 +78,14 @@ TEST(ChooseCauses, WhatIsChosenPredictsFreshPosesAsWellAsTheTruthsOwnCauses) {
   EXPECT_LE(by_itself, 0.5 * usual);
 }
 
+TEST(ChooseCauses, SayInWhichFormGearboxesGiveWay) {
+  const test::HeavyArm arm = arm_with_wave(0);
+  const ChosenCauses chosen =
+      test::demand(choose_causes(arm.cell, {}, test::measured(arm, 100, 1)));
+  EXPECT_TRUE(has(chosen.sources, "compliance_"));
+  EXPECT_EQ(std::count(chosen.sources.begin(), chosen.sources.end(), "compliance"), 0);
+}
+
 TEST(ChooseCauses, WhatIsNamedStaysAndIsNotTriedAgain) {
   const test::HeavyArm arm = arm_with_wave(0);
   const MeasurementBatch batch = test::measured(arm, 60, 1);

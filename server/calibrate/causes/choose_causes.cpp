@@ -153,6 +153,12 @@ class CauseSearch {
     const double freedom = loaded->rank - base_.rank;
     if (!judged({load, 0, 0, gain, freedom, false, {}}, missed(*loaded))) return;
     chosen_.sources = std::move(specs);
+    // In the form that was likeliest: not to be asked again beside hundreds of parameters.
+    for (const ErrorSourcePtr& source : loaded->model.sources) {
+      if (&source->cause() != yielding) continue;
+      std::replace(chosen_.sources.begin(), chosen_.sources.end(), std::string(yielding->spelling),
+                   source->name());
+    }
     base_ = std::move(*loaded);
   }
 
