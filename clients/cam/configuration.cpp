@@ -22,9 +22,6 @@ constexpr double kStretched = 1e-9;   // rad: a wrist that is open less is stret
 constexpr double kSameJoints = 1e-6;  // rad
 constexpr double kAsNear =
     1e-2;  // of the way: how a controller weighs its joints is not known to more
-// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that is
-// off by less is of the branch that was meant. Controllers do not ask for more.
-constexpr double kNextQuarter = kPi / 4;
 
 /// The way in which a controller weighs the joints is not published. Ways that differ by less than
 /// kAsNear are decided where their sums and their longest joints say the same.
@@ -130,6 +127,29 @@ void choose_turns(const Chain& arm, const Configuration& said,
 }
 
 }  // namespace
+
+bool keeps_configuration(const Configuration& said, const std::vector<double>& before,
+                         const std::vector<double>& now, double beyond_quarter) {
+  // A program may say what it does not hold: then an axis stays where it was.
+  const auto holds = [&](std::size_t axis, const auto& part_of, int wanted) {
+    const int part = part_of(now[axis]);
+    return part == wanted || (axis < before.size() && part == part_of(before[axis]));
+  };
+  const auto quarter = [](double deg) { return static_cast<int>(std::floor(deg / 90)); };
+  const auto turn = [](double deg) { return static_cast<int>(std::floor((deg + 180) / 360)); };
+  const auto sign = [](double deg) { return deg < 0 ? -1 : 1; };
+  for (std::size_t axis = 0; axis < now.size(); ++axis) {
+    if (axis < said.near.size() && said.near[axis] &&
+        std::abs(from_deg(now[axis]) - *said.near[axis]) > kPi / 4 + beyond_quarter &&
+        !holds(axis, quarter, quarter(to_deg(*said.near[axis]))))
+      return false;
+    if (axis < said.turns.size() && said.turns[axis] && !holds(axis, turn, *said.turns[axis]))
+      return false;
+    if (axis < said.signs.size() && said.signs[axis] && !holds(axis, sign, *said.signs[axis]))
+      return false;
+  }
+  return true;
+}
 
 ArmOfProgram::ArmOfProgram(const Chain& robot) : robot_(robot) {
   for (int j = 0; j < robot_.size(); ++j)

@@ -5,10 +5,15 @@
 #include <string>
 
 #include "clients/cam/program.h"
+#include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
 
 /// The joints that a controller takes for a target, by what the program says of the configuration.
 namespace trammel::cam {
+
+/// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that
+/// is off by less is of the branch that was meant. Controllers do not ask for more.
+constexpr double kNextQuarter = kPi / 4;
 
 struct NominalJoints {
   std::optional<JointVector> q;  ///< rad; empty: none found
@@ -74,5 +79,11 @@ class ArmOfProgram {
   bool offset_wrist_;       ///< or one as offset_wrist.h describes it
   bool bends_down_ = true;  ///< positive joint 5 bends the tool downward
 };
+
+/// True if axes (deg) are as the program says them, or where it contradicts itself as the ones
+/// before were (none: these are not known). `beyond_quarter`: rad, how far a joint may leave the
+/// quarter turn that is said.
+[[nodiscard]] bool keeps_configuration(const Configuration& said, const std::vector<double>& before,
+                                       const std::vector<double>& now, double beyond_quarter = 0);
 
 }  // namespace trammel::cam

@@ -10,6 +10,8 @@
 
 #include "clients/cam/configuration.h"
 #include "clients/cam/edits.h"
+#include "clients/cam/flow.h"
+#include "clients/cam/free_turns.h"
 #include "clients/cam/nominal_targets.h"
 #include "clients/cam/path_check.h"
 #include "server/base/plain_text.h"
@@ -26,6 +28,7 @@ constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
 constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
 constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
 constexpr double kReach = 3;                 // m, the lever of a joint
+constexpr double kAlongTheAxis = 0.02;       // of a way, off the tool's axis
 
 /// The axes in the target's own units; `axes`: degrees.
 std::vector<double> axes_of(const ProgramTarget& target, std::vector<double> axes) {
@@ -52,14 +55,26 @@ Status check_marks(const Program& program) {
 class Correcting {
  public:
   Correcting(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
-             const CorrectProgramOptions& options, NominalTargets nominal)
+             const CorrectProgramOptions& options, NominalTargets nominal, const Program& original,
+             const std::vector<double>& turned_deg)
       : program_(program),
+        original_(original),
+        turned_deg_(turned_deg),
         arm_(arm),
         cell_(cell),
         options_(options),
         nominal_(std::move(nominal)),
-        rows_(program.targets.size()) {
+        rows_(program.targets.size()),
+        moves_to_(program.targets.size()) {
     result_.notes = nominal_.notes;
+    for (const ProgramMove& move : program_.moves) {
+      for (const std::size_t t : move.targets) {
+        if (options_.lead_in) moves_to_[t].push_back(&move);
+      }
+    }
+    if (options_.lead_in && options_.lead_in->take_ups.empty())
+      result_.notes.emplace_back(
+          "the model knows of no play and no hysteresis: no approach point is needed");
   }
 
   Result<CorrectedProgram> correct(const AskCorrections& ask) {
@@ -81,7 +96,8 @@ class Correcting {
     row.tool = program_.tools[target.tool].name;
     row.frame = program_.frames[target.frame].name;
     row.coordinates = target.coordinates;
-    row.before = target.numbers;
+    row.before = original_.targets[t].numbers;
+    if (!turned_deg_.empty()) row.turned_deg = turned_deg_[t];
     row.folded = target.folded;
     row.status = "refused";
     row.message = nominal_.targets[t].why_not;
@@ -94,18 +110,133 @@ class Correcting {
       std::vector<exchange::AskedTarget> targets;
       for (const std::size_t t : group.targets)
         targets.push_back(std::move(nominal_.targets[t].asked));
-      const exchange::Answer<exchange::CorrectedTarget> answer =
+      exchange::Answer<exchange::CorrectedTarget> answer =
           TRY(ask(group.tool, group.payload, targets));
+      TRY(note_model(answer.model));
+      if (options_.lead_in) TRY(find_lead_ins(group, targets, ask, answer.items));
       targets = {};
-      if (!result_.model_id.empty() && result_.model.hash != answer.model.hash)
-        return failure(ErrorCode::kBusy, "the model changed while the program was corrected")
-            .next("try again");
-      result_.model = answer.model;
-      result_.model_id = answer.model.id;
       for (std::size_t k = 0; k < group.targets.size(); ++k)
         take(group.targets[k], answer.items[k]);
     }
     return {};
+  }
+
+  Status note_model(const exchange::ModelInfo& model) {
+    if (!result_.model_id.empty() && result_.model.hash != model.hash)
+      return failure(ErrorCode::kBusy, "the model changed while the program was corrected")
+          .next("try again");
+    result_.model = model;
+    result_.model_id = model.id;
+    return {};
+  }
+
+  Status find_lead_ins(const TargetGroup& group, const std::vector<exchange::AskedTarget>& targets,
+                       const AskCorrections& ask, std::vector<exchange::CorrectedTarget>& items) {
+    const AskTargets ask_again = [&](const std::vector<exchange::AskedTarget>& led)
+        -> Result<std::vector<exchange::CorrectedTarget>> {
+      auto answer = TRY(ask(group.tool, group.payload, led));
+      TRY(note_model(answer.model));
+      return std::move(answer.items);
+    };
+    const FindWay find_way = [&](std::size_t k, const exchange::CorrectedTarget& item) {
+      return way_to(group.targets[k], item);
+    };
+    std::vector<LeadInFound> found =
+        TRY(lead_in_where_needed(*options_.lead_in, targets, ask_again, find_way, items));
+    for (std::size_t k = 0; k < found.size(); ++k)
+      lead_ins_.emplace(group.targets[k], std::move(found[k]));
+    return {};
+  }
+
+  /// The lead-in to a target, or why there is none.
+  [[nodiscard]] LeadInFound way_to(std::size_t t, const exchange::CorrectedTarget& item) const {
+    if (arm_.has_rail()) return {{}, "the arm stands on a rail"};
+    double back_off = kBackOff;
+    for (const ProgramMove* move : moves_to_[t]) {
+      if (move->another.empty() || move->targets.size() != 1)
+        return {{},
+                fmt::format("the motion to it (line {}) does not stop there, or is none that could "
+                            "be written once more",
+                            move->line)};
+      back_off = std::max(back_off, own_way_along_the_axis(*move, t));
+    }
+    const Chain& robot = arm_.robot();
+    const JointVector q = exchange::si_from_degrees(item.joints_deg, robot);
+    const Pose X_FT = cell_.tools.at(nominal_.tools[program_.targets[t].tool].tool);
+    auto way = lead_in(robot, q, X_FT, options_.lead_in->take_ups, back_off);
+    if (!way) return {{}, "a limit or a singular place is in the way"};
+    for (const JointVector& offset : way->offsets) {
+      if (!keeps_configuration(program_.targets[t].configuration, arm_.to_axes(q),
+                               arm_.to_axes(q + offset), kNextQuarter))
+        return {{}, "a joint would leave the configuration that the program says"};
+    }
+    return {std::move(way), ""};
+  }
+
+  /// m: how far the motion itself comes along the tool's axis; 0 where it comes otherwise.
+  [[nodiscard]] double own_way_along_the_axis(const ProgramMove& move, std::size_t t) const {
+    const auto X_BT = wanted_pose(program_, arm_.robot(), cell_, nominal_, t);
+    double longest = 0;
+    for (const std::size_t m : move.before) {
+      if (!X_BT || !program_.targets[t].linear || m == kNoMotion ||
+          program_.moves[m].targets.size() != 1)
+        continue;
+      const auto X_BP =
+          wanted_pose(program_, arm_.robot(), cell_, nominal_, program_.moves[m].targets[0]);
+      if (!X_BP) continue;
+      const Vector3 p_TP = X_BT->inverse() * X_BP->translation();
+      if (p_TP.z() < 0 && p_TP.head<2>().norm() < kAlongTheAxis * p_TP.norm())
+        longest = std::max(longest, p_TP.norm());
+    }
+    return longest;
+  }
+
+  /// The points of a lead-in, before each motion to the target.
+  void write_lead_in(std::size_t t, const JointVector& q, const Pose& X_FT, ReceiptRow& row) {
+    const auto found = lead_ins_.find(t);
+    if (found == lead_ins_.end()) return;
+    tell_no_lead_in(found->second, row.message);
+    if (!found->second.way) return;
+    row.lead_in = static_cast<int>(found->second.way->offsets.size());
+    for (const ProgramMove* move : moves_to_[t]) {
+      for (const JointVector& offset : found->second.way->offsets)
+        write_another(*move, numbers_at(program_.targets[t], q + offset, X_FT));
+    }
+  }
+
+  void write_another(const ProgramMove& move, const std::vector<double>& numbers) {
+    ++result_.lead_ins;
+    std::string number;
+    if (move.file < program_.points.size()) {
+      const PointList& list = program_.points[move.file];
+      number = fmt::format("{:0{}}", list.next + new_points_[move.file]++, list.width);
+    }
+    for (const NewLine& line : move.another) {
+      std::string text = line.texts[0];
+      for (std::size_t k = 0; k < line.slots.size(); ++k)
+        text += number_text(numbers[line.slots[k].value], line.slots[k].style) + line.texts[k + 1];
+      if (const std::size_t at = text.find(kNewPoint); at != std::string::npos)
+        text.replace(at, 1, number);
+      edits_[move.file].insert_line(line.at, std::move(text));
+    }
+  }
+
+  /// How many points a file has now.
+  void write_counts() {
+    for (const auto& [file, more] : new_points_) {
+      const PointList& list = program_.points[file];
+      if (list.count.end > 0)
+        edits_[file].replace(list.count, fmt::format("{}", list.counted + more));
+    }
+  }
+
+  /// Joints in the coordinates of a target.
+  [[nodiscard]] std::vector<double> numbers_at(const ProgramTarget& target, const JointVector& q,
+                                               const Pose& X_FT) const {
+    if (is_joints(target.coordinates)) return axes_of(target, arm_.to_axes(q));
+    const Pose X_BT = arm_.robot().flange_pose(q) * X_FT;
+    return numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT,
+                      target.numbers);
   }
 
   void take(std::size_t t, const exchange::CorrectedTarget& item) {
@@ -124,7 +255,7 @@ class Correcting {
     row.sigma_mm = item.sigma_mm;
     row.sigma_measured_mm = item.sigma_measured_mm;
     row.iterations = item.iterations;
-    if (item.status != "ok" && item.status != "out_of_domain") return;
+    if (!is_answered(item)) return;
     const Pose X_BT = exchange::to_si(item.commanded);
     const Pose X_TF = cell_.tools.at(nominal_.tools[target.tool].tool).inverse();
     JointVector q = exchange::si_from_degrees(item.joints_deg, arm_.robot());
@@ -150,6 +281,7 @@ class Correcting {
     write(target, exact, row);
     row.rounding_mm = rounding(target, exact, row.after, q, X_TF);
     row.error_after_mm = std::hypot(row.error_after_mm, row.rounding_mm);
+    write_lead_in(t, q, X_TF.inverse(), row);
   }
 
   /// In the unit of the number.
@@ -243,6 +375,7 @@ class Correcting {
     // A row is large, and those of a long program mostly stand as they shall.
     if (!std::is_sorted(result_.rows.begin(), result_.rows.end(), by_place))
       std::stable_sort(result_.rows.begin(), result_.rows.end(), by_place);
+    write_counts();
     for (std::size_t f = 0; f < program_.files.size(); ++f) write_file(f);
     return std::move(result_);
   }
@@ -341,12 +474,17 @@ class Correcting {
   }
 
   const Program& program_;
+  const Program& original_;  ///< as it was read: its poses are not turned
+  const std::vector<double>& turned_deg_;
   const ArmOfProgram& arm_;
   const CellTools& cell_;
   const CorrectProgramOptions& options_;
   NominalTargets nominal_;
   std::vector<ReceiptRow> rows_;
   std::vector<Edits> edits_;
+  std::vector<std::vector<const ProgramMove*>> moves_to_;  ///< by target
+  std::map<std::size_t, LeadInFound> lead_ins_;            ///< by target
+  std::map<std::size_t, std::size_t> new_points_;          ///< by file
   CorrectedProgram result_;
 };
 
@@ -362,8 +500,15 @@ Result<CorrectedProgram> correct_program(const Program& program, const Chain& ro
                                          const CorrectProgramOptions& options) {
   TRY(check_marks(program));
   const ArmOfProgram arm(robot);
-  NominalTargets nominal = TRY(nominal_targets(program, arm, cell, options.tool, options.payload));
-  return Correcting(program, arm, cell, options, std::move(nominal)).correct(ask);
+  FreeTurns turned;
+  if (options.free_rz) {
+    FreeTurns found = TRY(turn_freely(program, arm, cell, ask, options));
+    turned = std::move(found);
+  }
+  const Program& wanted = options.free_rz ? turned.program : program;
+  NominalTargets nominal = TRY(nominal_targets(wanted, arm, cell, options.tool, options.payload));
+  return Correcting(wanted, arm, cell, options, std::move(nominal), program, turned.deg)
+      .correct(ask);
 }
 
 }  // namespace trammel::cam

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/cam/cell_tools.h"
+#include "clients/cam/lead_ins.h"
 #include "clients/cam/mark.h"
 #include "clients/cam/program.h"
 #include "clients/cam/receipt.h"
@@ -25,6 +27,8 @@ struct CorrectProgramOptions {
   bool keep_digits = false;   ///< numbers keep their decimals, whatever rounding costs
   std::string version;        ///< of this program, for the mark
   std::string date;           ///< for the mark
+  std::optional<LeadInOptions> lead_in = {};  ///< empty: no point is inserted
+  bool free_rz = false;  ///< the tool may turn about its axis: see free_turns.h
 };
 
 /// Refuses what choose_tools() refuses, a file that is marked as corrected, and what `ask` refuses.

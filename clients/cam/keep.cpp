@@ -51,6 +51,12 @@ NewText& NewText::numbers(std::size_t first, std::size_t count, int decimals,
   return *this;
 }
 
+std::string from_line_begin(const std::string& text, std::size_t statement, std::size_t at) {
+  const std::size_t begin = line_begin(text, statement);
+  const bool alone = text.find_first_not_of(" \t", begin) == statement;
+  return alone && at >= begin ? text.substr(begin, at - begin) : "";
+}
+
 void keep_original(const std::string& text, std::size_t at, const std::string& begin,
                    std::string original, ProgramTarget& target) {
   for (char& c : original) {

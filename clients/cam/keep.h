@@ -44,6 +44,10 @@ class NewText {
   }
   /// So many, from `first` on, with a text between.
   NewText& numbers(std::size_t first, std::size_t count, int decimals, const std::string& between);
+  /// A line above the one of `at`.
+  [[nodiscard]] NewLine line(std::size_t at) && {
+    return {at, std::move(whole_.texts), std::move(whole_.slots)};
+  }
   /// The target is no longer computed by the program.
   void fold(ProgramTarget& target) && {
     target.folded = true;
@@ -53,6 +57,11 @@ class NewText {
  private:
   Rewrite whole_;
 };
+
+/// The bytes from the begin of a statement's line up to `at`; empty where something else than
+/// blanks stands before the statement.
+[[nodiscard]] std::string from_line_begin(const std::string& text, std::size_t statement,
+                                          std::size_t at);
 
 /// Above the line of `at` a comment keeps what stood there. `begin`: of the dialect's comments.
 void keep_original(const std::string& text, std::size_t at, const std::string& begin,

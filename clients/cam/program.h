@@ -50,6 +50,23 @@ struct Rewrite {
   std::vector<Slot> slots;
 };
 
+/// A line that is written above one of the text: texts[0] slots[0] texts[1] ... texts[n].
+struct NewLine {
+  std::size_t at = 0;  ///< a byte of the line that it goes above
+  std::vector<std::string> texts;
+  std::vector<Slot> slots;
+};
+/// In texts of a NewLine: the number of a point that the file does not have yet.
+constexpr char kNewPoint = '\x01';
+
+/// The numbered points of a file.
+struct PointList {
+  std::size_t next = 0;     ///< a number that none has, nor any higher one
+  int width = 1;            ///< digits of a number, at least
+  Span count = {};          ///< the bytes that say how many there are; empty: none do
+  std::size_t counted = 0;  ///< what they say
+};
+
 /// The arm's configuration at a target, as a program states it. Candidates are the closed-form
 /// solutions of a spherical wrist; a dialect scores them.
 struct Configuration {
@@ -199,6 +216,9 @@ struct ProgramMove {
       {};  ///< deg, where it commands axes, also where these are left; empty: it does not
   std::set<std::size_t> before =
       {};  ///< motions that may be the last before it, as motions_before() has them
+  /// Lines that make one more motion of its kind before it, to a place in the coordinates of its
+  /// target; empty: it does not stop at its target, or cannot be repeated.
+  std::vector<NewLine> another = {};
 };
 
 /// A statement reads the stored numbers of a target: what it makes of them moves where the target
@@ -249,6 +269,7 @@ struct Program : StatedRobot {
   std::string dialect;
   std::vector<SourceFile> files;
   std::vector<MarkPlace> mark_places;  ///< one a file
+  std::vector<PointList> points;       ///< likewise, where its points are numbered; else empty
   std::vector<ProgramTool> tools;
   std::vector<ProgramFrame> frames;
   std::vector<ProgramTarget> targets;

@@ -29,6 +29,8 @@ struct ReceiptRow {
   double sigma_measured_mm = kNotKnown;  ///< of one measurement
   double rounding_mm = kNotKnown;        ///< distance of what is written from what was computed
   int iterations = 0;
+  int lead_in = 0;        ///< motions that were inserted before each motion to it
+  double turned_deg = 0;  ///< about the tool's axis, where that is free
   bool folded = false;
   bool moves_along =
       false;  ///< it is left as it was, and moves all the same: with a target that is corrected
@@ -57,6 +59,7 @@ struct CorrectedProgram {
   std::vector<InsertedLine> inserted;
   std::vector<std::string> notes;
   std::size_t moves = 0, moves_corrected = 0;
+  std::size_t lead_ins = 0;  ///< motions that were inserted, of all rows
   /// Largest change of the correction from a target to the next on a straight path, mm, and the
   /// latter's place.
   double largest_step_mm = 0;

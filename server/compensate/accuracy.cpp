@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/arm_steps.h"
 #include "server/compensate/known_rows.h"
 #include "server/numerics/seeded_random.h"
 
@@ -184,6 +185,8 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
   const std::vector<ErrorPrediction> poses = model.predict_all(contexts);
   PositionAccuracy accuracy;
   accuracy.draw(poses, model.cell().tracker.sigma);
+  for (const PoseContext& context : contexts)
+    accuracy.smallest_step_ = std::max(accuracy.smallest_step_, smallest_step(model, context));
   accuracy.hidden_ = std::sqrt(1 - std::pow(1 - kNoiseDoubt, 2)) * model.cell().tracker.sigma;
   const std::optional<Evaluation>& held_out = model.parts().validation;
   std::vector<JudgingCoordinate> coordinates;
@@ -206,6 +209,7 @@ std::optional<PositionAccuracy> PositionAccuracy::of(const CompensatedModel& mod
 }
 
 double PositionAccuracy::within(double radius) const {
+  if (radius < smallest_step_) return 0;
   double share = 0;
   for (const Factor& one : factors_)
     share += one.weight * share_below(errors_, radius / one.factor);
@@ -213,7 +217,7 @@ double PositionAccuracy::within(double radius) const {
 }
 
 double PositionAccuracy::at(double share) const {
-  double low = 0, high = errors_.back() * factors_.back().factor;
+  double low = 0, high = std::max(errors_.back() * factors_.back().factor, smallest_step_);
   for (int step = 0; step < 60; ++step) {
     const double middle = 0.5 * (low + high);
     (within(middle) < share ? low : high) = middle;
@@ -231,10 +235,14 @@ double PositionAccuracy::factor_at(double share) const {
   return factors_.back().factor;
 }
 
-double PositionAccuracy::least() const { return factor_at(0.025) * quantile_of(errors_, kShare); }
-double PositionAccuracy::most() const { return factor_at(0.975) * quantile_of(errors_, kShare); }
+double PositionAccuracy::least() const {
+  return std::max(smallest_step_, factor_at(0.025) * quantile_of(errors_, kShare));
+}
+double PositionAccuracy::most() const {
+  return std::max(smallest_step_, factor_at(0.975) * quantile_of(errors_, kShare));
+}
 double PositionAccuracy::of_distances() const {
-  return factor_at(0.975) * quantile_of(distances_, kShare);
+  return std::max(smallest_step_, factor_at(0.975) * quantile_of(distances_, kShare));
 }
 
 }  // namespace trammel

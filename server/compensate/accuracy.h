@@ -39,9 +39,9 @@ class PositionAccuracy {
   [[nodiscard]] static std::optional<PositionAccuracy> of(
       const CompensatedModel& model, const std::optional<MeasurementBatch>& batch = {});
 
-  /// m: `share` of fresh poses in the domain are within.
+  /// m: `share` of fresh poses in the domain are within. No radius below the arm's smallest step.
   [[nodiscard]] double at(double share) const;
-  /// Share of fresh poses in the domain whose true error is within `radius`, m.
+  /// Share of fresh poses in the domain whose true error is within `radius`, m; 0 below that step.
   [[nodiscard]] double within(double radius) const;
   /// m: at(kShare) if the stated covariances were wrong by as little or as much as is likely (95 %
   /// between the two).
@@ -67,6 +67,7 @@ class PositionAccuracy {
   std::vector<double> errors_;     // m, rising: |t| of draws at poses of the domain, as stated
   std::vector<double> distances_;  // m, rising: likewise, of distances between two
   std::vector<Factor> factors_;
+  double smallest_step_ = 0;  // m, of the arm: no radius is told below it
   double hidden_ = 0;
   int judged_by_ = 0;
 };

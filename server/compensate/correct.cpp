@@ -2,9 +2,11 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/compensate/arm_steps.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/correct_in_wrist.h"
 #include "server/compensate/few_joints.h"
+#include "server/compensate/take_ups.h"
 #include "server/measurement/pose_columns.h"
 #include "server/robot/branch_hint.h"
 #include "server/robot/flange_motion.h"
@@ -135,14 +137,42 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
       has_blocks ? "its kernel" : "the learned bias");
 }
 
+/// The remark on a model that alone would promise less than the arm can do; empty: it does not.
+std::string below_resolution(const CompensatedModel& model, const PoseContext& context,
+                             const ErrorPrediction& at) {
+  constexpr double kAtTheFloor = 1 + 1e-9;
+  const double least = least_rms(model, context);
+  if (least <= 0 || at.true_stddev_B.norm() > kAtTheFloor * least) return "";
+  return fmt::format("below resolution: the arm's smallest step is {:.3g} mm, less is not promised",
+                     to_mm(smallest_step(model, context)));
+}
+
+/// `a; b`, without what is empty.
+std::string both_said(std::string a, const std::string& b) {
+  if (!a.empty() && !b.empty()) a += "; ";
+  return a + b;
+}
+
 /// The way in which the arm comes to the target.
-PoseContext way_to(const Target& target) {
+PoseContext way_to(const Target& target, const std::string& tool, const std::string& payload) {
   PoseContext context;
+  context.tool = tool;
+  context.payload = payload;
   context.direction = target.direction;
   context.temperature = target.temperature;
   context.time = target.time;
   context.served = true;
   return context;
+}
+
+/// To `q`; a side of approach that is said is that of a move of kSaidMove.
+void come_as_said(const Chain& robot, const JointVector& q, PoseContext& context) {
+  context.q = q;
+  if (context.direction.empty() || context.before) return;
+  JointVector way(robot.size());
+  for (int j = 0; j < robot.size(); ++j)
+    way(j) = kSaidMove * context.direction[static_cast<std::size_t>(j)];
+  if (way.norm() > 0) context.before = context.q - robot.commanded(way);
 }
 
 /// Deviation of one measurement where the true position has this stddev an axis.
@@ -282,9 +312,8 @@ std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, cons
 Correction CompensatedModel::correct(const Target& target, const std::string& tool,
                                      const std::string& payload,
                                      const CorrectOptions& options) const {
-  PoseContext context = way_to(target);
-  context.tool = tool;
-  context.payload = payload;
+  PoseContext context = way_to(target, tool, payload);
+  const Pose& X_FT = parts().physics.tools.at(tool);
   Correction result;
   const auto end = [&](CorrectionStatus status, std::string message) {
     result.status = status;
@@ -292,16 +321,15 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return result;
   };
   const auto not_reached = [&](const InverseResult& joints) {
-    return end(status_of(joints.status),
-               with_branch_hint(why_not(cell().robot, result.X_BT_wanted,
-                                        parts().physics.tools.at(tool), joints, target.conf),
-                                branches_that_reach(target, result.X_BT_wanted, context, options)));
+    return end(
+        status_of(joints.status),
+        with_branch_hint(why_not(cell().robot, result.X_BT_wanted, X_FT, joints, target.conf),
+                         branches_that_reach(target, result.X_BT_wanted, context, options)));
   };
 
-  const Result<InverseResult> start =
-      nominal_joints(target, parts().physics.tools.at(tool).inverse());
+  const Result<InverseResult> start = nominal_joints(target, X_FT.inverse());
   if (!start) return end(CorrectionStatus::kRefused, sentence(start.error()));
-  context.q = start->q;
+  come_as_said(cell().robot, start->q, context);
   result.X_BT_wanted =
       target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context)
                           : target.X_BT;
@@ -333,11 +361,12 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
   expect_after(before, found.missing, cell().tracker, result);
-  const bool turns_all = !in_wrist && !has_few_joints(cell().robot);
-  const std::string left = turns_all ? "" : turn_left(cell().robot, found.missing.tail<3>());
-  if (before.in_domain) return end(CorrectionStatus::kOk, left);
+  std::string said = below_resolution(*this, context, before);
+  if (in_wrist || has_few_joints(cell().robot))
+    said = both_said(std::move(said), turn_left(cell().robot, found.missing.tail<3>()));
+  if (before.in_domain) return end(CorrectionStatus::kOk, said);
   return end(CorrectionStatus::kOutOfDomain,
-             corrected_by(inside_->bias, bias_weight) + (left.empty() ? "" : "; " + left));
+             both_said(corrected_by(inside_->bias, bias_weight), said));
 }
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "server/compensate/arm_steps.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/domain.h"
 
@@ -151,6 +152,12 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
 
 namespace {
 
+/// True if it is known where the joint came from. A request may say the sides of some joints alone.
+bool says_where_from(const PoseContext& context, int joint) {
+  if (!context.before) return false;
+  return context.direction.empty() || context.direction[static_cast<std::size_t>(joint)] != 0;
+}
+
 /// The context after a long move of that joint.
 PoseContext come_from_afar(PoseContext context, int joint) {
   context.before = context.q;
@@ -173,7 +180,7 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
   for (const ErrorSourcePtr& source : physics.sources) {
     const ContextNeeds needs = source->needs();
     warm = warm || needs.temperature;
-    if (needs.before && !context.before && source->joint() >= 0)
+    if (needs.before && source->joint() >= 0 && !says_where_from(context, source->joint()))
       add(come_from_afar(context, source->joint()));
     if (!needs.direction || !context.direction.empty()) continue;
     PoseContext approached = context;
@@ -289,6 +296,18 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
       with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
 }
 
+namespace {
+
+/// Raises the covariance of one measurement so that its true part has an rms of no less. What is
+/// added is the same along each axis.
+void raise_to(double least_rms, double metrology, Matrix3& covariance) {
+  const Vector3 known = (covariance.diagonal().array() - metrology).max(0.0);
+  const double missing = least_rms * least_rms - known.sum();
+  if (missing > 0) covariance.diagonal() = known.array() + metrology + missing / 3;
+}
+
+}  // namespace
+
 ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned) const {
   const PhysicalModel& physics = parts().physics;
   CalibratedPose pose{completed(asked), physics.X_WB.inverse(), {}, 0};
@@ -326,9 +345,10 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
     }
     if (learned->rotation) add_rotation_bias(pose, *learned->rotation, &prediction);
   }
+  const double metrology = cell().tracker.sigma * cell().tracker.sigma;
+  raise_to(least_rms(*this, context), metrology, covariance);
   prediction.covariance_B = covariance;
   prediction.stddev_B = covariance.diagonal().cwiseSqrt();
-  const double metrology = cell().tracker.sigma * cell().tracker.sigma;
   prediction.true_stddev_B = (covariance.diagonal().array() - metrology).max(0.0).sqrt();
   prediction.error_B =
       prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();

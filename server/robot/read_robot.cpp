@@ -5,6 +5,7 @@
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
 #include "server/robot/cell_values.h"
+#include "server/robot/smallest_step.h"
 
 /// The robot file: joints, links, limits, and which joints follow others.
 namespace trammel {
@@ -20,6 +21,34 @@ void read_link(const YamlMap& map, Joint& joint) {
   joint.link.a = from_mm(map.number("a_mm", 0));
   joint.link.alpha = from_deg(map.number("alpha_deg", 0));
   joint.link.beta = from_deg(map.number("beta_deg", 0));
+}
+
+constexpr double kCoarsestMm = 50;   // of a robot's repeatability: no arm is worse
+constexpr double kCoarsestStep = 1;  // of an encoder, deg, mm
+
+/// A number above 0 and at most `most`, in the unit of the key.
+double read_step(const YamlMap& map, const std::string& key, double most) {
+  const double step = map.number(key);
+  if (!(step > 0)) map.refuse(key, refused("must be above 0").beyond(step, 0));
+  if (step > most) map.refuse(key, refused("{:g}, limit {:g}", step, most).beyond(step, most));
+  return step;
+}
+
+/// rad (m); 0: not told.
+double encoder_step(const YamlMap& joint) {
+  for (const auto& [key, unit] :
+       {std::pair("encoder_resolution_deg", from_deg(1)), {"encoder_resolution_mm", from_mm(1)}}) {
+    if (joint.has(key)) return unit * read_step(joint, key, kCoarsestStep);
+  }
+  return 0;
+}
+
+ArmSteps read_steps(const YamlMap& robot) {
+  ArmSteps steps;
+  if (robot.has("repeatability_mm"))
+    steps.repeatability = from_mm(read_step(robot, "repeatability_mm", kCoarsestMm));
+  for (const YamlMap& joint : robot.maps("joints")) steps.encoders.push_back(encoder_step(joint));
+  return steps;
 }
 
 /// Reads the limits and the speed of the joint.
@@ -41,6 +70,8 @@ void read_motion(const YamlMap& map, Joint& joint) {
     joint.upper = si(range[1]);
   }
   if (map.has(speed)) joint.max_speed = si(map.number(speed));
+  const std::string of_others = revolute ? "encoder_resolution_mm" : "encoder_resolution_deg";
+  if (map.has(of_others)) map.refuse(of_others, "not of this type of joint");
   if (!map.boolean("passive", false)) return;
   if (map.has(limits)) map.refuse(limits, "a passive joint is never commanded and has no limits");
   joint.lower = joint.upper = 0;
@@ -49,7 +80,8 @@ void read_motion(const YamlMap& map, Joint& joint) {
 Joint read_joint(const YamlMap& map) {
   map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
             "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
-            "max_speed_deg_s", "max_speed_mm_s", "passive"});
+            "max_speed_deg_s", "max_speed_mm_s", "passive", "encoder_resolution_deg",
+            "encoder_resolution_mm"});
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");
@@ -111,7 +143,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
   return read_yaml(
              robot_yaml, where,
              [&](const YamlMap& map) {
-               map.only({"version", "name", "source", "joints", "coupling"});
+               map.only({"version", "name", "source", "joints", "coupling", "repeatability_mm"});
                if (map.integer("version", 0) != 1)
                  map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
                std::vector<Joint> joints;
@@ -125,6 +157,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                                         entry.number("ratio"), coupling_kind(entry)});
                  }
                }
+               map.attempt([&] { read_steps(map); });
                return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
              })
       .and_then([](Result<Chain> chain) { return chain; })
@@ -134,6 +167,11 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
 Result<Chain> read_robot(const std::string& path) {
   return read_text_file(path).and_then(
       [&](const std::string& text) { return parse_robot(text, path); });
+}
+
+Result<ArmSteps> steps_of(const Cell& cell) {
+  if (cell.robot_yaml.empty()) return ArmSteps{};
+  return read_yaml(cell.robot_yaml, cell.name, [](const YamlMap& map) { return read_steps(map); });
 }
 
 }  // namespace trammel

@@ -22,15 +22,14 @@ using fanuc::Assignment;
 using fanuc::Controller;
 using fanuc::Group;
 using fanuc::is_number;
+using fanuc::kJoints;
+using fanuc::kPose;
 using fanuc::Motion;
 using fanuc::Part;
 using fanuc::part_of;
 using fanuc::Position;
 using fanuc::Setting;
 using fanuc::Statement;
-
-constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "W", "P", "R"};
-constexpr std::array<const char*, 6> kJoints = {"J1", "J2", "J3", "J4", "J5", "J6"};
 
 /// The selection of UFRAME_NUM and UTOOL_NUM: a number; empty: not set; else why it is not known.
 struct Selected {
@@ -61,7 +60,11 @@ class File {
     controller_.programs.insert(name_);
     const Part motions = part_of(text_, "/MN");
     program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
-    for (Position& position : fanuc::positions_of(text_, part_of(text_, "/POS"))) {
+    const Part points = part_of(text_, "/POS");
+    points_end_ = points.end;
+    PointList& list = program_.points.emplace_back();
+    for (Position& position : fanuc::positions_of(text_, points)) {
+      list.next = std::max(list.next, 1 + fanuc::point_number(position.name));
       by_name_[position.name] = position.begin;
       positions_[position.begin] = std::move(position);
     }
@@ -120,8 +123,10 @@ class File {
   }
 
   void motion(std::size_t s, const Selected& selected) {
-    if (const auto motion = fanuc::motion_of(statements_[s]))
-      go(*motion, statements_[s].line, selected);
+    const auto motion = fanuc::motion_of(statements_[s]);
+    if (!motion) return;
+    go(*motion, statements_[s].line, selected);
+    repeat(*motion, statements_[s].tokens);
   }
 
   /// Behind all motions.
@@ -317,6 +322,37 @@ class File {
     }
   }
 
+  /// `L P[2] 250mm/sec FINE`: it stops there. Its point comes again under a new number.
+  void repeat(const Motion& motion, const Tokens& tokens) {
+    if (motion.points.size() != 1 || (motion.kind != "J" && motion.kind != "L")) return;
+    const auto known = by_name_.find(motion.points[0]);
+    const std::size_t point = tokens.find("P"), behind = tokens.find("]", point);
+    const std::size_t fine = tokens.find("FINE", point);
+    if (known == by_name_.end() || behind >= tokens.size() || fine >= tokens.size()) return;
+    for (std::size_t k = fine + 1; k < tokens.size(); ++k) {
+      // `SPOT[1]` or `TB .1sec, CALL ...` does work at the place; these do not.
+      const std::string_view word = tokens[k].text;
+      if (!word.starts_with("ACC") && word != "PTH" && word != "Wjnt" && !tokens[k].is_number())
+        return;
+    }
+    if (!tokens[0].is(motion.kind)) return;  // `IF R[1]=1,J P[1] ...`
+    const Position& position = positions_.at(known->second);
+    const std::size_t end = text_.find_first_of(";\r\n", tokens[behind].end);
+    const bool whole = end != std::string::npos && text_[end] == ';' &&
+                       points_end_ < text_.size() && position.groups.contains(1);
+    if (!whole) return;
+    const auto text = [&](std::size_t from, std::size_t to) {
+      return text_.substr(from, to - from);
+    };
+    std::vector<NewLine> lines = fanuc::another_position(text_, position, points_end_);
+    if (lines.empty()) return;
+    lines.push_back({tokens[0].begin,
+                     {fmt::format("   0:{}P[{}]{};", text(tokens[0].begin, tokens[point].begin),
+                                  kNewPoint, text(tokens[behind].end, end))},
+                     {}});
+    program_.moves.back().another = std::move(lines);
+  }
+
   void use(const Motion& motion, int line, const std::string& name, const Selected& selected) {
     bool any = false;
     for (const auto& [known, begin] : by_name_) {
@@ -346,6 +382,7 @@ class File {
   std::vector<Statement> statements_;
   std::string name_, last_motion_;
   bool jumps_anywhere_ = false;  ///< `JMP LBL[R[1]]`
+  std::size_t points_end_ = 0;   ///< behind /POS
   int line_tracking_ = 0;        ///< the line that says so; 0: none does
   std::set<std::size_t> used_;
 };

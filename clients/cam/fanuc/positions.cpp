@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <utility>
 
 #include "clients/cam/keep.h"
 
@@ -34,6 +35,10 @@ void read_groups(const Tokens& tokens, std::size_t begin, std::size_t end, Posit
 
 }  // namespace
 
+std::size_t point_number(const std::string& name) {
+  return std::strtoul(name.c_str() + 2, nullptr, 10);
+}
+
 std::vector<Position> positions_of(const std::string& text, const Part& part) {
   const Tokens tokens = tokens_of(text, part.begin, part.end, part.line, kLexis);
   std::vector<Position> positions;
@@ -50,6 +55,38 @@ std::vector<Position> positions_of(const std::string& text, const Part& part) {
     positions.push_back(std::move(position));
   }
   return positions;
+}
+
+std::vector<NewLine> another_position(const std::string& text, const Position& position,
+                                      std::size_t at) {
+  const Group& group = position.groups.at(1);
+  const bool joints = group.values.contains("J1");
+  std::map<std::size_t, std::pair<std::size_t, std::size_t>> numbers;  // by the first byte
+  for (std::size_t k = 0; k < kPose.size(); ++k) {
+    const auto value = group.values.find(joints ? kJoints[k] : kPose[k]);
+    if (value == group.values.end() || !number_in(value->second)) return {};
+    numbers[value->second.begin] = {value->second.end, k};
+  }
+  const std::size_t head_end = text.find(']', position.begin);
+  std::vector<NewLine> lines(1, NewLine{at, {fmt::format("P[{}]", kNewPoint)}, {}});
+  for (std::size_t b = head_end + 1; b < position.end;) {
+    NewLine& line = lines.back();
+    if (const auto number = numbers.find(b); number != numbers.end()) {
+      const auto& [end, k] = number->second;
+      const auto written = read_number(std::string_view(text).substr(b, end - b));
+      line.slots.push_back({k, written->style});
+      line.texts.emplace_back();
+      b = end;
+      continue;
+    }
+    if (text[b] == '\n')
+      lines.push_back({at, {""}, {}});
+    else if (text[b] != '\r')
+      line.texts.back() += text[b];
+    ++b;
+  }
+  lines.back().texts.back() += ";";
+  return lines;
 }
 
 void note_external(int group, const Group& values, ProgramTarget& target) {

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
+#include <string_view>
 
 #include "clients/cam/flow.h"
 #include "clients/cam/inform/job.h"
@@ -37,6 +39,7 @@ class Job {
         listed_(listed),
         text_(inform::job_of(program.files[index].text)) {
     program_.mark_places.push_back({text_.mark_at, "'", "", true});
+    list_points();
     if (text_.open_at > 0) program_.cuts.push_back({index_, text_.open_at, "the job has no END"});
   }
 
@@ -128,6 +131,65 @@ class Job {
     return "";
   }
 
+  /// `///NPOS 2,0,0,0,0,0`
+  void list_points() {
+    PointList& list = program_.points.emplace_back();
+    for (const auto& [name, position] : text_.positions) {
+      if (name[0] != 'C' || name.size() > 9) continue;
+      list.width = static_cast<int>(name.size()) - 1;
+      list.next = std::max(list.next, 1 + std::stoul(name.substr(1)));
+      if (last_ == nullptr || position.begin > last_->begin) last_ = &position;
+    }
+    const std::string& text = program_.files[index_].text;
+    constexpr std::string_view kHead = "///NPOS ";
+    const std::size_t head = text.find(kHead);
+    if (head == std::string::npos) return;
+    const std::size_t begin = head + kHead.size();
+    const std::size_t end = std::min(text.find_first_not_of("0123456789", begin), text.size());
+    if (end == begin || end - begin > 6) return;
+    list.count = {begin, end};
+    list.counted = std::stoul(text.substr(begin, end - begin));
+  }
+
+  /// `MOVL C00001 V=100.0`, with a position behind the last one, which has the same tool, frame and
+  /// configuration.
+  void repeat(const Statement& statement, const Motion& motion, const Position& position) {
+    const std::string& text = program_.files[index_].text;
+    const bool plain = (motion.word == "MOVJ" || motion.word == "MOVL") && motion.external.empty();
+    const bool stops = !statement.tokens.has("PL") || text_of_pl(statement) == "0";
+    static const std::set<std::string_view> kOfTheWay = {"V", "VJ", "PL", "ACC", "DEC", "="};
+    for (std::size_t k = 2; k < statement.tokens.size(); ++k) {
+      // `NWAIT` or `UNTIL IN#(1)=ON` does more than to go there.
+      if (!statement.tokens[k].is_number() && !kOfTheWay.contains(statement.tokens[k].text)) return;
+    }
+    if (!plain || !stops || last_ == nullptr || position.numbers.size() < 6 ||
+        program_.points[index_].count.end == 0)
+      return;
+    if (position.kind != last_->kind || position.tool != last_->tool ||
+        position.user != last_->user || position.conf != last_->conf)
+      return;
+    const Token name = statement.tokens[1];
+    const std::size_t end = std::min(text.find_first_of("\r\n", name.end), text.size());
+    const std::size_t behind = text.find('\n', last_->begin);
+    if (behind == std::string::npos) return;
+    NewText point({}, fmt::format("C{}=", kNewPoint));
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (k > 0) point.text(",");
+      const auto written = number_in(position.numbers[k]);
+      if (!written) return;
+      point.number(k, written->style.decimals);
+    }
+    program_.moves.back().another = {
+        std::move(point).line(behind + 1),
+        {name.begin,
+         {fmt::format("{} C{}{}", motion.word, kNewPoint, text.substr(name.end, end - name.end))},
+         {}}};
+  }
+  static std::string text_of_pl(const Statement& statement) {
+    const std::size_t at = statement.tokens.find("PL");
+    return std::string(statement.tokens[at + 2].text);
+  }
+
   std::size_t tool_of(const Position& position) {
     ProgramTool tool;
     tool.name = fmt::format(
@@ -214,6 +276,7 @@ class Job {
     const Position& position = text_.positions.at(motion->position);
     if (!motion->external.empty()) external_of_[program_.moves.size() - 1] = motion->external;
     used_.insert(motion->position);
+    repeat(statement, *motion, position);
     sites_.add(index_, position.begin, motion->position,
                {tool_of(position), frame_of(position), std::string(motion->word), index_,
                 statement.line, program_.moves.size() - 1, motion->word != "MOVJ"});
@@ -261,6 +324,7 @@ class Job {
   const ReadOptions& options_;
   ListedValues& listed_;
   inform::JobText text_;
+  const Position* last_ = nullptr;  ///< of text_, in the order of the file
   std::set<std::string> used_;
   std::string last_motion_;
   std::map<std::size_t, std::vector<std::string>> external_of_;  ///< names, by the motion

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "clients/cam/flow.h"
 #include "clients/cam/keep.h"
@@ -46,8 +48,35 @@ void Motions::finish(bool resumes) {
   sites_.finish(program_, [this](const Site& site, ProgramTarget& target) {
     return targets_.describe(site, target);
   });
+  find_repeatable();
   find_order(resumes);
   targets_.list_unused();
+}
+
+/// Motions that stop at their only target. Status, turns and external axes are the target's own.
+void Motions::find_repeatable() {
+  static const std::set<std::string_view> kWords = {"LIN", "PTP", "SLIN", "SPTP"};
+  for (const auto& [place, number] : moves_) {
+    ProgramMove& move = program_.moves[number];
+    const auto& [f, k] = place;
+    const Tokens& tokens = lines_[f][k].tokens;
+    if (move.targets.size() != 1 || !kWords.contains(tokens[0].text) || splines_.contains(place))
+      continue;
+    std::size_t next = 0;
+    const std::vector<Value> operands = operands_at(tokens, 1, &next);
+    if (operands.empty() || next < tokens.size()) continue;
+    const bool joints = is_joints(program_.targets[move.targets[0]].coordinates);
+    const std::size_t at = operands.front().begin;
+    std::string begin = from_line_begin(program_.files[f].text, tokens[0].begin, at);
+    if (begin.empty()) continue;
+    NewText line({}, std::move(begin) + "{");
+    for (std::size_t c = 0; c < kPose.size(); ++c) {
+      line.text(fmt::format("{}{} ", c == 0 ? "" : ",", joints ? kAxes[c] : kPose[c]));
+      line.number(c, kDecimals);
+    }
+    line.text(Targets::rest_of(targets_.last_of(operands, f)) + "}");
+    move.another = {std::move(line).line(at)};
+  }
 }
 
 void Motions::leave_at(std::size_t f, std::size_t k, const std::string& name,

@@ -49,6 +49,7 @@ class Motions {
   void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name,
                  const SiteUse& use);
   void note_axes(const Value& value, std::size_t move);
+  void find_repeatable();
   void find_order(bool resumes);
   void follow(const Place& place, const std::set<std::size_t>& before);
   [[nodiscard]] std::string text_of(std::size_t f, const Span& span) const;

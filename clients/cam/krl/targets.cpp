@@ -9,12 +9,6 @@
 
 namespace trammel::cam::krl {
 
-namespace {
-
-constexpr int kDecimals = 3;  // of a number that the program did not write
-
-}  // namespace
-
 std::string Targets::describe(const Site& site, ProgramTarget& target) const {
   const Assigned& place = places_.at({site.file, site.begin});
   target.line = lines_[place.file][place.line].number;
@@ -35,11 +29,7 @@ std::string Targets::describe(const Site& site, ProgramTarget& target) const {
   if (!pose) return pose.error();
   target.coordinates = Coordinates::kAnglesZyx;
   target.numbers = cam::numbers_of(Coordinates::kAnglesZyx, *pose, std::vector<double>(6, 0.0));
-  const Value* last = &place.operands.back();
-  if (last->kind == Value::Kind::kName) {
-    const Told<const Assigned*> named = names_.value_of(last->name, place.file);
-    last = named && (*named)->operands.size() == 1 ? &(*named)->operands[0] : nullptr;
-  }
+  const Value* last = last_of(place.operands, place.file);
   if (last != nullptr) note_rest(*last, target);
   fold(place, last, target);
   return "";
@@ -68,6 +58,24 @@ void Targets::rewrite(const Value& value, const std::array<const char*, 6>& fiel
   }
 }
 
+const Value* Targets::last_of(const std::vector<Value>& operands, std::size_t file) const {
+  const Value& last = operands.back();
+  if (last.kind != Value::Kind::kName) return &last;
+  const Told<const Assigned*> named = names_.value_of(last.name, file);
+  return named && (*named)->operands.size() == 1 ? &(*named)->operands[0] : nullptr;
+}
+
+std::string Targets::rest_of(const Value* value) {
+  std::string text;
+  if (value == nullptr || value->kind != Value::Kind::kAggregate) return text;
+  for (std::size_t k = 0; k < value->field_names.size(); ++k) {
+    const std::string& name = value->field_names[k];
+    if (name == "S" || name == "T" || (name.size() == 2 && name[0] == 'E'))
+      text += fmt::format(",{} {}", name, value->field_values[k].number);
+  }
+  return text;
+}
+
 /// The whole expression as one frame, with status, turns and external axes of its last operand.
 void Targets::fold(const Assigned& place, const Value* last, ProgramTarget& target) const {
   const std::string& text = program_.files[place.file].text;
@@ -77,14 +85,7 @@ void Targets::fold(const Assigned& place, const Value* last, ProgramTarget& targ
     if (k > 0) whole.text(fmt::format(",{} ", kPose[k]));
     whole.number(k, kDecimals);
   }
-  if (last != nullptr && last->kind == Value::Kind::kAggregate) {
-    for (std::size_t k = 0; k < last->field_names.size(); ++k) {
-      const std::string& name = last->field_names[k];
-      if (name == "S" || name == "T" || (name.size() == 2 && name[0] == 'E'))
-        whole.text(fmt::format(",{} {}", name, last->field_values[k].number));
-    }
-  }
-  std::move(whole.text("}")).fold(target);
+  std::move(whole.text(rest_of(last) + "}")).fold(target);
   keep_original(text, span.begin, ";", text.substr(span.begin, span.end - span.begin), target);
 }
 

@@ -12,6 +12,8 @@
 /// The targets where the motions of a KRL program go.
 namespace trammel::cam::krl {
 
+constexpr int kDecimals = 3;  ///< of a number that the program did not write
+
 class Targets {
  public:
   Targets(const std::vector<std::vector<Line>>& lines, const Variables& names,
@@ -25,6 +27,10 @@ class Targets {
   [[nodiscard]] std::string describe(const Site& site, ProgramTarget& target) const;
   /// Positions of data lists that nothing moves to.
   void list_unused();
+  /// The operand that has the status, turns and external axes; none where it is not known.
+  [[nodiscard]] const Value* last_of(const std::vector<Value>& operands, std::size_t file) const;
+  /// These as the text behind six numbers: `,S 2,T 10`.
+  [[nodiscard]] static std::string rest_of(const Value* value);
 
  private:
   [[nodiscard]] std::string describe_axes(const Value& value, ProgramTarget& target) const;

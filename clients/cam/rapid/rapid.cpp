@@ -363,8 +363,10 @@ class Reader {
       for (const Use* use : uses) program_.moves[use->move].left_some = true;
       return;
     }
-    for (const Use* use : uses)
+    for (const Use* use : uses) {
       program_.moves[use->move].targets.push_back(program_.targets.size());
+      program_.moves[use->move].another = targets_->another(*use, site.joints);
+    }
     if (target.folded) targets_->note_original(site, place != nullptr ? *place : data, target);
     program_.targets.push_back(std::move(target));
   }

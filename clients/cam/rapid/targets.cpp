@@ -15,6 +15,13 @@ namespace {
 
 using Kind = Expression::Kind;
 
+std::string external_text(const std::array<double, 6>& axes) {
+  std::vector<std::string> external;
+  for (const double axis : axes)
+    external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
+  return fmt::format("{}", fmt::join(external, ","));
+}
+
 }  // namespace
 
 Told<void> Targets::read_joints(const Data& data, ProgramTarget& target) {
@@ -104,14 +111,47 @@ void Targets::rewrite(const Expression& expression, const Scope& scope, std::siz
 
 void Targets::rewrite_whole(const Expression& expression, const TargetValue& value,
                             ProgramTarget& target) {
-  NewText whole({expression.begin, expression.end}, "[[");
-  whole.numbers(0, 3, value.decimals, ",").text("],[");
-  whole.numbers(3, 4, std::max(value.rotation_decimals, 6), ",");
-  std::vector<std::string> external;
-  for (const double axis : value.external)
-    external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
-  whole.text(fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ",")));
+  NewText whole({expression.begin, expression.end}, "");
+  write_whole(value, whole);
   std::move(whole).fold(target);
+}
+
+void Targets::write_whole(const TargetValue& value, NewText& whole) {
+  whole.text("[[").numbers(0, 3, value.decimals, ",").text("],[");
+  whole.numbers(3, 4, std::max(value.rotation_decimals, 6), ",");
+  whole.text(
+      fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), external_text(value.external)));
+}
+
+std::vector<NewLine> Targets::another(const Use& use, bool joints) const {
+  const Instruction& motion = *use.motion;
+  const std::string& text = program_.files[use.module].text;
+  if (motion.name != "movel" && motion.name != "movej" && motion.name != "moveabsj") return {};
+  const Expression* place = nullptr;
+  bool stops = false;
+  for (const Expression& argument : motion.arguments) {
+    if (!argument.label.empty()) continue;
+    if (place == nullptr) place = &argument;
+    stops |= argument.kind == Kind::kName && argument.name == "fine";
+  }
+  if (place == nullptr || !stops) return {};
+  std::string begin = from_line_begin(text, motion.begin, place->begin);
+  const std::size_t end = text.find(';', place->end);
+  if (begin.empty() || end == std::string::npos) return {};
+  const std::string rest = text.substr(place->end, end + 1 - place->end);
+  if ((begin + rest).find('\n') != std::string::npos) return {};
+  NewText line({}, std::move(begin));
+  if (joints) {
+    const Told<JointValue> value = meaning_.joints_of(*use.data.node, *use.data.scope);
+    if (!value) return {};
+    line.text("[[").numbers(0, 6, value->decimals, ",");
+    line.text(fmt::format("],[{}]]", external_text(value->external)));
+  } else {
+    const Told<TargetValue> value = meaning_.target_of(*use.data.node, *use.data.scope);
+    if (!value) return {};
+    write_whole(*value, line);
+  }
+  return {std::move(line.text(rest)).line(motion.begin)};
 }
 
 }  // namespace trammel::cam::rapid

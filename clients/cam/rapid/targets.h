@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cam/keep.h"
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/interpreter.h"
 
@@ -41,6 +42,9 @@ class Targets {
   Told<void> read_joints(const Data& data, ProgramTarget& target);
   [[nodiscard]] Told<void> read_target(const Data& data, const std::vector<const Use*>& uses,
                                        const Data* place, ProgramTarget& target) const;
+  /// The motion once more, to another place of its configuration; empty where it does not stop at
+  /// its target, or does not stand alone in its line.
+  [[nodiscard]] std::vector<NewLine> another(const Use& use, bool joints) const;
   /// The line above the statement that keeps what was folded.
   void note_original(const Site& site, const Data& place, ProgramTarget& target) const;
 
@@ -51,6 +55,7 @@ class Targets {
                std::size_t count, int decimals, ProgramTarget& target) const;
   static void rewrite_whole(const Expression& expression, const TargetValue& value,
                             ProgramTarget& target);
+  static void write_whole(const TargetValue& value, NewText& whole);
 
   const Interpreter& meaning_;
   const ReadOptions& options_;

@@ -32,6 +32,7 @@ using urscript::Told;
 using urscript::Value;
 
 constexpr Lexis kLexis = {"#", "\"'"};
+constexpr int kScriptDecimals = 6;  // of a place that the script did not write
 
 /// Moves the tool away from where motions say, from one function to another.
 struct Superposed {
@@ -306,6 +307,7 @@ class Script {
                           : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
+    repeat(at, value, now->kind == Value::Kind::kJoints);
     if (now->kind == Value::Kind::kCall)
       poses_.insert_or_assign(now->begin, values_of_.pose_of_value(value, 0));
     if (now->kind == Value::Kind::kJoints)
@@ -315,10 +317,39 @@ class Script {
                 program_.moves.size() - 1, !is_of_axes(tokens_[at])});
   }
 
+  /// Commas between the arguments of the call that the last bracket closes: `, qnear=[0, 1]), 1.2)`
+  /// has one.
+  static std::size_t commas_of_last_call(const Tokens& tokens) {
+    std::size_t commas = 0;
+    int depth = 0;
+    for (std::size_t k = tokens.size(); k-- > 0;) {
+      if (tokens[k].is(")") || tokens[k].is("]")) ++depth;
+      if (tokens[k].is("(") || tokens[k].is("[")) --depth;
+      if (tokens[k].is(",") && depth == 1) ++commas;
+    }
+    return commas;
+  }
+
+  /// `movel(hole, a=1.2, v=0.05)` stops at its target where no `r` rounds it.
+  void repeat(std::size_t at, const Value& value, bool joints) {
+    if (!tokens_[at].is("movel") && !tokens_[at].is("movej")) return;
+    const std::size_t end = std::min(text_.find_first_of("#\r\n", value.end), text_.size());
+    const std::string rest = text_.substr(value.end, end - value.end);
+    const Tokens behind = tokens_of(rest, kLexis);
+    constexpr std::size_t kWithoutRadius = 3;  // commas behind the place: a, v, t
+    if (behind.empty() || !behind.back().is(")") || behind.has("r") ||
+        commas_of_last_call(behind) > kWithoutRadius)
+      return;
+    std::string begin = from_line_begin(text_, tokens_[at].begin, value.begin);
+    if (begin.empty()) return;
+    NewText line({}, std::move(begin) + (joints ? "[" : "p["));
+    line.numbers(0, 6, kScriptDecimals, ", ").text("]" + rest);
+    program_.moves.back().another = {std::move(line).line(tokens_[at].begin)};
+  }
+
   void fold(const Value& value, ProgramTarget& target) const {
-    constexpr int kDecimals = 6;
     NewText whole({value.begin, value.end}, "p[");
-    std::move(whole.numbers(0, 6, kDecimals, ", ").text("]")).fold(target);
+    std::move(whole.numbers(0, 6, kScriptDecimals, ", ").text("]")).fold(target);
     keep_original(text_, value.begin, "#", text_.substr(value.begin, value.end - value.begin),
                   target);
   }

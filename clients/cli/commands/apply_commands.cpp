@@ -12,10 +12,13 @@
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/files/target_file.h"
 #include "clients/cli/service/answers.h"
+#include "clients/cli/service/lead_in_options.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/tolerance.h"
+#include "clients/cli/work/choose_approach.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/compensate/exchanged.h"
@@ -142,28 +145,97 @@ Status predict(const ApplyArguments& arguments) {
        {"--json", arguments.json, json_text(predictions_json(list, predictions))}});
 }
 
-Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& arguments) {
+/// The arguments of correct, for a program or a table of targets.
+struct CorrectArguments : ApplyArguments {
+  std::vector<std::string> inputs;
+  std::string receipt, report, format, frames, task;
+  std::vector<std::string> idle_axes;
+  std::vector<double> pulses_per_deg;
+  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false,
+       split = false, keep_joints = false, lead_in = false;
+  std::string free_turn;
+  double tolerance_mm = 0;
+
+  [[nodiscard]] CorrectProgramArguments of_program() const {
+    return {inputs,      model,     tool,  payload,        format,       output,
+            receipt,     report,    json,  frames,         allow_failed, strict,
+            keep_digits, undo,      again, split,          keep_joints,  tolerance_mm,
+            service,     idle_axes, task,  pulses_per_deg, lead_in,      free_turn};
+  }
+
+  /// True if the program chooses how the arm comes to the targets, for which it needs the model.
+  [[nodiscard]] bool chooses() const { return lead_in || !free_turn.empty(); }
+};
+
+/// Corrects a table with one tool and payload; `ask` asks `model`, here or behind a service.
+Result<Corrections> correct_with(const CompensatedModel& model, const std::string& tool,
+                                 const TargetFile& file, const CorrectArguments& arguments,
+                                 const cam::AskTargets& ask) {
+  const Chain& robot = model.cell().robot;
+  Corrections corrections{model.provenance().id, joint_types(robot), {}, notes_of(model)};
+  std::vector<exchange::AskedTarget> targets;
+  for (const TargetRow& row : file.rows) targets.push_back(row.target);
+  corrections.items = TRY(ask(targets));
+  if (!arguments.free_turn.empty()) {
+    TRY(turn_freely(ask, robot, targets, corrections));
+  }
+  if (arguments.lead_in) {
+    const cam::LeadInOptions options = TRY(lead_in_options(model, arguments.tolerance_mm));
+    TRY(lead_in_where_needed(ask, robot, model.parts().physics.tools.at(tool), options,
+                             std::move(targets), corrections));
+  }
+  return corrections;
+}
+
+Result<Corrections> correct_here(const TargetFile& file, const CorrectArguments& arguments) {
   const CompensatedModel model = TRY(load_model(arguments.model));
   TRY(check_targets(file, model.cell().robot));
   const std::string tool = TRY(resolve_tool(model.cell(), arguments.tool));
   const std::string payload = TRY(resolve_payload(model.cell(), arguments.payload));
   TRY(model.check_trained_with(tool, payload));
-  Corrections corrections{
-      model.provenance().id, joint_types(model.cell().robot), {}, notes_of(model)};
-  corrections.items.resize(file.rows.size());
   const exchange::Rails rails = exchange::rails_of(model.cell().robot);
   ProgressLine progress;
-  in_parallel(
-      file.rows.size(),
-      [&](std::size_t i) {
-        const Target target = target_of(file.rows[i].target, model.cell().robot);
-        corrections.items[i] = exchanged(model.correct(target, tool, payload), rails);
-      },
-      [&](double share) { progress.show("correcting", share); });
-  return corrections;
+  const cam::AskTargets ask = [&](const std::vector<exchange::AskedTarget>& targets)
+      -> Result<std::vector<exchange::CorrectedTarget>> {
+    std::vector<exchange::CorrectedTarget> items(targets.size());
+    in_parallel(
+        targets.size(),
+        [&](std::size_t i) {
+          const Target target = target_of(targets[i], model.cell().robot);
+          items[i] = exchanged(model.correct(target, tool, payload), rails);
+        },
+        [&](double share) { progress.show("correcting", share); });
+    return items;
+  };
+  return correct_with(model, tool, file, arguments, ask);
 }
 
-Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArguments& arguments) {
+/// The service answers, and its model tells where gears have play and how the arm stands.
+Result<Corrections> choose_by_service(const TargetFile& file, const CorrectArguments& arguments) {
+  return with_served_model<Corrections>(
+      arguments.model, arguments.service,
+      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model,
+          const SawModel& saw) -> Result<Corrections> {
+        TRY(check_targets(file, model.cell().robot));
+        const std::string tool = TRY(resolve_tool(model.cell(), arguments.tool));
+        client::CallContext context = of;
+        context.tool = arguments.tool;
+        context.payload = arguments.payload;
+        context.rails = exchange::rails_of(model.cell().robot);
+        ProgressLine progress;
+        const cam::AskTargets ask = [&](const std::vector<exchange::AskedTarget>& targets)
+            -> Result<std::vector<exchange::CorrectedTarget>> {
+          auto answer = TRY(session.correct_targets(
+              context, targets, [&](double share) { progress.show("correcting", share); }));
+          saw(answer.model);
+          return std::move(answer.items);
+        };
+        return correct_with(model, tool, file, arguments, ask);
+      });
+}
+
+Result<Corrections> correct_by_service(const TargetFile& file, const CorrectArguments& arguments) {
+  if (arguments.chooses()) return choose_by_service(file, arguments);
   client::CallContext context = TRY(call_context(arguments));
   context.rails = exchange::rails_of(file.joint_types);
   std::vector<exchange::AskedTarget> targets;
@@ -179,24 +251,6 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   return Corrections{answer.model.id, file.joint_types, std::move(answer.items),
                      std::move(answer.model.notes)};
 }
-
-/// The arguments of correct, for a program or a table of targets.
-struct CorrectArguments : ApplyArguments {
-  std::vector<std::string> inputs;
-  std::string receipt, report, format, frames, task;
-  std::vector<std::string> idle_axes;
-  std::vector<double> pulses_per_deg;
-  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false,
-       split = false, keep_joints = false;
-  double tolerance_mm = 0;
-
-  [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs,      model,     tool,  payload,       format,       output,
-            receipt,     report,    json,  frames,        allow_failed, strict,
-            keep_digits, undo,      again, split,         keep_joints,  tolerance_mm,
-            service,     idle_axes, task,  pulses_per_deg};
-  }
-};
 
 /// Refuses options that are of programs alone.
 Status check_table_usage(const CorrectArguments& arguments) {
@@ -459,6 +513,18 @@ void add_correct(CLI::App& app, Action& chosen) {
                  "Write nothing and exit with 3 where any target would be left as it was or, with "
                  "--tolerance, is not inside it with 95 % or is out of domain")
       ->excludes(allow_failed);
+  command->add_flag(
+      "--lead-in", arguments->lead_in,
+      "Where play or hysteresis would take a target out of the tolerance (--tolerance, or the "
+      "cell's), insert points before it, so that each such joint arrives from one side: back along "
+      "the tool's axis by 20 mm, and before that, where a joint hardly turns on this line, a turn "
+      "of it there. See that nothing stands in the way");
+  command
+      ->add_option("--free", arguments->free_turn,
+                   "rz: the tool may stand at any angle about its axis (a drill, a mill, a dot). "
+                   "Each target is turned to where least is unknown, clear of limits and of a "
+                   "singular wrist; targets of one path turn together")
+      ->check(CLI::IsMember({"rz"}));
   command->add_option("--receipt", arguments->receipt, "What became of each target, as CSV");
   command
       ->add_option(

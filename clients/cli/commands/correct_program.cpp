@@ -10,6 +10,7 @@
 #include "clients/cam/mark.h"
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/service/answers.h"
+#include "clients/cli/service/lead_in_options.h"
 #include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/notes_text.h"
@@ -59,8 +60,16 @@ cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progr
   };
 }
 
-cam::CorrectProgramOptions options_of(const CorrectProgramArguments& arguments) {
-  return {arguments.tool, arguments.payload, arguments.keep_digits, TRAMMEL_VERSION, today()};
+Result<cam::CorrectProgramOptions> options_of(const CorrectProgramArguments& arguments,
+                                              const CompensatedModel& model) {
+  cam::CorrectProgramOptions options{arguments.tool, arguments.payload, arguments.keep_digits,
+                                     TRAMMEL_VERSION, today()};
+  options.free_rz = !arguments.free_turn.empty();
+  if (arguments.lead_in) {
+    cam::LeadInOptions lead_in = TRY(lead_in_options(model, arguments.tolerance_mm));
+    options.lead_in = std::move(lead_in);
+  }
+  return options;
 }
 
 /// A corrected program, and what the model's cell file says of robot, instrument and operator.
@@ -80,9 +89,10 @@ Result<Corrected> with_papers(Result<cam::CorrectedProgram> program,
 Result<Corrected> correct_here(const cam::Program& program,
                                const CorrectProgramArguments& arguments) {
   const CompensatedModel model = TRY(load_model(arguments.model));
+  const cam::CorrectProgramOptions options = TRY(options_of(arguments, model));
   ProgressLine progress;
   return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model),
-                                          ask_model(model, progress), options_of(arguments)),
+                                          ask_model(model, progress), options),
                      model);
 }
 
@@ -92,7 +102,8 @@ Result<Corrected> correct_by_service(const cam::Program& program,
   return with_served_model<Corrected>(
       arguments.model, arguments.service,
       [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model,
-          const SawModel& saw) {
+          const SawModel& saw) -> Result<Corrected> {
+        const cam::CorrectProgramOptions options = TRY(options_of(arguments, model));
         ProgressLine progress;
         const cam::AskCorrections ask = [&](const std::string& tool, const std::string& payload,
                                             const std::vector<exchange::AskedTarget>& targets) {
@@ -105,9 +116,9 @@ Result<Corrected> correct_by_service(const cam::Program& program,
           if (answer) saw(answer->model);
           return answer;
         };
-        return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model), ask,
-                                                options_of(arguments)),
-                           model);
+        return with_papers(
+            cam::correct_program(program, model.cell().robot, tools_of(model), ask, options),
+            model);
       });
 }
 

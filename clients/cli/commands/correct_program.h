@@ -20,6 +20,8 @@ struct CorrectProgramArguments {
   std::vector<std::string> idle_axes = {};
   std::string task = {};                    ///< of an ABB backup
   std::vector<double> pulses_per_deg = {};  ///< of a Yaskawa job
+  bool lead_in = false;
+  std::string free_turn = {};  ///< `rz`; empty: none
 };
 
 [[nodiscard]] Result<Extent> correct_program(const CorrectProgramArguments& arguments);

@@ -175,6 +175,7 @@ std::vector<std::string> correction_columns(const Corrections& corrections) {
   each_column_at(Place::kInFront, exchange::kCorrectionFigures, any, add);
   columns.insert(columns.end(), {"model_id", "message"});
   each_column_at(Place::kBehind, exchange::kCorrectionFigures, any, add);
+  if (!corrections.turned_deg.empty()) columns.emplace_back("turned_rz_deg");
   return columns;
 }
 
@@ -202,6 +203,32 @@ std::string field_of(double value) { return std::isfinite(value) ? csv_number(va
 
 }  // namespace
 
+std::size_t Corrections::lead_in_points() const {
+  std::size_t points = 0;
+  for (const auto& of_target : lead_ins) points += of_target.size();
+  return points;
+}
+
+namespace {
+
+void add_row(const Corrections& corrections, std::size_t joints, const TargetRow& row,
+             const exchange::CorrectedTarget& item, std::string& text) {
+  const bool command = has_command(item);
+  for (const std::string& field : row.fields) text += csv_field(field) + ",";
+  text += fmt::format("{},{},{}", row.row, item.status,
+                      command ? pose_fields(item.commanded) : ",,,,,,");
+  for (std::size_t j = 0; j < joints; ++j) {
+    text += ',';
+    if (command && j < item.joints_deg.size()) text += csv_number(item.joints_deg[j]);
+  }
+  const auto add = [&](const std::string&, double number) { text += "," + field_of(number); };
+  each_column_at(Place::kInFront, exchange::kCorrectionFigures, item, add);
+  text += fmt::format(",{},{}", corrections.model_id, csv_field(item.message));
+  each_column_at(Place::kBehind, exchange::kCorrectionFigures, item, add);
+}
+
+}  // namespace
+
 std::string corrections_csv(const TargetFile& file, const Corrections& corrections) {
   const std::vector<std::string> ours = correction_columns(corrections);
   std::string text;
@@ -209,25 +236,32 @@ std::string corrections_csv(const TargetFile& file, const Corrections& correctio
   text += fmt::format("{}\n", fmt::join(ours, ","));
   const std::size_t joints = joint_count(corrections);
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
-    const exchange::CorrectedTarget& item = corrections.items[i];
-    const bool command = has_command(item);
-    for (const std::string& field : file.rows[i].fields) text += csv_field(field) + ",";
-    text += fmt::format("{},{},{}", file.rows[i].row, item.status,
-                        command ? pose_fields(item.commanded) : ",,,,,,");
-    for (std::size_t j = 0; j < joints; ++j) {
-      text += ',';
-      if (command && j < item.joints_deg.size()) {
-        text += csv_number(item.joints_deg[j]);
+    const std::string end = corrections.turned_deg.empty()
+                                ? "\n"
+                                : fmt::format(",{}\n", csv_number(corrections.turned_deg[i]));
+    if (i < corrections.lead_ins.size()) {
+      for (const exchange::CorrectedTarget& point : corrections.lead_ins[i]) {
+        add_row(corrections, joints, file.rows[i], point, text);
+        text += end;
       }
     }
-    const auto add = [&](const std::string&, double number) { text += "," + field_of(number); };
-    each_column_at(Place::kInFront, exchange::kCorrectionFigures, item, add);
-    text += fmt::format(",{},{}", corrections.model_id, csv_field(item.message));
-    each_column_at(Place::kBehind, exchange::kCorrectionFigures, item, add);
-    text += "\n";
+    add_row(corrections, joints, file.rows[i], corrections.items[i], text);
+    text += end;
   }
   return text;
 }
+
+namespace {
+
+ordered_json joints_json(const Corrections& corrections, const std::vector<double>& joints_deg) {
+  ordered_json joints = ordered_json::object();
+  for (std::size_t j = 0; j < joints_deg.size(); ++j) {
+    joints[joint_column(static_cast<int>(j), type_of(corrections.joint_types, j))] = joints_deg[j];
+  }
+  return joints;
+}
+
+}  // namespace
 
 ordered_json corrections_json(const TargetFile& file, const Corrections& corrections) {
   ordered_json items = ordered_json::array();
@@ -240,18 +274,23 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
       json["input"][file.columns[k]] = file.rows[i].fields[k];
     }
     if (has_command(item)) {
-      ordered_json joints = ordered_json::object();
-      for (std::size_t j = 0; j < item.joints_deg.size(); ++j) {
-        const JointType type = type_of(corrections.joint_types, j);
-        joints[joint_column(static_cast<int>(j), type)] = item.joints_deg[j];
-      }
       json["commanded"] = pose_json(item.commanded);
-      json["joints"] = joints;
+      json["joints"] = joints_json(corrections, item.joints_deg);
+    }
+    if (!corrections.turned_deg.empty()) json["turned_rz_deg"] = corrections.turned_deg[i];
+    if (!corrections.lead_ins.empty()) {
+      json["lead_in"] = ordered_json::array();
+      for (const exchange::CorrectedTarget& point : corrections.lead_ins[i])
+        json["lead_in"].push_back({{"commanded", pose_json(point.commanded)},
+                                   {"joints", joints_json(corrections, point.joints_deg)}});
     }
     put_figures({Place::kInFront, Place::kBehind}, exchange::kCorrectionFigures, item, json);
     items.push_back(json);
   }
-  return {{"model", corrections.model_id}, {"targets", items}};
+  ordered_json all = {{"model", corrections.model_id}};
+  if (!corrections.lead_ins.empty()) all["lead_ins"] = corrections.lead_in_points();
+  all["targets"] = items;
+  return all;
 }
 
 std::string corrections_summary(const Corrections& corrections) {
@@ -262,6 +301,13 @@ std::string corrections_summary(const Corrections& corrections) {
   for (const auto& [status, count] : counts) {
     text += fmt::format("{}{} {}", separator, count, status);
     separator = ", ";
+  }
+  if (!corrections.lead_ins.empty())
+    text += fmt::format("; {} points of lead-ins", corrections.lead_in_points());
+  if (!corrections.turned_deg.empty()) {
+    const auto turned = std::count_if(corrections.turned_deg.begin(), corrections.turned_deg.end(),
+                                      [](double turn) { return turn != 0; });
+    text += fmt::format("; {} turned about the tool's axis", turned);
   }
   return text + "\n";
 }

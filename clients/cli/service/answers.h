@@ -26,6 +26,11 @@ struct Corrections {
   std::vector<JointType> joint_types;
   std::vector<exchange::CorrectedTarget> items;  ///< one a target
   std::vector<Note> notes = {};                  ///< of the model
+  /// Points to go to before each target, status `lead_in`; empty: none were asked for.
+  std::vector<std::vector<exchange::CorrectedTarget>> lead_ins = {};
+  std::vector<double> turned_deg = {};  ///< about the tool's axis; empty: it was not free
+
+  [[nodiscard]] std::size_t lead_in_points() const;
 };
 
 /// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for,
@@ -35,9 +40,10 @@ struct Corrections {
                                                       const Predictions& predictions);
 
 /// The columns of the target file, then `row` (line in that file), `status`, the pose and joints to
-/// command, errors to expect, `iterations`, `model_id`, `message`. A column of the file that is
-/// named as one of these comes as `input_NAME`. A target that is not corrected has no pose and no
-/// joints to command, and an error only if it is known.
+/// command, errors to expect, `iterations`, `model_id`, `message`; where the tool was free to turn,
+/// `turned_rz_deg`. A lead-in is rows of status `lead_in` above the target's own. A column of the
+/// file that is named as one of these comes as `input_NAME`. A target that is not corrected has no
+/// pose and no joints to command, and an error only if it is known.
 [[nodiscard]] std::string corrections_csv(const TargetFile& file, const Corrections& corrections);
 [[nodiscard]] nlohmann::ordered_json corrections_json(const TargetFile& file,
                                                       const Corrections& corrections);

@@ -121,6 +121,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"correct",
      "  trammel correct --model cell.model targets.csv -o corrected.csv\n"
      "  trammel correct --model cell.model drill.mod -o out.mod --receipt r.csv\n"
+     "  trammel correct --model cell.model drill.mod -o out.mod --lead-in --tolerance 0.1\n"
      "  trammel correct --undo out.mod -o drill.mod"},
     {"check", "  trammel check --model cell.model --batch few.csv --json health.json"},
     {"diagnose",

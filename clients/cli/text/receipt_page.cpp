@@ -91,6 +91,7 @@ std::string facts(const CorrectedProgram& program) {
         fmt::format("{}, {} to corrected targets", program.moves, program.moves_corrected)}},
       {{"Targets",
         fmt::format("{}, {} left as they were", program.rows.size(), program.left_alone())}},
+      {{"Motions inserted before targets (lead-ins)", fmt::format("{}", program.lead_ins)}},
       {{"Expected error before", figures(program, &ReceiptRow::error_before_mm)}},
       {{"Expected error after", figures(program, &ReceiptRow::error_after_mm)}},
   };

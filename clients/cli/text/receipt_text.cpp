@@ -95,6 +95,8 @@ ordered_json item_of(const ReceiptRow& row) {
     item["after"] = row.after;
     item["joints"] = row.joints;
     item["folded"] = row.folded;
+    item["lead_in"] = row.lead_in;
+    item["turned_rz_deg"] = row.turned_deg;
   }
   if (std::isfinite(row.p_B.x()))
     item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
@@ -121,7 +123,7 @@ std::string receipt_csv(const CorrectedProgram& program) {
   text +=
       ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,"
       "domain,iterations,path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,"
-      "suggestion\n";
+      "suggestion,lead_in,turned_rz_deg\n";
   text.reserve(text.size() + kCsvBytes * program.rows.size());
   const auto out = std::back_inserter(text);
   for (const ReceiptRow& row : program.rows) {
@@ -140,8 +142,8 @@ std::string receipt_csv(const CorrectedProgram& program) {
     fmt::format_to(out, "{},{},", domain_of(row), row.iterations);
     add_fixed(text, row.path_limit_before_mm_s, 1);
     add_fixed(text, row.path_limit_after_mm_s, 1);
-    fmt::format_to(out, "{},{},{}\n", program.model_id, csv_field(row.message),
-                   csv_field(row.suggestion));
+    fmt::format_to(out, "{},{},{},{},{:g}\n", program.model_id, csv_field(row.message),
+                   csv_field(row.suggestion), row.lead_in, row.turned_deg);
   }
   return text;
 }
@@ -159,6 +161,7 @@ std::string receipt_json(const CorrectedProgram& program,
                        {"moves", program.moves},
                        {"moves_corrected", program.moves_corrected},
                        {"left_alone", program.left_alone()},
+                       {"lead_ins", program.lead_ins},
                        {"notes", notes_json(notes)},
                        {"largest_step",
                         {{"mm", json_mm(program.largest_step_mm)},
@@ -193,6 +196,15 @@ std::string receipt_summary(const CorrectedProgram& program) {
     separator = ", ";
   }
   text += "\n";
+  const auto led = std::count_if(program.rows.begin(), program.rows.end(),
+                                 [](const ReceiptRow& row) { return row.lead_in > 0; });
+  if (led > 0)
+    text +=
+        fmt::format("{} targets are led in to, by {} inserted motions\n", led, program.lead_ins);
+  const auto turned = std::count_if(program.rows.begin(), program.rows.end(), [](const auto& row) {
+    return row.corrected() && row.turned_deg != 0;
+  });
+  if (turned > 0) text += fmt::format("{} targets are turned about the tool's axis\n", turned);
   for (const std::string& note : program.notes) text += "note: " + note + "\n";
   return text;
 }

@@ -34,6 +34,11 @@ double share_inside(double tolerance, double rms, double sigma) {
 
 }  // namespace
 
+bool surely_inside(const ExpectedError& target, double tolerance_mm) {
+  return std::isfinite(target.after_mm + target.sigma_mm) &&
+         share_inside(tolerance_mm, target.after_mm, target.sigma_mm) >= kSure;
+}
+
 ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, double tolerance_mm) {
   ToleranceVerdict verdict{tolerance_mm};
   for (const ExpectedError& one : targets) {

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "server/base/units.h"
+#include "server/robot/chain.h"
+
+/// Tools that may stand at any angle about their axis (drill, mill, dot): which one is a choice.
+namespace trammel {
+
+/// rad: the steps in which turns about the tool's axis are tried, up to half a turn either way.
+constexpr double kFreeTurn = from_deg(15);
+constexpr int kFreeTurns = 12;  // either way
+
+/// Turned by so many steps about its own z.
+[[nodiscard]] Pose turned_freely(const Pose& X_BT, int steps);
+/// True if the joints stand clear of their limits (5 deg, 50 mm of a rail) and of a singular wrist
+/// (10 deg), so that a correction has room.
+[[nodiscard]] bool stands_clear(const Chain& robot, const JointVector& q);
+
+}  // namespace trammel
