@@ -6,6 +6,19 @@ include(CMakePackageConfigHelpers)
 install(TARGETS trammeld RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT trammeld)
 install(TARGETS trammel RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT trammel)
 install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel COMPONENT trammel)
+# The pages and files to which those of config and models lead, where their links find them.
+foreach(page
+  clients/cam/README.md clients/library/README.md clients/python/README.md deploy/patroni/README.md deploy/security/README.md
+  idl/README.md idl/repairs/README.md idl/repairs/guard/README.md server/bias/flange/README.md
+  server/calibrate/causes/README.md server/calibrate/instruments/README.md server/calibrate/maps/README.md
+  server/compensate/MODEL_FILE.md server/compensate/budget/README.md server/dds/records/README.md server/diagnose/README.md
+  server/diagnose/TOUR.md server/error_sources/README.md server/health/README.md server/http/README.md
+  server/measurement/files/README.md server/report/README.md server/robot/README.md server/store/README.md
+  server/tasks/README.md server/trainer/README.md tests/benchmarks/README.md deploy/discovery-server.xml deploy/patroni/etcd
+  deploy/patroni/patroni.yml)
+  get_filename_component(folder ${page} DIRECTORY)
+  install(FILES ${page} DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel/${folder} COMPONENT trammel)
+endforeach()
 install(DIRECTORY ${PROJECT_BINARY_DIR}/shell/man1/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT trammel)
 install(FILES ${PROJECT_BINARY_DIR}/shell/trammel DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT trammel)
 install(FILES ${PROJECT_BINARY_DIR}/shell/_trammel DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT trammel)

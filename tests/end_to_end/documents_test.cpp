@@ -96,7 +96,7 @@ bool is_left_out(const std::string& line) {
                      [&](const auto& one) { return line.starts_with(one.first); });
 }
 
-/// The files that the lines of config/README.md find in the folder where they are typed.
+/// The files that the lines of config/OPERATIONS.md find in the folder where they are typed.
 constexpr const char* kFiles = R"(
 set -euo pipefail
 cell=config/cell-7.yaml
@@ -189,14 +189,14 @@ int type_lines(const std::string& document, Desk& desk) {
 
 TEST(Documents, WhatTheCellEngineerIsToTypeEveryDayRuns) {
   Desk desk;
-  EXPECT_GE(type_lines("config/README.md", desk), 30);
+  EXPECT_GE(type_lines("config/OPERATIONS.md", desk), 30);
 }
 
 TEST(Documents, WhatEveryOtherDocumentHasSomebodyTypeRuns) {
   Desk desk;
   int typed = 0;
   for (const std::string& document : documents()) {
-    if (!is_run_elsewhere(document) && document != "config/README.md")
+    if (!is_run_elsewhere(document) && document != "config/OPERATIONS.md")
       typed += type_lines(document, desk);
   }
   EXPECT_GE(typed, 7);

@@ -96,25 +96,8 @@ TEST(Readme, TheWorkflowThatItNamesIsThere) {
   })) << name;
 }
 
-/// Every file that a page of the project links to or names as a place to look.
-TEST(Readme, EveryLinkOfEveryPageLeadsToAFile) {
-  const fs::path root = TRAMMEL_SOURCE_DIR;
-  std::vector<fs::path> pages;
-  for (const fs::path& entry :
-       {root, root / "server", root / "idl", root / "config", root / "models", root / "tests",
-        root / "clients", root / "deploy"}) {
-    if (!fs::exists(entry)) continue;
-    if (entry == root) {
-      for (const auto& file : fs::directory_iterator(root)) {
-        if (file.path().extension() == ".md") pages.push_back(file.path());
-      }
-      continue;
-    }
-    for (const auto& file : fs::recursive_directory_iterator(entry)) {
-      if (file.path().extension() == ".md") pages.push_back(file.path());
-    }
-  }
-  ASSERT_GE(pages.size(), 10U);
+/// Every file that these pages link to is there.
+void expect_links(const std::vector<fs::path>& pages) {
   for (const fs::path& page : pages) {
     const std::string text = text_of(page);
     for (auto at = text.find("]("); at != std::string::npos; at = text.find("](", at + 1)) {
@@ -124,6 +107,53 @@ TEST(Readme, EveryLinkOfEveryPageLeadsToAFile) {
       EXPECT_TRUE(fs::exists(page.parent_path() / target)) << page << ": " << target;
     }
   }
+}
+
+void add_pages(const fs::path& folder, std::vector<fs::path>& pages) {
+  for (const auto& file : fs::recursive_directory_iterator(folder)) {
+    if (file.path().extension() == ".md") pages.push_back(file.path());
+  }
+}
+
+TEST(Readme, EveryLinkOfEveryPageLeadsToAFile) {
+  const fs::path root = TRAMMEL_SOURCE_DIR;
+  std::vector<fs::path> pages;
+  for (const auto& file : fs::directory_iterator(root)) {
+    if (file.path().extension() == ".md") pages.push_back(file.path());
+  }
+  for (const char* folder : {"server", "idl", "config", "models", "tests", "clients", "deploy"}) {
+    if (fs::exists(root / folder)) add_pages(root / folder, pages);
+  }
+  ASSERT_GE(pages.size(), 10U);
+  expect_links(pages);
+}
+
+TEST(Readme, EveryLinkOfTheInstalledPagesLeadsToAFile) {
+  const test::TemporaryFolder folder;
+  const test::Finished installed =
+      test::run({"/usr/bin/cmake", "--install", TRAMMEL_BINARY_DIR, "--component", "trammel",
+                 "--prefix", folder.path().string()});
+  ASSERT_EQ(installed.exit_code, 0) << installed.err;
+  const fs::path pages_of = folder.path() / "share/trammel";
+  std::vector<fs::path> pages;
+  add_pages(pages_of, pages);
+  expect_links(pages);
+  for (const char* page : {"CELL_FILE.md", "SERVER_FILE.md", "OPERATIONS.md", "README.md"})
+    EXPECT_TRUE(fs::exists(pages_of / "config" / page)) << page;
+  EXPECT_TRUE(fs::exists(folder.path() / "share/man/man1/trammel-train.1"));
+}
+
+TEST(Readme, IsReadInTwoMinutesAndLeadsToThePagesOfAFewMinutesEach) {
+  const auto words_of = [](const char* page) {
+    std::ifstream file(fs::path(TRAMMEL_SOURCE_DIR) / page);
+    int words = 0;
+    for (std::string word; file >> word;) words += word.size() > 1 ? 1 : 0;
+    return words;
+  };
+  EXPECT_LE(words_of("README.md"), 450);
+  for (const char* page :
+       {"config/README.md", "config/CELL_FILE.md", "config/SERVER_FILE.md", "config/OPERATIONS.md"})
+    EXPECT_LE(words_of(page), 1500) << page;
 }
 
 }  // namespace
