@@ -59,6 +59,26 @@ TEST(ChooseCauses, TakeWhatAnArmHasAndLeaveWhatItHasNot) {
   }
 }
 
+TEST(ChooseCauses, SaysHowFarItIsAndStopsWhereItIsAskedTo) {
+  const test::HeavyArm arm = arm_with_wave(2e-4);
+  const MeasurementBatch batch = test::measured(arm, 60, 1);
+  std::vector<double> shares;
+  const ChosenCauses all = test::demand(choose_causes(arm.cell, {}, batch, [&](double share) {
+    shares.push_back(share);
+    return Status();
+  }));
+  EXPECT_GT(shares.size(), all.choice.tried.size()) << "a share for each cause that is tried";
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_GT(shares.front(), 0);
+  EXPECT_LT(shares.back(), 1);
+  const auto stopped = choose_causes(arm.cell, {}, batch, [](double share) -> Status {
+    if (share > 0.5) return failure(ErrorCode::kBusy, "given up on request");
+    return {};
+  });
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kBusy);
+}
+
 TEST(ChooseCauses, WhatIsChosenPredictsFreshPosesAsWellAsTheTruthsOwnCauses) {
   const test::HeavyArm arm = arm_with_wave(2e-4);
   const MeasurementBatch batch = test::measured(arm, 200, 1);

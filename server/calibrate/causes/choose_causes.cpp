@@ -114,18 +114,25 @@ struct Candidate {
   ColumnGroup columns = {};
 };
 
+// Of the whole choice, by the time that they take on a few thousand poses of an arm of six joints.
+constexpr double kBaseShare = 0.1, kLoadShare = 0.4, kCandidateShare = 0.7;
+
 class CauseSearch {
  public:
-  CauseSearch(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch)
-      : cell_(cell), batch_(batch), blocks_(joint_blocks(batch)) {}
+  CauseSearch(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+              const std::function<Status(double)>& go_on)
+      : cell_(cell), batch_(batch), go_on_(go_on), blocks_(joint_blocks(batch)) {}
 
   Result<ChosenCauses> run(const std::vector<std::string>& kept) {
     chosen_.sources = always_identified(*cell_, kept);
     base_ = TRY(calibrate_with_maps(cell_, chosen_.sources, batch_, {}));
     held_out_ = missed(base_);
+    TRY(go_on_(kBaseShare));
     try_load();
+    TRY(go_on_(kLoadShare));
     add_candidates();
-    if (!candidates_.empty()) try_others();
+    TRY(go_on_(kCandidateShare));
+    if (!candidates_.empty()) TRY(try_others());
     chosen_.choice.held_out = rms(held_out_);
     return std::move(chosen_);
   }
@@ -219,14 +226,16 @@ class CauseSearch {
   }
 
   /// Tries the remaining causes by falling gain, each beside those taken before it.
-  void try_others() {
+  Status try_others() {
     std::vector<ColumnGroup> present;
     for (const ErrorSourcePtr& source : base_.model.sources)
       present.push_back(columns_of_source(model_, source->name()));
     CauseEvidence evidence = evidence_of(base_, model_, present);
     const double in_space = 3 * std::pow(mean_sigma(base_, batch_), 2);
     held_out_ = in_space * evidence.left_out();
+    const auto all = static_cast<double>(candidates_.size());
     while (!candidates_.empty()) {
+      TRY(go_on_(1 - (1 - kCandidateShare) * static_cast<double>(candidates_.size()) / all));
       std::vector<CauseEvidence::Gain> gains;
       for (const Candidate& one : candidates_) gains.push_back(evidence.gain_of(one.columns));
       const auto largest = std::max_element(gains.begin(), gains.end(),
@@ -240,6 +249,7 @@ class CauseSearch {
       }
       candidates_.erase(one);
     }
+    return {};
   }
 
   /// About the arm that was `found`; `model` has further sources.
@@ -261,6 +271,7 @@ class CauseSearch {
 
   std::shared_ptr<const Cell> cell_;
   const MeasurementBatch& batch_;
+  const std::function<Status(double)>& go_on_;
   std::vector<std::vector<std::size_t>> blocks_;
   CalibrationResult base_;
   PhysicalModel model_;  // with all candidates
@@ -274,8 +285,9 @@ class CauseSearch {
 
 Result<ChosenCauses> choose_causes(const std::shared_ptr<const Cell>& cell,
                                    const std::vector<std::string>& kept,
-                                   const MeasurementBatch& batch) {
-  return CauseSearch(cell, batch).run(kept);
+                                   const MeasurementBatch& batch,
+                                   const std::function<Status(double share)>& go_on) {
+  return CauseSearch(cell, batch, go_on).run(kept);
 }
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,9 +16,10 @@ struct ChosenCauses {
 };
 
 /// The causes that `batch` shows, beside base, geometry, tools and `kept` (README.md). All that is
-/// kept stays. Refusals as calibrate().
-[[nodiscard]] Result<ChosenCauses> choose_causes(const std::shared_ptr<const Cell>& cell,
-                                                 const std::vector<std::string>& kept,
-                                                 const MeasurementBatch& batch);
+/// kept stays. Refusals as calibrate(), and when `go_on`, told the share that is done, gives up.
+[[nodiscard]] Result<ChosenCauses> choose_causes(
+    const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& kept,
+    const MeasurementBatch& batch,
+    const std::function<Status(double share)>& go_on = [](double) { return Status(); });
 
 }  // namespace trammel

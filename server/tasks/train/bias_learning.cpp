@@ -186,14 +186,20 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all,
   BiasOptions options;
   options.kernel = kernel;
   options.seed = seed;
-  options.progress = [&](double share) { return progress(0.6 * share); };
+  // By the time that they take: the orientations as long as the positions, where there are any.
+  const bool oriented = std::all_of(batch.measurements.begin(), batch.measurements.end(),
+                                    [](const Measurement& m) { return m.R_WT.has_value(); });
+  const double position_share = oriented ? 0.5 : 0.95, spread_share = 0.05;
+  options.progress = [&](double share) { return progress(position_share * share); };
   const Learned learned = TRY(learned_bias(parts, batch, left_out, options));
   if (!learned.bias) return {};
   take_over(parts, *learned.bias, batch, left_out);
-  parts.bias_spread = bias_spread(learned.problem, *learned.bias, left_out, seed,
-                                  [&](double share) { return progress(0.6 + 0.2 * share); });
+  parts.bias_spread =
+      bias_spread(learned.problem, *learned.bias, left_out, seed,
+                  [&](double share) { return progress(position_share + spread_share * share); });
   options.kernel = without_flange(learned.bias->state().kernel);
-  options.progress = [&](double share) { return progress(0.8 + 0.2 * share); };
+  const double both = position_share + spread_share;
+  options.progress = [&](double share) { return progress(both + (1 - both) * share); };
   return add_rotation_bias(parts, batch, learned.problem, options);
 }
 

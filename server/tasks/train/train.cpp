@@ -57,18 +57,37 @@ Result<Asked> asked_of(const Cell& cell, const TrainOptions& options) {
   return asked;
 }
 
+/// Says what is being done; false: give up.
+using Report = std::function<bool(const std::string& stage, double share)>;
+
+/// The share of a training after which each of its parts is done, by the time that they take.
+struct PartsDone {
+  double choice, physics, bias;
+};
+constexpr PartsDone kPhysicsKnown = {0, 0.3, 0.9}, kPhysicsChosen = {0.55, 0.65, 0.9};
+
 /// The sources to identify from these rows; what was chosen goes into `choice`. Distances and
 /// touches do not choose: with them the usual sources are identified.
 Result<std::vector<std::string>> sources_of(const std::shared_ptr<const Cell>& cell,
                                             const MeasurementBatch& rows,
-                                            const TrainOptions& options,
+                                            const TrainOptions& options, const Report& report,
                                             std::optional<CauseChoice>& choice) {
   Asked asked = TRY(asked_of(*cell, options));
   if (!asked.chosen_by_data) return with_unknown_tool(std::move(asked.sources), *cell);
   if (has_gauges(rows)) return with_unknown_tool(cell->model.error_sources, *cell);
-  ChosenCauses chosen = TRY(choose_causes(cell, asked.sources, rows));
+  if (!report("choosing causes", 0)) return given_up();
+  ChosenCauses chosen = TRY(choose_causes(cell, asked.sources, rows, [&](double share) -> Status {
+    if (!report("choosing causes", kPhysicsChosen.choice * share)) return given_up();
+    return {};
+  }));
   choice = std::move(chosen.choice);
   return std::move(chosen.sources);
+}
+
+/// The shares of a training from nothing but the measurements.
+PartsDone parts_done(const Cell& cell, const TrainOptions& options) {
+  const Result<Asked> asked = asked_of(cell, options);
+  return asked && asked->chosen_by_data ? kPhysicsChosen : kPhysicsKnown;
 }
 
 /// Records what to take the arm's temperature for where a request does not say it.
@@ -131,8 +150,16 @@ Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBat
 }
 
 /// The model with its figures on the poses it was trained on and on those held out.
-Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split) {
+Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split,
+                                   const Report& report) {
+  const auto go_on = [&](double share) -> Status {
+    if (!report("validating", kPhysicsKnown.bias + (1 - kPhysicsKnown.bias) * share))
+      return given_up();
+    return {};
+  };
+  TRY(go_on(0));
   TRY(add_training_figures(parts, split.train));
+  TRY(go_on(0.4));
   Result<CompensatedModel> bare = CompensatedModel::make(parts);
   if (!bare) return bare;
   if (const double hidden = hidden_by_sigma(*bare); hidden > parts.discrepancy) {
@@ -141,15 +168,14 @@ Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSpl
     bare = CompensatedModel::make(parts);
     if (!bare) return bare;
   }
+  TRY(go_on(0.6));
   parts.budget.reset();
   if (tells_a_budget(split.train)) parts.budget = error_budget(*bare, split.train);
+  TRY(go_on(0.8));
   parts.validation.reset();
   if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
   return CompensatedModel::make(std::move(parts));
 }
-
-/// Says what is being done; false: give up.
-using Report = std::function<bool(const std::string& stage, double share)>;
 
 /// A bias learned anew for a model whose named sources were, too: its poses become the domain.
 /// Where there is none to take, the domain of the physics stays.
@@ -161,8 +187,10 @@ Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainO
   const JointVector slope_before = parts.extrapolation_slope;
   parts.extrapolation_slope = slope;
   const Status learned =
-      add_bias(parts, refitted.poses, kernel, left_out, options.seed,
-               [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
+      add_bias(parts, refitted.poses, kernel, left_out, options.seed, [&](double share) {
+        const auto [choice, physics, bias] = kPhysicsKnown;
+        return report("learning the bias", physics + (bias - physics) * share);
+      });
   if (!learned) return learned;
   if (parts.bias) {
     record_domain(parts, refitted.poses);
@@ -188,9 +216,8 @@ Result<CompensatedModel> train_from(const CompensatedModel& from,
     TRY(add_bias_anew(refit, *options.bias, options, report));
   }
   refit.parts.sessions_left_out = std::move(unplaced);
-  if (!report("validating", 0.9)) return given_up();
   record_stamp(refit.parts, batch, options);
-  return validated(std::move(refit.parts), split);
+  return validated(std::move(refit.parts), split, report);
 }
 
 /// Parts of a calibrated model; the slope is that of its physics.
@@ -222,7 +249,9 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
                : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
   };
   return identify_sessions(identify, sources, batch, [&](double share) -> Status {
-    if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
+    const PartsDone done = parts_done(*cell, options);
+    const double now = done.choice + (done.physics - done.choice) * share;
+    if (!report("asking what changed between the sessions", now)) return given_up();
     return {};
   });
 }
@@ -249,7 +278,9 @@ Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
 Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
                                       const TrainOptions& options, const Report& report,
                                       std::optional<CauseChoice>& choice) {
-  const std::vector<std::string> sources = TRY(sources_of(cell, split.train, options, choice));
+  const std::vector<std::string> sources =
+      TRY(sources_of(cell, split.train, options, report, choice));
+  if (!report("calibrating", parts_done(*cell, options).choice)) return given_up();
   auto found = identified_by_most(identified_on(split.train, cell, sources, options, report),
                                   split.train, cell, sources, options, report);
   if (!found) return found;
@@ -275,11 +306,13 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
   const std::string asked = options.bias.value_or(cell->model.bias);
   const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
   TRY(add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
-               [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); }));
+               [&, done = parts_done(*cell, options)](double share) {
+                 const double now = done.physics + (done.bias - done.physics) * share;
+                 return report("learning the bias", now);
+               }));
   if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
-  if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
-  return validated(std::move(parts), split);
+  return validated(std::move(parts), split, report);
 }
 
 /// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of
@@ -353,10 +386,13 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Ch
   parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
   TRY(add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
                [&](double share) {
-                 return !options.progress || options.progress("learning the bias", share);
+                 return !options.progress ||
+                        options.progress("learning the bias", kPhysicsKnown.bias * share);
                }));
   record_training(parts, batch, rows, options);
-  return validated(std::move(parts), {rows, {}});
+  return validated(std::move(parts), {rows, {}}, [&](const std::string& stage, double share) {
+    return !options.progress || options.progress(stage, share);
+  });
 }
 
 }  // namespace trammel
