@@ -6,11 +6,11 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/defaults.h"
+#include "clients/cli/terminal/help_topics.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/terminal/spared_inputs.h"
 #include "clients/cli/terminal/usage.h"
-#include "clients/cli/text/help_topics.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cli {
@@ -44,8 +44,15 @@ int exit_code(ErrorCode code) {
 namespace {
 
 /// Where a command was asked to write its result for programs; empty where it was not.
-std::string json_path_in(const std::vector<std::string>& words) {
+std::string json_path_in(const CLI::App& app, const std::vector<std::string>& words) {
+  const auto prints_table = [&](const CLI::App* one) {
+    return !words.empty() && one->get_name() == words[0] &&
+           one->get_option_no_throw("--form") != nullptr;
+  };
+  const bool has_form = !app.get_subcommands(prints_table).empty();
   for (std::size_t k = 0; k < words.size(); ++k) {
+    const bool is_form = has_form && (words[k] == "-o" || words[k] == "--form");
+    if (is_form && k + 1 < words.size() && words[k + 1] == "json") return "-";
     if (words[k].starts_with("--json=")) return words[k].substr(7);
     if (words[k] == "--json" && k + 1 < words.size()) return words[k + 1];
   }
@@ -54,12 +61,12 @@ std::string json_path_in(const std::vector<std::string>& words) {
 
 /// One line for each error, on standard error; as JSON, too, where that was asked for on standard
 /// output.
-int tell_errors(const Error& error, const std::string& command,
+int tell_errors(const CLI::App& app, const Error& error, const std::string& command,
                 const std::vector<std::string>& words) {
   const std::string name = command.empty() ? "trammel" : "trammel " + command;
   for (const Error& one : apart(error))
     fmt::print(stderr, "{}: {}\n", emphasised(name), sentence(one));
-  tell_refusal(error, json_path_in(words));
+  tell_refusal(error, json_path_in(app, words));
   return exit_code(error.code);
 }
 
@@ -126,28 +133,29 @@ int run_command_line(int argc, const char* const* argv) {
   const std::string name = words.empty() || words[0].starts_with('-') ? "" : words[0];
   if (const auto unknown = unknown_word(app, words)) {
     const bool no_command = unknown->field == "command";
-    return tell_errors(*unknown, no_command ? "" : name, words);
+    return tell_errors(app, *unknown, no_command ? "" : name, words);
   }
   const Result<std::vector<std::string>> all = with_defaults(app, words, defaults_path());
-  if (!all) return tell_errors(all.error(), name, words);
+  if (!all) return tell_errors(app, all.error(), name, words);
   try {
     app.parse(std::vector<std::string>(all->rbegin(),
                                        all->rend()));  // the parser takes them from the end
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return tell_help(app, error);
-    return tell_errors(usage_error(app, error, name), name, words);
+    return tell_errors(app, usage_error(app, error, name), name, words);
   }
   if (!chosen) {
-    fmt::print(stderr, "A command is required\n{}", app.help());
-    return kWrongUsage;
+    tell(std::string(overview()), {});
+    return kNotAll;
   }
   const CLI::App& command = *app.get_subcommands().front();
-  if (const auto empty = empty_word(command)) return tell_errors(*empty, command.get_name(), words);
+  if (const auto empty = empty_word(command))
+    return tell_errors(app, *empty, command.get_name(), words);
   if (const Status fine = check_outputs(command); !fine)
-    return tell_errors(advised(fine.error(), command), command.get_name(), words);
+    return tell_errors(app, advised(fine.error(), command), command.get_name(), words);
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  return tell_errors(advised(done.error(), command), command.get_name(), words);
+  return tell_errors(app, advised(done.error(), command), command.get_name(), words);
 }
 
 }  // namespace trammel::cli

@@ -147,7 +147,7 @@ std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count,
                                                        Clock::time_point deadline) {
   MutexLock lock(mutex_);
   wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
-  changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
+  changed_.wait_until(lock, std::min(deadline, others_expected_until_),
                       [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count; });
   std::vector<KnownServer> servers;
   for (const auto& [id, server] : servers_) servers.push_back(server);
@@ -227,6 +227,7 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
   {
     const MutexLock lock(mutex_);
     if (status != nullptr) {
+      if (servers_.empty()) others_expected_until_ = Clock::now() + wire::kStatusPeriod / 2;
       servers_[status->server().to_string()] = {participant, *status, Clock::now(), written_s};
       records_[status->server().to_string()] = status->record().to_string();
     } else {

@@ -76,8 +76,8 @@ class ServerWatch {
   /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 
-  /// Waits until `count` servers are known, or until `deadline`. After the first server it waits at
-  /// most one status period.
+  /// Waits until `count` servers are known, or until `deadline`. The others are expected for half a
+  /// status period after the first one, once: one that is down costs no later call any time.
   [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count,
                                                           Clock::time_point deadline);
   /// Waits until the models in force are as many as the servers report, one status period at most.
@@ -123,6 +123,7 @@ class ServerWatch {
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
   std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
+  Clock::time_point others_expected_until_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, std::string> records_
       TRAMMEL_GUARDED_BY(mutex_);  // by id, also of those that have left
   std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id

@@ -9,8 +9,9 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/defaults.h"
+#include "clients/cli/terminal/help_topics.h"
+#include "clients/cli/terminal/names.h"
 #include "clients/cli/terminal/output.h"
-#include "clients/cli/text/help_topics.h"
 #include "clients/cli/text/manual.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
@@ -78,6 +79,7 @@ TEST_F(Help, OfEveryCommandHasExamplesThatTheCommandLineTakes) {
       CLI::App app("", "trammel");
       Action chosen;
       make_command_line(app, chosen);
+      words = words_by_option(app, words, false);
       EXPECT_NO_THROW(app.parse(std::vector<std::string>(words.rbegin(), words.rend()))) << line;
       EXPECT_TRUE(static_cast<bool>(chosen)) << line;
       EXPECT_EQ(app.get_subcommands().front()->get_name(), command->get_name()) << line;
@@ -107,8 +109,81 @@ TEST_F(Help, WhatIsPrintedFitsIn80Columns) {
       EXPECT_LE(line.size(), 80u) << about << ": " << line;
   };
   fits("");
+  fits("all");
   for (const HelpTopic& topic : help_topics()) fits(std::string(topic.name));
   for (const CLI::App* command : commands()) fits(command->get_name());
+}
+
+/// What a command line says, with its exit code.
+struct Said {
+  std::string out, err;
+  int exit_code = 0;
+};
+Said said(const std::vector<const char*>& words) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const int code = run_command_line(static_cast<int>(words.size()), words.data());
+  return {testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr(), code};
+}
+
+TEST_F(Help, TheProgramAloneShowsTenCommandsInGroupsAndWhereToBegin) {
+  const Said alone = said({"trammel"});
+  EXPECT_EQ(alone.exit_code, 1) << "as git alone";
+  EXPECT_EQ(alone.err, "");
+  int shown = 0;
+  for (const std::string& line : lines_of(alone.out)) {
+    const auto words = words_of(line);
+    const auto named = [&](const CLI::App* one) { return one->get_name() == words[0]; };
+    const auto all = commands();
+    if (line.starts_with("  ")) {
+      EXPECT_TRUE(std::any_of(all.begin(), all.end(), named)) << line;
+      ++shown;
+    }
+  }
+  EXPECT_EQ(shown, 10);
+  EXPECT_NE(alone.out.find("trammel help start"), std::string::npos);
+  EXPECT_NE(alone.out.find("trammel help all"), std::string::npos);
+  EXPECT_EQ(said({"trammel", "help"}).out, alone.out);
+  const std::string all = said({"trammel", "help", "all"}).out;
+  for (const CLI::App* command : commands())
+    EXPECT_NE(all.find("\n  " + command->get_name() + " "), std::string::npos);
+}
+
+TEST_F(Help, AWordOfAnotherProgramIsLedToWhatDoesItHere) {
+  for (const auto& [word, here] : {std::pair("calibrate", "trammel train"),
+                                   {"list", "trammel status"},
+                                   {"login", "--security FOLDER"},
+                                   {"upload", "trammel submit"},
+                                   {"measure", "trammel plan"},
+                                   {"start", "trammel help start"},
+                                   {"verify", "trammel check"},
+                                   {"diff", "trammel compare"},
+                                   {"serve", "trammeld --config"},
+                                   {"formats", "trammel help formats"},
+                                   {"evalute", "evaluate"}}) {
+    const Said led = said({"trammel", word});
+    EXPECT_EQ(led.exit_code, 2) << word;
+    EXPECT_NE(led.err.find(here), std::string::npos) << led.err;
+  }
+  EXPECT_NE(said({"trammel", "train", "--data", "b.csv"}).err.find("did you mean --batch?"),
+            std::string::npos);
+  EXPECT_NE(said({"trammel", "status", "--server", "b"}).err.find("did you mean --host?"),
+            std::string::npos);
+}
+
+TEST_F(Help, IsInTheRefusalWhereSomethingNeededWasLeftOut) {
+  const std::string refused = said({"trammel", "train", "cell.yaml"}).err;
+  EXPECT_NE(refused.find("--batch is required"), std::string::npos) << refused;
+  EXPECT_NE(refused.find("write trammel train CELL BATCH... --output FILE"), std::string::npos)
+      << refused;
+}
+
+TEST_F(Help, SaysWhatABareWordStandsFor) {
+  const std::string help = said({"trammel", "activate", "--help"}).out;
+  EXPECT_NE(help.find("Usage: trammel activate CELL@VERSION [OPTIONS]"), std::string::npos) << help;
+  EXPECT_NE(help.find("CELL@VERSION or --model"), std::string::npos) << help;
+  EXPECT_NE(said({"trammel", "train", "--help"}).out.find("trammel train CELL BATCH... --output"),
+            std::string::npos);
 }
 
 TEST_F(Help, ManualPagesAndCompletionsHaveEveryCommandAndOption) {

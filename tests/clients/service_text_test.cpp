@@ -75,9 +75,25 @@ TEST(ServiceText, ServersThatSayDifferentThingsOfABatchAreNamed) {
   other.server = "b";
   other.learned = false;
   const std::string text = batches_text({one, other});
-  EXPECT_NE(text.find("\na               cell-7          lt-07"), std::string::npos) << text;
-  EXPECT_NE(text.find("\nb               cell-7          lt-07"), std::string::npos) << text;
+  EXPECT_NE(text.find("\na       cell-7  lt-07"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nb       cell-7  lt-07"), std::string::npos) << text;
   EXPECT_EQ(batches_json({one, other})[1]["server"], "b");
+}
+
+TEST(ServiceText, AJobThatBeginsSaysWhatHappensNextAndTheCommandsThatShowIt) {
+  const std::string text = started_text("cell-7", 12);
+  EXPECT_TRUE(text.starts_with("job 12\n")) << text;
+  EXPECT_NE(text.find("trammel watch 12"), std::string::npos) << text;
+  EXPECT_NE(text.find("trammel models cell-7"), std::string::npos) << text;
+}
+
+TEST(ServiceText, JobsOfATableSayHowTheyEnded) {
+  const std::string text = all_jobs_text({job(1, "failed", "too few rows")});
+  EXPECT_NE(text.find("  1  cell-7  training  failed  2023-11-14 22:13  lt-07    too few rows\n"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(all_jobs_text({job(1, "failed", "")}, TableForm::kWide).find("server"),
+            std::string::npos);
 }
 
 TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {

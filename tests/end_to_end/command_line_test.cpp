@@ -162,7 +162,6 @@ TEST_F(CommandLine, AStudyPutsTheSourcesFiguresBesideOurs) {
 
 TEST_F(CommandLine, WrongUsageEndsWith2AndNamesWhatIsWrong) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
-      {{}, "A command is required"},
       {{"frobnicate"}, "frobnicate"},
       {{"train", "--cell", cell_}, "--batch is required"},
       {{"evaluate", "--model", "m", "--batch", "b", "--frob"}, "--frob"},

@@ -63,6 +63,20 @@ TEST_F(SeveralServersTest, EachCellsBatchesAndQuestionsReachTheServerThatHasIt) 
   EXPECT_EQ(batches->size(), 2U) << "of both servers, each once";
 }
 
+TEST_F(SeveralServersTest, StatusAnswersAtOnceAndNamesTheServerThatIsDown) {
+  second_.kill();
+  const std::string down = std::to_string(second_.port());
+  const auto began = std::chrono::steady_clock::now();
+  const test::Finished status = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status",
+                                           "--domain", std::to_string(first_.domain()), "--port",
+                                           std::to_string(first_.port()), "--port", down});
+  const auto took = std::chrono::steady_clock::now() - began;
+  EXPECT_EQ(status.exit_code, 0) << status.err;
+  EXPECT_LT(took, std::chrono::seconds(3)) << "each question waited a second for it";
+  EXPECT_NE(status.out.find("not reachable: 127.0.0.1:" + down), std::string::npos) << status.out;
+  EXPECT_NE(status.out.find("server " + first_.name()), std::string::npos) << status.out;
+}
+
 TEST_F(SeveralServersTest, OfTwoJobsWithOneNumberNoneIsTakenForTheOther) {
   const auto of_seven =
       session_->submit_measurements("cell-7", "of-seven", test::virtual_batch_csv(60, 1));

@@ -278,7 +278,9 @@ Status check_usage(const CorrectArguments& arguments) {
   if (!arguments.undo && arguments.model.empty())
     return failure(ErrorCode::kUsage, "--model is required")
         .of("--model")
-        .next("it may be left out with --undo only");
+        .next(
+            "name it first: trammel correct MODEL PROGRAM -o OUTPUT; it may be left out with "
+            "--undo only");
   if (is_program(arguments.inputs, arguments.format)) return {};
   const std::string ending = std::filesystem::path(arguments.inputs[0]).extension().string();
   if (arguments.format.empty() && (ending == ".xlsx" || ending == ".xls" || ending == ".ods")) {

@@ -6,6 +6,7 @@
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
@@ -38,6 +39,7 @@ constexpr std::size_t kShownPoses = 5;
 
 struct CompareArguments {
   std::string before, now, batch, json, report;
+  ServiceOptions service;
 };
 
 /// Both models on the same measurements.
@@ -219,8 +221,8 @@ Status compare(const CompareArguments& arguments) {
   std::vector<NamedFile> inputs = {{"A", arguments.before}, {"B", arguments.now}};
   if (!arguments.batch.empty()) inputs.push_back({"--batch", arguments.batch});
   TRY(outputs.check(inputs));
-  const CompensatedModel before = TRY(load_model(arguments.before));
-  const CompensatedModel now = TRY(load_model(arguments.now));
+  const CompensatedModel before = TRY(model_named(arguments.before, arguments.service));
+  const CompensatedModel now = TRY(model_named(arguments.now, arguments.service));
   const Compared all = TRY(compared(before, now, arguments));
   warn_of_notes(notes_of(now));
   const std::string text = text_of(all, before, now);
@@ -240,14 +242,16 @@ void add_compare_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("compare",
                                          "Compare two models of one robot: what changed in which "
                                          "parameter, and by how much at which poses");
-  command->add_option("A", arguments->before, "Model file")->required();
-  command->add_option("B", arguments->now, "Model file to hold against it")->required();
+  command->add_option("A", arguments->before, "Model file, or CELL@VERSION of a service")
+      ->required();
+  command->add_option("B", arguments->now, "Model to hold against it, named likewise")->required();
   command->add_option(
       "--batch", arguments->batch,
       "Measurements to judge both by (CSV: joints in deg, rails in mm; positions in mm)");
   command->add_option("--report", arguments->report,
                       "Page to write (HTML); opens without a network");
   add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return compare(*arguments); }; });
 }
 

@@ -15,6 +15,7 @@
 #include <fstream>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/service/named_places.h"
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
@@ -106,16 +107,6 @@ Found network(const std::string& host) {
   return {"network", State::kGood, fmt::format("datagrams arrive on {}", host), ""};
 }
 
-/// True if a trammel server of this host holds the port: its name in the abstract namespace.
-bool held_by_server(const std::string& host, std::uint16_t port) {
-  std::ifstream sockets("/proc/net/unix");
-  const std::string wanted = fmt::format("@trammel-dds-{}-{}", host, port);
-  for (std::string line; std::getline(sockets, line);) {
-    if (line.ends_with(wanted)) return true;
-  }
-  return false;
-}
-
 Found port(const std::string& host, std::uint16_t number) {
   const std::string check = fmt::format("port {}", number);
   if (held_by_server(host, number)) return {check, State::kGood, "a trammel server holds it", ""};
@@ -144,11 +135,6 @@ Found version_of(const client::ServerStatus& server) {
           fmt::format("version {} as this command line, {} cells, up {:.0f} s",
                       shown(server.version), server.cells.size(), server.uptime_s),
           ""};
-}
-
-bool is_of_this_host(const HostPort& place) {
-  const std::vector<std::string> own = own_addresses();
-  return std::find(own.begin(), own.end(), place.address) != own.end();
 }
 
 void look_at_servers(const ServiceOptions& options, const std::vector<HostPort>& places,

@@ -4,8 +4,8 @@
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/command_tree.h"
+#include "clients/cli/terminal/help_topics.h"
 #include "clients/cli/terminal/output.h"
-#include "clients/cli/text/help_topics.h"
 #include "clients/cli/text/manual.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
@@ -29,6 +29,10 @@ std::string list_of_topics() {
 
 Status help(const CLI::App& app, const std::string& about) {
   if (about.empty()) {
+    tell(std::string(overview()), {});
+    return {};
+  }
+  if (about == "all") {
     tell(app.get_formatter()->make_help(&app, "trammel", CLI::AppFormatMode::Normal) +
              list_of_topics(),
          {});
@@ -86,7 +90,7 @@ void add_help_commands(CLI::App& app, Action& chosen) {
   const auto about = std::make_shared<std::string>();
   CLI::App* help_command =
       app.add_subcommand("help", "Tell about a command or a topic: formats, cell, units, ...");
-  help_command->add_option("topic", *about, "A command or a topic; left out: the lists of both");
+  help_command->add_option("topic", *about, "A command or a topic, or all: the lists of both");
   help_command->callback(
       [&app, about, &chosen] { chosen = [&app, about] { return help(app, *about); }; });
 

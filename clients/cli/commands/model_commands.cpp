@@ -5,6 +5,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
@@ -169,6 +170,7 @@ Status train_model(const TrainArguments& arguments) {
 struct EvaluateArguments {
   std::string model, json, residuals;
   std::vector<std::string> batches;
+  ServiceOptions service;
 };
 
 /// The note on what the sessions of a batch stand on for a model, for people; empty where nothing
@@ -207,7 +209,7 @@ Status check_outputs(const EvaluateArguments& arguments) {
 
 Status evaluate(const EvaluateArguments& arguments) {
   TRY(check_outputs(arguments));
-  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CompensatedModel model = TRY(model_named(arguments.model, arguments.service));
   const CheckedBatch batch = TRY(read_checked_batches(arguments.batches, model.cell()));
   const InWorld world = TRY(in_world_of(model, batch.rows()));
   const Evaluation evaluation = model.evaluate(world.batch);
@@ -252,10 +254,11 @@ Status evaluate(const EvaluateArguments& arguments) {
 
 struct ReportArguments {
   std::string model, batch, output, json;
+  ServiceOptions service;
 };
 
 Status report(const ReportArguments& arguments) {
-  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CompensatedModel model = TRY(model_named(arguments.model, arguments.service));
   std::optional<MeasurementBatch> batch;
   std::string note;
   if (!arguments.batch.empty()) {
@@ -327,12 +330,13 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App* command = app.add_subcommand(
       "evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
-  command->add_option("--model", arguments->model, "Model file")->required();
+  add_model_option(*command, arguments->model);
   add_batches_option(*command, arguments->batches)->required();
   command->add_option("--residuals", arguments->residuals,
                       "Also write what is left of each pose, axis by axis, to this file (CSV; '-': "
                       "standard output)");
   add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
   command->callback(
       [arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }
@@ -341,12 +345,13 @@ void add_report(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReportArguments>();
   CLI::App* command =
       app.add_subcommand("report", "Write a model's report as a page that opens offline");
-  command->add_option("--model", arguments->model, "Model file")->required();
+  add_model_option(*command, arguments->model);
   command->add_option(
       "--batch", arguments->batch,
       "Measurements to compare it with (CSV: joints in deg, rails in mm; positions in mm)");
   command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
   add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });
 }
 

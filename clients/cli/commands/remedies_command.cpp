@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/notes_text.h"
@@ -24,6 +25,7 @@ constexpr int kCheckPoses = 30;  // as many as tell the arm's lines when they ar
 
 struct RemediesArguments {
   std::string model, targets, output, json, check_poses;
+  ServiceOptions service;
 };
 
 /// The poses that prove afterwards whether a remedy helped; empty where the cell cannot be planned.
@@ -126,7 +128,7 @@ Status remedies(const RemediesArguments& arguments) {
   std::vector<NamedFile> inputs = {{"--model", arguments.model}};
   if (!arguments.targets.empty()) inputs.push_back({"--targets", arguments.targets});
   TRY(outputs.check(inputs));
-  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CompensatedModel model = TRY(model_named(arguments.model, arguments.service));
   const ErrorBudget budget = TRY(budget_asked(model, arguments.targets));
   const std::string where = arguments.targets.empty()
                                 ? fmt::format("{} training poses", budget.poses)
@@ -156,7 +158,7 @@ void add_remedies_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "remedies",
       "Tell what could be put right in the controller, step by step, and what each step leaves");
-  command->add_option("--model", arguments->model, "Model file")->required();
+  add_model_option(*command, arguments->model);
   command->add_option(
       "--targets", arguments->targets,
       "Targets to say it of instead of the training poses (CSV: joints in deg, rails in mm)");
@@ -168,6 +170,7 @@ void add_remedies_command(CLI::App& app, Action& chosen) {
                    "afterwards whether it helped: measure them, then diagnose --since")
       ->type_name("FILE");
   add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
   command->callback(
       [arguments, &chosen] { chosen = [arguments] { return remedies(*arguments); }; });
 }

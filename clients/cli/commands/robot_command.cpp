@@ -3,6 +3,7 @@
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/rigid_robot.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/robot_text.h"
@@ -14,6 +15,7 @@ namespace {
 
 struct RobotArguments {
   std::string model, output, table, json;
+  ServiceOptions service;
 };
 
 Status export_robot(const RobotArguments& arguments) {
@@ -31,7 +33,7 @@ Status export_robot(const RobotArguments& arguments) {
   outputs.add("--table", arguments.table);
   outputs.add("--json", arguments.json);
   TRY(outputs.check({{"--model", arguments.model}}));
-  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CompensatedModel model = TRY(model_named(arguments.model, arguments.service));
   const RigidRobot robot = rigid_robot(model);
   outputs.put("--output", yaml ? robot_yaml_text(model, robot) : urdf_text(model, robot));
   outputs.put("--table", robot_table(model, robot));
@@ -50,7 +52,7 @@ void add_robot_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "export-robot",
       "Write the calibrated robot for other programs, and how much they cannot carry, mm");
-  command->add_option("--model", arguments->model, "Model file")->required();
+  add_model_option(*command, arguments->model);
   command
       ->add_option(
           "-o,--output", arguments->output,
@@ -60,6 +62,7 @@ void add_robot_command(CLI::App& app, Action& chosen) {
       "--table", arguments->table,
       "Also write nominal and calibrated parameters (CSV: mm, deg) with their uncertainty");
   add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
   command->callback(
       [arguments, &chosen] { chosen = [arguments] { return export_robot(*arguments); }; });
 }

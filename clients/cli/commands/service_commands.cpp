@@ -8,6 +8,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/near_columns.h"
 #include "clients/cli/service/health_answers.h"
+#include "clients/cli/service/named_places.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
@@ -34,6 +35,7 @@ struct ServiceArguments {
   std::int64_t job = 0;
   bool watch = false, release = false, force = false;
   double limit_s = 3600;
+  TableForm form = TableForm::kTable;
   ServiceOptions service;
 };
 
@@ -89,10 +91,10 @@ Result<Extent> follow(client::Session& session, std::int64_t job,
 }
 
 /// Tells the job's number, or with --watch follows it.
-Result<Extent> started(client::Session& session, std::int64_t job,
+Result<Extent> started(client::Session& session, const std::string& cell, std::int64_t job,
                        const ServiceArguments& arguments) {
   if (arguments.watch) return follow(session, job, arguments);
-  tell(fmt::format("job {}\n", job), {arguments.json});
+  tell(started_text(cell, job), {arguments.json});
   return write_json(arguments.json, {{"job", job}}).map([] { return Extent::kAll; });
 }
 
@@ -105,7 +107,7 @@ Result<Extent> submit(client::Session& session, const ServiceArguments& argument
                              ? std::filesystem::path(arguments.batch).stem().string()
                              : arguments.batch_id;
   const std::int64_t job = TRY(session.submit_measurements(cell, id, csv));
-  return started(session, job, arguments);
+  return started(session, cell, job, arguments);
 }
 
 Result<Extent> retrain(client::Session& session, const ServiceArguments& arguments) {
@@ -119,7 +121,7 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
       arguments.release
           ? session.release_and_train(cell, arguments.batch_ids, arguments.level, arguments.bias)
           : session.train(cell, arguments.batch_ids, arguments.level, arguments.bias));
-  return started(session, job, arguments);
+  return started(session, cell, job, arguments);
 }
 
 bool is_checked(const ordered_json& cell) {
@@ -165,11 +167,15 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   const ordered_json record = record_of(answers);
   const ordered_json fleet = fleet_of(answers);
   add_other_servers(fleet, list);
+  const std::vector<std::string> silent = silent_servers(arguments.service, servers.size());
+  for (const std::string& line : silent) text += line + "\n";
   text += record_text(record) + servers_text(fleet, record);
-  tell(text + models_text(models) + checked + jobs_text(jobs) + quarantine_text(apart),
+  tell(text + models_text(models, arguments.form) + checked + jobs_text(jobs) +
+           quarantine_text(apart),
        {arguments.json});
   return write_json(arguments.json, {{"record", record},
                                      {"servers", list},
+                                     {"silent", silent},
                                      {"fleet", fleet},
                                      {"models", models_json(models)},
                                      {"health", health},
@@ -184,7 +190,7 @@ Result<Extent> watch(client::Session& session, const ServiceArguments& arguments
 Status list_models(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const std::vector<exchange::ModelInfo> models = TRY(session.models(cell));
-  tell(models_text(models), {arguments.json});
+  tell(models_text(models, arguments.form), {arguments.json});
   return write_json(arguments.json, {{"cell", cell}, {"models", models_json(models)}});
 }
 
@@ -192,11 +198,13 @@ Status list_jobs(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell =
       TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
   const std::vector<client::DatedJob> jobs = TRY(session.jobs(cell));
-  tell(all_jobs_text(jobs), {arguments.json});
+  tell(all_jobs_text(jobs, arguments.form), {arguments.json});
   return write_json(arguments.json, {{"jobs", jobs_json(jobs)}});
 }
 
-Status list_batches(client::Session& session, const ServiceArguments& arguments) {
+Status list_batches(client::Session& session, ServiceArguments arguments) {
+  if (arguments.batch_id.empty() && take_form(arguments.output, arguments.form, arguments.json))
+    arguments.output.clear();
   const std::string cell =
       TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
   if (arguments.batch_id.empty() != arguments.output.empty())
@@ -208,7 +216,7 @@ Status list_batches(client::Session& session, const ServiceArguments& arguments)
     return write_output(arguments.output, csv);
   }
   const std::vector<client::BatchOfService> batches = TRY(session.batches(cell));
-  tell(batches_text(batches), {arguments.json});
+  tell(batches_text(batches, arguments.form), {arguments.json});
   return write_json(arguments.json, {{"batches", batches_json(batches)}});
 }
 
@@ -292,7 +300,8 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
   if (model.version == 0) {
     return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model)
         .of("--model")
-        .with_text(arguments.model);
+        .with_text(arguments.model)
+        .next(fmt::format("trammel models {} lists its versions", model.cell));
   }
   client::ChangeOptions options = TRY(decided_against(session, model.cell, arguments));
   options.force = arguments.force;
@@ -513,9 +522,15 @@ void add_service_commands(CLI::App& app, Action& chosen) {
   add_retrain(commands);
   commands.add("status",
                "Show the servers that answer, the models in force, jobs, and batches in quarantine",
-               status, [](CLI::App&, ServiceArguments&) {});
+               status, [](CLI::App& command, ServiceArguments& arguments) {
+                 add_form_option(command, arguments.form, arguments.json);
+               });
   add_running_jobs(commands);
-  commands.add("models", "List the history of a cell's models", list_models, add_cell);
+  commands.add("models", "List the history of a cell's models", list_models,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 add_form_option(command, arguments.form, arguments.json);
+               });
   commands.add(
       "show", "Tell what a stored version of a cell's model is, and how large its errors were",
       show_model, [](CLI::App& command, ServiceArguments& arguments) {
@@ -524,16 +539,20 @@ void add_service_commands(CLI::App& app, Action& chosen) {
             ->required();
       });
   commands.add("jobs", "List jobs that wait, run, and ended lately, and how", list_jobs,
-               add_any_cell);
-  commands.add(
-      "batches", "List the batches that a service has, or fetch one as a file", list_batches,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        add_any_cell(command, arguments);
-        command.add_option("--batch", arguments.batch_id, "Id of the batch to fetch");
-        command.add_option(
-            "-o,--output", arguments.output,
-            "File to write it to (CSV, as it came: joints in deg, rails in mm; positions in mm)");
-      });
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_any_cell(command, arguments);
+                 add_form_option(command, arguments.form, arguments.json);
+               });
+  commands.add("batches", "List the batches that a service has, or fetch one as a file",
+               list_batches, [](CLI::App& command, ServiceArguments& arguments) {
+                 add_any_cell(command, arguments);
+                 command.add_option("--batch", arguments.batch_id, "Id of the batch to fetch");
+                 command.add_option(
+                     "-o,--output", arguments.output,
+                     "File to write it to (CSV, as it came: joints in deg, rails in mm; positions "
+                     "in mm); of "
+                     "the list wide (all columns) or json (for programs, on standard output)");
+               });
   add_model_changes(commands);
 }
 

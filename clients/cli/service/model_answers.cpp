@@ -1,5 +1,7 @@
 #include "clients/cli/service/model_answers.h"
 
+#include <filesystem>
+
 #include "server/compensate/model_notes.h"
 #include "server/robot/cell_rules.h"
 
@@ -23,6 +25,15 @@ Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
   std::string known_payload = TRY(resolve_payload(model.cell(), payload));
   TRY(model.check_trained_with(known_tool, known_payload));
   return ToolAndPayload{std::move(known_tool), std::move(known_payload)};
+}
+
+Result<CompensatedModel> model_named(const std::string& name, const ServiceOptions& service) {
+  std::error_code error;
+  if (!service.service || std::filesystem::exists(name, error)) return load_model(name);
+  const ModelReference reference = TRY(parse_model_reference(name));
+  const auto session = TRY(open_session(service));
+  const std::string text = TRY(session->export_model(reference.cell, reference.version));
+  return deserialize(text, "the service's model " + name);
 }
 
 exchange::ModelInfo info_of(const CompensatedModel& model) {

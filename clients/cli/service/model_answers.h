@@ -24,6 +24,11 @@ struct ToolAndPayload {
                                                             const std::string& tool,
                                                             const std::string& payload);
 
+/// The model of a file or, with --service and where no file is called so, the service's: of
+/// `cell@version`, or of a cell the one in force.
+[[nodiscard]] Result<CompensatedModel> model_named(const std::string& name,
+                                                   const ServiceOptions& service);
+
 /// Tells which model answered a call.
 using SawModel = std::function<void(const exchange::ModelInfo&)>;
 

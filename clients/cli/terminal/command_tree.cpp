@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "clients/cli/terminal/names.h"
+
 namespace trammel::cli {
 
 namespace {
@@ -54,7 +56,7 @@ OptionText described(const CLI::Option& option, const std::string& group) {
   text.group = group;
   const TypeText type = type_of(option);
   text.words = words_of(type.range);
-  text.value = type.name;
+  text.value = type.name == "TEXT" && option.check_name("--output") ? "FILE" : type.name;
   if (text.positional) {
     text.names = {option.get_name(true)};
   } else {
@@ -139,17 +141,11 @@ class HelpFormat : public CLI::Formatter {
   }
 };
 
-/// The number of columns that a text takes: bytes that continue a character count nothing.
-std::size_t columns(const std::string& text) {
-  return static_cast<std::size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
-}
-
 std::string wrapped_line(const std::string& line, std::size_t indent, std::size_t width) {
   std::istringstream in(line);
   std::string text, row;
   for (std::string word; in >> word;) {
-    if (!row.empty() && columns(row) + 1 + columns(word) > width) {
+    if (!row.empty() && columns_of(row) + 1 + columns_of(word) > width) {
       text += row + "\n";
       row = std::string(indent, ' ') + word;
     } else {
@@ -163,24 +159,25 @@ std::string wrapped_line(const std::string& line, std::size_t indent, std::size_
 
 std::string OptionText::label() const {
   if (positional) return names.front() + (repeated ? " ..." : "");
-  return fmt::format("{}{}{}", fmt::join(names, ", "), value.empty() ? "" : " " + value,
-                     repeated ? " ..." : "");
+  return fmt::format("{}{}{}{}", place.empty() ? "" : place + " or ", fmt::join(names, ", "),
+                     value.empty() ? "" : " " + value, repeated ? " ..." : "");
 }
 
 std::string CommandText::usage(const std::string& program) const {
   std::string text = program.empty() ? name : program + " " + name;
   bool any = false;
+  const auto add_word = [&](const std::string& word, const OptionText& option) {
+    text += " " + (option.required ? word : "[" + word + "]") + (option.repeated ? "..." : "");
+  };
+  for (const OptionText& option : options)
+    if (!option.place.empty()) add_word(option.place, option);
+  for (const OptionText& option : options)
+    if (option.positional) add_word(option.names.front(), option);
   for (const OptionText& option : options) {
-    if (option.positional || !option.required) {
-      any = true;
-      continue;
-    }
-    text += fmt::format(" {} {}", option.names.back(), option.value);
-  }
-  for (const OptionText& option : options) {
-    if (option.positional)
-      text += " " + (option.required ? option.names.front() : "[" + option.names.front() + "]");
-    if (option.positional && option.repeated) text += "...";
+    const bool is_said_by_option = option.place.empty() && !option.positional;
+    if (is_said_by_option && option.required)
+      text += fmt::format(" {} {}", option.names.back(), option.value);
+    any |= !option.required;
   }
   if (any) text += " [OPTIONS]";
   return text + (commands.empty() ? "" : " [SUBCOMMAND]");
@@ -189,13 +186,29 @@ std::string CommandText::usage(const std::string& program) const {
 CommandText described(const CLI::App& app) {
   CommandText text{app.get_name(), app.get_description(), app.get_footer(), {}, {}};
   add_options(app, "", text.options);
+  const auto places = places_of_words(app.get_name());
+  for (auto place = places.rbegin(); place != places.rend(); ++place) {
+    const auto at =
+        std::find_if(text.options.begin(), text.options.end(), [&](const OptionText& one) {
+          return std::find(one.names.begin(), one.names.end(), place->option) != one.names.end();
+        });
+    if (at == text.options.end()) continue;
+    at->place = place->word;
+    at->group = "Arguments";
+    std::rotate(text.options.begin(), at, at + 1);
+  }
   std::stable_partition(text.options.begin(), text.options.end(),
-                        [](const OptionText& one) { return one.positional; });
+                        [](const OptionText& one) { return one.positional || !one.place.empty(); });
   for (const CLI::App* command :
        app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); })) {
     if (!command->get_group().empty()) text.commands.push_back(described(*command));
   }
   return text;
+}
+
+std::size_t columns_of(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {

@@ -17,9 +17,10 @@ struct OptionText {
   std::string description;         ///< with range, default, and what it needs or excludes
   std::string group;               ///< its heading
   std::vector<std::string> words;  ///< the only values that it takes; empty: any
+  std::string place;  ///< what a bare word that stands for it is called; empty: none does
   bool required = false, positional = false, repeated = false;
 
-  /// `-o, --output FILE`.
+  /// `-o, --output FILE`; `CELL or --cell TEXT`.
   [[nodiscard]] std::string label() const;
 };
 
@@ -33,6 +34,9 @@ struct CommandText {
 };
 
 [[nodiscard]] CommandText described(const CLI::App& app);
+
+/// The number of columns that a text takes: bytes that continue a character count nothing.
+[[nodiscard]] std::size_t columns_of(const std::string& text);
 
 /// Lines of at most `width` columns, broken between words only; those after the first are indented
 /// by `indent`. Line ends in `text` stay; a line that begins with a blank is an example and stays

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "clients/cli/terminal/names.h"
 #include "server/base/letters.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
@@ -81,14 +82,18 @@ std::string defaults_path() {
 
 Result<std::vector<std::string>> with_defaults(const CLI::App& app, std::vector<std::string> words,
                                                const std::string& path) {
-  if (path.empty() || words.empty()) return words;
-  const std::vector<Default> defaults = TRY(read_defaults(path));
+  if (words.empty()) return words;
+  const std::vector<Default> defaults =
+      TRY(path.empty() ? Result<std::vector<Default>>() : read_defaults(path));
   const auto is_command = [&](const CLI::App* one) {
     return one->get_name() == words[0] && !words[0].empty();
   };
   const auto commands = app.get_subcommands(is_command);
   const bool asks_help = says(words, "--help") || says(words, "-h");
   if (commands.empty() || asks_help) return words;
+  const bool cell_is_known = std::any_of(defaults.begin(), defaults.end(),
+                                         [](const Default& one) { return one.name == "cell"; });
+  words = words_by_option(app, words, cell_is_known);
   std::vector<std::string> added;
   for (const Default& one : defaults) {
     const std::string option = "--" + one.name;

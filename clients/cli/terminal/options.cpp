@@ -7,7 +7,6 @@
 #include <cstdlib>
 
 #include "server/base/plain_text.h"
-#include "server/robot/cell.h"
 
 namespace trammel::cli {
 
@@ -166,12 +165,34 @@ void add_json_option(CLI::App& command, std::string& path) {
       ->type_name("FILE");
 }
 
+bool take_form(const std::string& word, TableForm& form, std::string& json) {
+  if (word == "wide") form = TableForm::kWide;
+  if (word == "json") json = "-";
+  return word == "wide" || word == "json";
+}
+
+void add_form_option(CLI::App& command, TableForm& form, std::string& json) {
+  command
+      .add_option_function<std::string>(
+          "-o,--form", [&form, &json](const std::string& word) { take_form(word, form, json); },
+          "The table with all columns (wide), or the result for programs on standard output (json)")
+      ->check(CLI::IsMember(std::vector<std::string>{"wide", "json"}));
+}
+
 CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths) {
   return command
       .add_option("--batch", paths,
                   "Measurements (CSV: joints in deg, rails in mm; positions in mm); again for each "
                   "measuring session: the tracker may stand elsewhere in each")
       ->allow_extra_args(false);
+}
+
+CLI::Option* add_model_option(CLI::App& command, std::string& model) {
+  return command
+      .add_option("--model", model,
+                  "Model file, or CELL@VERSION of a service; with --service also a cell's id: its "
+                  "model in force")
+      ->required();
 }
 
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload) {
@@ -181,30 +202,6 @@ void add_tool_options(CLI::App& command, std::string& tool, std::string& payload
   command.add_option("--payload", payload,
                      "Payload id of the cell, for rows that name none; may be left out where the "
                      "cell has only one");
-}
-
-Result<ModelReference> parse_model_reference(const std::string& text) {
-  ModelReference reference;
-  const std::size_t at = text.find('@');
-  reference.cell = text.substr(0, at);
-  if (reference.cell.empty())
-    return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text)
-        .of("--model")
-        .with_text(text);
-  if (at == std::string::npos) return reference;
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + at + 1, end, reference.version);
-  if (error != std::errc() || stop != end || reference.version < 1) {
-    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text)
-        .of("--model")
-        .with_text(text);
-  }
-  return reference;
-}
-
-Result<std::string> cell_id(const std::string& id_or_file) {
-  if (!id_or_file.ends_with(".yaml") && !id_or_file.ends_with(".yml")) return id_or_file;
-  return read_cell(id_or_file).map([](const Cell& cell) { return cell.name; });
 }
 
 }  // namespace trammel::cli

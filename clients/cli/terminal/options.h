@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/cli/terminal/names.h"
+#include "clients/cli/terminal/table.h"
 #include "clients/session/session.h"
 #include "server/base/result.h"
 
@@ -46,18 +48,14 @@ void need_finite_numbers(CLI::App& app);
 /// `--seed`: a whole number from 0.
 void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
 void add_json_option(CLI::App& command, std::string& path);
+/// `-o wide|json` of a command that prints a table; json goes to standard output, as `--json -`.
+void add_form_option(CLI::App& command, TableForm& form, std::string& json);
+/// Takes such a word; false: it is none.
+bool take_form(const std::string& word, TableForm& form, std::string& json);
 /// `--batch FILE`, again for each: every one is a measuring session.
 CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths);
+/// `--model`, of a file or of a service; required.
+CLI::Option* add_model_option(CLI::App& command, std::string& model);
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload);
-
-/// `cell` or `cell@version`, as --model and --service name a model.
-struct ModelReference {
-  std::string cell;
-  int version = 0;  ///< 0: the one in force
-};
-[[nodiscard]] Result<ModelReference> parse_model_reference(const std::string& text);
-
-/// The id of a cell from what --cell says: the id, or a cell file that holds it.
-[[nodiscard]] Result<std::string> cell_id(const std::string& id_or_file);
 
 }  // namespace trammel::cli

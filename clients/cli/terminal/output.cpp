@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <sstream>
+#include <string_view>
 
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -32,6 +34,14 @@ bool same_file(const std::string& a, const std::string& b) {
     return fs::weakly_canonical(fs::absolute(path, error), error);
   };
   return fs::equivalent(a, b, error) || place(a) == place(b);
+}
+
+/// True where the stream is a terminal that shows colours, and the user has not said no to them.
+bool shows_colours(int stream) {
+  const char* terminal = std::getenv("TERM");
+  const char* plain = std::getenv("NO_COLOR");
+  return ::isatty(stream) == 1 && terminal != nullptr && std::strcmp(terminal, "dumb") != 0 &&
+         (plain == nullptr || *plain == '\0');
 }
 
 /// True if this process has written a result to standard output. A second one after it would not be
@@ -89,7 +99,8 @@ std::string json_text(const nlohmann::ordered_json& value) {
 
 void tell(const std::string& text, std::initializer_list<std::string> paths) {
   if (std::any_of(paths.begin(), paths.end(), is_standard_output)) return;
-  std::fputs(shown_lines(text).c_str(), stdout);
+  const std::string lines = shown_lines(text);
+  std::fputs((shows_colours(STDOUT_FILENO) ? painted(lines) : lines).c_str(), stdout);
 }
 
 void Outputs::add(const std::string& option, const std::string& path,
@@ -158,11 +169,26 @@ Status write_together(const std::vector<OutputText>& texts) {
 }
 
 std::string emphasised(const std::string& text) {
-  const char* terminal = std::getenv("TERM");
-  const char* plain = std::getenv("NO_COLOR");
-  const bool colours = ::isatty(STDERR_FILENO) == 1 && terminal != nullptr &&
-                       std::strcmp(terminal, "dumb") != 0 && (plain == nullptr || *plain == '\0');
-  return colours ? "\033[1;31m" + text + "\033[0m" : text;
+  return shows_colours(STDERR_FILENO) ? "\033[1;31m" + text + "\033[0m" : text;
+}
+
+std::string painted(const std::string& lines) {
+  constexpr const char *kGood = "\033[32m", *kDoubtful = "\033[33m", *kBad = "\033[31m";
+  constexpr std::pair<std::string_view, const char*> kStates[] = {
+      {"* ", kGood},          {"healthy:", kGood},     {"cannot_tell:", kDoubtful},
+      {"note:", kDoubtful},   {"warning:", kDoubtful}, {"in quarantine", kDoubtful},
+      {"changed:", kBad},     {"stop:", kBad},         {"failed", kBad},
+      {"not reachable", kBad}};
+  std::istringstream in(lines);
+  std::string all;
+  for (std::string line; std::getline(in, line);) {
+    const auto state = std::find_if(std::begin(kStates), std::end(kStates),
+                                    [&](const auto& one) { return line.starts_with(one.first); });
+    all += state == std::end(kStates) ? line : state->second + line + "\033[0m";
+    all += "\n";
+  }
+  if (!lines.ends_with('\n') && !all.empty()) all.pop_back();
+  return all;
 }
 
 std::string time_left(double elapsed_s, double share) {

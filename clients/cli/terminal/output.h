@@ -25,8 +25,9 @@ void tell_refusal(const Error& error, const std::string& json_path);
 
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
-/// Text for people on standard output, control characters of foreign text spelled out; left out
-/// when a result for programs goes there (`paths`: where results go).
+/// Text for people on standard output, control characters of foreign text spelled out, painted()
+/// where that is a terminal that shows colours and NO_COLOR is not set; left out when a result for
+/// programs goes there (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
 
 /// A file that a command reads or writes, and the option that names it.
@@ -67,6 +68,9 @@ struct OutputText {
 /// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not
 /// set; else as it is.
 [[nodiscard]] std::string emphasised(const std::string& text);
+
+/// Lines for a terminal in colours: those that begin with a state are green, yellow or red by it.
+[[nodiscard]] std::string painted(const std::string& lines);
 
 /// `, about 40 s left`, from how long a share of the work took; empty while that says little (under
 /// 2 s or 2 %) and at the end.

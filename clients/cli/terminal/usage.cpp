@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <set>
 
+#include "clients/cli/terminal/command_tree.h"
+#include "clients/cli/terminal/help_topics.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
 
@@ -51,12 +53,92 @@ std::string question(const std::string& prefix, const std::string& meant) {
   return meant.empty() ? "" : ", did you mean " + prefix + meant + "?";
 }
 
+/// Words of other programs, and what does that here.
+struct OtherWord {
+  std::string_view word, here;
+};
+constexpr std::array kOtherCommands = {
+    OtherWord{"abort", "trammel cancel JOB"},
+    OtherWord{"apply", "trammel correct, or trammel activate CELL@VERSION"},
+    OtherWord{"calibrate", "trammel train"},
+    OtherWord{"compensate", "trammel correct"},
+    OtherWord{"daemon", "trammeld --config server.yaml, a program of its own"},
+    OtherWord{"delete", "trammel discard CELL BATCH"},
+    OtherWord{"deploy", "trammel activate CELL@VERSION"},
+    OtherWord{"diff", "trammel compare A B"},
+    OtherWord{"fit", "trammel train"},
+    OtherWord{"fix", "trammel correct"},
+    OtherWord{"health", "trammel check"},
+    OtherWord{"identify", "trammel train"},
+    OtherWord{"info", "trammel show CELL@VERSION, or trammel status"},
+    OtherWord{"init", "trammel plan, with a cell file (trammel help cell)"},
+    OtherWord{"kill", "trammel cancel JOB"},
+    OtherWord{"learn", "trammel train"},
+    OtherWord{"list", "trammel status, or trammel models CELL"},
+    OtherWord{"log", "trammel audit"},
+    OtherWord{"login", "--security FOLDER, where a service asks for certificates"},
+    OtherWord{"logs", "trammel audit"},
+    OtherWord{"ls", "trammel status, or trammel models CELL"},
+    OtherWord{"measure", "trammel plan (what to measure) or trammel convert (what was)"},
+    OtherWord{"optimise", "trammel train"},
+    OtherWord{"optimize", "trammel train"},
+    OtherWord{"ping", "trammel status"},
+    OtherWord{"publish", "trammel activate CELL@VERSION"},
+    OtherWord{"push", "trammel submit CELL BATCH"},
+    OtherWord{"remove", "trammel discard CELL BATCH"},
+    OtherWord{"restore", "trammel rollback CELL"},
+    OtherWord{"revert", "trammel rollback CELL"},
+    OtherWord{"rm", "trammel discard CELL BATCH"},
+    OtherWord{"run", "trammeld --config server.yaml, a program of its own"},
+    OtherWord{"send", "trammel submit CELL BATCH"},
+    OtherWord{"serve", "trammeld --config server.yaml, a program of its own"},
+    OtherWord{"stop", "trammel cancel JOB"},
+    OtherWord{"test", "trammel evaluate"},
+    OtherWord{"undo", "trammel correct --undo, or trammel rollback CELL"},
+    OtherWord{"upload", "trammel submit CELL BATCH"},
+    OtherWord{"use", "trammel activate CELL@VERSION"},
+    OtherWord{"validate", "trammel evaluate"},
+    OtherWord{"verify", "trammel check"},
+    OtherWord{"version", "trammel --version"}};
+constexpr std::array kOtherOptions = {
+    OtherWord{"address", "host"},   OtherWord{"config", "cell"},
+    OtherWord{"csv", "batch"},      OtherWord{"data", "batch"},
+    OtherWord{"dest", "output"},    OtherWord{"follow", "watch"},
+    OtherWord{"input", "batch"},    OtherWord{"measurements", "batch"},
+    OtherWord{"message", "reason"}, OtherWord{"n", "count"},
+    OtherWord{"number", "count"},   OtherWord{"points", "count"},
+    OtherWord{"poses", "count"},    OtherWord{"server", "host"},
+    OtherWord{"url", "host"},       OtherWord{"wait", "watch"},
+    OtherWord{"yes", "force"}};
+
+std::string_view here(std::span<const OtherWord> words, std::string_view word) {
+  const auto found = std::find_if(words.begin(), words.end(),
+                                  [&](const OtherWord& one) { return one.word == word; });
+  return found == words.end() ? std::string_view() : found->here;
+}
+
+/// `trammel help TOPIC`, where the word is a topic of the help; else empty.
+std::string topic_called(const std::string& word) {
+  for (const HelpTopic& topic : help_topics())
+    if (topic.name == word) return "trammel help " + word;
+  return "";
+}
+
 Error unknown_command(const CLI::App& app, const std::string& word) {
+  const std::string topic = topic_called(word);
+  const std::string_view other = topic.empty() ? here(kOtherCommands, word) : topic;
+  if (!other.empty()) {
+    return failure(ErrorCode::kUsage, "{}: no such command, did you mean {}?", word, other)
+        .of("command")
+        .with_text(word)
+        .next("trammel help start shows the way from nothing to a corrected program")
+        .value();
+  }
   const std::string near = meant(word, command_names(app));
   return failure(ErrorCode::kUsage, "{}: no such command{}", shown_short(word), question("", near))
       .of("command")
       .with_text(shown_short(word))
-      .next(near.empty() ? "trammel help lists them all"
+      .next(near.empty() ? "trammel help all lists them"
                          : fmt::format("trammel {} --help tells about it", near))
       .value();
 }
@@ -65,8 +147,10 @@ Error unknown_option(const CLI::App& command, const std::string& word) {
   std::vector<std::string> names;
   add_option_names(command, names);
   const std::string name = word.substr(0, word.find('='));
-  const std::string near =
-      meant(name.substr(std::min(name.find_first_not_of('-'), name.size())), names);
+  const std::string bare = name.substr(std::min(name.find_first_not_of('-'), name.size()));
+  const std::string other(here(kOtherOptions, bare));
+  const bool is_here = std::find(names.begin(), names.end(), other) != names.end();
+  const std::string near = is_here ? other : meant(bare, names);
   return failure(ErrorCode::kUsage, "{}: no such option{}", shown_short(name), question("--", near))
       .of(shown_short(name))
       .with_text(shown_short(word))
@@ -232,7 +316,7 @@ std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::st
     return failure(ErrorCode::kUsage, "{}: options stand behind a command", shown_short(words[0]))
         .of(shown_short(words[0]))
         .with_text(shown_short(words[0]))
-        .next("trammel help lists the commands")
+        .next("trammel help all lists the commands")
         .value();
   }
   if (command == nullptr) return unknown_command(app, words[0]);
@@ -284,6 +368,14 @@ std::string word_in(const std::string& what, bool unconverted) {
   return equals == std::string::npos ? "" : what.substr(equals + 3);
 }
 
+/// How the command is written, where something that it needs was left out; else empty.
+std::string form_of_command(const CLI::App& app, const CLI::ParseError& error,
+                            const std::string& command) {
+  const CLI::App* of = command_of(app, command);
+  if (of == nullptr || dynamic_cast<const CLI::RequiredError*>(&error) == nullptr) return "";
+  return "write " + described(*of).usage("trammel") + "; ";
+}
+
 }  // namespace
 
 Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::string& command) {
@@ -305,8 +397,9 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::
       .of(option)
       .with_text(shown_short(word))
       .next(command.empty()
-                ? "trammel help lists commands and topics"
-                : fmt::format("trammel {} --help tells its options, with examples", command))
+                ? "trammel help all lists commands and topics"
+                : form_of_command(app, error, command) +
+                      fmt::format("trammel {} --help tells its options, with examples", command))
       .value();
 }
 

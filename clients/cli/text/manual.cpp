@@ -6,7 +6,7 @@
 #include <cctype>
 #include <sstream>
 
-#include "clients/cli/text/help_topics.h"
+#include "clients/cli/terminal/help_topics.h"
 #include "server/base/letters.h"
 
 namespace trammel::cli {

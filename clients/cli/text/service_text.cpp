@@ -117,11 +117,39 @@ std::string jobs_text(const std::vector<client::DatedJob>& jobs) {
   return text + failed;
 }
 
-std::string all_jobs_text(const std::vector<client::DatedJob>& jobs) {
+std::string all_jobs_text(const std::vector<client::DatedJob>& jobs, TableForm form) {
   if (jobs.empty()) return "no jobs\n";
-  std::string text;
-  for (const client::DatedJob& job : jobs) text += job_line(job);
-  return text;
+  std::vector<std::vector<std::string>> rows;
+  for (const client::DatedJob& job : jobs) {
+    const client::JobStatus& status = job.status;
+    const bool runs = status.stage == "training" || status.stage == "storing";
+    rows.push_back({std::to_string(status.job), status.cell, kind_in_words(job.kind),
+                    status.stage + (runs ? fmt::format(" {:.0f} %", 100 * status.share) : ""),
+                    date_text(job.created_unix_s), date_text(job.started_unix_s.value_or(0)),
+                    date_text(job.finished_unix_s.value_or(0)),
+                    job.worker.empty() ? job.server : job.worker,
+                    fmt::format("{}", fmt::join(job.batches, ", ")), status.what});
+  }
+  return table_text({{"job", true},
+                     {"cell"},
+                     {"kind"},
+                     {"stage"},
+                     {"accepted"},
+                     {"begun", false, true},
+                     {"ended", false, true},
+                     {"server", false, true},
+                     {"batches"},
+                     {"what"}},
+                    rows, form) +
+         "(dates in UTC; trammel watch JOB tells how one ends)\n";
+}
+
+std::string started_text(const std::string& cell, std::int64_t job) {
+  return fmt::format(
+      "job {0}\n"
+      "A model of cell {1} is trained now, and put in force if it is better on poses held out.\n"
+      "trammel watch {0} follows it; trammel models {1} lists what came of it.\n",
+      job, cell);
 }
 
 ordered_json models_json(const std::vector<exchange::ModelInfo>& models) {
@@ -130,20 +158,28 @@ ordered_json models_json(const std::vector<exchange::ModelInfo>& models) {
   return json;
 }
 
-std::string models_text(const std::vector<exchange::ModelInfo>& models) {
+std::string models_text(const std::vector<exchange::ModelInfo>& models, TableForm form) {
   if (models.empty()) return "no models\n";
-  std::string text =
-      fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id",
-                  "poses", "held out mm", "trained", "data of", "error sources");
-  for (const exchange::ModelInfo& model : models) {
-    text += fmt::format(
-        "{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ',
-        model.cell, model.version, model.id, model.training_poses,
-        model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
-        date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
-        level_in_words(model.level));
-  }
-  text += "  (* in force; dates in UTC)\n";
+  std::vector<std::vector<std::string>> rows;
+  for (const exchange::ModelInfo& model : models)
+    rows.push_back({model.in_force ? "*" : "", fmt::format("{}@{}", model.cell, model.version),
+                    model.id, std::to_string(model.training_poses),
+                    model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
+                    date_text(model.trained_at_unix_s),
+                    date_text(model.measured_at_unix_s.value_or(0)), model.batch_id, model.hash,
+                    level_in_words(model.level)});
+  std::string text = table_text({{""},
+                                 {"model"},
+                                 {"id", false, true},
+                                 {"poses", true},
+                                 {"held out mm", true},
+                                 {"trained"},
+                                 {"data of"},
+                                 {"batch", false, true},
+                                 {"hash", false, true},
+                                 {"error sources"}},
+                                rows, form) +
+                     "(* in force; dates in UTC; trammel show MODEL tells of one)\n";
   for (const exchange::ModelInfo& model : models) {
     for (const Note& note : grave(model.notes))
       text += fmt::format("{}@{}: {}", model.cell, model.version, notes_text({note}));
@@ -306,22 +342,25 @@ std::string state_of(const client::BatchOfService& batch) {
 
 }  // namespace
 
-std::string batches_text(const std::vector<client::BatchOfService>& batches) {
+std::string batches_text(const std::vector<client::BatchOfService>& batches, TableForm form) {
   if (batches.empty()) return "no batches\n";
   // Each server says what it knows of a batch, which may differ.
   const bool several = std::any_of(
       batches.begin(), batches.end(),
       [&](const client::BatchOfService& one) { return one.server != batches.front().server; });
-  const auto server = [&](const std::string& name) {
-    return several ? fmt::format("{:<16}", name) : "";
-  };
-  std::string text = fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server("server"), "cell",
-                                 "batch", "poses", "accepted", "state");
-  for (const client::BatchOfService& one : batches) {
-    text += fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server(one.server), one.cell, one.batch,
-                        one.poses, date_text(one.accepted_unix_s), state_of(one));
-  }
-  return text + "(dates in UTC)\n";
+  std::vector<std::vector<std::string>> rows;
+  for (const client::BatchOfService& one : batches)
+    rows.push_back({one.server, one.cell, one.batch, std::to_string(one.poses),
+                    date_text(one.accepted_unix_s), one.hash, state_of(one)});
+  return table_text({{"server", false, !several},
+                     {"cell"},
+                     {"batch"},
+                     {"poses", true},
+                     {"accepted"},
+                     {"hash", false, true},
+                     {"state"}},
+                    rows, form) +
+         "(dates in UTC)\n";
 }
 
 ordered_json batches_json(const std::vector<client::BatchOfService>& batches) {
@@ -390,14 +429,13 @@ std::string ended_text(const client::JobStatus& job) {
 std::string next_step(const client::JobStatus& job) {
   if (job.verdict == "quarantined") {
     return fmt::format(
-        "next: trammel diagnose --service --cell {0} says what the batch differs in; trammel "
-        "retrain --service --cell {0} --batch ID --release learns from it, if it is good",
+        "next: trammel diagnose --service {0} says what the batch differs in; trammel "
+        "retrain {0} --batch ID --release learns from it, if it is good",
         job.cell);
   }
   if (job.model_version > 0 && !job.in_force && !put_in_force(job)) {
-    return fmt::format(
-        "next: trammel activate --service --model {}@{} puts it in force, if it is wanted",
-        job.cell, job.model_version);
+    return fmt::format("next: trammel activate {}@{} puts it in force, if it is wanted", job.cell,
+                       job.model_version);
   }
   return job.next.empty() ? "" : "next: " + job.next;
 }

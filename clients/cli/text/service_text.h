@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cli/terminal/table.h"
 #include "clients/session/session.h"
 
 /// Texts of a service on its servers, models, jobs and batches, for people (dates in UTC) and for
@@ -15,11 +16,15 @@ namespace trammel::cli {
 /// A line a job: those that run and wait, of those that are done the last one of each cell, those
 /// that failed.
 [[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
-/// A line each, with how those that are over ended.
-[[nodiscard]] std::string all_jobs_text(const std::vector<client::DatedJob>& jobs);
+/// A row each, with how those that are over ended.
+[[nodiscard]] std::string all_jobs_text(const std::vector<client::DatedJob>& jobs,
+                                        TableForm form = TableForm::kTable);
+/// A job that was begun, and the commands that show how it goes.
+[[nodiscard]] std::string started_text(const std::string& cell, std::int64_t job);
 
 [[nodiscard]] nlohmann::ordered_json models_json(const std::vector<exchange::ModelInfo>& models);
-[[nodiscard]] std::string models_text(const std::vector<exchange::ModelInfo>& models);
+[[nodiscard]] std::string models_text(const std::vector<exchange::ModelInfo>& models,
+                                      TableForm form = TableForm::kTable);
 
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
@@ -42,8 +47,9 @@ void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordere
 
 [[nodiscard]] nlohmann::ordered_json batches_json(
     const std::vector<client::BatchOfService>& batches);
-/// A line a batch, with the server that says it where there are several.
-[[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches);
+/// A row a batch, with the server that says it where there are several.
+[[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches,
+                                       TableForm form = TableForm::kTable);
 
 /// A version that was put in force: before, after, limit, why, and what to do next, as far as the
 /// service says so. `said`: its `in_force` of the cell (READ_HEALTH), from outside; null: nothing.

@@ -16,6 +16,9 @@ struct HelpTopic {
 
 [[nodiscard]] std::span<const HelpTopic> help_topics();
 
+/// The ten commands of every day in groups, for who types `trammel` alone.
+[[nodiscard]] std::string_view overview();
+
 /// Command lines that work, one a line, for the end of a command's help; empty for a command that
 /// is not known.
 [[nodiscard]] std::string_view examples_of(std::string_view command);

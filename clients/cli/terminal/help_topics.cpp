@@ -1,4 +1,4 @@
-#include "clients/cli/text/help_topics.h"
+#include "clients/cli/terminal/help_topics.h"
 
 #include <algorithm>
 #include <array>
@@ -10,15 +10,17 @@ namespace trammel::cli {
 namespace {
 
 constexpr std::array kTopics = {
-    HelpTopic{"start", "from nothing to a corrected program, in five commands",
-              "Plan measuring poses, measure them, train a model, look at it, correct a program:\n"
-              "  trammel plan --cell cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
-              "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
-              "  trammel train --cell cell.yaml --batch batch.csv -o cell.model\n"
-              "  trammel report --model cell.model -o report.html\n"
-              "  trammel correct --model cell.model drill.mod -o drill-corrected.mod\n"
-              "\n"
-              "Without a robot at hand: trammel simulate measures a plan on a virtual one."},
+    HelpTopic{
+        "start", "from nothing to a corrected program, in five commands",
+        "Plan measuring poses, measure them, train a model, look at it, correct a program:\n"
+        "  trammel plan cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
+        "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
+        "  trammel train cell.yaml batch.csv -o cell.model\n"
+        "  trammel report cell.model -o report.html\n"
+        "  trammel correct cell.model drill.mod -o drill-corrected.mod\n"
+        "\n"
+        "What cell.yaml says: trammel help cell. What batch.csv holds: trammel help formats.\n"
+        "Without a robot at hand: trammel simulate measures a plan on a virtual one."},
     HelpTopic{"formats", "the columns of every table that is read",
               "All tables are text in columns with a header line: separated by ',', ';' or tabs, "
               "as the header is. With ';' or tabs numbers may have decimal commas. Names of "
@@ -63,7 +65,7 @@ constexpr std::array kTopics = {
         "levels", "what a training identifies (--level, --bias)",
         "M0 nothing, M1 base, M2 base and geometry, M3 base, geometry and compliance; a list, or a "
         "level and more:\n"
-        "  trammel train --cell c.yaml --batch b.csv --level M2,gear_transmission:3 -o m\n"
+        "  trammel train c.yaml b.csv --level M2,gear_transmission:3 -o m\n"
         "With auto the measurements choose what is added to base, geometry and tools, and train "
         "tells what was tried: --level auto, or model: {error_sources: auto} in the cell file.\n"
         "\n"
@@ -99,10 +101,10 @@ constexpr std::array kTopics = {
 
 constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"plan",
-     "  trammel plan --cell cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
-     "  trammel plan --cell cell.yaml --check 12 -o check.csv\n"
-     "  trammel plan --cell cell.yaml --count 40 --criterion observability -o p.csv"},
-    {"simulate", "  trammel simulate --cell cell.yaml --truth truth.yaml --plan plan.csv -o b.csv"},
+     "  trammel plan cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
+     "  trammel plan cell.yaml --check 12 -o check.csv\n"
+     "  trammel plan cell.yaml --count 40 --criterion observability -o p.csv"},
+    {"simulate", "  trammel simulate cell.yaml --truth truth.yaml --plan plan.csv -o b.csv"},
     {"convert",
      "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
      "  trammel convert --robodk calibration.csv -o batch.csv"},
@@ -110,26 +112,30 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"cpa", "  trammel cpa --robot robot.yaml --arcs arcs.csv"},
     {"deflection", "  trammel deflection --data loads.csv"},
     {"train",
-     "  trammel train --cell cell.yaml --batch batch.csv -o cell.model\n"
-     "  trammel train --cell cell.yaml --batch mon.csv --batch tue.csv --level M3 -o m\n"
-     "  trammel train --cell tool.yaml --batch few.csv --from m --refit tool -o m2"},
-    {"evaluate", "  trammel evaluate --model cell.model --batch fresh.csv --json -"},
-    {"report", "  trammel report --model cell.model --batch fresh.csv -o report.html"},
+     "  trammel train cell.yaml batch.csv -o cell.model\n"
+     "  trammel train cell.yaml mon.csv tue.csv --level M3 -o m\n"
+     "  trammel train tool.yaml few.csv --from m --refit tool -o m2"},
+    {"evaluate", "  trammel evaluate cell.model fresh.csv --json -"},
+    {"report",
+     "  trammel report cell.model fresh.csv -o report.html\n"
+     "  trammel report cell-7@3 -o report.html"},
     {"predict",
-     "  trammel predict --model cell.model --joints plan.csv -o where.csv\n"
-     "  trammel predict --model cell.model drill.mod -o where.csv"},
+     "  trammel predict cell.model --joints plan.csv -o where.csv\n"
+     "  trammel predict cell.model drill.mod -o where.csv"},
     {"correct",
-     "  trammel correct --model cell.model targets.csv -o corrected.csv\n"
-     "  trammel correct --model cell.model drill.mod -o out.mod --receipt r.csv\n"
-     "  trammel correct --model cell.model drill.mod -o out.mod --lead-in --tolerance 0.1\n"
+     "  trammel correct cell.model targets.csv -o corrected.csv\n"
+     "  trammel correct cell.model drill.mod -o out.mod --receipt r.csv\n"
+      "  trammel correct cell.model drill.mod -o out.mod --lead-in --tolerance 0.1\n"
      "  trammel correct --undo out.mod -o drill.mod"},
-    {"check", "  trammel check --model cell.model --batch few.csv --json health.json"},
+    {"check", "  trammel check cell.model few.csv --json health.json"},
     {"diagnose",
-     "  trammel diagnose --cell cell.yaml --batch batch.csv --report page.html\n"
-     "  trammel diagnose --cell cell.yaml --batch b.csv --next-poses next.csv\n"
-     "  trammel diagnose --cell cell.yaml --batch b.csv --prove --report page.html"},
-    {"remedies", "  trammel remedies --model cell.model -o remedies.html"},
-    {"compare", "  trammel compare a.model b.model --batch fresh.csv --report page.html"},
+     "  trammel diagnose cell.yaml batch.csv --report page.html\n"
+     "  trammel diagnose cell.yaml b.csv --next-poses next.csv\n"
+      "  trammel diagnose cell.yaml b.csv --prove --report page.html"},
+    {"remedies", "  trammel remedies cell.model -o remedies.html"},
+    {"compare",
+     "  trammel compare a.model b.model --batch fresh.csv --report page.html\n"
+     "  trammel compare cell-7@2 cell-7@3"},
     {"study", "  trammel study drilling --json -"},
     {"fleet", "  trammel fleet --model a.model --model b.model --model c.model"},
     {"setup",
@@ -139,32 +145,33 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel import-backup BACKUP -o cell.yaml\n"
      "  trammel import-backup BACKUP --compare cell.yaml"},
     {"export-robot",
-     "  trammel export-robot --model cell.model -o robot.urdf\n"
-     "  trammel export-robot --model cell.model -o robot.yaml --table robot.csv"},
-    {"confirm-robot", "  trammel confirm-robot --cell cell.yaml --poses shown.csv"},
-    {"submit", "  trammel submit --cell cell-7 --batch batch.csv --watch"},
-    {"retrain", "  trammel retrain --cell cell-7 --batch b1 --batch b2 --watch"},
-    {"status", "  trammel status --port 17500 --json -"},
-    {"watch", "  trammel watch --job 12"},
-    {"cancel", "  trammel cancel --job 12"},
-    {"models", "  trammel models --cell cell-7"},
-    {"show", "  trammel show --model cell-7@3"},
-    {"jobs", "  trammel jobs --cell cell-7"},
+     "  trammel export-robot cell.model -o robot.urdf\n"
+     "  trammel export-robot cell.model -o robot.yaml --table robot.csv"},
+    {"confirm-robot", "  trammel confirm-robot cell.yaml --poses shown.csv"},
+    {"submit", "  trammel submit cell-7 batch.csv --watch"},
+    {"retrain", "  trammel retrain cell-7 --batch b1 --batch b2 --watch"},
+    {"status",
+     "  trammel status\n  trammel status -o wide\n  trammel status --port 17500 --json -"},
+    {"watch", "  trammel watch 12"},
+    {"cancel", "  trammel cancel 12"},
+    {"models", "  trammel models cell-7"},
+    {"show", "  trammel show cell-7@3"},
+    {"jobs", "  trammel jobs cell-7"},
     {"batches",
-     "  trammel batches --cell cell-7\n"
-     "  trammel batches --cell cell-7 --batch b1 -o b1.csv"},
-    {"activate", "  trammel activate --model cell-7@3 --reason \"checked on 12 poses\""},
-    {"rollback", "  trammel rollback --cell cell-7 --expected 3 --reason \"drill jig was loose\""},
-    {"release", "  trammel release --cell cell-7 --batch b2"},
-    {"discard", "  trammel discard --cell cell-7 --batch b2"},
-    {"export", "  trammel export --model cell-7 -o cell-7.model"},
-    {"import", "  trammel import --cell cell-7 --model cell-7.model"},
-    {"audit", "  trammel audit --cell cell-7"},
-    {"history", "  trammel history --cell cell-7 -o history.html"},
+     "  trammel batches cell-7\n"
+     "  trammel batches cell-7 b1 -o b1.csv"},
+    {"activate", "  trammel activate cell-7@3 --reason \"checked on 12 poses\""},
+    {"rollback", "  trammel rollback cell-7 --expected 3 --reason \"drill jig was loose\""},
+    {"release", "  trammel release cell-7 b2"},
+    {"discard", "  trammel discard cell-7 b2"},
+    {"export", "  trammel export cell-7 -o cell-7.model"},
+    {"import", "  trammel import cell-7 cell-7.model"},
+    {"audit", "  trammel audit cell-7"},
+    {"history", "  trammel history cell-7 -o history.html"},
     {"replay",
-     "  trammel replay --model cell-7.model /var/lib/trammel/records\n"
-     "  trammel replay --service --model cell-7@4 requests-000000001.jsonl --strict\n"
-     "  trammel replay --service --model cell-7@5 --next-poses next.csv"},
+     "  trammel replay cell-7.model /var/lib/trammel/records\n"
+     "  trammel replay cell-7@4 requests-000000001.jsonl --strict\n"
+     "  trammel replay cell-7@5 --next-poses next.csv"},
     {"backup",
      "  trammel backup --store data/trammel.db -o monday.db\n"
      "  trammel backup --check monday.db"},
@@ -175,7 +182,8 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel store reopen data/trammel.db\n"
      "  trammel store check data/trammel.db\n"
      "  trammel store describe postgresql://db-1/trammel --cell cell-7 --as line-2"},
-    {"help", "  trammel help\n  trammel help formats\n  trammel help train"},
+    {"help",
+     "  trammel help start\n  trammel help all\n  trammel help formats\n  trammel help train"},
     {"doctor", "  trammel doctor\n  trammel doctor --port 17501 --store data/trammel.db --json -"},
     {"completion",
      "  source <(trammel completion bash)\n"
@@ -184,6 +192,35 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
 };
 
 }  // namespace
+
+std::string_view overview() {
+  return "Makes an industrial robot land where it was told to.\n"
+         "\n"
+         "new here?                trammel help start\n"
+         "\n"
+         "from measurements to a model\n"
+         "  plan CELL              choose poses to measure\n"
+         "  train CELL BATCH       calibrate the robot, learn what is left over\n"
+         "  evaluate MODEL BATCH   errors on poses that were held out\n"
+         "  report MODEL           a page that people look at\n"
+         "\n"
+         "use it\n"
+         "  correct MODEL PROGRAM  a robot program or targets that land where they are wanted\n"
+         "\n"
+         "keep it true\n"
+         "  check MODEL BATCH      is the robot still as the model has it?\n"
+         "  diagnose CELL BATCH    which physical cause does the model lack?\n"
+         "\n"
+         "with a running service\n"
+         "  submit CELL BATCH      hand measurements in; a model is trained from them\n"
+         "  status                 servers, models in force, jobs\n"
+         "  activate CELL@VERSION  put a version in force\n"
+         "\n"
+         "MODEL is a file, or CELL@VERSION of a service.\n"
+         "trammel COMMAND --help tells a command's options; trammel help all lists all commands "
+         "and "
+         "topics.\n";
+}
 
 std::span<const HelpTopic> help_topics() { return kTopics; }
 
@@ -200,7 +237,7 @@ std::string_view common_footer() {
          "row, value and limit.\n"
          "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in "
          "force); 2 wrong usage; 3 refused data; 4 service unreachable or busy.\n"
-         "trammel help lists commands and topics: formats, cell, units, service, ...";
+         "trammel help all lists commands and topics: formats, cell, units, service, ...";
 }
 
 }  // namespace trammel::cli
