@@ -108,17 +108,24 @@ struct Session::Participant {
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(
       const typename Operation::Request::type& request, const Route& route) {
+    using Reply = typename Operation::Reply::type;
     const auto caller = caller_of<Operation>();
     if (!caller) return tl::make_unexpected(caller.error());
     const auto until = deadline();
+    std::optional<Reply> busy;
     while (true) {
-      auto reply = (*caller)->call(request, route, until);
-      const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
-      const auto again =
-          Clock::now() +
-          std::chrono::milliseconds(
-              is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
-      if (!is_busy || again >= until) return as_result(std::move(reply));
+      Result<Reply> reply = (*caller)->call(request, route, until);
+      const bool too_late = reply && reply->header().result() == wire::RESULT_DEADLINE_MISSED;
+      // Why it was busy tells more than that too little time was left.
+      if (busy && too_late) return as_result<Reply>(*std::move(busy));
+      if (busy && !reply)
+        reply.error().message += "; before, it was busy: " + error_of(busy->header()).message;
+      if (!reply || reply->header().result() != wire::RESULT_BUSY)
+        return as_result<Reply>(std::move(reply));
+      const auto again = Clock::now() + std::chrono::milliseconds(std::max(
+                                            reply->header().retry_after_ms(), kLeastPatience));
+      if (again >= until) return as_result<Reply>(std::move(reply));
+      busy = *std::move(reply);
       watch->wait_until(again);
     }
   }

@@ -50,8 +50,13 @@ Result<std::unique_ptr<Database>> open_to_write(const std::string& place) {
   return file;
 }
 
-Failure unreadable(const DatabaseError& error, const std::string& place) {
-  return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(spoken_place(place));
+Failure failure_at(const DatabaseError& error, const std::string& place) {
+  Failure said = failure_of(error, spoken_place(place));
+  if (error.kind() != DatabaseError::Kind::kAgain || !is_postgres_url(place)) return said;
+  const auto another = PostgresDatabase::connect(place, Session::kMayBeReadOnly);
+  const std::string who = another ? who_holds(**another, Locked::kRows) : "";
+  if (!who.empty()) said.value().message += "; " + who;
+  return said;
 }
 
 }  // namespace trammel

@@ -15,8 +15,9 @@ namespace trammel {
 /// A store to change in what the services know nothing of: a file, of which the caller holds the
 /// lock of who writes it, or a database by its URL. Refuses and throws as open_to_read().
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_write(const std::string& place);
-/// The failure of a store that cannot be read.
-[[nodiscard]] Failure unreadable(const DatabaseError& error, const std::string& place);
+/// The failure of a store that is looked at, with whoever holds it locked. `place` may hold a
+/// password.
+[[nodiscard]] Failure failure_at(const DatabaseError& error, const std::string& place);
 
 /// Runs `work(database)` on one moment of the store at `place`.
 template <typename Work>
@@ -28,7 +29,7 @@ auto look_into(const std::string& place, const Work& work)
     const Transaction moment(**database, Transaction::For::kReading);
     return work(**database);
   } catch (const DatabaseError& error) {
-    return unreadable(error, place);
+    return failure_at(error, place);
   }
 }
 

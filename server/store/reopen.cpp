@@ -37,7 +37,7 @@ Status reopen_store(const std::string& place) {
     const auto database = open_to_write(place);
     return database ? take_up_again(**database, said) : tl::make_unexpected(database.error());
   } catch (const DatabaseError& error) {
-    return failure_of(error, said);
+    return failure_at(error, place);
   }
 }
 

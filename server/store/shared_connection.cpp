@@ -15,8 +15,7 @@ namespace {
 
 constexpr std::size_t kMostConnections = 4;
 constexpr std::size_t kMostWithHeartbeat = kMostConnections + 1;
-constexpr std::chrono::seconds kPatience{
-    6};  // for a connection that others use, and for rows that others lock
+constexpr std::chrono::seconds kPatience{1};  // for a connection that others use, and for locks
 constexpr int kMostTries = 5;
 
 /// Longer each time, and not the same for all who were in each other's way.
@@ -153,47 +152,26 @@ Status SharedConnection::run(const Job& job, Transaction::For what, std::size_t 
       result = failure(ErrorCode::kInternal, "{}", error.what()).in(path);
     }
     const bool lost = (*connected)->is_lost();
+    const bool in_the_way = failed && failed->kind() == DatabaseError::Kind::kAgain;
+    const bool gives_up = !in_the_way || tries == kMostTries || Clock::now() >= until;
+    const std::string who =
+        in_the_way && gives_up && !lost ? who_holds(**connected, Locked::kRows) : "";
     give_back(std::move(*connected));
     if (!failed) {
       if (result && what == Transaction::For::kWriting) note_written();
       return result;
     }
-    const bool were_in_the_way =
-        failed->kind() == DatabaseError::Kind::kAgain && tries < kMostTries && Clock::now() < until;
-    const bool was_lost_before = failed->kind() == DatabaseError::Kind::kAway && lost && tries == 1;
-    if (!were_in_the_way && !was_lost_before) return told(*failed, lost);
+    const bool is_away = failed->kind() == DatabaseError::Kind::kAway;
+    if (gives_up && !(is_away && lost && tries == 1)) {
+      Failure said = failure_of(*failed, path);
+      if (!who.empty()) said.value().message += "; " + who;
+      // What cannot even be read is away for all, until try_again() sees that it is there.
+      const bool unreadable = in_the_way && what == Transaction::For::kReading;
+      if (is_away || unreadable) note_trouble(said.value(), lost || unreadable);
+      return said;
+    }
     wait_without_word({}, Clock::now() + pause_after(tries));
   }
-}
-
-Status SharedConnection::told(const DatabaseError& error, bool lost) {
-  Failure said = failure_of(error, path);
-  if (error.kind() == DatabaseError::Kind::kAway) note_trouble(said.value(), lost);
-  if (error.kind() == DatabaseError::Kind::kAgain) {
-    if (const std::string who = who_holds(); !who.empty()) said.value().message += "; " + who;
-  }
-  return said;
-}
-
-std::string SharedConnection::who_holds() {
-  auto connected = borrow(kMostConnections);
-  if (!connected) return "";
-  std::string who;
-  try {
-    Rows row =
-        prepare(**connected,
-                "SELECT a.application_name, a.usename, a.pid FROM pg_locks AS l JOIN "
-                "pg_stat_activity AS a ON a.pid = l.pid JOIN pg_class AS c ON c.oid = l.relation "
-                "WHERE l.granted AND l.mode NOT IN ('AccessShareLock') AND a.pid <> "
-                "pg_backend_pid() AND c.relname IN ('cells', 'jobs', 'batches', 'audit_end') AND "
-                "COALESCE(a.application_name, '') <> 'trammel' ORDER BY a.pid LIMIT 1");
-    if (row.next())
-      who = fmt::format("{} of role {} (process {}) holds rows locked", row.text(0), row.text(1),
-                        row.integer(2));
-  } catch (const DatabaseError&) {  // nobody can say
-  }
-  give_back(std::move(*connected));
-  return who;
 }
 
 bool SharedConnection::hears_of_change(const std::stop_token& stop, Clock::time_point until) {
@@ -228,6 +206,8 @@ Status SharedConnection::try_again() {
   return run(
       [this](Database& database) -> Status {
         change(database, "UPDATE store_identity SET id = id");
+        if (const std::string who = who_holds(database, Locked::kForReaders); !who.empty())
+          return failure(ErrorCode::kBusy, "{}", who).in(path);
         return check_not_moved(database, path);
       },
       Transaction::For::kWriting, kMostConnections);

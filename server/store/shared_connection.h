@@ -34,7 +34,6 @@ class SharedConnection final : public StoreConnection {
   /// In one transaction, again where others were in the way. `most`: connections that may be in use
   /// with this one.
   [[nodiscard]] Status run(const Job& job, Transaction::For what, std::size_t most);
-  [[nodiscard]] Status told(const DatabaseError& error, bool lost);
 
   /// Checks that the database is the store that served here before, of a schema that this program
   /// knows.
@@ -46,8 +45,6 @@ class SharedConnection final : public StoreConnection {
   /// True if the word of a change came. Connects where needed: what changed before that is not
   /// told.
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
-  /// Who else holds rows locked, for people; empty: not known.
-  [[nodiscard]] std::string who_holds();
 
   const std::string url_;  // may hold a password
   Mutex mutex_;

@@ -109,12 +109,12 @@ Status check_file_is_here(const fs::path& path) {
 }
 
 Status check_database(const std::string& url) {
-  const std::string place = spoken_place(url);
   try {
     const auto database = open_to_write(url);
-    return database ? check_not_moved(**database, place) : tl::make_unexpected(database.error());
+    if (!database) return tl::make_unexpected(database.error());
+    return check_not_moved(**database, spoken_place(url));
   } catch (const DatabaseError& error) {
-    return unreadable(error, place);
+    return failure_at(error, url);
   }
 }
 

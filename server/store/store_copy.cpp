@@ -221,7 +221,7 @@ Result<StoreContent> copy_store(const std::string& from, const std::string& to, 
     return source == SourceAfter::kMoved ? move_store(from, to, progress)
                                          : copy_and_keep(from, to, progress);
   } catch (const DatabaseError& error) {
-    return failure_of(error, spoken_place(from));
+    return failure_at(error, from);
   }
 }
 

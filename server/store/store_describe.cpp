@@ -5,6 +5,7 @@
 #include "server/store/audit_rows.h"
 #include "server/store/cell_rows.h"
 #include "server/store/database/postgres_database.h"
+#include "server/store/open_to_read.h"
 #include "server/store/server_rows.h"
 #include "server/store/shared_schema.h"
 #include "server/store/store_place.h"
@@ -30,7 +31,7 @@ std::invoke_result_t<const Work&, Database&> in_record(const std::string& url,
     if (done) transaction.commit();
     return done;
   } catch (const DatabaseError& error) {
-    return failure_of(error, place);
+    return failure_at(error, url);
   }
 }
 

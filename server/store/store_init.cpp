@@ -1,6 +1,7 @@
 #include "server/store/store_init.h"
 
 #include "server/store/database/postgres_database.h"
+#include "server/store/open_to_read.h"
 #include "server/store/shared_schema.h"
 #include "server/store/store_place.h"
 
@@ -18,7 +19,7 @@ Status init_store(const std::string& url, const std::string& role) {
     TRY(migrate_shared_schema(**database, place));
     return role.empty() ? Status() : grant_shared_store(**database, role);
   } catch (const DatabaseError& error) {
-    return failure_of(error, place);
+    return failure_at(error, url);
   }
 }
 

@@ -1,32 +1,46 @@
 #include "server/store/store_place.h"
 
 #include <algorithm>
-#include <array>
+
+#include "server/store/database/postgres_settings.h"
 
 namespace trammel {
 namespace {
 
-constexpr std::array<std::string_view, 2> kSchemes = {"postgresql://", "postgres://"};
+std::string value_of(const PostgresSettings& settings, std::string_view key) {
+  const auto found = std::find_if(settings.begin(), settings.end(),
+                                  [&](const auto& one) { return one.first == key; });
+  return found == settings.end() ? std::string() : found->second;
+}
+
+/// A host with its port; empty: a socket, whose folder is no name.
+std::string host_of(const PostgresSettings& settings) {
+  std::string host = value_of(settings, "host");
+  if (host.empty()) host = value_of(settings, "hostaddr");
+  if (host.starts_with('/')) host.clear();
+  const std::string port = value_of(settings, "port");
+  return port.empty() ? host : host + ":" + port;
+}
 
 }  // namespace
 
 bool is_postgres_url(std::string_view place) {
-  return std::any_of(kSchemes.begin(), kSchemes.end(),
-                     [&](auto scheme) { return place.starts_with(scheme); });
+  const auto has = [place](std::string_view text) { return place.find(text) != place.npos; };
+  return has("://") || has("password=") || (has("=") && settings_of(std::string(place)));
 }
 
 std::string spoken_place(const std::string& place) {
   if (!is_postgres_url(place)) return place;
-  const std::size_t begin = place.find("://") + 3;
-  std::string rest = place.substr(begin);
-  // As libpq looks for them: before the first '/', at the first '@'. What is behind a '?' is no
-  // name, either.
-  std::size_t host = rest.find_first_of("@/");
-  if (host != std::string::npos && rest[host] == '/') host = std::string::npos;
-  std::string user = host == std::string::npos ? "" : rest.substr(0, host);
-  if (host != std::string::npos) rest.erase(0, host + 1);
-  user = user.substr(0, user.find_first_of(":?"));
-  return "postgresql://" + (user.empty() ? "" : user + "@") + rest.substr(0, rest.find('?'));
+  const auto each = settings_of(place);
+  if (!each) return "postgresql://...";
+  // A user with a '?' is what was meant to be an option.
+  std::string user = value_of(each->front(), "user");
+  user.erase(std::min(user.find('?'), user.size()));
+  std::string hosts;
+  for (const PostgresSettings& one : *each) hosts += (hosts.empty() ? "" : ",") + host_of(one);
+  const std::string database = value_of(each->front(), "dbname");
+  return fmt::format("postgresql://{}{}{}{}", user.empty() ? "" : user + "@", hosts,
+                     database.empty() ? "" : "/", database);
 }
 
 }  // namespace trammel

@@ -227,7 +227,7 @@ TEST(ServiceText, TheServersOfARecordAreThereBehindOrGone) {
             "  two on h2 (0.1.0, process 8): trains, works on job 4 of cell-7, 2 changes behind\n"
             "  three on h3: gone, not heard of since 2023-11-14 22:13 UTC (60 s)\n");
   EXPECT_EQ(servers_text(nullptr, record),
-            "which servers are there is not known while the record is away\n");
+            "which servers are there, and their jobs, is not known while the record is away\n");
   EXPECT_EQ(servers_text({one}, {{"kind", "sqlite"}}), "");
   EXPECT_EQ(servers_text({1, "x"}, record).substr(0, 23), "servers of the record:\n")
       << "whatever a server says";

@@ -342,6 +342,25 @@ TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {
   EXPECT_TRUE(known.contains("b3"));
 }
 
+TEST_F(Fleet, WhoeverHoldsTheRecordLockedIsNamedToWhoAsksAndKeepsNoServerFromEnding) {
+  start(first_);
+  ASSERT_TRUE(end_of(*session_with({&first_}), submit(*session_with({&first_}), "b1", 1)).in_force);
+  const auto hasty = session_with({&first_}, seconds(4));
+  for (const char* mode : {"EXCLUSIVE", "ACCESS EXCLUSIVE"}) {
+    const test::LockedTable somebody(url_, "audit_end, servers", mode);
+    EXPECT_EQ(served(*hasty), 1);
+    const auto refused = hasty->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2));
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos)
+        << sentence(refused.error());
+    EXPECT_EQ(first_.stop(), 0) << mode;
+    first_.start();
+    EXPECT_EQ(served(*hasty), 1) << "started meanwhile";
+  }
+  wait_until([&] { return hasty->batches("cell-7").has_value(); }, "it is let go");
+  EXPECT_EQ(batches(*hasty), std::set<std::string>{"b1"});
+}
+
 TEST_F(Fleet, EachServerShowsTheSameFleetAndOneThatIsKilledIsSaidToBeGone) {
   start(first_, with_pages(first_));
   start(second_, with_pages(second_));

@@ -6,10 +6,12 @@
 
 #include <atomic>
 #include <map>
+#include <regex>
 #include <set>
 #include <thread>
 
 #include "server/store/store_check.h"
+#include "server/store/store_copy.h"
 #include "server/store/store_init.h"
 #include "server/store/store_place.h"
 #include "tests/store/store_under_test.h"
@@ -236,19 +238,77 @@ TEST_F(SharedStore, NoErrorHoldsThePasswordOrAValue) {
       << sentence(refused.error());
 }
 
-TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
+TEST_F(SharedStore, APlaceThatLibpqCannotReadIsRefusedAndNothingOfItRepeated) {
+  for (const char* place :
+       {"postgresql://keeper:s3@cret@127.0.0.1/plant",
+        "postgresql://keeper:s3/cret@127.0.0.1/plant", "postgresql://keeper:5/cret@127.0.0.1/plant",
+        "postgresql://keeper:s3%zzcret@h/plant", "PostgreSQL://keeper:s3cret@127.0.0.1/plant",
+        "mysql://keeper:s3cret@127.0.0.1/plant", "host=127.0.0.1 dbname=plant password=s3 cret",
+        "postgresql://h/plant?nonsense=s3cret"}) {
+    const std::string wrong = place;
+    const std::vector<Error> refusals = {Store::open(wrong, folder_.file("none")).error(),
+                                         check_store(wrong).error(), init_store(wrong).error(),
+                                         look_through_store(wrong).error()};
+    for (const Error& refused : refusals) {
+      EXPECT_EQ(refused.code, ErrorCode::kRefused) << sentence(refused);
+      EXPECT_NE(sentence(refused).find("no URL that PostgreSQL reads"), std::string::npos);
+      for (const char* secret : {"s3", "cret", "5/"})
+        EXPECT_EQ(sentence(refused).find(secret), std::string::npos) << sentence(refused);
+    }
+  }
+}
+
+TEST_F(SharedStore, MayBeNamedInEitherWayThatLibpqReads) {
+  const std::string words =
+      std::regex_replace(url_, std::regex("postgresql://(.*)@/(.*)[?]host=(.*)"),
+                         "user=$1 dbname=$2 host=$3 password=s3cret");
+  EXPECT_EQ(spoken_place(words), spoken_place(url_));
+  EXPECT_TRUE(check_store(words));
+  put_in_force(*demand(Store::open(words, folder_.file("words"))), 1);
+  EXPECT_EQ(demand(open()->version_in_force("cell-7")), 1);
+  for (const char* file : {"trammel.db", "/var/lib/a=b/trammel.db", "a=b.db", ""})
+    EXPECT_FALSE(is_postgres_url(file)) << file;
+}
+
+TEST_F(SharedStore, WhoeverHoldsItLockedIsNamedBeforeTheClientsPatienceEnds) {
   const auto store = open();
   put_in_force(*store, 1);
-  test::Process somebody({"/usr/bin/psql", url_, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
-                          "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
-                          "SELECT pg_sleep(60)"});
-  ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
-  const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
-  EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos)
-      << sentence(refused.error());
-  EXPECT_TRUE(demand(store->batches("cell-7")).empty());
+  constexpr std::chrono::seconds kPatienceOfClients{2};  // if nobody says otherwise
+  for (const char* held : {"audit_end", "cells", "batches", "job_batches"}) {
+    const test::LockedTable somebody(url_, held, "EXCLUSIVE");
+    const auto begin = std::chrono::steady_clock::now();
+    const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, kPatienceOfClients) << held;
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
+    EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos)
+        << sentence(refused.error());
+    EXPECT_TRUE(demand(store->batches("cell-7")).empty());
+  }
+  EXPECT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
+}
+
+TEST_F(SharedStore, ATableThatNobodyCanReadTakesTheRecordAwayUntilItIsLetGo) {
+  const auto store = open();
+  put_in_force(*store, 1);
+  {
+    const test::LockedTable somebody(url_, "models", "ACCESS EXCLUSIVE");
+    const auto is_named = [](const Error& error) {
+      EXPECT_EQ(error.code, ErrorCode::kBusy) << sentence(error);
+      EXPECT_NE(error.message.find("psql of role postgres"), std::string::npos) << sentence(error);
+    };
+    is_named(store->models("cell-7").error());
+    is_named(look_through_store(url_).error());
+    EXPECT_FALSE(store->state().readable);
+    is_named(store->try_again().error());
+    EXPECT_FALSE(store->state().readable) << "it is not there yet";
+    const auto begin = std::chrono::steady_clock::now();
+    for (int i = 0; i < 100; ++i) is_named(store->models("cell-7").error());
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1)) << "at once";
+    EXPECT_EQ(store->versions_to_serve("cell-7"), std::vector<int>{1}) << "from its copy";
+  }
+  ASSERT_TRUE(store->wait_until_writable({}));
+  EXPECT_EQ(demand(store->models("cell-7")).size(), 1u);
 }
 
 /// A test that takes the whole database away has one of its own.

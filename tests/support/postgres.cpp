@@ -181,6 +181,18 @@ std::string Postgres::sql(const std::string& url, const std::string& statement) 
   return said.out;
 }
 
+LockedTable::LockedTable(const std::string& url, const std::string& table, const std::string& mode)
+    : psql_({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
+             fmt::format("LOCK TABLE {} IN {} MODE", table, mode), "-c", "SELECT 'locked'", "-c",
+             "SELECT pg_sleep(600)"}) {
+  if (!psql_.wait_for_line("locked", kPostgresPatience)) give_up(psql_.standard_error());
+}
+
+LockedTable::~LockedTable() {
+  psql_.signal(SIGINT);  // a server whose client is killed does not see it while it sleeps
+  static_cast<void>(psql_.wait(kPostgresPatience));
+}
+
 void Postgres::write_down(const std::string& url) const {
   const std::string name = sql(url, "SELECT current_database()");
   sql(url,

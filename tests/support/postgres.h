@@ -76,4 +76,14 @@ class Postgres {
   std::size_t read_of_log_ = 0;
 };
 
+/// Somebody's psql, which holds a table of that database locked until the end of this.
+class LockedTable {
+ public:
+  LockedTable(const std::string& url, const std::string& table, const std::string& mode);
+  ~LockedTable();
+
+ private:
+  Process psql_;
+};
+
 }  // namespace trammel::test

@@ -217,10 +217,10 @@ void look_at_store(const std::string& path, std::vector<Found>& found) {
   const Status usable = check_store(path);
   const bool in_use = !usable && usable.error().code == ErrorCode::kConflict;
   if (!usable && !in_use) {
-    found.push_back({"store", State::kBad, sentence(usable.error()),
-                     usable.error().next.empty()
-                         ? "name the key store of the server file; its folder must exist"
-                         : usable.error().next});
+    Error why = usable.error();
+    std::string next = std::exchange(why.next, "");
+    if (next.empty()) next = "name the key store of the server file; its folder must exist";
+    found.push_back({"store", State::kBad, sentence(why), std::move(next)});
     return;
   }
   found.push_back({"store", State::kGood, in_use ? "in use by a server" : "could be opened", ""});

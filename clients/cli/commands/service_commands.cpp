@@ -152,10 +152,16 @@ ordered_json fleet_of(const std::vector<ordered_json>& answers) {
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const std::vector<client::ServerStatus> servers = TRY(session.servers());
   const std::vector<exchange::ModelInfo> models = TRY(session.model_status());
-  const std::vector<client::BatchOfService> apart = TRY(session.quarantine(""));
-  const std::vector<client::DatedJob> jobs = TRY(session.jobs(""));
   const std::vector<ordered_json> answers = TRY(health_answers(session, "", 1));
   const std::vector<ordered_json> health = cells_of(answers);
+  const ordered_json record = record_of(answers);
+  const bool is_away = record.contains("reachable") && record["reachable"] == false;
+  std::vector<client::BatchOfService> apart;  // these two stand in the record
+  std::vector<client::DatedJob> jobs;
+  if (!is_away) {
+    apart = TRY(session.quarantine(""));
+    jobs = TRY(session.jobs(""));
+  }
   std::string text, checked;
   for (const ordered_json& cell : health) checked += is_checked(cell) ? cell_health_line(cell) : "";
   ordered_json list = ordered_json::array();
@@ -164,23 +170,23 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
     list.push_back(server_json(server));
     list.back().update(part_of(server.server_id, answers));
   }
-  const ordered_json record = record_of(answers);
   const ordered_json fleet = fleet_of(answers);
   add_other_servers(fleet, list);
   const std::vector<std::string> silent = silent_servers(arguments.service, servers.size());
   for (const std::string& line : silent) text += line + "\n";
   text += record_text(record) + servers_text(fleet, record);
-  tell(text + models_text(models, arguments.form) + checked + jobs_text(jobs) +
-           quarantine_text(apart),
-       {arguments.json});
-  return write_json(arguments.json, {{"record", record},
-                                     {"servers", list},
-                                     {"silent", silent},
-                                     {"fleet", fleet},
-                                     {"models", models_json(models)},
-                                     {"health", health},
-                                     {"jobs", jobs_json(jobs)},
-                                     {"quarantine", quarantine_json(apart)}});
+  text += models_text(models, arguments.form) + checked;
+  if (!is_away) text += jobs_text(jobs) + quarantine_text(apart);
+  tell(text, {arguments.json});
+  return write_json(arguments.json,
+                    {{"record", record},
+                     {"servers", list},
+                     {"silent", silent},
+                     {"fleet", fleet},
+                     {"models", models_json(models)},
+                     {"health", health},
+                     {"jobs", is_away ? ordered_json() : jobs_json(jobs)},
+                     {"quarantine", is_away ? ordered_json() : quarantine_json(apart)}});
 }
 
 Result<Extent> watch(client::Session& session, const ServiceArguments& arguments) {

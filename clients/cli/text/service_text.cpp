@@ -295,7 +295,8 @@ std::string record_text(const ordered_json& record) {
 
 std::string servers_text(const ordered_json& servers, const ordered_json& record) {
   if (word_in(record, "kind") != "postgresql") return "";
-  if (!servers.is_array()) return "which servers are there is not known while the record is away\n";
+  if (!servers.is_array())
+    return "which servers are there, and their jobs, is not known while the record is away\n";
   std::string text;
   for (const ordered_json& server : servers) {
     const std::string who =

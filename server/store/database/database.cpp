@@ -27,6 +27,9 @@ Failure failure_of(const DatabaseError& error, const std::string& place) {
           .in(place)
           .next("ask again under the same id, on any server");
     case Kind::kRefused:
+      return refused("{}", spoken(error))
+          .in(place)
+          .next("let the role use the store: trammel store init --grant ROLE, as its owner");
     case Kind::kBadValue:
       return refused("{}", spoken(error)).in(place);
     case Kind::kOther:

@@ -24,7 +24,7 @@ constexpr milliseconds kCommit{10000};  // it may wait for a standby
 constexpr milliseconds kLongWork{600000};
 constexpr int kOldestServer = 130000;  // gen_random_uuid()
 constexpr const char* kLimits =
-    "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; SET LOCAL "
+    "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '1s'; SET LOCAL "
     "idle_in_transaction_session_timeout = '10s'";
 
 constexpr std::string_view kWarning = "01000", kReadOnly = "25006";
@@ -400,6 +400,24 @@ void PostgresDatabase::commit() {
   // It is a success for the server, and on this host alone: the wait for the standby was ended.
   if (warned_)
     throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
+}
+
+std::string who_holds(Database& database, Locked what) {
+  try {
+    const std::string query = fmt::format(
+        "SELECT a.application_name, a.usename, a.pid FROM pg_locks AS l JOIN pg_stat_activity AS a "
+        "ON a.pid = l.pid JOIN pg_class AS c ON c.oid = l.relation WHERE l.granted AND l.mode {} "
+        "AND a.pid <> pg_backend_pid() AND a.datname = current_database() AND a.usename IS NOT "
+        "NULL AND c.relnamespace = to_regnamespace(current_schema()) AND "
+        "COALESCE(a.application_name, '') <> 'trammel' ORDER BY a.xact_start, a.pid LIMIT 1",
+        what == Locked::kRows ? "<> 'AccessShareLock'" : "= 'AccessExclusiveLock'");
+    Rows row = database.run(query.c_str(), Database::Values());
+    if (!row.next()) return "";
+    return fmt::format("{} of role {} (process {}) holds rows locked", row.text(0), row.text(1),
+                       row.integer(2));
+  } catch (const DatabaseError&) {
+    return "";
+  }
 }
 
 void PostgresDatabase::roll_back() noexcept {

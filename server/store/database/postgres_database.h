@@ -68,4 +68,9 @@ class PostgresDatabase final : public Database {
   bool takes_long_ = false;  // of the open transaction
 };
 
+/// Whoever else holds rows or tables of the store locked, longest first, for people; empty: nobody,
+/// or it is not known.
+enum class Locked { kRows, kForReaders };
+[[nodiscard]] std::string who_holds(Database& database, Locked what);
+
 }  // namespace trammel

@@ -30,6 +30,13 @@ std::vector<std::string> parts_of(const std::string& list) {
   return parts;
 }
 
+/// A password with an '@' or a '/' that is not written as %XX, of which libpq makes other parts.
+bool holds_a_password(const std::string& key, const std::string& value) {
+  if (key == "port") return value.find_first_not_of("0123456789,") != value.npos;
+  return (key == "dbname" && value.find('@') != value.npos) ||
+         (key == "host" && !value.starts_with('/') && value.find_first_of("@/", 1) != value.npos);
+}
+
 /// One port may be that of all hosts.
 std::string nth(const std::vector<std::string>& parts, std::size_t index) {
   return parts.size() == 1 ? parts.front() : index < parts.size() ? parts[index] : "";
@@ -42,17 +49,19 @@ Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
   const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> options(
       ::PQconninfoParse(url.c_str(), &why), &::PQconninfoFree);
   if (why != nullptr) ::PQfreemem(why);
-  if (!options) {
+  const auto unread = [] {
     return refused("is no URL that PostgreSQL reads")
         .next(
             "write postgresql://USER@HOST/DATABASE?OPTION=VALUE, and what is special in a name as "
             "%XX");
-  }
+  };
+  if (!options) return unread();
   PostgresSettings common;
   std::string hosts, addresses, ports;
   for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
     if (option->val == nullptr) continue;
     const std::string key = option->keyword;
+    if (holds_a_password(key, option->val)) return unread();
     if (key == "host") {
       hosts = option->val;
     } else if (key == "hostaddr") {
