@@ -15,7 +15,7 @@ namespace trammel::orientations {
 namespace {
 
 constexpr double kMostCounted =
-    from_deg(30);  // more counts as much: wrong is wrong, and few rows must not decide
+    from_deg(30);             // more counts as much: wrong is wrong, and few rows must not decide
 constexpr double kGon = 0.9;  // deg
 constexpr std::size_t kMostTries =
     40;  // poses whose own R_FT is tried: half may be wrong, one must be right

@@ -119,11 +119,11 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
     const std::vector<Vector3> angles = TRY(vectors(columns, three, unit));
     for (const ThreeNumbers& way : ways_of_three_numbers()) {
       if (way.columns.empty()) continue;  // no controller shows it so
-      ShownPoses::Orientations read{fmt::format("{} {} {}, {}", columns.table().columns()[three[0]],
-                                                columns.table().columns()[three[1]],
-                                                columns.table().columns()[three[2]],
-                                                way.meaning.empty() ? way.name : way.meaning),
-                                    {}};
+      ShownPoses::Orientations read{
+          fmt::format("{} {} {}, {}", columns.table().columns()[three[0]],
+                      columns.table().columns()[three[1]], columns.table().columns()[three[2]],
+                      way.meaning.empty() ? way.name : way.meaning),
+          {}};
       if (!said && unit == 1.0) read.meaning += ", rad";
       for (const Vector3& one : angles) read.R.push_back(way.rotation(one).toRotationMatrix());
       shown.orientations.push_back(std::move(read));

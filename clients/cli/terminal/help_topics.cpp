@@ -125,13 +125,13 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"correct",
      "  trammel correct cell.model targets.csv -o corrected.csv\n"
      "  trammel correct cell.model drill.mod -o out.mod --receipt r.csv\n"
-      "  trammel correct cell.model drill.mod -o out.mod --lead-in --tolerance 0.1\n"
+     "  trammel correct cell.model drill.mod -o out.mod --lead-in --tolerance 0.1\n"
      "  trammel correct --undo out.mod -o drill.mod"},
     {"check", "  trammel check cell.model few.csv --json health.json"},
     {"diagnose",
      "  trammel diagnose cell.yaml batch.csv --report page.html\n"
      "  trammel diagnose cell.yaml b.csv --next-poses next.csv\n"
-      "  trammel diagnose cell.yaml b.csv --prove --report page.html"},
+     "  trammel diagnose cell.yaml b.csv --prove --report page.html"},
     {"remedies", "  trammel remedies cell.model -o remedies.html"},
     {"compare",
      "  trammel compare a.model b.model --batch fresh.csv --report page.html\n"
