@@ -22,7 +22,6 @@ namespace {
 using nlohmann::ordered_json;
 
 using exchange::kPoseColumns;
-using exchange::Place;
 
 /// The numbers of a figure, in the order of its columns.
 std::array<double, 1> numbers_of(double value) { return {value}; }
@@ -51,7 +50,8 @@ void each_column(std::string_view names, const Value& value, const Take& take) {
 
 /// The same of the figures of an answer that stand at this place of a table.
 template <typename Figures, typename Answer, typename Take>
-void each_column_at(Place place, const Figures& figures, const Answer& answer, const Take& take) {
+void each_column_at(exchange::Place place, const Figures& figures, const Answer& answer,
+                    const Take& take) {
   exchange::each_figure(figures, [&](const auto& figure) {
     if (figure.place == place) each_column(figure.columns, answer.*figure.value, take);
   });
@@ -78,8 +78,8 @@ ordered_json pose_json(const exchange::Pose& pose) {
 
 /// Adds the figures of an answer that stand at one of these places.
 template <typename Figures, typename Answer>
-void put_figures(const std::set<Place>& places, const Figures& figures, const Answer& answer,
-                 ordered_json& json) {
+void put_figures(const std::set<exchange::Place>& places, const Figures& figures,
+                 const Answer& answer, ordered_json& json) {
   exchange::each_figure(figures, [&](const auto& figure) {
     const auto& value = answer.*figure.value;
     using Value = std::decay_t<decltype(value)>;
@@ -115,17 +115,17 @@ std::size_t joint_count(const Corrections& corrections) {
 }  // namespace
 
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
-  std::vector<Place> behind = {Place::kBehind};
-  if (predictions.covariance) behind.push_back(Place::kCovariance);
-  if (predictions.orientation) behind.push_back(Place::kOrientation);
+  std::vector<exchange::Place> behind = {exchange::Place::kBehind};
+  if (predictions.covariance) behind.push_back(exchange::Place::kCovariance);
+  if (predictions.orientation) behind.push_back(exchange::Place::kOrientation);
   const auto line = [&](const exchange::Prediction& item, const std::string& names,
                         const auto& in_front, const auto& after) {
     std::string text;
     each_column_at(
-        Place::kInFront, exchange::kPredictionFigures, item,
+        exchange::Place::kInFront, exchange::kPredictionFigures, item,
         [&](const std::string& name, double number) { text += in_front(name, number) + ","; });
     text += names;
-    for (const Place place : behind) {
+    for (const exchange::Place place : behind) {
       each_column_at(
           place, exchange::kPredictionFigures, item,
           [&](const std::string& name, double number) { text += "," + after(name, number); });
@@ -146,9 +146,10 @@ std::string predictions_csv(const JointList& list, const Predictions& prediction
 }
 
 ordered_json predictions_json(const JointList& list, const Predictions& predictions) {
-  std::set<Place> told = {Place::kInFront, Place::kBehind, Place::kJsonOnly};
-  if (predictions.covariance) told.insert(Place::kCovariance);
-  if (predictions.orientation) told.insert(Place::kOrientation);
+  std::set<exchange::Place> told = {exchange::Place::kInFront, exchange::Place::kBehind,
+                                    exchange::Place::kJsonOnly};
+  if (predictions.covariance) told.insert(exchange::Place::kCovariance);
+  if (predictions.orientation) told.insert(exchange::Place::kOrientation);
   ordered_json items = ordered_json::array();
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
     ordered_json item = {{"pose_id", list.poses[i].pose_id}};
@@ -172,9 +173,9 @@ std::vector<std::string> correction_columns(const Corrections& corrections) {
     columns.push_back(joint_column(static_cast<int>(j), type_of(corrections.joint_types, j)));
   }
   const exchange::CorrectedTarget any;
-  each_column_at(Place::kInFront, exchange::kCorrectionFigures, any, add);
+  each_column_at(exchange::Place::kInFront, exchange::kCorrectionFigures, any, add);
   columns.insert(columns.end(), {"model_id", "message"});
-  each_column_at(Place::kBehind, exchange::kCorrectionFigures, any, add);
+  each_column_at(exchange::Place::kBehind, exchange::kCorrectionFigures, any, add);
   if (!corrections.turned_deg.empty()) columns.emplace_back("turned_rz_deg");
   return columns;
 }
@@ -222,9 +223,9 @@ void add_row(const Corrections& corrections, std::size_t joints, const TargetRow
     if (command && j < item.joints_deg.size()) text += csv_number(item.joints_deg[j]);
   }
   const auto add = [&](const std::string&, double number) { text += "," + field_of(number); };
-  each_column_at(Place::kInFront, exchange::kCorrectionFigures, item, add);
+  each_column_at(exchange::Place::kInFront, exchange::kCorrectionFigures, item, add);
   text += fmt::format(",{},{}", corrections.model_id, csv_field(item.message));
-  each_column_at(Place::kBehind, exchange::kCorrectionFigures, item, add);
+  each_column_at(exchange::Place::kBehind, exchange::kCorrectionFigures, item, add);
 }
 
 }  // namespace
@@ -284,7 +285,8 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
         json["lead_in"].push_back({{"commanded", pose_json(point.commanded)},
                                    {"joints", joints_json(corrections, point.joints_deg)}});
     }
-    put_figures({Place::kInFront, Place::kBehind}, exchange::kCorrectionFigures, item, json);
+    put_figures({exchange::Place::kInFront, exchange::Place::kBehind}, exchange::kCorrectionFigures,
+                item, json);
     items.push_back(json);
   }
   ordered_json all = {{"model", corrections.model_id}};
