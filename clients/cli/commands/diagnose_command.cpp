@@ -181,6 +181,18 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   return tell_applied(**applied, arguments);
 }
 
+Result<Extent> diagnose_by_service(const DiagnoseArguments& arguments) {
+  if (arguments.prove)
+    return failure(ErrorCode::kUsage, "--prove is for files").of("--prove").next(kProveOnFiles);
+  if (!arguments.since.empty())
+    return failure(ErrorCode::kUsage,
+                   "a service diagnoses by its own model and takes no model file to compare with")
+        .of("--since")
+        .next(kSinceOnFiles);
+  return diagnose_at_service(arguments).map(
+      [](bool all) { return all ? Extent::kAll : Extent::kPart; });
+}
+
 void add_prove_options(CLI::App& command, DiagnoseArguments& arguments) {
   CLI::Option* prove = command.add_flag(
       "--prove", arguments.prove,
@@ -274,17 +286,7 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
       if (!arguments->service.service) return diagnose_files(*arguments);
-      if (arguments->prove)
-        return failure(ErrorCode::kUsage, "--prove is for files").of("--prove").next(kProveOnFiles);
-      if (!arguments->since.empty())
-        return failure(ErrorCode::kUsage,
-                       "a service diagnoses by its own model and takes no model file to compare "
-                       "with")
-            .of("--since")
-            .next(kSinceOnFiles);
-      return diagnose_at_service(*arguments).map([](bool all) {
-        return all ? Extent::kAll : Extent::kPart;
-      });
+      return diagnose_by_service(*arguments);
     };
   });
 }
