@@ -33,7 +33,7 @@ class Plot {
         R"(<svg class="proved" viewBox="0 0 {} {}" role="img"><path d="M0 {:.1f}H{}"/>)"
         R"({}{}{}{}{}{}</svg>)",
         kWidth, kHeight + kNumbers, y(kProvedShare), kWidth, mark("predicted", proved_.predicted),
-        mark("size", proved_.smallest),
+        mark("size", proved_.is_proved() ? proved_.smallest : std::nullopt),
         line("found", &PutIn::found) + line("wrong", &PutIn::misnamed),
         line("right", &PutIn::named), points, numbers());
   }
@@ -79,10 +79,15 @@ class Plot {
   double low_ = 0, high_ = 0;
 };
 
-int tried_with(const ProvedCause& proved) {
-  int tried = 0;
-  for (const PutIn& size : proved.sizes) tried += size.tried;
-  return tried;
+/// The effects of all sizes.
+PutIn all_of(const ProvedCause& proved) {
+  PutIn all;
+  for (const PutIn& size : proved.sizes) {
+    all.tried += size.tried;
+    all.named += size.named;
+    all.misnamed += size.misnamed;
+  }
+  return all;
 }
 
 /// The share of its largest effects that were found, but in doubt.
@@ -100,11 +105,17 @@ std::string proved_size(const ProvedCause& proved) {
   if (proved.is_proved())
     return fmt::format("<b>{:.3g}</b> ({:.3g} to {:.3g})", in_um(*proved.smallest),
                        in_um(*proved.from), in_um(*proved.to));
-  return proved.from ? fmt::format("{:.3g} or more", in_um(*proved.from)) : "not known yet";
+  const PutIn all = all_of(proved);
+  // Without an effect that was missed the lower bound is that of the sizes tried.
+  const bool has_bound = proved.from && all.named < all.tried;
+  return fmt::format(
+      "{}; named {} of {}",
+      has_bound ? fmt::format("{:.3g} or more", in_um(*proved.from)) : "not known yet", all.named,
+      all.tried);
 }
 
 HtmlRow proof_row(const ProvedCause& proved) {
-  const int tried = tried_with(proved);
+  const int tried = all_of(proved).tried;
   return {{html_text(kind_in_words(proved.cause)),
            proved.cause.joint >= 0 ? fmt::format("{}", proved.cause.joint + 1) : "–",
            proved_size(proved),
@@ -118,10 +129,9 @@ std::string proof_section(const Proof& proof) {
   const PutIn& healthy = proof.healthy;
   PutIn all;
   for (const ProvedCause& one : proof.causes) {
-    for (const PutIn& size : one.sizes) {
-      all.tried += size.tried;
-      all.misnamed += size.misnamed;
-    }
+    const PutIn own = all_of(one);
+    all.tried += own.tried;
+    all.misnamed += own.misnamed;
   }
   std::string body = fmt::format(
       "<p class=\"note\">Effects of known size were put into what the best model leaves over of "

@@ -40,8 +40,8 @@ TEST(DiagnoseText, TellsTheSizeProvedBesideThePredictedOneAndHowFarTheOthersAreK
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
   for (const char* part :
        {"Proved in the residuals of this batch: named with 90 %", "27 um (24 um to 31 um)",
-        "not named up to 90 um, found 9 of 9", "9 um or more", "for sure: 1 of 28 diagnoses",
-        "nothing put in: 1 of 12", "1 of 3 causes are not decided"})
+        "not named up to 90 um, found 9 of 9", "9 um or more, named 0 of 1",
+        "for sure: 1 of 28 diagnoses", "nothing put in: 1 of 12", "1 of 3 causes are not decided"})
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
 }
 

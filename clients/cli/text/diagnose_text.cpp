@@ -258,7 +258,16 @@ std::string proved_size(const ordered_json& cause) {
   if (cause.at("outcome") == "proved")
     return fmt::format("{} ({} to {})", micrometres(cause.at("smallest_mm")),
                        micrometres(interval.at(0)), micrometres(interval.at(1)));
-  return interval.at(0).is_null() ? "not known yet" : micrometres(interval.at(0)) + " or more";
+  int tried = 0, named = 0;
+  for (const ordered_json& size : sizes) {
+    tried += size.at("tried").get<int>();
+    named += size.at("named").get<int>();
+  }
+  // Without an effect that was missed the lower bound is that of the sizes tried.
+  const bool has_bound = named < tried && !interval.at(0).is_null();
+  return fmt::format("{}, named {} of {}",
+                     has_bound ? micrometres(interval.at(0)) + " or more" : "not known yet", named,
+                     tried);
 }
 
 std::string proof_table(const ordered_json& diagnosis) {
