@@ -173,14 +173,18 @@ class Correcting {
     return {std::move(way), ""};
   }
 
-  /// m: how far the motion itself comes along the tool's axis; 0 where it comes otherwise.
+  /// m: how far the motion itself comes along the tool's axis, from the one above it or those that
+  /// may come before it; 0 where it comes otherwise.
   [[nodiscard]] double own_way_along_the_axis(const ProgramMove& move, std::size_t t) const {
     const auto X_BT = wanted_pose(program_, arm_.robot(), cell_, nominal_, t);
+    if (!X_BT || !program_.targets[t].linear) return 0;
+    std::set<std::size_t> before = move.before;
+    if (const ProgramMove* first = program_.moves.data();
+        &move != first && (&move)[-1].file == move.file)
+      before.insert(static_cast<std::size_t>(&move - first) - 1);
     double longest = 0;
-    for (const std::size_t m : move.before) {
-      if (!X_BT || !program_.targets[t].linear || m == kNoMotion ||
-          program_.moves[m].targets.size() != 1)
-        continue;
+    for (const std::size_t m : before) {
+      if (m == kNoMotion || program_.moves[m].targets.size() != 1) continue;
       const auto X_BP =
           wanted_pose(program_, arm_.robot(), cell_, nominal_, program_.moves[m].targets[0]);
       if (!X_BP) continue;
@@ -200,11 +204,13 @@ class Correcting {
     row.lead_in = static_cast<int>(found->second.way->offsets.size());
     for (const ProgramMove* move : moves_to_[t]) {
       for (const JointVector& offset : found->second.way->offsets)
-        write_another(*move, numbers_at(program_.targets[t], q + offset, X_FT));
+        write_another(*move, program_.targets[t], q + offset, X_FT, row.sigma_mm);
     }
   }
 
-  void write_another(const ProgramMove& move, const std::vector<double>& numbers) {
+  void write_another(const ProgramMove& move, const ProgramTarget& target, const JointVector& q,
+                     const Pose& X_FT, double sigma_mm) {
+    const std::vector<double> numbers = numbers_at(target, q, X_FT);
     ++result_.lead_ins;
     std::string number;
     if (move.file < program_.points.size()) {
@@ -213,8 +219,11 @@ class Correcting {
     }
     for (const NewLine& line : move.another) {
       std::string text = line.texts[0];
-      for (std::size_t k = 0; k < line.slots.size(); ++k)
-        text += number_text(numbers[line.slots[k].value], line.slots[k].style) + line.texts[k + 1];
+      for (std::size_t k = 0; k < line.slots.size(); ++k) {
+        const Slot& slot = line.slots[k];
+        const double value = numbers[slot.value];
+        text += number_text(value, fine_style(target, slot, value, sigma_mm)) + line.texts[k + 1];
+      }
       if (const std::size_t at = text.find(kNewPoint); at != std::string::npos)
         text.replace(at, 1, number);
       edits_[move.file].insert_line(line.at, std::move(text));
@@ -304,6 +313,13 @@ class Correcting {
     }
   }
 
+  /// The style of the slot with as many digits as the target is worth.
+  [[nodiscard]] NumberStyle fine_style(const ProgramTarget& target, const Slot& slot, double value,
+                                       double sigma_mm) const {
+    if (target.coordinates == Coordinates::kJointPulses) return slot.style;
+    return with_rounding(value, slot.style, largest_rounding(target, slot.value, sigma_mm));
+  }
+
   void write(const ProgramTarget& target, const std::vector<double>& exact, ReceiptRow& row) {
     row.after = target.numbers;
     for (const Rewrite& rewrite : target.rewrites) {
@@ -312,10 +328,7 @@ class Correcting {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
         const NumberStyle style =
-            options_.keep_digits || target.coordinates == Coordinates::kJointPulses
-                ? slot.style
-                : with_rounding(value, slot.style,
-                                largest_rounding(target, slot.value, row.sigma_mm));
+            options_.keep_digits ? slot.style : fine_style(target, slot, value, row.sigma_mm);
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
         text += number;
@@ -502,7 +515,7 @@ Result<CorrectedProgram> correct_program(const Program& program, const Chain& ro
   const ArmOfProgram arm(robot);
   FreeTurns turned;
   if (options.free_rz) {
-    FreeTurns found = TRY(turn_freely(program, arm, cell, ask, options));
+    FreeTurns found = TRY(turn_freely(program, arm, cell, ask, options.tool, options.payload));
     turned = std::move(found);
   }
   const Program& wanted = options.free_rz ? turned.program : program;

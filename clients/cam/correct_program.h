@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,11 +15,6 @@
 /// A program in, a corrected program and its receipt out. The same for every dialect, and for a
 /// model in a file or behind a service.
 namespace trammel::cam {
-
-/// Corrects targets with one tool and payload. All answers of one program come from one model.
-using AskCorrections = std::function<Result<exchange::Answer<exchange::CorrectedTarget>>(
-    const std::string& tool, const std::string& payload,
-    const std::vector<exchange::AskedTarget>& targets)>;
 
 struct CorrectProgramOptions {
   std::string tool, payload;  ///< of the cell, as the user named them

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "clients/cam/nominal_targets.h"
+#include "clients/cam/receipt.h"
 #include "server/base/units.h"
 #include "server/exchange/si.h"
 #include "server/robot/free_turn.h"
@@ -95,8 +96,8 @@ std::vector<TurningPath> paths_of(const Program& program) {
 class Turning {
  public:
   Turning(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
-          const AskCorrections& ask, const CorrectProgramOptions& options)
-      : program_(program), arm_(arm), cell_(cell), ask_(ask), options_(options) {
+          const AskCorrections& ask, const std::string& tool, const std::string& payload)
+      : program_(program), arm_(arm), cell_(cell), ask_(ask), tool_(tool), payload_(payload) {
     made_.program = program;
     made_.deg.assign(program.targets.size(), 0);
   }
@@ -139,7 +140,7 @@ class Turning {
   Result<std::vector<Outcome>> outcomes_at(int step) {
     for (std::size_t t = 0; t < program_.targets.size(); ++t) set(t, step);
     const NominalTargets nominal =
-        TRY(nominal_targets(made_.program, arm_, cell_, options_.tool, options_.payload));
+        TRY(nominal_targets(made_.program, arm_, cell_, tool_, payload_));
     std::vector<Outcome> outcomes(program_.targets.size());
     for (const TargetGroup& group : groups_of(made_.program, nominal)) {
       std::vector<exchange::AskedTarget> targets;
@@ -197,7 +198,7 @@ class Turning {
   const ArmOfProgram& arm_;
   const CellTools& cell_;
   const AskCorrections& ask_;
-  const CorrectProgramOptions& options_;
+  const std::string &tool_, &payload_;
   std::vector<Outcome> as_it_is_;
   FreeTurns made_;
 };
@@ -206,8 +207,8 @@ class Turning {
 
 Result<FreeTurns> turn_freely(const Program& program, const ArmOfProgram& arm,
                               const CellTools& cell, const AskCorrections& ask,
-                              const CorrectProgramOptions& options) {
-  return Turning(program, arm, cell, ask, options).turn();
+                              const std::string& tool, const std::string& payload) {
+  return Turning(program, arm, cell, ask, tool, payload).turn();
 }
 
 }  // namespace trammel::cam

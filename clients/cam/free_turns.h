@@ -1,9 +1,11 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
+#include "clients/cam/cell_tools.h"
 #include "clients/cam/configuration.h"
-#include "clients/cam/correct_program.h"
+#include "clients/cam/lead_ins.h"
 
 /// The turn of each target about the tool's axis, where that is free.
 namespace trammel::cam {
@@ -20,6 +22,6 @@ struct FreeTurns {
 /// stay.
 [[nodiscard]] Result<FreeTurns> turn_freely(const Program& program, const ArmOfProgram& arm,
                                             const CellTools& cell, const AskCorrections& ask,
-                                            const CorrectProgramOptions& options);
+                                            const std::string& tool, const std::string& payload);
 
 }  // namespace trammel::cam

@@ -30,7 +30,12 @@ struct LeadInFound {
 /// `found: why_not` behind what a row says already.
 void tell_no_lead_in(const LeadInFound& found, std::string& message);
 
-/// Corrects targets with one tool and payload.
+/// Corrects targets with one tool and payload. All answers of one program come from one model.
+using AskCorrections = std::function<Result<exchange::Answer<exchange::CorrectedTarget>>(
+    const std::string& tool, const std::string& payload,
+    const std::vector<exchange::AskedTarget>& targets)>;
+
+/// The same with the tool and payload that are agreed.
 using AskTargets = std::function<Result<std::vector<exchange::CorrectedTarget>>(
     const std::vector<exchange::AskedTarget>& targets)>;
 /// The way to a target of these, or why there is none.

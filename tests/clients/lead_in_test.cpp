@@ -145,23 +145,25 @@ TEST(LeadInOfPrograms, ItsPointsTurnEveryGearWithPlayOneWay) {
   }
 }
 
-const char* const kUrBegin =
-    "def d():\n  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n"
-    "  movej([-0.17, 0.1, 0.2, -0.2, 0.6, 0.1], a=1.4, v=1.05)\n";
-
 TEST(LeadInOfPrograms, AHoleThatIsDrilledFromFurtherAwayIsLedInToFromThere) {
-  const Sample drilled{Dialect::kUrScript,
-                       std::string(kUrBegin) +
-                           "  movel(p[1.75, -0.25, 1.2, 0, 1.570796327, 0], a=1.2, v=0.2)\n"
-                           "  movel(p[1.8, -0.25, 1.2, 0, 1.570796327, 0], a=1.2, v=0.05)\nend\n"};
-  const CorrectedProgram made = corrected(drilled, 0.1);
-  const ReceiptRow& hole = made.rows.back();
-  ASSERT_GT(hole.lead_in, 0) << hole.message;
-  const Program again = read_program(drilled.dialect, made.files, reading());
-  for (std::size_t m = again.moves.size() - 2;
-       m + 1 + static_cast<std::size_t>(hole.lead_in) >= again.moves.size(); --m) {
-    const double x = again.targets.at(again.moves[m].targets.at(0)).numbers[0];
-    EXPECT_LT(x, 1.7505) << "the tool turns aside in front of the part, not in the hole";
+  // The tool's axis is the base's x. Each sample comes to the hole from 50 mm before it.
+  const std::pair<const char*, const char*> from[] = {
+      {"1800,-300,1200", "1750,-250,1200"},
+      {"X 1800.0,Y -300.0", "X 1750.0,Y -250.0"},
+      {"1800.000  mm,\tY =  -300.000", "1750.000  mm,\tY =  -250.000"},
+      {"1800.000,-300.000", "1750.000,-250.000"}};
+  for (std::size_t k = 0; k < std::size(from); ++k) {
+    Sample drilled = samples()[k];
+    const auto& [beside, before] = from[k];
+    drilled.text.replace(drilled.text.find(beside), std::string(beside).size(), before);
+    const CorrectedProgram made = corrected(drilled, 0.1);
+    SCOPED_TRACE(made.files[0].text);
+    ASSERT_GT(made.lead_ins, 0u);
+    const Program again = read_program(drilled.dialect, made.files, reading());
+    for (std::size_t m = 1; m + 1 < again.moves.size(); ++m) {
+      const double x_mm = again.targets.at(again.moves[m].targets.at(0)).numbers[0];
+      EXPECT_LT(x_mm, 1755) << "the tool turns aside in front of the part, not in the hole";
+    }
   }
 }
 
@@ -234,7 +236,7 @@ std::string holes(const std::string& motion) {
       "def d():\n  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n"
       "  movej([0.01, 0.1, 0.2, 0.02, 0.9, 0], a=1.4, v=1.05)\n";
   for (int k = 0; k < 5; ++k)
-    text += fmt::format("  {}(p[1.6, {}, 1.0, 0, 2.4, 0], a=1.2, v=0.05)\n", motion, 0.1 * k);
+    text += fmt::format("  {}(p[1.6, {}, 1.0, 0, 3.0, 0], a=1.2, v=0.05)\n", motion, 0.1 * k);
   return text + "end\n";
 }
 

@@ -29,6 +29,18 @@ CompensatedModel model_with(const std::string& of_robot) {
   return test::nominal_model(std::make_shared<const Cell>(cell_with(of_robot)), 10);
 }
 
+/// The same, which knows its base to 0.1 mm alone.
+CompensatedModel unsure_model_with(const std::string& of_robot) {
+  CompensatedModel::Parts parts = model_with(of_robot).parts();
+  parts.physics = test::demand(make_physical_model(parts.physics.cell, {"base"}));
+  for (const Parameter& parameter : parts.physics.parameters())
+    parts.parameters.push_back({parameter, 0, 1e-4, true});
+  const auto count = static_cast<Eigen::Index>(parts.parameters.size());
+  parts.physics.values = Eigen::VectorXd::Zero(count);
+  parts.covariance = 1e-8 * Eigen::MatrixXd::Identity(count, count);
+  return test::demand(CompensatedModel::make(std::move(parts)));
+}
+
 Correction corrected(const CompensatedModel& model) {
   Target target;
   target.joint_target = true;
@@ -81,8 +93,9 @@ TEST(SmallestStep, RepeatsByIso9283HoldWhatIsPromisedAndAreNotToldAsWorseThanThe
 }
 
 TEST(SmallestStep, AnArmThatRepeatsBetterThanItsModelIsToldAsBefore) {
-  const Correction before = corrected(model_with("")),
-                   after = corrected(model_with("repeatability_mm: 0.000001\n"));
+  const Correction before = corrected(unsure_model_with("")),
+                   after = corrected(unsure_model_with("repeatability_mm: 0.05\n"));
+  ASSERT_GT(to_mm(before.stddev), 0.05);
   EXPECT_EQ(after.error_after, before.error_after);
   EXPECT_EQ(after.message, "");
 }

@@ -98,7 +98,7 @@ void put_figures(const std::set<exchange::Place>& places, const Figures& figures
 /// Whether there is a pose to command. If not, no numbers are written: a program could take them
 /// for a command.
 bool has_command(const exchange::CorrectedTarget& target) {
-  return target.status == "ok" || target.status == "out_of_domain";
+  return target.status == "ok" || target.status == "out_of_domain" || target.status == "lead_in";
 }
 
 JointType type_of(const std::vector<JointType>& types, std::size_t joint) {

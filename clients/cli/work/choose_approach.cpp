@@ -11,7 +11,7 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr double kWorthATurn = 0.99;  // of the sigma without
+constexpr double kWorthATurn = 0.9;  // of the sigma without
 
 /// Turns all the same way, step by step: each step begins at the joints of the one before. A target
 /// that is left as it stands is turned on until it is reached.
