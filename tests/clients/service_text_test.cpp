@@ -105,7 +105,7 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   EXPECT_NE(models_text({model}).find("2023-11-14 22:13  2023-11-13 23:13"), std::string::npos)
       << models_text({model});
   model.level = "base,gear_transmission:3@48.5";
-  EXPECT_NE(models_text({model}).find("base position, gear ripple in joint 3\n"),
+  EXPECT_NE(models_text({model}, TableForm::kWide).find("base position, gear ripple in joint 3\n"),
             std::string::npos);
   EXPECT_EQ(models_json({model})[0]["level"], model.level) << "programs read the spelling";
   model.measured_at_unix_s.reset();
@@ -141,7 +141,7 @@ TEST(ServiceText, OfAModelInForceTheWholeErrorOfTheDrawingAndWhereTheRestOfTheBu
   model.in_force = true;
   EXPECT_TRUE(
       models_text({model}).ends_with("cell-7@2: the drawing is off by 21.100 mm rms at 120 "
-                                     "poses (trammel show --model cell-7)\n"))
+                                     "poses (trammel show cell-7)\n"))
       << models_text({model});
   EXPECT_EQ(models_json({model})[0]["budget"]["sentences"].size(), 2u);
 }
@@ -172,7 +172,7 @@ TEST(ServiceText, AnActivationSaysBeforeAfterLimitWhyAndTheNextCommand) {
 
 TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   client::JobStatus end{3, "cell-7", "done", "not in force: worse", 1, 4, false};
-  EXPECT_NE(next_step(end).find("trammel activate --service --model cell-7@4"), std::string::npos);
+  EXPECT_NE(next_step(end).find("trammel activate cell-7@4"), std::string::npos);
   end.in_force = true;
   EXPECT_EQ(next_step(end), "");
   EXPECT_EQ(next_step({3, "cell-7", "done", "nothing", 1, 0, false}), "") << "a diagnosis";

@@ -161,7 +161,7 @@ Result<Extent> check_at_service(const CheckArguments& arguments) {
   if (model.version != 0) {
     return failure(ErrorCode::kUsage, "a service checks against the model in force")
         .of("--model")
-        .next("name the cell alone");
+        .next(fmt::format("name the cell alone: trammel check {} BATCH --service", model.cell));
   }
   const auto session = TRY(open_session(arguments.service));
   if (arguments.batch.empty()) {

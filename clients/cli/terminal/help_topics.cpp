@@ -12,6 +12,9 @@ namespace {
 constexpr std::array kTopics = {
     HelpTopic{
         "start", "from nothing to a corrected program, in five commands",
+        "From a program or a backup of the controller, trammel setup FOLDER -o cell-7 writes the "
+        "cell file and a plan. Then:\n"
+        "\n"
         "Plan measuring poses, measure them, train a model, look at it, correct a program:\n"
         "  trammel plan cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
         "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
@@ -205,7 +208,7 @@ std::string_view overview() {
          "  report MODEL           a page that people look at\n"
          "\n"
          "use it\n"
-         "  correct MODEL PROGRAM  a robot program or targets that land where they are wanted\n"
+         "  correct MODEL PROGRAM  a robot program, or targets, that land where wanted\n"
          "\n"
          "keep it true\n"
          "  check MODEL BATCH      is the robot still as the model has it?\n"
@@ -217,9 +220,8 @@ std::string_view overview() {
          "  activate CELL@VERSION  put a version in force\n"
          "\n"
          "MODEL is a file, or CELL@VERSION of a service.\n"
-         "trammel COMMAND --help tells a command's options; trammel help all lists all commands "
-         "and "
-         "topics.\n";
+         "trammel COMMAND --help tells a command's options.\n"
+         "trammel help all lists all commands and topics.\n";
 }
 
 std::span<const HelpTopic> help_topics() { return kTopics; }

@@ -116,8 +116,8 @@ bool needs_no_name(const CLI::App& command, const Taken& taken) {
   return (undo != nullptr && taken.said.contains(undo)) || taken.bare.size() <= own_words(command);
 }
 
-const CLI::App* command_with_places(const CLI::App& app, const std::vector<std::string>& words) {
-  if (words.empty() || places_of_words(words[0]).empty()) return nullptr;
+const CLI::App* command_of_words(const CLI::App& app, const std::vector<std::string>& words) {
+  if (words.empty() || words[0].empty()) return nullptr;
   const auto found =
       app.get_subcommands([&](const CLI::App* one) { return one->get_name() == words[0]; });
   return found.empty() ? nullptr : found.front();
@@ -144,7 +144,7 @@ std::span<const Place> places_of_words(const std::string& command) {
 
 std::vector<std::string> words_by_option(const CLI::App& app, const std::vector<std::string>& words,
                                          bool cell_is_known) {
-  const CLI::App* command = command_with_places(app, words);
+  const CLI::App* command = command_of_words(app, words);
   if (command == nullptr) return words;
   const Taken taken = taken_apart(*command, words);
   const auto free = needs_no_name(*command, taken) ? std::vector<const CLI::Option*>()

@@ -71,7 +71,7 @@ constexpr std::array kOtherCommands = {
     OtherWord{"health", "trammel check"},
     OtherWord{"identify", "trammel train"},
     OtherWord{"info", "trammel show CELL@VERSION, or trammel status"},
-    OtherWord{"init", "trammel plan, with a cell file (trammel help cell)"},
+    OtherWord{"init", "trammel setup FOLDER -o CELL, or a cell file (trammel help cell)"},
     OtherWord{"kill", "trammel cancel JOB"},
     OtherWord{"learn", "trammel train"},
     OtherWord{"list", "trammel status, or trammel models CELL"},

@@ -184,7 +184,7 @@ std::string models_text(const std::vector<exchange::ModelInfo>& models, TableFor
     for (const Note& note : grave(model.notes))
       text += fmt::format("{}@{}: {}", model.cell, model.version, notes_text({note}));
     if (model.in_force && !model.budget.empty())
-      text += fmt::format("{}@{}: {} (trammel show --model {})\n", model.cell, model.version,
+      text += fmt::format("{}@{}: {} (trammel show {})\n", model.cell, model.version,
                           model.budget.front(), model.cell);
   }
   return text;
