@@ -929,7 +929,7 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
                               "--bias", "none", "--watch"});
   EXPECT_EQ(worse.exit_code, kNotAll) << worse.err;
   for (const char* part :
-       {"version 2, not in force", "held-out rms", "trammel activate --service --model cell-7@2"}) {
+       {"version 2, not in force", "held-out rms", "trammel activate cell-7@2"}) {
     EXPECT_NE(worse.out.find(part), std::string::npos) << part << " is not in:\n" << worse.out;
   }
   const Finished refused = ask({"activate", "--model", "cell-7@2"});
