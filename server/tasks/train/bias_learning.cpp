@@ -189,17 +189,16 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all,
   // By the time that they take: the orientations as long as the positions, where there are any.
   const bool oriented = std::all_of(batch.measurements.begin(), batch.measurements.end(),
                                     [](const Measurement& m) { return m.R_WT.has_value(); });
-  const double position_share = oriented ? 0.5 : 0.95, spread_share = 0.05;
-  options.progress = [&](double share) { return progress(position_share * share); };
+  const double positions = oriented ? 0.5 : 0.95, with_spread = oriented ? 0.55 : 1;
+  options.progress = [&](double share) { return progress(positions * share); };
   const Learned learned = TRY(learned_bias(parts, batch, left_out, options));
   if (!learned.bias) return {};
   take_over(parts, *learned.bias, batch, left_out);
   parts.bias_spread =
       bias_spread(learned.problem, *learned.bias, left_out, seed,
-                  [&](double share) { return progress(position_share + spread_share * share); });
+                  [&](double share) { return progress(std::lerp(positions, with_spread, share)); });
   options.kernel = without_flange(learned.bias->state().kernel);
-  const double both = position_share + spread_share;
-  options.progress = [&](double share) { return progress(both + (1 - both) * share); };
+  options.progress = [&](double share) { return progress(std::lerp(with_spread, 1.0, share)); };
   return add_rotation_bias(parts, batch, learned.problem, options);
 }
 

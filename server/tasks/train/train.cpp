@@ -153,8 +153,7 @@ Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBat
 Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split,
                                    const Report& report) {
   const auto go_on = [&](double share) -> Status {
-    if (!report("validating", kPhysicsKnown.bias + (1 - kPhysicsKnown.bias) * share))
-      return given_up();
+    if (!report("validating", std::lerp(kPhysicsKnown.bias, 1.0, share))) return given_up();
     return {};
   };
   TRY(go_on(0));
@@ -189,7 +188,7 @@ Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainO
   const Status learned =
       add_bias(parts, refitted.poses, kernel, left_out, options.seed, [&](double share) {
         const auto [choice, physics, bias] = kPhysicsKnown;
-        return report("learning the bias", physics + (bias - physics) * share);
+        return report("learning the bias", std::lerp(physics, bias, share));
       });
   if (!learned) return learned;
   if (parts.bias) {
@@ -250,7 +249,7 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
   };
   return identify_sessions(identify, sources, batch, [&](double share) -> Status {
     const PartsDone done = parts_done(*cell, options);
-    const double now = done.choice + (done.physics - done.choice) * share;
+    const double now = std::lerp(done.choice, done.physics, share);
     if (!report("asking what changed between the sessions", now)) return given_up();
     return {};
   });
@@ -307,8 +306,7 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
   const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
   TRY(add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
                [&, done = parts_done(*cell, options)](double share) {
-                 const double now = done.physics + (done.bias - done.physics) * share;
-                 return report("learning the bias", now);
+                 return report("learning the bias", std::lerp(done.physics, done.bias, share));
                }));
   if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
   record_training(parts, batch, split.train, options);
