@@ -339,7 +339,9 @@ JobRunner::End JobRunner::put_back(const StoredJob& job, const std::string& why,
       job.id, stop, [&] { return store_.set_job_queued(job.id, attempt_counts); }));
   JobProgress progress = progress_at(job, JobStage::kQueued);
   progress.what = why;
-  book_.report(progress);
+  const auto known = book_.find(job.id);
+  // A lock that stays is met once a second, and told once.
+  if (!known || known->stage != progress.stage || known->what != why) book_.report(progress);
   return End::kAgain;
 }
 

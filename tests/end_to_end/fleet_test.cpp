@@ -16,6 +16,7 @@
 #include "tests/support/daemon.h"
 #include "tests/support/held_answer.h"
 #include "tests/support/http_client.h"
+#include "tests/support/own_ports.h"
 #include "tests/support/postgres.h"
 #include "tests/support/process.h"
 #include "tests/support/virtual_cell.h"
@@ -168,6 +169,21 @@ TEST_F(Fleet, WhatIsPutInForceOnOneServerIsServedByAllAndDecidedOnAny) {
   ASSERT_TRUE(again) << sentence(again.error());
   EXPECT_EQ(*again, *back) << "the same change, asked of another server, is made once";
   EXPECT_EQ(batches(*session_with({&first_, &second_})), (std::set<std::string>{"b1", "b2"}));
+}
+
+TEST(FleetToTry, IsStartedByOneCommandAndLosesNothingWhenOneOfEachIsKilled) {
+  const auto shown = test::run({"/usr/bin/env", "TRAMMEL_BUILD=" TRAMMEL_BINARY_DIR,
+                                fmt::format("TRAMMEL_PORT={}", test::own_ports()),
+                                fmt::format("TRAMMEL_DOMAIN={}", test::own_domain()),
+                                TRAMMEL_SOURCE_DIR "/deploy/fleet"},
+                               2 * kFleetLimit);
+  EXPECT_EQ(shown.exit_code, 0) << shown.out << shown.err;
+  for (const char* line :
+       {"job 1 of cell cell-7 done: version 1, in force", "job 2 of cell cell-7 done: version 2",
+        "  one on .*: gone, not heard of since", "  trainer on .*: gone, not heard of since",
+        "the same answers while the database is away", "cell-7 +third +40 .*",
+        "all [0-9]+ rows are as they were written"})
+    EXPECT_TRUE(std::regex_search(shown.out, std::regex(line))) << line << "\n" << shown.out;
 }
 
 TEST_F(Fleet, TheJobOfATrainingHostThatIsKilledIsDoneByAnother) {
