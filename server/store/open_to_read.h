@@ -19,18 +19,25 @@ namespace trammel {
 /// password.
 [[nodiscard]] Failure failure_at(const DatabaseError& error, const std::string& place);
 
-/// Runs `work(database)` on one moment of the store at `place`.
-template <typename Work>
-auto look_into(const std::string& place, const Work& work)
+/// Runs `work(database)` on the store at `place`, opened by one of the two above.
+template <typename Open, typename Work>
+auto work_at(const std::string& place, const Open& open, const Work& work)
     -> decltype(work(std::declval<Database&>())) {
   try {
-    const auto database = open_to_read(place);
-    if (!database) return tl::make_unexpected(database.error());
-    const Transaction moment(**database, Transaction::For::kReading);
-    return work(**database);
+    const auto database = open(place);
+    return database ? work(**database) : tl::make_unexpected(database.error());
   } catch (const DatabaseError& error) {
     return failure_at(error, place);
   }
+}
+
+/// Runs `work(database)` on one moment of the store at `place`.
+template <typename Work>
+auto look_into(const std::string& place, const Work& work) {
+  return work_at(place, open_to_read, [&](Database& database) {
+    const Transaction moment(database, Transaction::For::kReading);
+    return work(database);
+  });
 }
 
 }  // namespace trammel

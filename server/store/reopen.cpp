@@ -27,18 +27,13 @@ Status take_up_again(Database& database, const std::string& place) {
 }  // namespace
 
 Status reopen_store(const std::string& place) {
-  const std::string said = spoken_place(place);
   std::optional<WriterLock> nobody_writes;
   if (!is_postgres_url(place)) {
     auto lock = TRY(WriterLock::take(place));
     nobody_writes.emplace(std::move(lock));
   }
-  try {
-    const auto database = open_to_write(place);
-    return database ? take_up_again(**database, said) : tl::make_unexpected(database.error());
-  } catch (const DatabaseError& error) {
-    return failure_at(error, place);
-  }
+  return work_at(place, open_to_write,
+                 [&](Database& database) { return take_up_again(database, spoken_place(place)); });
 }
 
 }  // namespace trammel

@@ -108,20 +108,13 @@ Status check_file_is_here(const fs::path& path) {
   }
 }
 
-Status check_database(const std::string& url) {
-  try {
-    const auto database = open_to_write(url);
-    if (!database) return tl::make_unexpected(database.error());
-    return check_not_moved(**database, spoken_place(url));
-  } catch (const DatabaseError& error) {
-    return failure_at(error, url);
-  }
-}
-
 }  // namespace
 
 Status check_store(const std::string& path) {
-  if (is_postgres_url(path)) return check_database(path);
+  if (is_postgres_url(path))
+    return work_at(path, open_to_write, [&](Database& database) {
+      return check_not_moved(database, spoken_place(path));
+    });
   return check_folder(path)
       .and_then([&] { return check_file(path); })
       .and_then([&] { return WriterLock::look(path); })

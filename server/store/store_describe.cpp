@@ -4,10 +4,8 @@
 
 #include "server/store/audit_rows.h"
 #include "server/store/cell_rows.h"
-#include "server/store/database/postgres_database.h"
 #include "server/store/open_to_read.h"
 #include "server/store/server_rows.h"
-#include "server/store/shared_schema.h"
 #include "server/store/store_place.h"
 
 namespace trammel {
@@ -17,22 +15,16 @@ namespace {
 template <typename Work>
 std::invoke_result_t<const Work&, Database&> in_record(const std::string& url,
                                                        Transaction::For what, const Work& work) {
-  const std::string place = spoken_place(url);
   if (!is_postgres_url(url))
     return refused("is no URL of PostgreSQL")
-        .in(place)
+        .in(url)
         .next("a file has one server, whose files count");
-  const auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
-  if (!database) return Failure(database.error()).in(place);
-  try {
-    TRY(check_shared_schema(**database, place));
-    Transaction transaction(**database, what);
-    auto done = work(**database);
+  return work_at(url, open_to_write, [&](Database& database) {
+    Transaction transaction(database, what);
+    auto done = work(database);
     if (done) transaction.commit();
     return done;
-  } catch (const DatabaseError& error) {
-    return failure_at(error, url);
-  }
+  });
 }
 
 /// The newest start of the server that has the cell.
