@@ -1,12 +1,9 @@
 // The history of a cell in a record that several servers share, where others are in the way.
 #include <gtest/gtest.h>
 
-#include <chrono>
-
 #include "server/trainer/trainer.h"
 #include "tests/support/demand.h"
 #include "tests/support/postgres.h"
-#include "tests/support/process.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel {
@@ -38,17 +35,12 @@ class SharedHistory : public testing::Test {
 TEST_F(SharedHistory, ARollbackStepsPastNoVersionThatOnlyCannotBeReadNow) {
   ASSERT_TRUE(registry_.version("cell-7", 1));  // in memory, as version 2 is not
   {
-    test::Process somebody({"/usr/bin/psql", url_, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
-                            "LOCK TABLE models IN ACCESS EXCLUSIVE MODE", "-c", "SELECT 'locked'",
-                            "-c", "SELECT pg_sleep(60)"});
-    ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
+    const test::LockedTable somebody(url_, "models", "ACCESS EXCLUSIVE");
     const auto refused = trainer_.rollback("cell-7", {"r", "roll back cell-7"});
     ASSERT_FALSE(refused) << "version " << *refused;
     EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
   }
-  test::Postgres::of_program().sql(url_,
-                                   "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation "
-                                   "= 'models'::regclass AND mode = 'AccessExclusiveLock'");
+  ASSERT_TRUE(store_->wait_until_writable({}));
   EXPECT_EQ(demand(trainer_.rollback("cell-7", {"r", "roll back cell-7"})), 2);
   EXPECT_EQ(served(), 2);
 }
