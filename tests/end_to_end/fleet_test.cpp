@@ -172,11 +172,11 @@ TEST_F(Fleet, WhatIsPutInForceOnOneServerIsServedByAllAndDecidedOnAny) {
 }
 
 TEST(FleetToTry, IsStartedByOneCommandAndLosesNothingWhenOneOfEachIsKilled) {
-  const auto shown = test::run({"/usr/bin/env", "TRAMMEL_BUILD=" TRAMMEL_BINARY_DIR,
-                                fmt::format("TRAMMEL_PORT={}", test::own_ports()),
-                                fmt::format("TRAMMEL_DOMAIN={}", test::own_domain()),
-                                TRAMMEL_SOURCE_DIR "/deploy/fleet"},
-                               2 * kFleetLimit);
+  const auto shown = test::run(
+      {"/usr/bin/env", "TRAMMEL_BUILD=" TRAMMEL_BINARY_DIR,
+       fmt::format("TRAMMEL_PORT={}", test::own_ports()),
+       fmt::format("TRAMMEL_DOMAIN={}", test::own_domain()), TRAMMEL_SOURCE_DIR "/deploy/fleet"},
+      2 * kFleetLimit);
   EXPECT_EQ(shown.exit_code, 0) << shown.out << shown.err;
   for (const char* line :
        {"job 1 of cell cell-7 done: version 1, in force", "job 2 of cell cell-7 done: version 2",
