@@ -115,7 +115,7 @@ struct Candidate {
 };
 
 // Of the whole choice, by the time that they take on a few thousand poses of an arm of six joints.
-constexpr double kBaseShare = 0.1, kLoadShare = 0.4, kCandidateShare = 0.7;
+constexpr double kBaseShare = 0.04, kLoadShare = 0.2, kCandidateShare = 0.5;
 
 class CauseSearch {
  public:

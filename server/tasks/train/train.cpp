@@ -64,7 +64,7 @@ using Report = std::function<bool(const std::string& stage, double share)>;
 struct PartsDone {
   double choice, physics, bias;
 };
-constexpr PartsDone kPhysicsKnown = {0, 0.3, 0.9}, kPhysicsChosen = {0.55, 0.65, 0.9};
+constexpr PartsDone kPhysicsKnown = {0, 0.3, 0.9}, kPhysicsChosen = {0.1, 0.75, 0.9};
 
 /// The sources to identify from these rows; what was chosen goes into `choice`. Distances and
 /// touches do not choose: with them the usual sources are identified.
