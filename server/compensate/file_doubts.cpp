@@ -153,16 +153,16 @@ std::optional<Note> base_elsewhere(const PhysicalModel& model) {
   const bool far = away >= kFar || turned >= kFarTurn;
   return Note{
       "base_elsewhere", far ? Severity::kWarning : Severity::kInfo,
-      fmt::format("the robot's base stands {:.{}f} mm from where the cell file has it, turned by "
-                  "{:.1f} deg, "
-                  "by the measurements, which the model follows: {}; write base: {{xyz_mm: "
-                  "[{:.1f}, {:.1f}, "
-                  "{:.1f}], q_wxyz: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]}}, or null",
-                  to_mm(away), far ? 0 : 1, to_deg(turned),
-                  far ? "was the instrument set up elsewhere, or is `base` of the cell file wrong?"
-                      : "if it was measured and not drawn, the first length of the robot file is "
-                        "off by that",
-                  to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), q.w(), q.x(), q.y(), q.z())};
+      fmt::format(
+          "the robot's base stands {:.{}f} mm from where the cell file has it, turned by "
+          "{:.1f} deg, by the measurements, which the model follows{} base: {{xyz_mm: "
+          "[{:.1f}, {:.1f}, {:.1f}], q_wxyz: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]}}, or null",
+          to_mm(away), far ? 0 : 1, to_deg(turned),
+          far ? ". Was the instrument set up elsewhere, or is `base` of the cell file wrong? "
+                "Write"
+              : "; if it was measured and not drawn, the first length of the robot file is "
+                "off by that; else write",
+          to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), q.w(), q.x(), q.y(), q.z())};
 }
 
 Note measurements_rounded(const Rounding& rounding) {
@@ -240,7 +240,7 @@ std::optional<Note> lengths_scaled(const PhysicalModel& model,
   return Note{
       "lengths_scaled", Severity::kWarning,
       fmt::format(
-          "all {} lengths of the arm come out {:.3f} % {} than drawn: one cause is likelier "
+          "all {} lengths of the arm come out about {:.2f} % {} than drawn: one cause is likelier "
           "than as many errors of making. Is it the instrument's scale (hold it against a "
           "known length, give it the air's temperature), or an arm that is {:.0f} K {} than "
           "its drawing? These positions do not tell; where it is the instrument, corrected "

@@ -326,7 +326,7 @@ TEST(ModelNotes, LengthsThatAreAllOffByOneShareAreSaidWithWhatMayMakeThemSo) {
   const auto note = note_of(scaled(1e-3, 0), "lengths_scaled");
   ASSERT_TRUE(note);
   EXPECT_EQ(note->severity, Note::Severity::kWarning);
-  EXPECT_NE(note->text.find("0.100 % longer than drawn"), std::string::npos) << note->text;
+  EXPECT_NE(note->text.find("about 0.10 % longer than drawn"), std::string::npos) << note->text;
   EXPECT_NE(note->text.find("the instrument's scale"), std::string::npos) << note->text;
   EXPECT_NE(note->text.find("83 K warmer"), std::string::npos) << note->text;
   EXPECT_TRUE(note_of(scaled(1e-3, 20e-6), "lengths_scaled"));

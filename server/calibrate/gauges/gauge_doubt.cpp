@@ -24,9 +24,10 @@ namespace {
 using CellPtr = std::shared_ptr<const Cell>;
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
-constexpr double kFarRow = 0.1;  // m: no drawing is so far off at a single row
-constexpr double kAsked = 3;     // times the stated sigma, for touches: a larger misfit starts the
-                                 // search for another reading
+constexpr double kFarRow = 0.1;     // m: no drawing is so far off at a single row
+constexpr double kFarAnchor = 0.1;  // m: a base is set to some cm, and its anchors with it
+constexpr double kAsked = 3;  // times the stated sigma, for touches: a larger misfit starts the
+                              // search for another reading
 constexpr double kMuchBetter = 0.2;  // share of the misfit as given, relative to the spread of the
                                      // values; below it the other reading was surely meant
 
@@ -126,7 +127,7 @@ struct Wire {
   }
   [[nodiscard]] bool fits() const { return found && found->off < kNoModelError; }
   [[nodiscard]] bool stands_as_stated() const {
-    return fits() && stated && off_at(*stated) < kNoModelError;
+    return fits() && stated && off_at(*stated) < kFarAnchor;
   }
 };
 
@@ -199,7 +200,7 @@ std::optional<Error> doubt_of_place(const std::string& anchor,
       meant.emplace_back(fmt::format("with the place of '{}'", other), *one.stated);
   std::string reading = "at another place", then;
   for (const auto& [name, place] : meant) {
-    if (wire.off_at(place) > std::min(kNoModelError, kMuchBetter * off)) continue;
+    if (wire.off_at(place) > kMuchBetter * off) continue;
     reading = name;
     then = fmt::format("; read {} they would fit to {:.1f} mm", name, to_mm(wire.off_at(place)));
     break;
@@ -210,7 +211,7 @@ std::optional<Error> doubt_of_place(const std::string& anchor,
              "while those to others fit{}",
              anchor, to_mm(off), then)
       .of("anchors")
-      .beyond(to_mm(off), to_mm(kNoModelError))
+      .beyond(to_mm(off), to_mm(kFarAnchor))
       .with_text(fmt::format("anchor '{}' {}", anchor, reading))
       .next(
           fmt::format("correct xyz_mm of '{}' in the cell file: the distances put it near [{:.0f}, "
