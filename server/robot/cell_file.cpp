@@ -13,7 +13,7 @@
 #include "server/robot/cell_papers.h"
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
-#include "server/robot/cell_values.h"
+#include "server/robot/cell_values_file.h"
 #include "server/robot/robot_confirmation.h"
 
 namespace trammel {

@@ -213,9 +213,8 @@ void add_convert(CLI::App& app, Action& chosen) {
                                          "Leica Tracker Pilot (CSV), with --joints");
   what->add_option("--robodk", arguments->robodk,
                    "Measurements exported by a RoboDK calibration project (CSV)");
-  CLI::Option* table = what->add_option(
-      "--table", arguments->table,
-      "A table whose --columns you tell; a first line of names counts for nothing");
+  CLI::Option* table = what->add_option("--table", arguments->table,
+                                        "A table whose --columns you tell, whatever it names them");
   what->require_option(1);
   CLI::Option* columns =
       command

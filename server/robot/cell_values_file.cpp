@@ -1,4 +1,4 @@
-#include "server/robot/cell_values.h"
+#include "server/robot/cell_values_file.h"
 
 #include <cmath>
 

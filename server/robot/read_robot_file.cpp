@@ -4,7 +4,7 @@
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
-#include "server/robot/cell_values.h"
+#include "server/robot/cell_values_file.h"
 #include "server/robot/smallest_step.h"
 
 /// The robot file: joints, links, limits, and which joints follow others.
