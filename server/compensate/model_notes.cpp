@@ -262,19 +262,16 @@ void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
     notes.push_back({doubt.code, Severity::kWarning, doubt.text});
 }
 
-/// The base by the measurements, unless it was to be found anew.
+/// The base by the measurements, unless it was to be found anew. Several set-ups of the instrument
+/// say themselves that it stood elsewhere.
 void add_base_elsewhere(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const auto is_anew = [](const RefitRecord& refit) {
     const auto& base = cause_correcting(causes::Part::kBase).spelling;
     return std::find(refit.sources.begin(), refit.sources.end(), base) != refit.sources.end();
   };
   const auto& refits = parts.provenance.refits;
-  if (std::any_of(refits.begin(), refits.end(), is_anew)) return;
-  auto note = base_elsewhere(parts.physics);
-  if (!note) return;
-  // The cell file has the base for one set-up of the instrument, and here are several.
-  if (!parts.sessions.empty()) note->severity = Severity::kInfo;
-  notes.push_back(*std::move(note));
+  if (!parts.sessions.empty() || std::any_of(refits.begin(), refits.end(), is_anew)) return;
+  if (auto note = base_elsewhere(parts.physics)) notes.push_back(*std::move(note));
 }
 
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
