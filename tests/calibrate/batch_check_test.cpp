@@ -348,7 +348,7 @@ TEST(BatchCheck, AnAnchorWhosePlaceIsWrittenWithAnotherSignOrOrderIsNamed) {
        "200, 2600]}",
        "anchor 'a1' with the place of 'a2'"},
       {"a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: [2600, "
-       "200, 2300]}",
+       "200, 1600]}",
        "anchor 'a3' at another place"},
       {"a1: {xyz_mm: [2300, -1500, 100]}, a2: {xyz_mm: [1900, 1700, 400]}, a3: {xyz_mm: [2.6, "
        "0.2, 2.6]}",

@@ -199,11 +199,12 @@ std::optional<Error> doubt_of_place(const std::string& anchor,
     if (other != anchor && one.stated)
       meant.emplace_back(fmt::format("with the place of '{}'", other), *one.stated);
   std::string reading = "at another place", then;
+  double least = kMuchBetter * off;
   for (const auto& [name, place] : meant) {
-    if (wire.off_at(place) > kMuchBetter * off) continue;
+    if (wire.off_at(place) > least) continue;
+    least = wire.off_at(place);
     reading = name;
-    then = fmt::format("; read {} they would fit to {:.1f} mm", name, to_mm(wire.off_at(place)));
-    break;
+    then = fmt::format("; read {} they would fit to {:.1f} mm", name, to_mm(least));
   }
   const Vector3& p = wire.found->p_W;
   return refused(
