@@ -564,13 +564,14 @@ TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
   EXPECT_NEAR(drift.rate, 6e-5, 4e-5);
   EXPECT_EQ(drift.steps.size(), steps.size() - 1);
   EXPECT_LT(true_error(model, robot), 1e-5);
-  EXPECT_NE(notes_of(model).front().text.find(fmt::format("it has moved by {:.2f}", 1e3 * moved)),
-            std::string::npos)
-      << notes_of(model).front().text;
   const SessionChange told = session_changes(model).front();
   EXPECT_EQ(told.course, SessionChange::Course::kWanders);
   ASSERT_EQ(told.sizes.size(), 1u);
-  EXPECT_NEAR(told.sizes.front().value, 1e3 * moved, 2 * told.sizes.front().u95);
+  EXPECT_NEAR(told.sizes.front().value, to_deg(moved), 2 * told.sizes.front().u95);
+  EXPECT_NE(notes_of(model).front().text.find(
+                fmt::format("it has moved by {:.5f}", told.sizes.front().value)),
+            std::string::npos)
+      << notes_of(model).front().text;
   EXPECT_EQ(serialize(test::demand(deserialize(serialize(model), "again"))), serialize(model));
 }
 
