@@ -2,9 +2,9 @@
 
 #include <Eigen/Dense>
 
-/// Eigen's decompositions and products of matrices of doubles are compiled once, in
-/// dense_algebra.cpp. This header is precompiled into every source, so that no other source
-/// compiles them again: they are the larger half of the time of a build.
+/// dense_algebra.cpp compiles Eigen's decompositions and products of matrices of doubles once.
+/// Every source includes this header precompiled, so no other source compiles them again. Compiling
+/// them takes the larger half of the time of a build.
 
 #ifndef TRAMMEL_DENSE_ALGEBRA
 #define TRAMMEL_DENSE_ALGEBRA extern template

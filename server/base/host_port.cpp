@@ -20,7 +20,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::uint16_t kAnyPort = 9;  // a route does not depend on it
+constexpr std::uint16_t kAnyPort = 9;  // any number serves: a route does not depend on it
 
 std::string text_of(const in_addr& address) {
   std::array<char, INET_ADDRSTRLEN> text{};

@@ -7,7 +7,7 @@
 
 #include "server/base/result.h"
 
-/// Where a service is reached.
+/// The address of a service.
 namespace trammel {
 
 struct HostPort {
@@ -17,7 +17,7 @@ struct HostPort {
 };
 
 inline constexpr std::uint16_t kDiscoveryPort =
-    11811;  ///< of a discovery server, where none is said
+    11811;  ///< of a discovery server, if none is stated
 inline constexpr std::size_t kMostDiscoveryServers = 8;
 
 /// Parses `host` or `host:port`. The host is a name or an IPv4 address; a name becomes its first

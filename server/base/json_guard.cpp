@@ -17,7 +17,7 @@ struct Token {
   std::size_t begin = 0, end = 0;
 };
 
-/// Reads the text token by token and counts. Keeps nothing but the counts.
+/// Reads the text token by token and keeps counts only.
 class Scanner {
  public:
   Scanner(std::string_view json, const std::string& where, const JsonLimits& limits)

@@ -49,8 +49,8 @@ std::uint64_t LineOutput::dropped() const {
 
 bool LineOutput::put(std::string_view text) {
   while (!text.empty()) {
-    const long went =
-        put_part(text.substr(0, PIPE_BUF));  // so much goes into a pipe whole, or not at all
+    const long went = put_part(text.substr(0, PIPE_BUF));  // a pipe takes this many bytes
+                                                           // completely or not at all
     if (went < 0 && errno == EINTR) continue;
     if (went <= 0) return false;
     within_line_ = text[static_cast<std::size_t>(went) - 1] != '\n';

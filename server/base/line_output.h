@@ -8,9 +8,10 @@
 
 namespace trammel {
 
-/// Lines to a descriptor that others may have stopped reading: a pipe, a terminal, a socket. Never
+/// Lines to a descriptor whose reader may have stopped reading: a pipe, a terminal, a socket. Never
 /// waits, and never raises a signal of its own (a process that ignores SIGPIPE gets none at all).
-/// Drops lines that do not go; the next line that goes says how many were. Thread-safe.
+/// Drops lines that cannot be written; the next written line states how many were dropped.
+/// Thread-safe.
 class LineOutput {
  public:
   /// `descriptor` stays open and its flags, which other processes may share, stay as they are.
@@ -21,11 +22,11 @@ class LineOutput {
 
   /// `line` with its line end.
   void write(std::string_view line);
-  /// Lines that nobody has been told of yet.
+  /// Dropped lines that no written line has reported yet.
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
-  /// True if all of it went.
+  /// True if all of the text was written.
   [[nodiscard]] bool put(std::string_view text) TRAMMEL_REQUIRES(mutex_);
   /// Bytes that went at once; below 0: none.
   [[nodiscard]] long put_part(std::string_view part) const;

@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// The median of `values`, which must not be empty; of an even number the upper one of the two in
+/// The median of `values`, which must not be empty; for an even number the upper one of the two in
 /// the middle.
 [[nodiscard]] inline double median(std::vector<double> values) {
   TRAMMEL_CHECK(!values.empty());

@@ -6,12 +6,12 @@
 
 namespace trammel {
 
-/// Something that whoever uses a result should know.
+/// A note for the users of a result.
 struct Note {
   enum class Severity {
     kInfo,
     kWarning,
-    kStop  ///< a model with it is not put in force by itself: a person decides
+    kStop  ///< a model with it is not put in force automatically: a person decides
   };
   std::string code;  ///< for programs: `robot_not_confirmed`
   Severity severity = Severity::kInfo;

@@ -41,7 +41,7 @@ bool controls(std::uint32_t code) {
          code == 0xFEFF;
 }
 
-/// Those of the Unicode property Default_Ignorable_Code_Point, which fonts show as nothing, and
+/// True for the Unicode property Default_Ignorable_Code_Point, which fonts do not draw, and for
 /// noncharacters.
 bool is_unseen(std::uint32_t code) {
   struct Range {

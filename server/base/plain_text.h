@@ -16,7 +16,8 @@ namespace trammel {
 /// two texts that differ only in them look alike. Code points that are not characters are excluded
 /// as well.
 [[nodiscard]] bool is_plain(std::string_view text);
-/// True if the text is UTF-8 without control characters but tabs and line ends: the text of a file.
+/// True if the text is UTF-8 and its only control characters are tabs and line ends: the text of a
+/// file.
 [[nodiscard]] bool is_plain_lines(std::string_view text);
 
 /// The text with everything that is not plain spelled out, as JSON spells it: `\u001b`, `\u009b`; a

@@ -37,7 +37,7 @@ struct Error {
   std::optional<long> row;      ///< line of the file, counted from 1 with its header
   std::string field;            ///< column, key (`tools: spindle: xyz_mm`) or option
   std::optional<double> value;  ///< as read, in the unit of the field
-  std::optional<double> limit;  ///< the limit that was broken, in the same unit
+  std::optional<double> limit;  ///< the violated limit, in the same unit
   std::string text;             ///< the value as read, where it is a word
   std::string next;             ///< the next step for the user, as one clause
   std::vector<Error> also;      ///< other errors found in the same reading
@@ -56,8 +56,8 @@ template <typename T>
 using Result = tl::expected<T, Error>;
 using Status = Result<void>;
 
-/// A failure on its way to the caller. Each layer adds what it knows, inner layers first. Members
-/// that are already set stay as they are.
+/// A failure on its way to the caller. Each layer adds its context, inner layers first. Members
+/// that are already set do not change.
 class Failure : public tl::unexpected<Error> {
  public:
   explicit Failure(Error error) : tl::unexpected<Error>(std::move(error)) {}
@@ -118,8 +118,7 @@ template <typename... Args>
   return Failure(std::move(error));
 }
 
-/// The value that `TRY` hands out: a copy of the value of a named result, the moved value of a
-/// temporary one.
+/// The value that `TRY` returns: a copy for a named result, the moved value for a temporary one.
 template <typename R>
 auto value_of(R&& result) {
   if constexpr (!std::is_void_v<typename std::remove_cvref_t<R>::value_type>)
@@ -134,8 +133,8 @@ template <typename... Args>
 
 }  // namespace trammel
 
-/// The value of a `Result`, or the way out: where `expression` failed, the function that stands
-/// around it returns its error as it is. A `Status` has no value. Example: `const Cell cell =
+/// The value of a `Result`, or an early return: if `expression` failed, the enclosing function
+/// returns its error unchanged. A `Status` has no value. Example: `const Cell cell =
 /// TRY(read_cell(path));`
 #define TRY(expression)                                                                      \
   (__extension__({                                                                           \

@@ -14,9 +14,9 @@ namespace trammel {
 namespace {
 
 constexpr int kMostDecimals = 4;
-constexpr int kMostDigits = 5;  // in front of the point that still read as a number
+constexpr int kMostDigits = 5;  // in front of the point; more do not read as a number
 
-constexpr double kSmallestPlain = 1e-7;  // of an uncertainty that is written without a power of ten
+constexpr double kSmallestPlain = 1e-7;  // a smaller uncertainty is written with a power of ten
 
 /// Units that begin with an angle, and the units that people read instead.
 struct Angular {

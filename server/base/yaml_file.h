@@ -27,8 +27,8 @@ class YamlMap {
 
   /// Notes every key that is not in `known` as an error, and goes on.
   void only(std::initializer_list<const char*> known) const;
-  /// Calls `read`. An error in it is noted, and reading goes on: read_yaml() reports all errors at
-  /// its end.
+  /// Calls `read`. An error in it is recorded, and reading goes on: read_yaml() reports all errors
+  /// at its end.
   template <typename Read>
   void attempt(const Read& read) const {
     try {
