@@ -36,7 +36,8 @@ bool factorise(Index size, double* lower, double* log_det) {
   return true;
 }
 
-// By forward elimination of the identity, row after row of the inverse: columns of its transpose.
+// Forward elimination of the identity gives row after row of the inverse, stored as columns of its
+// transpose.
 void invert(Index size, const double* lower, Block* block) {
   memset(block->transpose, 0, sizeof(block->transpose));
   memset(block->inverse, 0, sizeof(block->inverse));
@@ -104,8 +105,8 @@ struct Workspace {
 
 Index work_size(Index rows) { return 4 * kMaxBlock * padded_rows(rows); }
 
-// Columns k to k + size of the symmetric matrix whose lower triangle is `a`, into the panel; zero
-// in the rows of the block itself, so that the update leaves it alone.
+// Copies columns k to k + size of the symmetric matrix with the lower triangle `a` into the panel.
+// The rows of the block itself become zero, so that the update does not change them.
 void gather_columns(Index k, Index size, const double* a, Index ld, const Workspace& w) {
   const Index below = k + size;
   for (Index i = 0; i < k; ++i) {

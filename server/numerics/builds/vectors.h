@@ -1,6 +1,6 @@
 #pragma once
 
-/// One vector of doubles: how it is loaded and stored, its square root and its exponential.
+/// One vector of doubles: load, store, square root and exponential.
 ///
 /// Every header of this folder is compiled once for each build, behind the build's target pragma
 /// and with TRAMMEL_VECTOR_LANES (doubles in a vector) and TRAMMEL_TILE_COLUMNS defined. See
@@ -51,10 +51,9 @@ inline Index round_up(Index n, Index step) { return (n + step - 1) / step * step
 #if TRAMMEL_VECTOR_LANES == 8
 
 // e^x for x <= 0, 1e-15 + |x| 1e-16 relative; below -708 it stays at e^-708, which is 0 for any sum
-// here. x = n/8 ln 2
-// + r, |r| <= ln 2 / 16: 2^(n/8) is one permutation of eight doubles and an integer addition, e^r a
-// Chebyshev polynomial of degree 6. Adding 1.5 * 2^52 leaves n in the low bits of the mantissa; the
-// table has n mod 8 taken off where n << 49 puts it.
+// here. x = n/8 ln 2 + r, |r| <= ln 2 / 16. 2^(n/8) is one permutation of eight doubles and an
+// integer addition; e^r is a Chebyshev polynomial of degree 6. Adding 1.5 * 2^52 leaves n in the
+// low bits of the mantissa; the table has n mod 8 taken off where n << 49 puts it.
 inline Vec exp_of_negative(Vec x) {
   constexpr Bits kPowers = {0x3ff0000000000000, 0x3fef72b83c7d517b, 0x3fef06fe0a31b715,
                             0x3feebfdad5362a27, 0x3feea09e667f3bcd, 0x3feeace5422aa0db,
