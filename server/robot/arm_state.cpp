@@ -316,7 +316,7 @@ void ArmKinematics::add_first_moments(const LinkVectors& turn, JointStateMatrix&
       if (chain_->joint(j).type != JointType::kRevolute) continue;
       const Vector3& z = links_[static_cast<std::size_t>(j)].z;
       // As for a body: a rotation before the joint turns axis and moment together, a rotation
-      // beyond it the moment alone.
+      // beyond it turns the moment alone.
       const Vector3 by_turn = z.cross(first.moment).cross(gravity);
       const Vector3 by_moment = gravity.cross(z);
       for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));

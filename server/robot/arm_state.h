@@ -34,9 +34,9 @@ struct ArmState {
   Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
   Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation;
                                     ///< rotation vector] in W
-  FirstMoments first_moments;       ///< beyond the told masses; 2 x n or empty
-  JointArray
-      spring_torque;  ///< n or empty, Nm (N): what springs add to the gravity torque on each gear
+  FirstMoments first_moments;       ///< beyond the stated masses; 2 x n or empty
+  JointArray spring_torque;  ///< n or empty, Nm (N): the springs' addition to the gravity torque on
+                             ///< each gear
 
   /// Adds `delta` (rad, m) to the joint as its gear would: through signs, and bars that couple it
   /// (Chain::drive).
@@ -158,9 +158,9 @@ class ArmKinematics {
   /// 6 x n: the tool's motion in W per deflection of each joint's gear (signs do not enter, bars
   /// do), the J of eq. (3.6).
   [[nodiscard]] JointJacobian deflection_jacobian() const;
-  /// Derivative of deflection_jacobian() * `of_gears` with that deflection (n) held.
+  /// Derivative of deflection_jacobian() * `of_gears`, with that deflection (n) held constant.
   [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& of_gears) const;
-  /// Points in W that bending depends on: a point on the axis of `joint`, the far end of its link,
+  /// Points in W on which bending depends: a point on the axis of `joint`, the far end of its link,
   /// the centre of gravity, the tool point. Also the weight, N.
   struct LoadedLink {
     Vector3 start, end, cog, tip, weight;
@@ -189,7 +189,7 @@ class ArmKinematics {
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
   /// One column per link row: the rotation of everything downstream of the link.
   [[nodiscard]] LinkVectors turns() const;
-  /// Adds to `T` what the first moments change of the moments about the axes.
+  /// Adds to `T` the effect of the first moments on the derivative of the torques about the axes.
   void add_first_moments(const LinkVectors& turn, JointStateMatrix& T) const;
 
   const Chain* chain_;

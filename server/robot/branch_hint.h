@@ -9,7 +9,7 @@
 /// wire and files carry the branches only in this form, so it is written and read here alone.
 namespace trammel {
 
-/// A message taken apart. Without branches `before` is all of it.
+/// The parts of a message. Without branches `before` is the whole message.
 struct BranchHint {
   std::string before;
   std::vector<int> branches;

@@ -61,7 +61,7 @@ struct Cell {
   Tracker tracker;
   ModelSpec model;
   std::vector<std::pair<double, double>>
-      joint_ranges;  ///< rad, of this cell; empty = the robot's limits
+      joint_ranges;  ///< rad, for this cell; empty = the robot's limits
   std::optional<Workspace> workspace;
   SessionRule sessions;
   std::optional<double>
@@ -84,8 +84,8 @@ struct Cell {
 /// The tool of a request: `requested`, or the only tool if that is empty. Refuses an unknown name.
 /// Refuses an empty name if the cell has several tools.
 [[nodiscard]] Result<std::string> resolve_tool(const Cell& cell, const std::string& requested);
-/// The payload of a request, chosen as a tool is. A cell without payloads has one called ""
-/// (nothing carried).
+/// The payload of a request, by the rules for tools. A cell without payloads has one named "" (no
+/// load).
 [[nodiscard]] Result<std::string> resolve_payload(const Cell& cell, const std::string& requested);
 
 }  // namespace trammel

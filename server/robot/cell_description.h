@@ -16,7 +16,7 @@ struct CellDescription {
 
 [[nodiscard]] CellDescription description_of(const Cell& cell);
 
-/// `cell file`, `robot file`, `cell file and robot file`: what differs; empty: nothing.
+/// The differing files: `cell file`, `robot file`, `cell file and robot file`; empty: none.
 [[nodiscard]] std::string what_differs(const CellDescription& a, const CellDescription& b);
 
 }  // namespace trammel

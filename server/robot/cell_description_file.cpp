@@ -27,8 +27,8 @@ std::string spelled(const std::string& scalar) {
   return error == std::errc() && stopped == end ? fmt::format("{:.17g}", number) : scalar;
 }
 
-/// One spelling for values that mean the same. Texts carry their length, so that no two texts are
-/// spelled alike.
+/// One spelling for values with the same meaning. Texts carry their length, so different texts
+/// never have the same spelling.
 std::string spelled(const YAML::Node& node) {
   if (node.IsSequence()) {
     std::string text = "[";

@@ -11,7 +11,7 @@ namespace trammel {
 struct CellDoubt {
   std::string code;  ///< `gravity_up`, `quaternion_order`, `lengths_in_metres`, `hayati_missing`
   std::string text;  ///< one sentence, with the key and the value
-  bool of_robot_file = false;  ///< else of the cell file
+  bool of_robot_file = false;  ///< true: about the robot file; false: about the cell file
 };
 
 /// Joints (0-based) whose axis is parallel to the next one, but whose row in the robot file is not

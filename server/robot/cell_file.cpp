@@ -89,7 +89,7 @@ void leave_to_data(std::vector<std::string> named, ModelSpec& spec) {
   spec.bias = kAutoSources;
 }
 
-/// A list, or `auto`, alone or in the list; `auto` where nothing is said.
+/// A list, or `auto`, alone or in the list; `auto` if the file states nothing.
 void read_error_sources(const YamlMap& model, ModelSpec& spec) {
   if (!model.has("error_sources") || says_auto(model)) return leave_to_data({}, spec);
   std::vector<std::string> names = model.texts("error_sources");
@@ -291,8 +291,8 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
   });
 }
 
-/// The text of a file that another file names. Refuses a pipe: whoever starts a program does not
-/// know that it would wait there.
+/// The text of a file that another file names. Refuses a pipe, since a user would not expect the
+/// program to wait there.
 Result<std::string> file_text_of(const std::string& path) {
   std::error_code unknown;
   if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))

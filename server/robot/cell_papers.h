@@ -7,13 +7,13 @@
 
 namespace trammel {
 
-/// The fields of a cell's certificate, as its file has them; empty where it says nothing.
+/// The fields of a cell's certificate, from its file; missing ones are empty.
 struct CellPapers {
   std::string serial_number;  ///< of the robot
-  std::string instrument;     ///< that its batches are measured with
+  std::string instrument;     ///< the instrument of its batches
   std::string operator_name;  ///< who measures
 };
-/// Nothing of a cell without a file.
+/// Empty for a cell without a file.
 [[nodiscard]] Result<CellPapers> papers_of(const Cell& cell);
 
 }  // namespace trammel

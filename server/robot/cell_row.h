@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// Line of the cell file in which `model` has this key, counted from 1; empty where it has not.
+/// Line of the cell file with this key of `model`, counted from 1; empty if the key is missing.
 [[nodiscard]] std::optional<long> row_of_model_key(const Cell& cell, const std::string& key);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace trammel {
 
 /// The demands of a cell's owner, beside its description.
 struct CellRules {
-  std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
+  std::optional<double> tolerance;  ///< m: the required accuracy of the cell, for 95 % of its
+                                    ///< positions
   bool fleet_prior =
       false;  ///< false: no prior is taken from robots of this type that were trained before
   bool controller_compensates =
@@ -19,7 +20,7 @@ struct CellRules {
   /// External axes that carry neither the robot nor the part, by their names in robot programs.
   std::vector<std::string> idle_axes = {};
 };
-/// As the cell file says; nothing is demanded of a cell without one.
+/// The rules in the cell file; a cell without a file has none.
 [[nodiscard]] Result<CellRules> rules_of(const Cell& cell);
 
 }  // namespace trammel

@@ -9,8 +9,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kFarthestMm = 1e9;   // of any frame or point: no cell is larger
-constexpr double kWorstSigma = 5e-3;  // m; no instrument for robots is worse
+constexpr double kFarthestMm = 1e9;   // for any frame or point: no cell is larger
+constexpr double kWorstSigma = 5e-3;  // m; every instrument for robots is better
 
 double read_radius(const YamlMap& map, const std::string& key) {
   const double radius = map.number(key);

@@ -5,14 +5,15 @@
 #include "server/base/yaml_file.h"
 #include "server/robot/gauge.h"
 
-/// The values that cell and robot files are made of. Each refuses by the key that is wrong.
+/// The values in cell and robot files. Each reader refuses with the key of the wrong value.
 namespace trammel {
 
-/// Three numbers, none larger than any cell.
+/// Three numbers within the size of any cell.
 [[nodiscard]] Vector3 read_vector(const YamlMap& map, const std::string& key);
 /// A direction of length 1.
 [[nodiscard]] Vector3 read_direction(const YamlMap& map, const std::string& key);
-/// Refuses what is no name of a tool, a payload or an anchor, as ids in requests have it.
+/// Refuses a text that is no name of a tool, a payload or an anchor, under the rules for ids in
+/// requests.
 void check_key(const YamlMap& map, const std::string& name, const char* what);
 
 /// The instruments of the cell: its tracker, and the anchors of others.

@@ -33,7 +33,7 @@ struct LinkGeometry {
 struct Joint {
   JointType type = JointType::kRevolute;
   LinkGeometry link;  ///< nominal; theta (revolute) or d (prismatic) is the offset at joint value 0
-  bool hayati = false;  ///< beta is a parameter of this link and d is not
+  bool hayati = false;  ///< this link has the parameter beta instead of d
   double sign = 1;      ///< -1 where the controller counts against the right-hand rule, else +1
   double lower = -std::numeric_limits<double>::infinity();  ///< rad (m), of the commanded value
   double upper = std::numeric_limits<double>::infinity();
@@ -54,7 +54,7 @@ enum class CouplingKind {
                    ///< other joint does
 };
 
-/// As robot files spell it.
+/// The spelling in robot files.
 [[nodiscard]] const char* to_string(CouplingKind kind);
 
 /// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its
@@ -82,7 +82,7 @@ class Chain {
   [[nodiscard]] const std::vector<Coupling>& couplings() const { return couplings_; }
   /// n x n: d(kinematic joint value)/d(commanded joint value): signs and couplings.
   [[nodiscard]] const Eigen::MatrixXd& transmission() const { return transmission_; }
-  /// n x n: d(kinematic joint value)/d(gear angle): signs, and what bars couple.
+  /// n x n: d(kinematic joint value)/d(gear angle): signs and couplings by bars.
   [[nodiscard]] const Eigen::MatrixXd& drive() const { return drive_; }
   /// n x n: drive() for gears that are counted as their axes turn. It maps the deflections of the
   /// gears to the joints; its transpose maps torques about the axes to torques on the gears.

@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// Axes go to axes: each permutation of them with the signs that make a rotation.
+/// Each permutation of the axes, with the signs that make a rotation.
 std::vector<Matrix3> all_turns() {
   std::vector<Matrix3> turns;
   std::array<int, 3> axis = {0, 1, 2};

@@ -6,8 +6,8 @@
 
 namespace trammel {
 
-/// The 24 rotations that take a cube onto itself, none first. Every rotation is within 63 degrees
-/// of one of them, so they are starts for a search over all rotations.
+/// The 24 rotations that take a cube onto itself, the identity first. Every rotation is within 63
+/// degrees of one of them, so they are starts for a search over all rotations.
 [[nodiscard]] const std::vector<Matrix3>& cube_turns();
 
 /// X_AB turned in A by `turn` about the point `p_A`, which stays where it is.

@@ -4,7 +4,7 @@ namespace trammel {
 
 namespace {
 
-/// The length of `d`, with the derivative where it has one.
+/// The length of `d`, with its derivative if it exists.
 GaugedLength length_of(const Vector3& d) {
   const double length = d.norm();
   return {length, length > 0 ? Vector3(d / length) : Vector3::Zero()};

@@ -9,11 +9,11 @@
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
 
-/// Instruments that tell one number of a pose instead of a position: draw wires, ballbars and
+/// Instruments that give one number at a pose instead of a position: draw wires, ballbars and
 /// ranges, which measure a distance; dial gauges and probes, which touch a surface.
 namespace trammel {
 
-/// The point that an instrument measures to, as the cell file has it under `anchors`.
+/// The reference point of an instrument, under `anchors` in the cell file.
 struct Anchor {
   enum class Shape { kPoint, kSphere, kPlane, kRing };
   Shape shape = Shape::kPoint;
@@ -22,7 +22,7 @@ struct Anchor {
   Vector3 direction_W =
       Vector3::UnitZ();  ///< unit vector: normal of the plane, away from its body; axis of the ring
   double radius = 0;     ///< m, of sphere or ring
-  std::optional<double> sigma;  ///< m, of one value of this instrument
+  std::optional<double> sigma;  ///< m, of one reading of this instrument
   std::optional<double> zero;   ///< m: the offset of the readings; empty: calibration identifies it
   bool zero_open = false;  ///< true: the zero is certainly unknown; false: the data decide whether
                            ///< there is one
@@ -30,10 +30,10 @@ struct Anchor {
 /// By their ids.
 using Anchors = std::map<std::string, Anchor>;
 
-/// The anchors of the cell file; none where the cell has no file.
+/// The anchors of the cell file; empty for a cell without a file.
 [[nodiscard]] Result<Anchors> anchors_of(const Cell& cell);
 
-/// One number that an instrument told.
+/// One reading of an instrument.
 struct Gauge {
   enum class Kind {
     kDistance,  ///< from the tool point to the anchor's point
@@ -43,11 +43,12 @@ struct Gauge {
   Kind kind = Kind::kDistance;
   std::string anchor;
   double value = 0;        ///< m
-  std::string minus_pose;  ///< id of the pose that the value is told against; empty: of itself
+  std::string minus_pose;  ///< id of the pose against which the value is read; empty: none
   std::shared_ptr<const PoseContext> minus;  ///< that pose
 };
 
-/// A distance, and its derivative by the tool point. That by the anchor's point is the negative.
+/// A distance, and its derivative by the tool point. The derivative by the anchor's point is the
+/// negative.
 struct GaugedLength {
   double value = 0;  ///< m
   Vector3 by_point_W = Vector3::Zero();

@@ -75,8 +75,8 @@ Descent descend(const Chain& chain, const Pose& X_BF, const JointVector& start,
   return now;
 }
 
-/// True where the smallest singular value of the Jacobian is below kSingularValue. Then J Jᵀ (or Jᵀ
-/// J, the smaller one) less kSingularValue² is not positive definite.
+/// True if the smallest singular value of the Jacobian is below kSingularValue. Then J Jᵀ (or Jᵀ J,
+/// if that is smaller) minus kSingularValue² is not positive definite.
 bool is_singular(const Chain& chain, const JointVector& q) {
   const auto J = flange_motion(chain, q).jacobian;
   JointMatrix square;

@@ -36,8 +36,8 @@ struct InverseResult {
 [[nodiscard]] bool has_spherical_wrist(const Chain& chain);
 
 /// The branch of `X_BF` in closed form. `conf` is 0..7, numbered as ABB's cfx: +4 the wrist centre
-/// stands behind axis 1, +2 it stands behind the lower arm, +1 joint 5 is negative. Joints turn to
-/// the values nearest to `near` (zero when absent) that the limits allow. Refuses a chain without
+/// is behind axis 1, +2 it is behind the lower arm, +1 joint 5 is negative. Joints turn to the
+/// values nearest to `near` (zero when absent) that the limits allow. Refuses a chain without
 /// spherical wrist and a conf outside 0..7.
 [[nodiscard]] Result<InverseResult> inverse_kinematics(
     const Chain& chain, const Pose& X_BF, int conf,

@@ -9,9 +9,9 @@ namespace trammel {
 
 namespace {
 
-constexpr double kStill = 1e-6;  // rad (m): a gear that turns less stands still
+constexpr double kStill = 1e-6;  // rad (m): a gear with a smaller turn counts as still
 
-/// The joints from which the tool comes along its axis.
+/// The joints at the start of the line along the tool's axis.
 std::optional<JointVector> backed_off(const Chain& robot, const JointVector& q, const Pose& X_FT,
                                       double back_off) {
   const Pose X_BT = robot.flange_pose(q) * X_FT * Eigen::Translation3d(0, 0, -back_off);
@@ -20,12 +20,13 @@ std::optional<JointVector> backed_off(const Chain& robot, const JointVector& q, 
   return found.q;
 }
 
-/// How far the gear is turned before the line, on which it turns by `on_line`.
+/// The turn of the gear before the line. On the line it turns by `on_line`.
 double before_line(const TakeUp& one, double on_line, int side) {
   return std::abs(on_line) >= one.way ? 0 : side * (one.way - std::abs(on_line));
 }
 
-/// The lead-in whose gears that the line leaves still come from their side, or from the other one.
+/// The lead-in in which the gears that the line does not turn come from their side, or from the
+/// other one.
 std::optional<LeadIn> led_in(const Chain& robot, const JointVector& q, const JointVector& back,
                              const std::vector<TakeUp>& take_ups, bool other_side) {
   LeadIn made;

@@ -34,7 +34,7 @@ double read_step(const YamlMap& map, const std::string& key, double most) {
   return step;
 }
 
-/// rad (m); 0: not told.
+/// rad (m); 0: not stated.
 double encoder_step(const YamlMap& joint) {
   for (const auto& [key, unit] :
        {std::pair("encoder_resolution_deg", from_deg(1)), {"encoder_resolution_mm", from_mm(1)}}) {
@@ -119,7 +119,8 @@ CouplingKind coupling_kind(const YamlMap& map) {
   map.refuse("kind", refused("'{}', expected controller or parallelogram", text).with_text(text));
 }
 
-constexpr double kShortestArm = 0.05;  // m, all lengths of its links together; no robot is smaller
+constexpr double kShortestArm = 0.05;  // m, all lengths of its links together; every robot is
+                                       // larger
 
 /// Refuses an arm that is smaller than any robot.
 void check_lengths(const YamlMap& map, const std::vector<Joint>& joints) {

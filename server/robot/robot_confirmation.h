@@ -11,9 +11,9 @@ namespace trammel {
 /// The record, under `robot_confirmed` in the cell file, that the robot file was compared with the
 /// controller.
 struct RobotConfirmation {
-  std::string robot_sha256;  ///< of the robot file that was compared; another text is another robot
-  int poses = 0;             ///< that the controller showed
-  double position_mm = 0;    ///< the largest difference
+  std::string robot_sha256;    ///< of the compared robot file; another text is another robot
+  int poses = 0;               ///< the number of poses that the controller showed
+  double position_mm = 0;      ///< the largest difference
   double orientation_deg = 0;  ///< the largest difference
   std::string day;             ///< 2026-11-26
 };

@@ -5,11 +5,11 @@
 
 #include "server/robot/chain.h"
 
-/// Robot files as they are written; models/README.md says what stands in them.
+/// Writes robot files. models/README.md describes their content.
 namespace trammel {
 
-/// The keys `joints` and `coupling`, with everything that the chain holds. `links`: what stands in
-/// place of its nominal ones, one a joint.
+/// The keys `joints` and `coupling`, with everything that the chain holds. `links` replaces the
+/// nominal links, one per joint.
 [[nodiscard]] std::string joints_yaml(const Chain& robot, const std::vector<LinkGeometry>& links);
 
 /// A robot file of the chain as it is. `source`: where its numbers come from, one line.

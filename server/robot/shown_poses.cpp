@@ -127,8 +127,8 @@ class Comparison {
   }
 
  private:
-  /// m and rad: three standard deviations of the rounding there, and the precision that controllers
-  /// compute with.
+  /// m and rad: three standard deviations of the rounding, plus the precision of the controllers'
+  /// computations.
   [[nodiscard]] std::pair<double, double> limits_at(const Chain& robot, std::size_t i) const {
     const Eigen::MatrixXd J = robot.jacobian(shown_.q[i]) * rounding_.joints.matrix().asDiagonal();
     const double position =
@@ -207,7 +207,7 @@ Frames free_frames(const Chain& robot, const ShownPoses& shown, const std::vecto
   return frames;
 }
 
-/// A number of the robot file that may be another one with the controller.
+/// A number of the robot file that the controller may have with another value.
 struct FileNumber {
   int joint = 0;
   double LinkGeometry::*number = nullptr;
@@ -382,7 +382,7 @@ std::string off_text(const RobotComparison& result) {
                      to_mm(result.position_max), to_deg(result.rotation_max));
 }
 
-/// The answer where the arm fits the shown poses as `reading` takes them.
+/// The answer if the arm fits the shown poses according to `reading`.
 RobotComparison fitting(const Cell& cell, const ShownPoses& shown, const Reading& reading) {
   RobotComparison result = described(reading, shown.q.size());
   const std::string still = still_joints(cell.robot, shown);
@@ -408,7 +408,8 @@ RobotComparison fitting(const Cell& cell, const ShownPoses& shown, const Reading
   return result;
 }
 
-/// The first way in which the controller's own base and tool explain all, if any does.
+/// The first reading in which the controller's own base and tool explain all poses, if there is
+/// one.
 std::optional<Reading> with_free_frames(const Cell& cell, const ShownPoses& shown,
                                         const Comparison& comparison) {
   constexpr std::size_t kFewestFree = 4;  // poses: twelve numbers are free

@@ -8,23 +8,21 @@
 /// The check whether a robot file is the controller's: joints and poses that the controller shows,
 /// against the file's forward kinematics.
 ///
-/// A model corrects positions against the robot file, but it is the controller that solves a
-/// corrected pose for joints, with its own lengths. Where the two arms differ, every corrected pose
-/// lands off by the difference, however well the model fits.
+/// A model corrects positions against the robot file, but the controller solves a corrected pose
+/// for joints with its own lengths. If the two arms differ, every corrected pose is off by the
+/// difference, however well the model fits.
 namespace trammel {
 
 /// The poses that a controller shows for some joints.
 struct ShownPoses {
-  /// One way in which the three angles may be meant. Makers differ: A B C, W P R, a rotation
-  /// vector.
+  /// One possible meaning of the three angles. Makers differ: A B C, W P R, a rotation vector.
   struct Orientations {
     std::string meaning;     ///< `Rz(A) Ry(B) Rx(C)`
     std::vector<Matrix3> R;  ///< one a pose
   };
-  std::vector<JointVector> q;  ///< rad (m), as shown
-  std::vector<Vector3> p;      ///< m
-  std::vector<Orientations>
-      orientations;  ///< the ways in which they may be meant; empty: none is shown
+  std::vector<JointVector> q;              ///< rad (m), as shown
+  std::vector<Vector3> p;                  ///< m
+  std::vector<Orientations> orientations;  ///< their possible meanings; empty: none is shown
 };
 
 /// The result of the comparison.
@@ -38,7 +36,7 @@ struct RobotComparison {
   double position_limit = 0;  ///< m: the largest error that rounding of the shown numbers explains,
                               ///< at the worst pose
   std::string shown_as;  ///< `the flange in the robot's base`, `tool spindle in the cell's base`
-  std::string angles;    ///< how the orientation was read
+  std::string angles;    ///< the meaning of the angles that was used
   std::vector<std::string> could_be;  ///< changes that would turn the file's arm into the
                                       ///< controller's, the likeliest first
 };

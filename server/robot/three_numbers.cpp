@@ -12,7 +12,7 @@ namespace trammel {
 
 namespace {
 
-/// The ways of makers: KUKA; FANUC, Yaskawa and ROS; RoboDK; Universal Robots; Kawasaki.
+/// The forms of makers: KUKA; FANUC, Yaskawa and ROS; RoboDK; Universal Robots; Kawasaki.
 std::vector<ThreeNumbers> ways_of_makers() {
   return {{"A B C",
            "turns about z, y and x, in this order, each about the turned axis",
@@ -77,7 +77,7 @@ std::array<Vector3, 2> ThreeNumbers::numbers(const Matrix3& R) const {
 std::string ThreeNumbers::columns_text() const {
   if (columns.empty()) return "";
   std::array<std::string, 3> shown = columns.front();
-  const bool long_names = shown[0].size() > 2;  // rvx_rad is written so
+  const bool long_names = shown[0].size() > 2;  // this is the spelling of rvx_rad
   for (std::string& one : shown)
     if (!long_names && !one.empty()) one[0] = upper(one[0]);
   return fmt::format("{}, {}, {}", shown[0], shown[1], shown[2]);
