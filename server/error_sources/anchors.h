@@ -7,10 +7,10 @@
 #include "server/error_sources/physical_model.h"
 #include "server/robot/gauge.h"
 
-/// The parameters of instruments that tell one number: the places of their anchors, and the offsets
-/// of their readings. A model lists them as the sources `anchors` and `instrument_zero`, with
-/// values and covariances beside those of the arm. They are not errors of the robot: they move no
-/// tool, and diagnosis does not look for them.
+/// The parameters of instruments that measure one number: the places of their anchors, and the
+/// offsets of their readings. A model lists them as the sources `anchors` and `instrument_zero`,
+/// with values and covariances beside those of the arm. They are not errors of the robot: they move
+/// no tool, and diagnosis does not look for them.
 namespace trammel {
 
 /// An anchor in a model: the values from the cell file, and the positions of the others among the

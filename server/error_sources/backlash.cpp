@@ -9,7 +9,7 @@ namespace {
 
 /// Play in a gear: the joint lags behind its motor by half the play, and more under load: delta q =
 /// -dir (b + k |tau|), where dir is the direction of approach. If all poses are approached from one
-/// side, it cannot be told from a joint zero.
+/// side, it cannot be separated from a joint zero.
 class Backlash final : public ErrorSource {
  public:
   explicit Backlash(const SourceSpec& spec)

@@ -92,7 +92,7 @@ class CablePull final : public ErrorSource {
   int joint_;
   int other_;
   Eigen::RowVectorXd sum_;     ///< of both axes, by the angle of each gear
-  Eigen::RowVectorXd pulled_;  ///< how much of the torque about both axes loads each gear
+  Eigen::RowVectorXd pulled_;  ///< the share of the torque about both axes that loads each gear
   Range range_;
   std::vector<Parameter> parameters_;
 };

@@ -74,7 +74,7 @@ const CauseRecord& cause_spelled(std::string_view spelling) {
 
 namespace {
 
-/// The first record with that value of a member.
+/// The first record whose member has that value.
 template <typename Value>
 const CauseRecord& first_with(Value CauseRecord::*member, Value value) {
   const auto records = catalogue().records();

@@ -14,20 +14,19 @@ namespace trammel {
 [[nodiscard]] std::vector<const CauseRecord*> all_causes();
 
 /// The cause that `spelling` names. It may be the spelling of the cause, of one of its forms, or of
-/// a source in a list
-/// (`joint_slip:2@40`). Null if it is unknown.
+/// a source in a list (`joint_slip:2@40`). Null if it is unknown.
 [[nodiscard]] const CauseRecord* find_cause(std::string_view spelling);
 
 /// The record of a spelling that must be known: an unknown one is a bug.
 [[nodiscard]] const CauseRecord& cause_spelled(std::string_view spelling);
 
-/// The first cause of that search family. It is a bug if there is none.
+/// The first cause with that search family. A missing one is a bug.
 [[nodiscard]] const CauseRecord& first_searched_by(causes::SearchFamily family);
 
 /// The first record that stands for `what`. A missing record is a bug.
 [[nodiscard]] const CauseRecord& cause_that_stands_for(causes::StandsFor what);
 
-/// The cause whose parameters correct that part of the nominal cell. It is a bug if there is none.
+/// The cause whose parameters correct that part of the nominal cell. A missing one is a bug.
 [[nodiscard]] const CauseRecord& cause_correcting(causes::Part part);
 
 /// The gaps in a record, in words for its author; empty if it is complete. Its rivals must

@@ -23,18 +23,17 @@ struct ContextNeeds {
   bool direction = false;  ///< of the source's joint, approached from both sides
   bool velocity = false;
   bool payload = false;  ///< something must hang on the flange
-  bool before = false;   ///< the pose that the robot came from
+  bool before = false;   ///< the previous pose of the robot
   bool history = false;  ///< temperature and time of every pose
-  bool stand = false;    ///< where the instrument stands, in the cell file
+  bool stand = false;    ///< the place of the instrument, in the cell file
 };
 
 /// `gear_transmission:3@48.5+97`: a cause, its joint, and further numbers.
 struct SourceSpec {
-  std::string text;  ///< as spelled
-  std::string name;  ///< the cause, or its form
-  int joint = -1;    ///< 0-based; -1 where none is named
-  std::vector<double>
-      at;  ///< after the @: orders, or the pose (1-based row of the batch) at which it begins
+  std::string text;        ///< as spelled
+  std::string name;        ///< the cause, or its form
+  int joint = -1;          ///< 0-based; -1 where none is named
+  std::vector<double> at;  ///< after the @: orders, or the first pose (1-based row of the batch)
 };
 using SourceMaker = Result<std::shared_ptr<const ErrorSource>> (*)(const SourceSpec& spec,
                                                                    const Cell& cell);
@@ -73,7 +72,7 @@ enum class SearchFamily {
   kPose,      ///< every pose by itself
 };
 
-/// The kind of thing that a record stands for.
+/// The kind of thing that a record describes.
 enum class StandsFor {
   kACause,           ///< one physical cause
   kNoKnownCause,     ///< an effect that no known cause explains
@@ -81,11 +80,11 @@ enum class StandsFor {
                      ///< force
 };
 
-/// Tells whether a cause may be wrong in single parameters only.
+/// Tells whether a cause may be wrong in single parameters.
 enum class Numbers {
   kTogether,   ///< all parameters together
   kSingly,     ///< one by one, and each is this same cause
-  kApart,      ///< one by one, and two of them are two causes
+  kApart,      ///< one by one, and two of them count as two causes
   kOneAJoint,  ///< the same, and each is a joint's
 };
 
@@ -107,7 +106,7 @@ struct Rival {
   Likeness likeness = Likeness::kImitator;
   std::string_view parameter =
       {};               ///< one of its parameters, `{}` for the joint; empty: the whole cause
-  double surprise = 0;  ///< nat: penalty on this cause while the model has no source of the rival
+  double surprise = 0;  ///< nat: penalty on this cause while the model lacks a source of the rival
 };
 
 /// The measurement that distinguishes a cause from its rivals. Of the remedies of two causes,
@@ -130,8 +129,8 @@ inline constexpr Remedy kWiderRange{80, "a wider range of joints, or another too
 
 /// A number that is reported with a cause.
 struct Figure {
-  std::string_view name;  ///< how its name begins
-  std::string_view unit;  ///< as people read it; may be empty
+  std::string_view name;  ///< beginning of its name
+  std::string_view unit;  ///< in people's units; may be empty
   std::string_view meaning;
 };
 
@@ -154,7 +153,7 @@ struct AddedByData {
   std::string_view beside;  ///< the cause that shows it; it must be among the error sources
   bool (*is_known)(const Cell& cell);  ///< true if the cell's files state the effect; then the
                                        ///< cause is not added
-  std::string_view note;               ///< for people, where a model has it
+  std::string_view note;               ///< for people, if a model has it
 };
 
 /// The order in which causes act on the arm: in the order given here, then by `turn`, then in the
@@ -183,13 +182,13 @@ struct CauseRecord {
   ContextNeeds needs;
   causes::SearchFamily search;
   causes::Acting acts;
-  std::vector<causes::Form> forms;  ///< the usual one first; none: no error source describes it
+  std::vector<causes::Form> forms;  ///< the usual one first; empty: no error source describes it
   std::vector<causes::Rival> rivals;
   causes::Remedy told_apart_by;
   std::string_view shown_by;  ///< the quantity that a batch must record to show the cause
   std::string_view action;    ///< for the shop floor
   std::vector<causes::Figure>
-      figures;  ///< of its findings: those of the summary, then its parameters
+      figures;  ///< figures of its findings: those of the summary, then its parameters
 
   // Members that only some causes set.
   causes::Part part = causes::Part::kNone;

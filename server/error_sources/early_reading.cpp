@@ -17,8 +17,8 @@ std::vector<Parameter> shares(int joints) {
 /// Robot or tracker are read before the arm stands still, so each joint lacks a share of its last
 /// move: delta q = -e (q - q_before). A servo that settles lacks the same share of every move after
 /// the same time. An instrument that begins to average too early sees the same tail of the move. e
-/// is not negative: a joint that overshoots lacks nothing, and waiting does not bring it back. The
-/// cause belongs to the measurement, so it does not act on requests.
+/// is not negative, because a joint that overshoots misses no part of its way, and waiting does not
+/// bring it back. The cause belongs to the measurement, so it does not act on requests.
 class EarlyReading final : public JointError {
  public:
   EarlyReading(const SourceSpec& spec, int joints) : JointError(spec.text, -1, shares(joints)) {}

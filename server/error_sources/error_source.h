@@ -14,8 +14,8 @@
 
 namespace trammel {
 
-/// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people
-/// read it.
+/// One number that calibration may identify. Values are in SI; `unit` and `scale` convert them for
+/// people.
 struct Parameter {
   std::string name;        ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
   std::string unit;        ///< for people: `mm`, `rad`, `rad/Nmm`
@@ -23,7 +23,8 @@ struct Parameter {
   double prior = 0;        ///< mean of the prior, SI
   double prior_scale = 1;  ///< standard deviation of the prior, SI
   double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
-  bool is_place = false;  ///< says where an effect is (the order of an oscillation), not how large
+  bool is_place = false;  ///< gives the place of an effect (the order of an oscillation), not its
+                          ///< size
 };
 
 /// One physical cause of error: its parameters and their effect on the arm. Immutable; thread-safe.
@@ -46,11 +47,11 @@ class ErrorSource {
   [[nodiscard]] virtual std::optional<Search> search() const { return std::nullopt; }
   /// One sentence about it for reports.
   [[nodiscard]] virtual std::string explanation() const = 0;
-  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where
-  /// `jacobian` is given, its columns first_column... receive the exact derivative, and sources
-  /// that depend on the state pass the derivatives of earlier sources on. The joints of `context`
-  /// are the angles of their gears (Chain::gear_angles), not what a controller with couplings
-  /// counts.
+  /// Changes `state` by the effect of the cause at this pose, with `values` (SI) for its
+  /// parameters. If `jacobian` is given, its columns first_column... receive the exact derivative,
+  /// and sources that depend on the state pass the derivatives of earlier sources on. The joints of
+  /// `context` are the angles of their gears (Chain::gear_angles), not the counts of a controller
+  /// with couplings.
   virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values,
                      ArmState& state, StateJacobian* jacobian, int first_column) const = 0;
 };

@@ -10,7 +10,7 @@ namespace {
 constexpr double kMassOfReach =
     60;  // kg/m^3: a robot's moving mass over the cube of its reach, as makers list them
 constexpr double kSpreadUnknown = 1;  // share of the expected moment, where no masses are stated
-constexpr double kSpreadTold = 0.3;   // the same where they are
+constexpr double kSpreadTold = 0.3;   // likewise, where masses are stated
 constexpr double kLeastLever = 0.05;  // m: a link's weight may be that far beside its axis
 
 double length_of(const Joint& joint) { return std::hypot(joint.link.d, joint.link.a); }

@@ -8,7 +8,7 @@
 #include "server/error_sources/error_source.h"
 #include "server/robot/gauge.h"
 
-/// The parameters of instruments that tell one number, as sources of a model.
+/// The parameters of instruments with one number per reading, as sources of a model.
 namespace trammel {
 
 inline constexpr std::string_view kAnchors = "anchors";

@@ -12,7 +12,7 @@ namespace {
 constexpr double kLessExpected = 8;  // nat, while the arm's geometry is not in the model
 constexpr int kHarmonics = 4;
 constexpr double kRatio =
-    1e-3;  // rad/rad, prior: teeth and bars are exact, what drags along is not
+    1e-3;  // rad/rad, prior: teeth and bars are exact, friction between joints is not
 constexpr double kAmplitude =
     2e-4;  // rad, prior of a first harmonic: a tenth of a mm on a bar of half a metre
 

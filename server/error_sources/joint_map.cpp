@@ -78,7 +78,7 @@ class JointMap final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// The spectrum that these numbers say; empty where they say none.
+/// The spectrum in these numbers; empty if they have none.
 std::optional<MapSpectrum> spectrum_of(const std::vector<double>& numbers) {
   MapSpectrum spectrum;
   if (numbers.empty()) return spectrum;

@@ -12,22 +12,22 @@ namespace trammel {
 struct MapSpectrum {
   int harmonics = 48;
   double amplitude = 3e-4;  ///< rad, of slow harmonics
-  double knee = 6;          ///< harmonic at which they begin to fall
+  double knee = 6;          ///< harmonic at which the amplitudes begin to fall
   double power = 2;         ///< of the variance, by 1 + (h/knee)²
 
   [[nodiscard]] double stddev(int harmonic) const;
 };
 
-/// The map of `joint` (0-based) with that spectrum, as a source is spelled:
+/// The map of `joint` (0-based) with that spectrum, in the spelling of a source:
 /// `joint_map:2@110+312.5+1.84+1.02`, harmonics, amplitude in µrad, knee and power.
 [[nodiscard]] std::string spelled_map(int joint, const MapSpectrum& spectrum);
 
-/// The joint (0-based) of a map that says nothing of its spectrum, `joint_map:2`; nothing for any
-/// other spelling.
+/// The joint (0-based) of a map without a stated spectrum, `joint_map:2`. Empty for any other
+/// spelling.
 [[nodiscard]] std::optional<int> joint_of_open_map(const std::string& spelling);
 
 /// The spelling without a spectrum that was learned: `joint_map:2` of
-/// `joint_map:2@110+312.5+1.84+1.02`. Any other spelling as it is.
+/// `joint_map:2@110+312.5+1.84+1.02`. Any other spelling stays unchanged.
 [[nodiscard]] std::string without_learned_spectrum(const std::string& spelling);
 
 }  // namespace trammel

@@ -8,8 +8,8 @@ namespace {
 
 constexpr double kUsualSlip = 2e-3;  // rad
 
-/// A joint loses its zero at a pose and keeps the new one. A second number, mrad, says how far that
-/// usually is.
+/// A joint loses its zero at a pose and keeps the new one. A second number, mrad, gives the usual
+/// size.
 class JointSlip final : public JointError {
  public:
   explicit JointSlip(const SourceSpec& spec)

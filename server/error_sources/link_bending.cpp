@@ -108,8 +108,8 @@ const CauseRecord& causes::link_bending() {
       .search = SearchFamily::kColumns,
       .acts = {ActsOn::kLoadedArm, 1},
       .forms = {{"link_bending", make}},
-      // Joints give way before links do; only beside the joints' compliance is bending a cause of
-      // its own. Odds of 50 to 1 (4 nat) while the model has neither.
+      // Joints yield before links do. Bending is a separate cause only if the model has the
+      // compliance of the joints. Odds of 50 to 1 (4 nat) while the model has neither.
       .rivals = {{.cause = "compliance", .likeness = Likeness::kSpecialCase, .surprise = 4},
                  {.cause = "payload"}},
       .told_apart_by = remedies::kOtherLoad,

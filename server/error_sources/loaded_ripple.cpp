@@ -76,7 +76,7 @@ class LoadedRipple final : public ErrorSource {
 
 constexpr double kUsualOrder = 2;  // cycles a turn of the motor: a strain wave gear's
 
-/// Without orders: two waves a turn of the motor, where the robot file tells the gear's ratio.
+/// Without orders: two waves per turn of the motor, if the robot file has the gear's ratio.
 Result<SourceSpec> with_orders(SourceSpec spec, const Joint& joint) {
   if (!spec.at.empty()) return spec;
   if (!(joint.gear_ratio > 0)) {

@@ -5,7 +5,7 @@
 #include "server/base/units.h"
 #include "server/error_sources/error_source.h"
 
-/// Parameters in the units people read them in.
+/// Parameters in the units for people.
 namespace trammel {
 
 [[nodiscard]] inline Parameter length_parameter(std::string name, double prior_scale_mm) {

@@ -56,7 +56,7 @@ class PayloadError final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// From a pose on, something else hangs on the flange.
+/// From a pose on, another load hangs on the flange.
 class PayloadChanged final : public ErrorSource {
  public:
   explicit PayloadChanged(const SourceSpec& spec)

@@ -8,8 +8,8 @@ namespace trammel {
 
 namespace {
 
-/// The pose as its causes see it: with the angles of the gears, where the controller counts other
-/// angles. Recorded approach directions are those of the gears already.
+/// The pose as its causes see it: with the angles of the gears, if the controller counts other
+/// angles. Recorded approach directions already refer to the gears.
 class AtTheGears {
  public:
   AtTheGears(const Chain& robot, const PoseContext& context) : context_(&context) {
@@ -132,7 +132,8 @@ namespace {
 
 constexpr std::size_t kMostSources = 500;
 constexpr std::size_t kMostSpecBytes = 1000;
-constexpr std::size_t kMostParameters = 1300;  // their covariance has the square of it
+constexpr std::size_t kMostParameters = 1300;  // their covariance grows with the square of the
+                                               // number
 
 /// Refuses too many sources and spellings that are too long, before any source is made.
 Status check_counts(const std::vector<std::string>& specs) {

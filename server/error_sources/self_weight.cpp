@@ -11,8 +11,8 @@ namespace {
 constexpr double kLessExpected = 8;     // nat, while the arm's geometry is not in the model
 constexpr double kVertical = 1 - 1e-6;  // cosine: an axis along gravity feels no weight
 
-/// True where the weight beyond joint `i` can turn a joint at all. It cannot where all axes up to
-/// it are one vertical.
+/// True where the weight beyond joint `i` can turn a joint at all. It cannot if all axes up to it
+/// lie on one vertical line.
 bool is_felt(const Cell& cell, int i) {
   const Chain& chain = cell.robot;
   if (chain.joint(i).type != JointType::kRevolute) return false;

@@ -186,8 +186,7 @@ bool corrects(const std::vector<std::string>& sources, causes::Part part) {
 
 namespace {
 
-/// The cause with its parts in words: joint, number and place stand behind it as `:3`, `:d6`,
-/// `@40`.
+/// The cause and its parts in words. Joint, number and place follow it as `:3`, `:d6`, `@40`.
 std::string in_words(const CauseRecord& record, const std::string& spelling) {
   const std::size_t at = spelling.find('@');
   const std::size_t colon = spelling.substr(0, at).find(':');

@@ -39,8 +39,8 @@ namespace trammel {
 /// The sources of level M3, which a bias is told of in any case.
 [[nodiscard]] std::vector<std::string> standard_sources();
 
-/// True if both spellings are of one cause, whichever of its forms: `compliance` and
-/// `compliance_linear`; joints and what begins at a pose apart.
+/// True if both spellings are of one cause, in any of its forms: `compliance` and
+/// `compliance_linear`. Causes of different joints, or that begin at different poses, differ.
 [[nodiscard]] bool are_forms_of_one(const std::string& source, const std::string& other);
 
 /// `source` in the spelling of `list`: the cause's name if `list` has it and `source` is one of its

@@ -7,9 +7,9 @@ namespace {
 
 constexpr double kRate = 1e-5;  // rad/K, prior
 
-/// The zero of a joint goes with the temperature of its gearbox, which follows the recorded one
-/// with a lag: delta q = z (T_lag - 20). Without the history of the temperature the gearbox has
-/// that of the thermometer.
+/// The zero of a joint depends on the temperature of its gearbox, which follows the recorded
+/// temperature with a lag: delta q = z (T_lag - 20). Without a history of the temperature the
+/// gearbox is as warm as the thermometer.
 class ThermalZero final : public ErrorSource {
  public:
   explicit ThermalZero(const SourceSpec& spec)

@@ -21,8 +21,8 @@ void add_six(std::vector<Parameter>& parameters, const std::string& suffix) {
 }
 
 /// The pose of a tool on the flange differs from the nominal one: X_FT = Tx Ty Tz Rz Ry Rx
-/// X_FT_nominal, in F; six parameters for each tool of the cell. With one tool it is told from the
-/// last link only in part: tx = a6, tz = d6, trx = alpha6, trz = q6.
+/// X_FT_nominal, in F; six parameters for each tool of the cell. With one tool it can be separated
+/// from the last link only in part: tx = a6, tz = d6, trx = alpha6, trz = q6.
 class Tool final : public ErrorSource {
  public:
   explicit Tool(const Cell& cell) {
