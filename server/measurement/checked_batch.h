@@ -42,8 +42,8 @@ class CheckedBatch {
   [[nodiscard]] CheckedBatch holding_out(const std::vector<bool>& flags) const;
   /// False if the recorded times contradict the order of the rows.
   [[nodiscard]] bool is_in_order_of_time() const;
-  /// A copy with the poses in the order of their times, and with velocities computed from that
-  /// order, as `robot` went through them. A batch that is in order is returned unchanged.
+  /// A copy with the poses in the order of their times, and with the velocities of `robot` in that
+  /// order. A batch that is in order is returned unchanged.
   [[nodiscard]] CheckedBatch in_order_of_time(const Chain& robot) const;
 
  private:

@@ -12,7 +12,7 @@ namespace trammel {
 /// The rows that have a position. Indices and rows stay.
 [[nodiscard]] MeasurementBatch positions_of(const MeasurementBatch& batch);
 
-/// Refuses gauges where `who` (`diagnose`, `a check`) works with positions alone.
+/// Refuses gauges for a task `who` (`diagnose`, `a check`) that works with positions alone.
 [[nodiscard]] Status require_positions(const MeasurementBatch& batch, const std::string& who);
 
 /// Resolves anchors, tools and payloads of the gauges, and gives a value without a sigma that of

@@ -19,8 +19,7 @@ bool is_in_order(const Rows& rows) {
          });
 }
 
-/// True if the robot can have come to `now` from `before` by the sides of the gears that were
-/// recorded.
+/// True if the recorded sides of the gears allow that the robot came from `before` to `now`.
 bool may_come_from(const JointVector& before, const PoseContext& now, const Chain& robot) {
   if (before.size() != now.q.size()) return false;
   if (now.direction.empty()) return true;

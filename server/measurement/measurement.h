@@ -18,14 +18,14 @@ enum class MeasurementSet { kUnassigned, kTrain, kValidation };
 struct Measurement {
   std::string pose_id;
   PoseContext context;
-  Vector3 p_W = Vector3::Zero();  ///< tool point as measured, m; of a gauge it is not a number
+  Vector3 p_W = Vector3::Zero();  ///< measured tool point, m; not a number for a gauge
   std::optional<Matrix3> R_WT;    ///< tool orientation as measured, active W <- T
   std::optional<Gauge> gauge;     ///< one number instead of a position (gauges.h)
   std::optional<double> sigma;    ///< m, of one axis of this point, or of the gauge
   std::optional<double>
       sigma_rotation;  ///< rad, of one axis of this orientation, if it differs from the tracker's
   MeasurementSet set = MeasurementSet::kUnassigned;
-  std::string session_id;  ///< as recorded: one set-up of the instrument; empty: the batch is one
+  std::string session_id;  ///< the recorded set-up of the instrument; empty: the batch is one
   int session = 0;         ///< its place in MeasurementBatch::sessions
   int row = 0;             ///< line in its file, for messages
   std::vector<std::string> extra;  ///< values of the batch's extra columns
@@ -37,7 +37,7 @@ struct MeasurementBatch {
   std::string where;  ///< the file as messages name it; empty = not from a file
   std::vector<Measurement> measurements;
   std::vector<JointType>
-      joint_types;  ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
+      joint_types;  ///< from the columns: `q1_deg` or, for a rail, `q7_mm`; empty = the robot's
   std::vector<std::string>
       extra_columns;        ///< header names of columns that Trammel does not know, kept
   std::string source_text;  ///< the CSV as it came

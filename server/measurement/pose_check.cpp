@@ -9,8 +9,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kColdest = -60, kHottest = 150;  // degrees Celsius, of any robot
-constexpr double kLimitTolerance = 1e-6;          // rad, m: what a file rounds away
+constexpr double kColdest = -60, kHottest = 150;  // degrees Celsius, for any robot
+constexpr double kLimitTolerance = 1e-6;          // rad, m: lost in the rounding of a file
 
 }  // namespace
 

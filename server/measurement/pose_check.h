@@ -13,8 +13,8 @@ namespace trammel {
 [[nodiscard]] Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
                                          const std::string& where);
 
-/// Where a file has columns of the driven joints alone, in their order: puts 0 for each passive
-/// joint (passive_joint.h) into the columns and the poses.
+/// Inserts 0 for each passive joint (passive_joint.h) into the columns and the poses, if the file
+/// only has columns of the driven joints, in their order.
 void put_in_passive_joints(const Chain& robot, std::vector<JointType>& columns,
                            const std::vector<PoseContext*>& poses);
 

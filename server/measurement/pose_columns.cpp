@@ -34,7 +34,7 @@ std::optional<JointColumn> as_joint_column(std::string_view column_name) {
   return column;
 }
 
-/// An optional column's number in this row; empty field = nothing recorded.
+/// The number of an optional column in this row; an empty field means that nothing was recorded.
 Result<std::optional<double>> optional_number(const CsvTable& table, std::size_t row,
                                               const std::optional<std::size_t>& column,
                                               double limit) {
@@ -71,7 +71,7 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
     found.joint_types_.push_back(column.second);
     direction_names.push_back(fmt::format("dir{}", number));
   }
-  // Targets on a branch have no joints of their own, but a way to come there.
+  // Targets on a branch have no joints of their own, but they may have an approach.
   for (int n = 1; joints.empty() && table.find(fmt::format("dir{}", n)); ++n)
     direction_names.push_back(fmt::format("dir{}", n));
   std::vector<std::size_t> directions = TRY(table.all_or_none(direction_names));

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kSameJoints = 1e-6;  // rad, m: as repeats are told
+constexpr double kSameJoints = 1e-6;  // rad, m: the same limits as for repeats
 
 }  // namespace
 

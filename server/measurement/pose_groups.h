@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// Rows (rising) that stand at one joint vector.
+/// Rows (rising) at one joint vector.
 using PoseGroup = std::vector<Eigen::Index>;
 
 /// Groups the rows of `q` (N x n, rad or m) by joint vector, in the order of their first row.
@@ -22,8 +22,8 @@ using PoseGroup = std::vector<Eigen::Index>;
 [[nodiscard]] bool are_seen_together(const Measurement& a, const Measurement& b);
 /// Groups the rows of `batch` by are_seen_together().
 [[nodiscard]] std::vector<PoseGroup> groups_seen_together(const MeasurementBatch& batch);
-/// The number of rows that are seen together with each row, itself counted; empty where all are
-/// alone. Gauges see the arm from different sides, and are alone.
+/// For each row, the number of rows that are seen together, the row itself included; empty if every
+/// row is alone. Gauges see the arm from different sides, and are alone.
 [[nodiscard]] std::vector<int> counted_together(const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -31,7 +31,8 @@ constexpr double kWorthAsking =
     1e-3;  // m: with a smaller misfit no reading is tried, since a robot's model error is as large
 constexpr double kOfRows =
     5e-3;  // the same for rows: on a path, a late clock looks like the next row
-constexpr double kMuchBetter = 0.25;  // of the distance as given: a reading that was surely meant
+constexpr double kMuchBetter = 0.25;  // share of the distance as given: below it the reading was
+                                      // surely meant
 constexpr double kAsGood = 1.5;  // times the best misfit: readings below it cannot be distinguished
 constexpr double kFollow =
     20e-3;  // m: below this misfit, single rows, zeros and tools are examined
@@ -39,16 +40,17 @@ constexpr double kBadRow = 10e-3;  // and 8 times the median: a row of other joi
 constexpr double kBadRowRatio = 8;
 constexpr std::size_t kFewestBadRows = 3;
 constexpr double kFixedPoint = 1e-3;   // spread of a tip's places on a spike
-constexpr double kSamePlace = 1e-6;    // the same where nobody measured it
+constexpr double kSamePlace = 1e-6;    // likewise, for positions that were not measured
 constexpr double kOtherPlace = 50e-3;  // m: a base farther from the cell file's stands at another
                                        // place
 // A larger zero error than any robot has.
 constexpr double kMostZero = from_deg(15);
 constexpr double kCertainZero = from_deg(4);  // its standard deviation is below that
 constexpr double kCertainBase = from_deg(1);
-constexpr double kToolStddev = 5e-3;  // of a tool as it is mounted
+constexpr double kToolStddev = 5e-3;  // of a mounted tool
 constexpr double kToolSigmas = 4;
-constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell is that near
+constexpr double kSameTool = 0.4;  // share of the distance: another tool of the cell that is this
+                                   // near
 // Stated uncertainties.
 constexpr std::size_t kFewestForSigma = 20;  // poses: below that an arm follows noise
 constexpr double kNotThatGood =
@@ -57,7 +59,7 @@ constexpr double kHarmless = 3e-4;  // m: who states less may be careful, and do
 // Angles.
 constexpr double kOtherTurn = from_deg(0.5);  // a larger difference in turn lets orientations
                                               // decide between readings
-constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
+constexpr double kNearBase = from_deg(30);    // a base near its place in the cell file
 
 std::string mm(double metres) {
   const double value = to_mm(metres);
@@ -165,7 +167,7 @@ class Look {
   std::optional<ArmFit> given_, anywhere_;
   double off_drawing_ = -1;
   std::vector<Reading> readings_;
-  std::vector<Tried> found_;  // readings that fit and cannot be told apart, the most likely first
+  std::vector<Tried> found_;  // readings that fit and cannot be separated, the most likely first
 };
 
 void Look::search() {
@@ -198,7 +200,7 @@ void Look::search() {
   };
   const auto best = std::min_element(tried.begin(), tried.end(), fits_best);
   if (best == tried.end()) return;
-  // A joint's zero or sign may make up in part for a tool whose point is elsewhere.
+  // A wrong zero or sign of a joint may partly compensate a wrong tool point.
   const bool is_rather_the_tool =
       kAsGood * anywhere().quality + 0.2 * kWorthAsking < best->fit.quality;
   if (!is_rather_the_tool) keep_best(std::move(tried));
@@ -415,7 +417,7 @@ std::optional<Error> Look::of_zero() const {
   return std::nullopt;
 }
 
-/// Positions that are far better than they say: their deviations are in another unit.
+/// Doubts positions that are far more precise than stated: their deviations are in another unit.
 std::optional<Error> Look::of_sigma() const {
   if (table_.size() < kFewestForSigma) return std::nullopt;
   std::vector<double> stated;

@@ -34,10 +34,10 @@ struct ReadingLook {
   /// true: the doubt concerns another tool, another point of it or another place of the base, not a
   /// mistake of reading.
   bool of_tool = false;
-  JointVector zeros;  ///< rad (m), of each joint: where the positions put its zero; 0 where they do
-                      ///< not tell
-  /// m: how far the positions are off the drawing itself, base and unknown tools wherever they fit
-  /// best; of the seven of ten that fit best. Negative: fewer than 6 poses.
+  JointVector zeros;  ///< rad (m), of each joint: its zero by the positions; 0 if they do not
+                      ///< determine it
+  /// m: the distance of the positions from the drawing itself, with base and unknown tools at their
+  /// best fit; for the best seven of ten positions. Negative: fewer than 6 poses.
   double off_drawing = -1;
   /// The base by the positions, if they determine its orientation to a degree.
   std::optional<Pose> X_WB;

@@ -103,7 +103,7 @@ std::optional<double> mean_of(const Group& group, Field field) {
   return sum / count;
 }
 
-/// The mean, where each of the group has it.
+/// The mean, if each of the group has one.
 std::optional<JointVector> mean_before(const Group& group) {
   JointVector sum = JointVector::Zero(group.front()->context.q.size());
   for (const Measurement* m : group) {

@@ -10,7 +10,7 @@ struct RepeatStatistics {
   int measurements = 0;  ///< the number of measurements in those groups
   double sigma =
       0;  ///< m, one axis of one measurement, pooled over the groups: robot and tracker together
-  int degrees_of_freedom = 0;  ///< 3 (n - 1) summed over the groups; 0 = `sigma` says nothing
+  int degrees_of_freedom = 0;  ///< 3 (n - 1) summed over the groups; 0 = `sigma` is meaningless
   double sigma_rotation = 0;   ///< rad, one axis of one measured orientation, pooled
   int rotation_degrees_of_freedom = 0;
   /// Factor on the stated sigmas, >= 1: the square root of chi² per degree of freedom (Birge

@@ -12,8 +12,8 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kFewestValues = 10;
-constexpr double kFewestSteps = 5;    // that the values extend over: else they hardly differ
-constexpr double kSameNumber = 1e-6;  // of a step, by the last bits of a value
+constexpr double kFewestSteps = 5;    // over which the values extend; with fewer they hardly differ
+constexpr double kSameNumber = 1e-6;  // of a step: rounding in the last bits of a value
 constexpr double kCounts = 0.5;       // of the stated sigma
 constexpr std::array<double, 12> kSteps = {10,   5,     1,     0.5,  0.1,  0.05,
                                            0.01, 0.005, 0.001, 5e-4, 2e-4, 1e-4};
@@ -32,7 +32,7 @@ std::vector<double> stated_sigmas(const MeasurementBatch& batch, const Cell& cel
   return all;
 }
 
-/// Each kind of number by itself: three coordinates, or gauges.
+/// Each kind of number separately: three coordinates, or gauges.
 std::vector<std::vector<double>> columns_mm(const MeasurementBatch& batch, bool of_gauges) {
   std::vector<std::vector<double>> all(of_gauges ? 1 : 3);
   for (const Measurement& m : batch.measurements) {

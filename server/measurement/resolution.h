@@ -5,14 +5,15 @@
 
 #include "server/measurement/measurement.h"
 
-/// How fine the numbers of a batch are written: displays of controllers and short files round them.
+/// The resolution of the numbers in a batch. Displays of controllers and short files round them.
 namespace trammel {
 
 /// The coarsest step of a decimal file (1, 0.5, 0.1 ...) of which all `values` are whole multiples.
-/// Empty where they are finer than 1e-4, hardly differ, or are too few to be no chance.
+/// Empty if they are finer than 1e-4, hardly differ, or are so few that chance may explain the
+/// step.
 [[nodiscard]] std::optional<double> step_of(const std::vector<double>& values);
 
-/// Measured numbers that are rounded so coarsely that it counts beside their stated sigma.
+/// Measured numbers with a rounding that is not small against their stated sigma.
 struct Rounding {
   double step = 0;   ///< m
   double sigma = 0;  ///< m, stated: the median of the rows
@@ -21,15 +22,15 @@ struct Rounding {
   /// m: the standard deviation of the rounding alone.
   [[nodiscard]] double stddev() const;
 };
-/// The rounding of the positions of `batch`, else of its distances and touches, where its standard
-/// deviation is more than half of the stated sigma. Empty where it is less.
+/// The rounding of the positions of `batch`, else of its distances and touches, if its standard
+/// deviation is more than half of the stated sigma. Empty if it is less.
 [[nodiscard]] std::optional<Rounding> coarse_rounding(const MeasurementBatch& batch,
                                                       const Cell& cell);
 
-/// m: the median of the sigmas that positions have of their own; empty where most have none.
+/// m: the median of the sigmas that positions have of their own; empty if most have none.
 [[nodiscard]] std::optional<double> sigma_of_rows(const MeasurementBatch& batch);
 
-/// rad: the step of the turning joints; empty where they are written finer than 1e-4 deg.
+/// rad: the step of the turning joints; empty if they are written finer than 1e-4 deg.
 [[nodiscard]] std::optional<double> joint_step(const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -11,13 +11,13 @@ namespace {
 constexpr double kOldestUnixTime =
     1e9;  // s: September 2001; smaller times count from another start
 
-/// A session as it comes in the file.
+/// A session in the order of the file.
 struct Found {
   std::string id;
   std::optional<double> began;  // Unix time, s
 };
 
-/// In the order in which they first come.
+/// The sessions in the order of their first rows.
 std::vector<Found> sessions_in(const MeasurementBatch& batch) {
   std::vector<Found> found;
   std::map<std::string, std::size_t> place;

@@ -13,7 +13,7 @@ struct BatchSplit {
   MeasurementBatch validation;
 };
 
-/// Draws `share` of `count` things with `seed`, one flag for each; at least one is not drawn.
+/// Draws `share` of `count` items with `seed`, one flag for each; at least one item is not drawn.
 /// Reproducible.
 [[nodiscard]] std::vector<bool> drawn_of(std::size_t count, double share, std::uint64_t seed);
 

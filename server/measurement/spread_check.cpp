@@ -13,8 +13,9 @@ namespace trammel {
 
 namespace {
 
-constexpr double kRatio = 3;     // nominal and real robot differ by millimetres, not by this
-constexpr double kSlack = 0.05;  // m: what a wrong tool or a moved tracker may add in a small batch
+constexpr double kRatio = 3;     // nominal and real robot differ by millimetres, not by this factor
+constexpr double kSlack = 0.05;  // m: the possible effect of a wrong tool or a moved tracker in a
+                                 // small batch
 constexpr double kSlackOfSmallAngles =
     0.01;  // m: with |q| within 2 pi degrees the tool's share is a tenth
 constexpr double kUnknownToolLength = 0.5;  // m
@@ -33,8 +34,8 @@ double spread_of(const std::vector<Vector3>& points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-/// The spread of the nine points of ten that are nearest to the middle. A number that an instrument
-/// writes where it saw nothing (-9999) is a bad row and no other unit.
+/// The spread of the nine tenths of the points that are nearest to the middle. An instrument that
+/// saw nothing may write a number such as -9999. That is a bad row and not another unit.
 double spread_of_most(std::vector<Vector3> points) {
   constexpr double kMost = 0.9;
   Vector3 middle;

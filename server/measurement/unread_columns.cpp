@@ -18,7 +18,7 @@ using Three = std::array<std::string, 3>;
 const std::array<Three, 4> kDirections = {
     {{"i", "j", "k"}, {"u", "v", "w"}, {"nx", "ny", "nz"}, {"vx", "vy", "vz"}}};
 
-/// True if a field of the column differs from another one, and all are numbers.
+/// True if all fields of the column are numbers, and at least two differ.
 bool holds_numbers(const MeasurementBatch& batch, std::size_t column) {
   const std::string* first = nullptr;
   bool differ = false;
@@ -31,7 +31,7 @@ bool holds_numbers(const MeasurementBatch& batch, std::size_t column) {
   return differ;
 }
 
-/// The columns as they stand in the file that have these names; empty where one is missing.
+/// The columns with these names, as written in the file; empty if one is missing.
 std::vector<std::string> columns_of(const std::vector<std::string>& columns, const Three& names) {
   std::vector<std::string> found;
   for (const std::string& name : names)
@@ -40,7 +40,7 @@ std::vector<std::string> columns_of(const std::vector<std::string>& columns, con
   return found.size() == names.size() ? found : std::vector<std::string>{};
 }
 
-/// Says how to name columns that makers use for an orientation; empty where there are none.
+/// Explains how to name the columns that makers use for an orientation; empty if there are none.
 std::string orientation_among(const std::vector<std::string>& columns) {
   for (const ThreeNumbers& way : ways_of_three_numbers()) {
     for (const Three& names : way.columns) {

@@ -7,9 +7,9 @@
 
 namespace trammel {
 
-/// A sentence on the columns of the file that hold other numbers from row to row and that nothing
-/// is learned from: each by its name, and what to do where they are an orientation or a direction.
-/// `told`: columns that somebody has spoken of. Empty where there are none.
+/// A sentence on columns of changing numbers from which nothing is learned. It gives the name of
+/// each, and the remedy if they are an orientation or a direction. `told`: columns that were
+/// already reported. Empty if there are none.
 [[nodiscard]] std::string unread_columns(const MeasurementBatch& batch,
                                          const std::vector<std::string>& told = {});
 

@@ -20,11 +20,11 @@ namespace {
 
 constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
 constexpr double kSigmaLimitMm =
-    5;  // no instrument is worse, and micrometres read as millimetres are
+    5;  // above any instrument, and below micrometres read as millimetres
 constexpr std::size_t kMostMeasurements =
     100'000;  // rows of one file: five times the limit of one training
 
-/// The columns of an orientation told by three numbers: `a_deg`, `b_deg`, `c_deg`.
+/// The columns of an orientation in the form of three numbers: `a_deg`, `b_deg`, `c_deg`.
 struct ThreeColumns {
   const ThreeNumbers* way = nullptr;
   std::vector<std::size_t> columns;
@@ -35,7 +35,7 @@ struct ThreeColumns {
 struct BatchColumns {
   PoseColumns pose;
   std::vector<std::size_t> position, quaternion, extra;
-  ThreeColumns three;  // the orientation by these or the quaternion
+  ThreeColumns three;  // the orientation in these columns or the quaternion
   std::optional<std::size_t> sigma, set, session;
   std::optional<std::size_t> distance, touch, anchor, minus_pose;
 
@@ -56,8 +56,8 @@ Status find_position(const CsvTable& table, BatchColumns& columns) {
   return {};
 }
 
-/// The orientation by three columns whose names say the way and the unit. Refuses two of them, and
-/// a part of a rotation vector.
+/// The orientation in three columns with names that state the form and the unit. Refuses two such
+/// sets, and an incomplete rotation vector.
 Result<ThreeColumns> find_three(const CsvTable& table) {
   ThreeColumns found;
   for (const ThreeNumbers& way : ways_of_three_numbers()) {
@@ -122,7 +122,7 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   return columns;
 }
 
-/// True if the row has anything in one of these columns.
+/// True if the row has a value in one of these columns.
 bool says(const CsvTable& table, std::size_t row, const std::vector<std::size_t>& columns) {
   return std::any_of(columns.begin(), columns.end(),
                      [&](std::size_t column) { return !table.field(row, column).empty(); });
@@ -154,7 +154,7 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
   return {};
 }
 
-/// The one number of the row. Refuses a position beside it.
+/// The one number of the row. Refuses a row that also has a position.
 Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
   const bool distance = says(table, row, columns.distance);
   const char* name = distance ? "distance_mm" : "touch_mm";
@@ -199,7 +199,7 @@ Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& co
   return {};
 }
 
-/// Reads what was measured: a gauge, or a position.
+/// Reads the measurement: a gauge, or a position.
 Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns,
                      Measurement& measurement) {
   const bool gauged = says(table, row, columns.distance) || says(table, row, columns.touch);
@@ -384,7 +384,7 @@ Result<MeasurementBatch> parse_batch_table(const std::string& text,
   const auto is_word = [](const std::string& field) {
     return !is_number(with_decimal_point(field));
   };
-  // A first line of names counts for nothing: the columns are told.
+  // Ignores a first line of names if the caller gives the columns.
   if (rows.size() > 1 &&
       std::all_of(rows.front().fields.begin(), rows.front().fields.end(), is_word))
     rows.erase(rows.begin());

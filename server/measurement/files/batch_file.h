@@ -42,12 +42,12 @@ namespace trammel {
                                                         const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_robodk_csv(const std::string& path);
 
-/// Reads a table without a header, or with one that counts for nothing. The caller gives the
-/// columns: names of a batch's columns in their order, `skip` for a column to ignore. `_rad` and
-/// `_m` mean the same column as `_deg` and
-/// `_mm`: `q1_rad`, `x_m`. The separator is the first of `;`, tab, `,` and blanks that occurs in
-/// the first line; `#` and `//` start comments; with `;`, tab or blanks a number may have a decimal
-/// comma. Refuses a row of another length, and the same as parse_batch_csv().
+/// Reads a table without a header, or with one that is ignored. The caller gives the columns: names
+/// of a batch's columns in their order, `skip` for a column to ignore. `_rad` and `_m` mean the
+/// same column as `_deg` and `_mm`: `q1_rad`, `x_m`. The separator is the first of `;`, tab, `,`
+/// and blanks that occurs in the first line; `#` and `//` start comments; with `;`, tab or blanks a
+/// number may have a decimal comma. Refuses a row of another length, and the same as
+/// parse_batch_csv().
 [[nodiscard]] Result<MeasurementBatch> parse_batch_table(const std::string& text,
                                                          const std::vector<std::string>& columns,
                                                          const std::string& where);

@@ -67,7 +67,7 @@ std::string spelled(char separator) {
   return separator == '\t' ? "a tab" : fmt::format("'{}'", separator);
 }
 
-/// `sep=;` and its end; nothing where the text does not begin so.
+/// Parses a first line `sep=;`; empty if the text does not begin with one.
 std::optional<CsvStart> said(std::string_view text) {
   if (text.size() < 5 || lower(text[0]) != 's' || lower(text[1]) != 'e' || lower(text[2]) != 'p' ||
       text[3] != '=')

@@ -6,19 +6,19 @@
 
 #include "server/base/result.h"
 
-/// The dialect that spreadsheets give a table: which character separates values, and which one
-/// stands before decimals. A dialect that the text does not decide is refused, never guessed.
+/// The dialect that a spreadsheet gives a table: the separator of values, and the decimal sign. A
+/// dialect that the text does not decide is refused, never guessed.
 namespace trammel {
 
-/// Refuses what is no text: a spreadsheet (.xlsx, .ods, .xls), UTF-16, an archive. The error says
-/// how to export it.
+/// Refuses files that are not text: a spreadsheet (.xlsx, .ods, .xls), UTF-16, an archive. The
+/// error explains the export.
 [[nodiscard]] Status check_is_text(std::string_view text, const std::string& where);
 
 /// The start of a table, and the separator of its values.
 struct CsvStart {
   char separator = ',';
   std::size_t skipped_bytes = 0;  ///< byte order mark, and a line `sep=;`
-  int line = 1;                   ///< of the first byte that is not skipped
+  int line = 1;                   ///< of the first byte of the table
 };
 
 /// Finds the separator of the header line: `,`, `;` or tab. If several occur, it is the one that
@@ -27,8 +27,8 @@ struct CsvStart {
 /// that leave several candidates.
 [[nodiscard]] Result<CsvStart> start_of_csv(std::string_view text, const std::string& where);
 
-/// True if a column of this name holds quantities, as tables of measurements call them: `x_mm`,
-/// `Q1_DEG`, `Rx [deg]`, `qw`.
+/// True if a column of this name holds quantities, by the names that tables of measurements use:
+/// `x_mm`, `Q1_DEG`, `Rx [deg]`, `qw`.
 [[nodiscard]] bool holds_quantities(std::string_view column);
 
 /// The decimal sign of a number: `,` or `.`. Empty if the field has no decimals or is not a number.

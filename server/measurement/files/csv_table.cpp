@@ -27,8 +27,8 @@ constexpr const char* kTwoCommas =
 constexpr const char* kThousands =
     "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
 
-/// The advice by which a value that is no number becomes one. Blanks of all kinds and apostrophes
-/// separate thousands; word processors write another minus.
+/// The advice that turns a value into a number. Blanks of all kinds and apostrophes separate
+/// thousands; word processors write another minus.
 const char* mended(std::string text) {
   for (const std::string_view minus : {"\u2212", "\u2013"})
     if (text.starts_with(minus)) return "its minus is another character: write it as '-'";
@@ -155,7 +155,7 @@ class Scanner {
   std::string_view text_;
   const std::string& where_;
   char separator_;
-  std::string ends_;  // of a value that is not quoted
+  std::string ends_;  // characters that end an unquoted value
   int line_;
 };
 

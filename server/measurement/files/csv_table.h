@@ -47,8 +47,7 @@ class CsvTable {
   /// The column of this name. If there is none, the only column that differs from it in upper and
   /// lower case alone.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
-  /// Refuses a column that is missing; the error says which one is like it, and lists the columns
-  /// of the file.
+  /// Refuses a missing column; the error names a similar one, and lists the columns of the file.
   [[nodiscard]] Result<std::size_t> require(std::string_view column) const;
   /// The numbers of all `columns`; empty if the file has none of them. Refuses a part of them.
   [[nodiscard]] Result<std::vector<std::size_t>> all_or_none(
@@ -57,9 +56,9 @@ class CsvTable {
   [[nodiscard]] const std::string& field(std::size_t row, std::size_t column) const {
     return rows_[row].fields[column];
   }
-  /// An id or a name, which may be empty. Refuses what check_name() (plain_text.h) refuses.
+  /// An id or a name, which may be empty. Refuses the same as check_name() (plain_text.h).
   [[nodiscard]] Result<std::string> name(std::size_t row, std::size_t column) const;
-  /// Refuses what is not a finite number of magnitude <= `limit`.
+  /// Refuses values other than finite numbers of magnitude <= `limit`.
   [[nodiscard]] Result<double> number(std::size_t row, std::size_t column,
                                       double limit = 1e12) const;
   [[nodiscard]] Result<int> integer(std::size_t row, std::size_t column, int lowest,
@@ -78,7 +77,7 @@ class CsvTable {
  private:
   [[nodiscard]] Status set_columns(Row header);
   [[nodiscard]] Status add_row(Row row);
-  /// Writes decimal commas as points, so that whoever reads a field sees one spelling.
+  /// Writes decimal commas as points, so that all readers of a field see one spelling.
   [[nodiscard]] Status settle_decimals();
 
   std::string where_;

@@ -19,7 +19,7 @@ struct CommandedPose {
 /// Poses in order: a measuring plan, or joints to predict for.
 struct JointList {
   std::string where;                   ///< the file as messages name it
-  std::vector<JointType> joint_types;  ///< as the columns say: `q1_deg` or, of a rail, `q7_mm`
+  std::vector<JointType> joint_types;  ///< from the columns: `q1_deg` or, for a rail, `q7_mm`
   std::vector<CommandedPose> poses;
 };
 

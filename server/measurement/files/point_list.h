@@ -41,7 +41,8 @@ struct PointList {
 /// point, the file is refused. Time stamps at the end of a line (fields with `/` or `:`, AM, PM, an
 /// ISO date) are skipped.
 ///
-/// Layouts without a header line, told by the number of fields, the same in every line:
+/// Layouts without a header line, recognised by the number of fields, which is the same in every
+/// line:
 ///
 ///     [[collection] group] target  c1 c2 c3                 4 to 6 fields
 ///     [[collection] group] target  c1 c2 c3  u1 u2 u3       7 to 9 fields: coordinate
@@ -72,8 +73,8 @@ struct PointList {
 /// same), phi (from +z). A comment with `cylindric`, `spherical` or `polar` says so. Angles are deg
 /// unless `Angular units: rad` or the header says otherwise. Lengths are mm unless a comment
 /// `Units: inches`, the header or `options.unit` says m or inch. Rotation of a frame: Rz(rz) Ry(ry)
-/// Rx(rx), which both kinds of angles mean. Uncertainties become one sigma of an axis: the root
-/// mean square of the three, in metres, over `options.coverage`; three zeros mean that none was
+/// Rx(rx), for both kinds of angles. Uncertainties become one sigma of an axis: the root mean
+/// square of the three, in metres, over `options.coverage`; three zeros mean that none was
 /// recorded.
 ///
 /// Refuses, naming file, row, column, value and limit: no points, another number of fields, a value
@@ -85,10 +86,10 @@ struct PointList {
                                             const PointFileOptions& options = {});
 
 /// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the
-/// name of the point (of both the last component counts). With `in_order` the first point measures
-/// the first pose, and so on: names do not count, and both lists must be as long. The batch has the
-/// order of the points, which is the order in time. Poses without a point are left out. Refuses a
-/// point without a pose, a pose_id twice, and lists without a point.
+/// name of the point (the last component counts in both). With `in_order` the first point measures
+/// the first pose, and so on: names do not count, and both lists must have the same length. The
+/// batch has the order of the points, which is the order in time. Poses without a point are left
+/// out. Refuses a point without a pose, a pose_id twice, and lists without a point.
 [[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points,
                                                    const JointList& commanded,
                                                    bool in_order = false);

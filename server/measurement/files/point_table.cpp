@@ -302,8 +302,8 @@ Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& w
       .next("name the columns in a first line (name,x,y,z), or separate values by ';'");
 }
 
-/// The header where there is one among the first lines, whatever a program wrote above it of
-/// itself; else the first line of data.
+/// The header if there is one among the first lines, below the lines in which a program describes
+/// the file; otherwise the first line of data.
 std::vector<TextLine>::const_iterator first_of_table(const std::vector<TextLine>& lines) {
   constexpr int kMostAbove = 30;
   const auto is_data = [](const TextLine& line) { return !line.comment; };

@@ -34,8 +34,8 @@ struct ReferenceCheck {
   Pose X_WV = Pose::Identity();
   double rms = 0;            ///< m, of |difference_W|
   double rms_remaining = 0;  ///< m, of |remaining_W|
-  /// rms_remaining <= repeat_above: one rigid motion explains the differences. Else a reflector has
-  /// moved, and the transform must not be used.
+  /// rms_remaining <= repeat_above: one rigid motion explains the differences. Otherwise a
+  /// reflector has moved, and the transform must not be used.
   bool rigid = true;
   std::vector<ReferenceResidual> residuals;  ///< in the order of the references
   std::string worst;                         ///< reflector with the largest |remaining_W|

@@ -22,7 +22,7 @@ constexpr double kFarthest = 1e3;   // m
 constexpr double kTurnsLimit = 10;  // of a joint
 constexpr std::size_t kPositionalJoints = 6;
 constexpr std::size_t kFewestColumns = 9;    // of a layout by position
-constexpr std::size_t kColumnsOfPoses = 18;  // of the one with orientations
+constexpr std::size_t kColumnsOfPoses = 18;  // columns of the layout with orientations
 constexpr double kMetresPerInch = 0.0254;    // m
 constexpr std::size_t kMostTcps = 2;         // more, another one in most rows, are none
 constexpr const char* kNameTheColumns =
@@ -41,7 +41,7 @@ struct RoboDkColumns {
   std::vector<std::size_t> quaternion, tcp, extra;
   std::vector<std::string> extra_names;
   std::optional<std::size_t> pose_id;
-  const ThreeNumbers* way = nullptr;  ///< in which `angles` tell the orientation
+  const ThreeNumbers* way = nullptr;  ///< the form of the orientation in `angles`
 };
 
 /// The column with the unit that its header names, or `unit`.
@@ -136,7 +136,7 @@ class NamedColumns {
     return {};
   }
 
-  /// All three, or none of them; refuses one that is there twice.
+  /// All three or none of the columns. Refuses a column that occurs twice.
   [[nodiscard]] Status find_three(const std::array<std::string, 3>& wanted, const std::string& unit,
                                   std::vector<ScaledColumn>& found) {
     std::vector<ScaledColumn> columns;
@@ -167,8 +167,8 @@ class NamedColumns {
   }
 
   [[nodiscard]] Status find_orientation() {
-    // A part of three columns is refused, unless it is of others that are all there: `a` of `o a
-    // t`.
+    // Refuses an incomplete set of three columns, unless its columns belong to another complete
+    // set: `a` of `o a t`.
     for (const bool complete : {true, false}) {
       for (const ThreeNumbers& way : ways_of_three_numbers()) {
         for (const std::array<std::string, 3>& names : way.columns) {

@@ -16,7 +16,7 @@ constexpr std::string_view kBlanks = " \t\r";
 constexpr std::size_t kMostLines = 1'000'000;
 constexpr std::size_t kMostDataLines = 100'000;
 
-/// Where the field at the start of `line` ends.
+/// The end of the field at the start of `line`.
 std::size_t field_end(std::string_view line, char separator) {
   const std::string_view ends =
       separator == ' ' ? std::string_view(" \t") : std::string_view(&separator, 1);

@@ -16,12 +16,12 @@ constexpr std::size_t kLongestLine = 65'536;  ///< bytes
 struct TextLine {
   int number = 0;  ///< from 1
   std::string_view text;
-  bool comment = false;  ///< starts with `//` or `#`; `text` is then what follows
+  bool comment = false;  ///< starts with `//` or `#`; `text` is then the rest
 };
 
-/// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order
-/// mark. Refuses what is no text; as kTooLarge more than a million lines, 100,000 lines of data,
-/// and a line longer than `longest` bytes.
+/// The lines that are not empty, without surrounding blanks; LF or CRLF, with or without byte order
+/// mark. Refuses binary data. Refuses as kTooLarge more than a million lines, 100,000 lines of
+/// data, and a line longer than `longest` bytes.
 [[nodiscard]] Result<std::vector<TextLine>> text_lines(std::string_view text,
                                                        const std::string& where,
                                                        std::size_t longest = kLongestLine);

@@ -105,8 +105,7 @@ void add_circumstance_columns(const MeasurementBatch& batch, std::vector<Written
 
 namespace {
 
-/// The batch with the poses that gauges are told against and that tell nothing themselves, which
-/// are no measurements.
+/// The batch plus the poses to which gauges refer and which are no measurements themselves.
 MeasurementBatch with_named_poses(MeasurementBatch batch) {
   std::map<std::string, const PoseContext*> missing;
   for (const Measurement& m : batch.measurements) {

@@ -21,7 +21,7 @@ constexpr double kLength = 3e-3;      // m, of a and d
 constexpr double kTwist = from_deg(0.3);
 constexpr double kCompliance = from_rad_per_nmm(3e-9);  // rad/Nm
 constexpr double kToolPoint = 5e-3;                     // m, of a tool that the cell knows
-constexpr double kToolLength = 1;                       // m, of one that it does not
+constexpr double kToolLength = 1;                       // m, of a tool that the cell does not know
 constexpr double kUnmodelled = 1e-3;                    // m, of a position
 // Robustness.
 constexpr double kCounted = 0.7;   // share of the positions that fit best
@@ -30,7 +30,7 @@ constexpr double kFarRow = 3;      // times the median distance
 constexpr double kNearRow = 3e-3;  // m: no position within it is left out
 constexpr int kBaseParameters = 6;
 constexpr int kMostSteps = 15, kStepsOfFrames = 6, kRoundsOfStart = 3;
-constexpr double kLastStep = 1e-3;  // of the quality: a gain that is none
+constexpr double kLastStep = 1e-3;  // relative gain of the quality that counts as none
 constexpr std::size_t kFewestRows = 3;
 
 using Indices = std::vector<std::size_t>;
@@ -247,7 +247,7 @@ class Fitting {
     }
     A = Eigen::MatrixXd(A.selfadjointView<Eigen::Lower>());
     A.diagonal().head(kBaseParameters).array() +=
-        1e-2;  // a base that no pose shows stays where it is
+        1e-2;  // a base that no pose determines does not move
     for (const auto& [tool, place] : layout_.tools()) {
       const double weight = std::pow(layout_.tool_stddev(place), -2);
       const int at = layout_.tool_at(tool);
@@ -294,7 +294,7 @@ class Fitting {
   const bool whole_arm_;
 };
 
-/// Where nominal joints put the tool points, in B.
+/// The tool points at the nominal joints, in B.
 Eigen::Matrix3Xd nominal_points(const NumberTable& table, const Cell& cell,
                                 const std::map<std::string, Pose>& tools) {
   Eigen::Matrix3Xd p_B(3, static_cast<Eigen::Index>(table.size()));

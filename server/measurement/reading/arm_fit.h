@@ -9,18 +9,19 @@
 /// The fit of joints to positions, for any arm that the robot of a cell may be.
 namespace trammel::reading {
 
-/// An arm as it may have been built, mounted and mastered, and how the positions of a table fit it.
+/// A possible arm, with errors of building, mounting and mastering, and its fit to the positions of
+/// a table.
 ///
 /// The model: p_W = X_WB X_BF(q + zeros; links, compliance) p_FT. The base is free. A known tool is
 /// off by 5 mm, each zero by 3 deg, each length by 3 mm, each twist by 0.3 deg, each compliance by
-/// 3e-9 rad/Nmm (standard deviations); an unknown tool lies within a metre. Every position is off
-/// by 1 mm besides.
+/// 3e-9 rad/Nmm (standard deviations); an unknown tool lies within a metre. In addition every
+/// position is off by 1 mm.
 struct ArmFit {
   Pose X_WB = Pose::Identity();
   std::map<std::string, Pose> tools;  ///< X_FT; the rotations are the cell's, or identity
   Eigen::VectorXd arm;                ///< deviations of the arm, SI: zeros first, one a joint
   double off = 0;               ///< m, rms distance of the positions that fit best, seven of ten
-  double quality = 0;           ///< m, the same with the price of deviations that are hardly likely
+  double quality = 0;           ///< m, the same with a penalty for unlikely deviations
   double base_turn_stddev = 0;  ///< rad, of the base's rotation about its worst axis, for this arm
   Eigen::VectorXd stddev_of_zeros;                 ///< rad (m), a joint
   std::map<std::string, Matrix3> tool_covariance;  ///< m2, of the tool points
@@ -38,8 +39,8 @@ enum class ToolPoints {
 [[nodiscard]] ArmFit fitted(const NumberTable& table, const Cell& cell, const ArmFit& start,
                             ToolPoints points = ToolPoints::kAsDrawn);
 
-/// fitted() of positions at one place, which do not tell how the base is turned: from several
-/// turns, the best fit.
+/// fitted() for positions at one place, which do not determine the turn of the base: the best fit
+/// from several turns.
 [[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell,
                                            const ArmFit& start);
 

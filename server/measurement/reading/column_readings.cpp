@@ -158,8 +158,8 @@ class JointReadings {
   std::vector<Reading> all_;
 };
 
-/// Adds readings of the rows nearest to the origin in another unit than the others: beyond the
-/// widest gap between the rows' distances from it.
+/// Adds readings with the rows nearest to the origin in another unit: the rows below the widest gap
+/// in the distances from the origin.
 void add_rows_in_other_units(const NumberTable& table, std::vector<Reading>& all) {
   std::vector<double> far;
   for (std::size_t i = 0; i < table.size(); ++i) far.push_back(table.position(i).norm());
@@ -199,8 +199,8 @@ Reading left_handed(int axis) {
           }};
 }
 
-/// The robot whose table tells in each row the a and alpha of the link before; the last row's are
-/// lost, and lie in the tool.
+/// The robot whose table has, in each row, the a and alpha of the link before; those of the last
+/// row are lost in the tool.
 Result<Chain> with_links_one_row_up(const Chain& robot) {
   std::vector<Joint> joints;
   for (int j = 0; j < robot.size(); ++j) {

@@ -9,7 +9,7 @@
 
 namespace trammel::reading {
 
-/// The numbers of a batch, row by row: what a reading understands in another way.
+/// The numbers of a batch, row by row, which readings reinterpret.
 struct NumberTable {
   Eigen::MatrixXd q;     ///< joints x rows, as commanded, rad (m)
   Eigen::Matrix3Xd p_W;  ///< m
@@ -31,8 +31,8 @@ struct NumberTable {
 /// `joints_of`.
 [[nodiscard]] NumberTable matched(const NumberTable& table, const std::vector<std::size_t>& rows,
                                   const std::vector<std::size_t>& joints_of);
-/// About `most` rows, evenly drawn from those of each tool. No tool is left out, however few its
-/// rows are and in whatever order the tools take turns.
+/// About `most` rows, evenly drawn from those of each tool. Every tool keeps rows, however few it
+/// has, and in any order of the tools.
 [[nodiscard]] NumberTable thinned(const NumberTable& table, std::size_t most);
 
 }  // namespace trammel::reading

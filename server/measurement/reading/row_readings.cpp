@@ -35,8 +35,8 @@ std::string place(Shift shift) {
                    : fmt::format("of {} rows before", -shift);
 }
 
-/// Each row with the joints of the row that `joints_of` says; rows whose joints are not there are
-/// left out.
+/// Each row with the joints of the row that `joints_of` gives; rows without such joints are left
+/// out.
 Reading reread(std::string name, std::vector<std::optional<std::size_t>> joints_of) {
   return {std::move(name), "rows", true,
           [joints_of = std::move(joints_of)](const NumberTable& table) {
@@ -95,7 +95,7 @@ class Rows {
     for (std::size_t i = 0; i < n_; ++i) joints_of[i] = at(i, shift, n_);
     return reread("with the joints " + place(shift), std::move(joints_of));
   }
-  /// Where `shift` rows later is, within [0, count).
+  /// The row `shift` rows later, if it is within [0, count).
   static std::optional<std::size_t> at(std::size_t row, Shift shift, std::size_t count) {
     const Shift place = static_cast<Shift>(row) + shift;
     if (place < 0 || place >= static_cast<Shift>(count)) return std::nullopt;
@@ -138,7 +138,7 @@ class Rows {
   const std::size_t n_;
   std::vector<double> measured_, nominal_;  // m, from each row to the next
   std::vector<double> expected_;            // the expected distances, with the blocks taken so far
-  double most_ = 0;                         // that one step may count
+  double most_ = 0;                         // largest contribution of one step
   std::vector<std::optional<std::size_t>> joints_of_;
 };
 

@@ -10,7 +10,7 @@ namespace trammel::reading {
 
 namespace {
 
-constexpr double kFarApart = 10e-3;  // m: no arm repeats so badly
+constexpr double kFarApart = 10e-3;  // m: no arm has so bad a repeatability
 constexpr std::size_t kFewestApart = 3;
 
 }  // namespace

@@ -7,9 +7,10 @@
 
 namespace trammel::reading {
 
-/// Doubts rows at one joint vector with places far apart, if most such vectors have this: several
-/// reflectors share a name, or something changed in between. Their average would be a place where
-/// nothing is. If such rows do not follow each other and are few, they may be a check for changes.
+/// Doubts rows that have one joint vector but places far apart, if most repeated vectors show this.
+/// Several reflectors share a name, or something changed in between. The average would be a place
+/// without a reflector. If such rows do not follow each other and are few, they may be a check for
+/// changes.
 [[nodiscard]] std::optional<Error> doubt_of_several_points(const NumberTable& table);
 
 }  // namespace trammel::reading
