@@ -20,7 +20,7 @@ namespace {
 using Rows = std::vector<std::size_t>;  // rising
 
 constexpr double kAsked =
-    3;  // times the stated sigma: the least that a fit leaves where bad rows are looked for
+    3;  // times the stated sigma: with a smaller misfit no bad rows are searched
 constexpr double kKept =
     0.55;  // share of the rows that are fitted: with two bad ones in five, some are spared
 constexpr double kAgreeing = 0.6;       // share that must agree at the end
@@ -116,7 +116,8 @@ class RowSearch {
     return kPlacing + kPlacingTool * static_cast<std::size_t>(unknown);
   }
 
-  /// Base and tools by a few rows: of many draws the one that most rows are near to.
+  /// Finds base and tools from a few rows. Of many draws it keeps the one with the most rows
+  /// nearby.
   [[nodiscard]] std::optional<CalibrationResult> placed_by_few(const MeasurementBatch& rows) const {
     std::optional<CalibrationResult> best;
     std::ptrdiff_t most = 0;
@@ -225,7 +226,7 @@ class RowSearch {
     return settled ? enough(settled->rows) : all_rows(batch_.measurements.size());
   }
 
-  /// `rows`; all, where they are too few to be right.
+  /// `rows`, or all rows if these are too few to be right.
   [[nodiscard]] Rows enough(Rows rows) const {
     Rows all = all_rows(batch_.measurements.size());
     return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all
@@ -265,7 +266,7 @@ Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell,
   return all;
 }
 
-/// m, the most that is left of one session beyond the stated sigma.
+/// m: the largest residual of a session beyond the stated sigma.
 double most_left(const CalibrationResult& found) {
   double most = 0;
   for (const SessionSetting& session : found.sessions) most = std::max(most, session.own_noise);

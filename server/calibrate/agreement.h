@@ -7,12 +7,12 @@
 
 #include "server/calibrate/calibration.h"
 
-/// Finds the rows of a batch that agree on one arm, where many are bad.
+/// Finds the rows of a batch that agree on one arm if many rows are bad.
 namespace trammel {
 
 struct Agreement {
-  MeasurementBatch agreeing;  ///< rows that one arm leads to
-  MeasurementBatch others;    ///< rows that this arm does not lead to, at most two in five
+  MeasurementBatch agreeing;  ///< rows that fit one arm
+  MeasurementBatch others;    ///< rows that do not fit this arm, at most two in five
 };
 
 /// The rows of `batch` on which `sources` should be identified; empty means all rows. `plain` was

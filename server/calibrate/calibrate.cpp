@@ -24,16 +24,15 @@ namespace trammel {
 
 namespace {
 
-constexpr double kWeighed =
-    20;  // nat: so much more likely must the data be with a cause that they add
+constexpr double kWeighed = 20;  // nat: a cause that the data add must make them likelier by this
 constexpr double kInsteadOfScales =
-    3;                            // the same where it makes scales of the sessions superfluous
+    3;  // likewise, for a cause that makes scales of the sessions superfluous
 constexpr double kOfMetal = 0.2;  // of the prior scale: 4 um per m and K
 constexpr std::size_t kSessionsOfWarmth =
     3;  // with two sessions, a scale of the instrument explains the same
 constexpr double kStretched =
     10;  // nat: so much more likely must the data be with scales of the sessions,
-constexpr double kStretchedOfSession = 3;  // and so much more for each of them
+constexpr double kStretchedOfSession = 3;  // in addition for each of them
 constexpr double kPerhapsStretched =
     0.25;  // share of that price; if scales alone would gain more, a trial is worthwhile
 constexpr double kZeroed = 10;  // the same with zero errors of the instruments
@@ -51,9 +50,9 @@ Eigen::Index place_of_base(const PhysicalModel& model) {
 
 bool has_unknown_frame(const Cell& cell) { return !cell.X_WB || has_unknown_tool(cell); }
 
-/// Unknown frames where the closed forms put them, refined together and taken over as the model's.
-/// Beside an unknown tool a base that is known and to be identified is free, too: the instrument
-/// may stand elsewhere.
+/// Refines the unknown frames together, starting from their closed forms, and sets them in the
+/// model. With an unknown tool, a known base that is to be identified is free as well, since the
+/// instrument may stand elsewhere.
 Status refine_frames(PhysicalModel& model, const MeasurementBatch& batch,
                      const CalibrateOptions& options) {
   const bool base_known = model.cell->X_WB.has_value();
@@ -146,7 +145,7 @@ Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch,
   return locate_anchors(model, batch);
 }
 
-/// Everything but the frames, which are where the model has them.
+/// Calibrates everything but the frames. The frames keep their places in the model.
 Result<CalibrationResult> calibrate_placed(CalibrationProblem problem,
                                            const CalibrateOptions& options) {
   TRY(check_needs(problem));
@@ -255,7 +254,7 @@ std::size_t largest_session(const MeasurementBatch& batch) {
   return static_cast<std::size_t>(largest - settings.begin());
 }
 
-/// The batch with its last session and that one in each other's place.
+/// The batch in which the last session and `session` have changed places.
 MeasurementBatch exchanged(MeasurementBatch batch, std::size_t session) {
   const auto one = static_cast<int>(session);
   const auto last = static_cast<int>(batch.sessions.size()) - 1;
@@ -376,8 +375,8 @@ Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
   return best;
 }
 
-/// With `added` beside the cause that shows it, in each of its forms; the other sources as they
-/// were found.
+/// Lists of sources with `added` in each of its forms beside the cause that shows it; the other
+/// sources keep their found values.
 std::vector<std::vector<std::string>> with_added(const CalibrationResult& without,
                                                  const CauseRecord& added) {
   const CauseRecord& beside = cause_spelled(added.added_by_data->beside);
@@ -391,8 +390,9 @@ std::vector<std::vector<std::string>> with_added(const CalibrationResult& withou
   return candidates;
 }
 
-/// The causes that the data may add to `specs`. A cause needs the one beside which it is added, the
-/// files must not state it, and the batch must be able to show it.
+/// The causes that the data may add to `specs`. The list of sources must contain the source to
+/// which the cause is an addition. The files must not state the cause, and the batch must be able
+/// to show it.
 std::vector<const CauseRecord*> may_be_added(const Cell& cell,
                                              const std::vector<std::string>& specs,
                                              const MeasurementBatch& batch) {
@@ -435,7 +435,7 @@ bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& 
   return with.log_likelihood > without.log_likelihood - price + kInsteadOfScales;
 }
 
-/// With the links' weights, and their growth, where the data ask for them.
+/// Calibrates, adding the links' weights and the thermal growth if the data justify them.
 Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& cell,
                                             const std::vector<std::string>& specs,
                                             const MeasurementBatch& batch,
@@ -449,7 +449,7 @@ Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& c
   return best;
 }
 
-/// With zero errors of the instruments, the other sources as they were found.
+/// Calibrates with the instrument errors at zero and the other sources unchanged.
 Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without,
                                            const MeasurementBatch& batch,
                                            const CalibrateOptions& options) {

@@ -10,7 +10,7 @@ Result<CalibrationResult> calibrate_with_maps(const std::shared_ptr<const Cell>&
                                               const std::vector<std::string>& specs,
                                               const MeasurementBatch& batch,
                                               const CalibrateOptions& options) {
-  // Specs that are wrong, or given twice, are refused as they are written.
+  // Refuses specs that are wrong or given twice, in their written form.
   TRY(make_physical_model(cell, specs));
   std::vector<std::string> all = spelled_out(specs, *cell);
   std::vector<std::string> others;

@@ -31,8 +31,8 @@ struct CalibrateOptions {
   std::vector<bool> held;    ///< a flag for each parameter that stays as it is; empty: none
   bool weigh_links = false;  ///< the data may add `self_weight` to `compliance` if the files have
                              ///< no link masses
-  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has
-                       ///< little influence
+  bool robust = true;  ///< Huber loss beyond the residual that 1 in 1000 good poses exceeds, so a
+                       ///< bad pose has little influence
 };
 
 /// A pose whose residual is far above its sigma.

@@ -35,13 +35,13 @@ class ChangeKinds {
 
   [[nodiscard]] const std::vector<ChangeKind>& kinds() const { return kinds_; }
   [[nodiscard]] const PhysicalModel& probe() const { return probe_; }
-  /// The probe's parameters: those of the model, and those of the kinds, in the order of
+  /// The parameters of the probe: those of the model, and those of the kinds, in the order of
   /// kinds().
   [[nodiscard]] std::vector<Eigen::Index> own() const;
   [[nodiscard]] std::vector<Eigen::Index> changes() const { return places_; }
 
  private:
-  /// Adds each of several tools by itself, where the cause takes one.
+  /// Adds the cause for each tool separately, if it depends on a tool.
   void add_of_arm(const CauseRecord& cause);
   void add(const CauseRecord& cause, int joint, const std::string& behind = "");
 

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kChance = 1e-4;  // of a false change in all sessions together
+constexpr double kChance = 1e-4;  // of a false change, in all sessions together
 constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
 constexpr double kLeastSeen =
     1;  // information of a candidate, prior units: below it these poses do not show it
@@ -28,8 +28,8 @@ constexpr std::size_t kFewestToWander = 4;  // sessions
 constexpr double kSlowest = 1e-4;           // prior standard deviations a session
 constexpr int kRates = 60;
 
-/// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P),
-/// of its motion.
+/// The normal equations of some rows of one session. They concern the changes (K), the shared
+/// parameters (P) and the motion of the session.
 struct Sums {
   MatrixXd own, shared, motion;  // K x K, K x P, K x 7
   VectorXd gradient;             // K
@@ -286,7 +286,7 @@ class ChangeSearch {
     }
   }
 
-  /// The gain of the columns [first, first + count) beside all that is free.
+  /// The gain of the columns [first, first + count) in addition to everything that is free.
   [[nodiscard]] double gain(Index first, Index count, const Seen& seen) const {
     const MatrixXd shared = seen.shared.middleRows(first, count);
     const MatrixXd explained = factor_.solve(shared.transpose());
@@ -329,9 +329,8 @@ class ChangeSearch {
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;
   const std::size_t joints_;
-  std::vector<bool>
-      calm_;  // sessions that tell how much larger gains are than white noise makes them
-  MatrixXd information_;  // P x P, of the shared parameters with their priors, in prior units
+  std::vector<bool> calm_;  // sessions that show by how much gains exceed those of white noise
+  MatrixXd information_;    // P x P, of the shared parameters with their priors, in prior units
   std::vector<SessionBlock> blocks_;
   std::vector<Sums> whole_;   // by session
   std::vector<Sums> halves_;  // by joint and session: its poses above the middle

@@ -13,15 +13,15 @@ namespace trammel {
 struct Change {
   std::string source;       ///< in the spelling of a list of error sources: `joint_slip:3@121`
   std::size_t session = 0;  ///< from which on, its place in CalibrationResult::sessions
-  double gain = 0;          ///< twice the log likelihood that it adds, everything else refitted
+  double gain = 0;  ///< the increase of twice the log likelihood, with everything else refitted
   double p_value =
-      1;  ///< chance that the best of all candidates at all boundaries gains as much with no change
+      1;  ///< chance of such a gain by the best candidate at any boundary without a change
   std::vector<std::string> could_also_be = {};  ///< explain it nearly as well: `tool_changed@121`
   /// The rate of a joint's zero that wanders instead, rad from session to session, a random walk;
   /// 0: it changed once.
   double rate = 0;
   std::vector<std::string> steps =
-      {};  ///< of a wandering zero: its sources, one for each session but the first
+      {};  ///< for a wandering zero: its sources, one for each session except the first
 
   /// The error sources that it adds to a model's list.
   [[nodiscard]] std::vector<std::string> sources() const {

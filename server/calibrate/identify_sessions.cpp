@@ -52,14 +52,14 @@ bool is_better(const CalibrationResult& with, const CalibrationResult& without,
   return with.log_likelihood > without.log_likelihood + price;
 }
 
-/// The sources of the model, and what the change adds.
+/// The sources of the model, and those that the change adds.
 std::vector<std::string> with_change(const PhysicalModel& model, const Change& change) {
   std::vector<std::string> names = names_of(model);
   for (std::string& source : change.sources()) names.push_back(std::move(source));
   return names;
 }
 
-/// Drops changes, the weakest first, that the sessions do not speak for once the others are known.
+/// Drops changes, the weakest first, that the sessions no longer support beside the others.
 Result<IdentifiedSessions> without_idle_changes(const Identify& identify, IdentifiedSessions found,
                                                 const MeasurementBatch& batch) {
   for (std::size_t k = 0; k < found.changes.size() && found.changes.size() > 1;) {

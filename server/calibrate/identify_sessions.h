@@ -15,7 +15,7 @@ struct IdentifiedSessions {
   std::vector<Change>
       changes;  ///< changes of the arm between sessions, in the order in which they were found
 };
-/// calibrate() of the batch with these sources.
+/// A function that calibrates the batch with these sources.
 using Identify = std::function<Result<CalibrationResult>(const std::vector<std::string>& sources)>;
 /// Identifies `sources` on `batch` and, if it has several sessions, the changes between them. As
 /// long as a change is beyond chance, it joins the sources, and the parameters that it changes

@@ -33,14 +33,15 @@ constexpr double kLeastSeen =
     1;  // information of a candidate, prior units: below it the poses do not show it
 constexpr double kUsuallyLeft =
     1e-3;  // m, model error: where it is larger, a jump may be larger by the same ratio
-constexpr double kLittle = 1e-6;   // of the poses' information: a prior that hardly shrinks a size
+constexpr double kLittle = 1e-6;  // share of the poses' information: a prior so weak that it hardly
+                                  // shrinks a size
 constexpr double kWholeBatch = 1;  // share of the batch's length: lags of slow growth
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
 constexpr Index kWaves = 16;  // half waves over the batch, the terms of a wandering course
 constexpr double kRoughness[] = {
     1, 2};  // power of the wave number that its amplitudes fall by: a walk, and smoother
 constexpr double kBeforeWandering =
-    4.6;  // nat, 100 to 1: ahead of the likeliest course of that kind
+    4.6;  // nat, 100 to 1: the lead over the likeliest wandering course of that kind
 
 /// The equations of one pose, in units of sigma: residual, derivatives by the free parameters (P)
 /// and by the kinds (K).
@@ -200,7 +201,7 @@ class JumpSearch {
     }
   }
 
-  /// `most_prior`: of the information, at most so much is the prior's.
+  /// `most_prior`: the largest ratio of the prior's information to that of the data.
   [[nodiscard]] Fitted fit(Index first, Index count, const KindSums& sums,
                            double most_prior = 1e12) const {
     const MatrixXd shared = sums.shared.middleRows(first, count);
@@ -309,8 +310,8 @@ class JumpSearch {
     return best;
   }
 
-  /// The factor by which gains exceed those of white noise: the mean over single numbers between
-  /// halves of the poses by each joint's angle.
+  /// The factor by which gains exceed those of white noise: the mean gain of single numbers between
+  /// halves of the poses, split by each joint's angle.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;
     const Index joints = poses_.front().measurement->context.q.size();

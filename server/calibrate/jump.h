@@ -17,8 +17,7 @@ struct Jump {
   int row = 0;          ///< the row of that pose in its file
   double effect =
       0;  ///< m, rms: the shift of the measured points from that row on, with all else unchanged
-  double p_value =
-      1;  ///< chance that the best of all kinds at all rows explains as much with no jump
+  double p_value = 1;  ///< chance of such a gain by the best kind at any row without a jump
   std::vector<std::string> could_also_be = {};  ///< explain it nearly as well
 };
 /// `from pose p101 (row 102) on: lost zero in joint 3, 0.160 mm rms`

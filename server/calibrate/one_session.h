@@ -4,9 +4,8 @@
 
 namespace trammel {
 
-/// True if the change held in Change::session only, and the sessions after it are as those before:
-/// a reflector that sat elsewhere that day. Its source ends where the session does:
-/// `tool_changed@121+1+180`.
+/// True if the change lasted for Change::session only, as when a reflector sat elsewhere that day.
+/// Its source ends with the session: `tool_changed@121+1+180`.
 [[nodiscard]] bool is_of_one_session(const Change& change);
 
 }  // namespace trammel

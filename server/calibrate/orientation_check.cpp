@@ -37,8 +37,8 @@ constexpr double kFarRow = 5;  // times the median of all poses: a row of anothe
 constexpr double kTellingSpread =
     20;  // spread over residual: the base's direction is then known to 3 degrees
 constexpr double kBadPosition = 6;  // times the median residual: a pose that is wrong as a whole
-constexpr double kMostBadPositions = 0.1;  // share of all positions: more are no outliers, and none
-                                           // is left out
+constexpr double kMostBadPositions = 0.1;  // share of all positions: if more are bad, they are no
+                                           // outliers, and all stay
 // Numbers of poses.
 constexpr std::size_t kFewestOriented =
     3;  // of a tool: two orientations agree with too many readings
@@ -57,10 +57,10 @@ struct Positions {
   std::vector<Pose> X_BF;
 };
 
-/// Where the base points.
+/// The direction of the base.
 struct Turned {
   Quaternion q_WB;
-  std::vector<bool> bad;  ///< rows whose position is out, too
+  std::vector<bool> bad;  ///< rows whose position is bad, too
 };
 
 double spread_across(const Eigen::Matrix3Xd& p) {
@@ -190,7 +190,7 @@ class Question {
   static Failure doubted(const std::string& what, double off) {
     return refused("{}", what).of("qw,qx,qy,qz").beyond(to_deg(off), to_deg(kMostOff));
   }
-  /// True if they fit so well that no other reading needs to be tried.
+  /// True if the orientations fit so well that no other reading needs a try.
   bool follow() const { return given_.fit <= kWorthAsking && far_rows().empty(); }
   bool by_order() const { return all_[best_].by_order; }
   bool reads_better() const { return of_best_.fit < std::min(kMostOff, 0.5 * given_.fit); }
@@ -274,7 +274,8 @@ class Question {
   std::size_t two_orders_ = 0;  // a reading of some rows only; 0: none
 };
 
-/// Orientations that are the same in all rows, though the flange turns: nobody measured them.
+/// Doubts orientations that are equal in all rows although the flange turns: they were not
+/// measured.
 std::optional<Error> doubt_of_same(const Oriented& group) {
   double turned = 0;
   for (std::size_t i = 0; i < group.rows.size(); ++i) {

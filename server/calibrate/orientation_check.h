@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/measurement/measurement.h"
 
-/// Checks that the measured orientations belong to the commanded joints, asked before anything is
+/// Checks that the measured orientations belong to the commanded joints, before anything is
 /// identified from them.
 ///
 /// The model is R_WT = R_WB R_BF(q) R_FT, to the few degrees that a nominal chain may be off. R_WB

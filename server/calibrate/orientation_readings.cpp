@@ -15,17 +15,18 @@ namespace trammel::orientations {
 namespace {
 
 constexpr double kMostCounted =
-    from_deg(30);             // more counts as much: wrong is wrong, and few rows must not decide
+    from_deg(30);  // larger errors count the same: wrong is wrong, and few rows must not decide
 constexpr double kGon = 0.9;  // deg
 constexpr std::size_t kMostTries =
-    40;  // poses whose own R_FT is tried: half may be wrong, one must be right
-constexpr std::size_t kRowsOfFirstLook = 24;  // evenly drawn: which of many readings are hopeless
+    40;  // poses with their own R_FT as trial: half may be wrong, one must be right
+constexpr std::size_t kRowsOfFirstLook = 24;  // evenly drawn, to find the hopeless among many
+                                              // readings
 
-/// The numbers (x, y, z, w) where (w, x, y, z) was understood, and the other way round.
+/// The numbers (x, y, z, w) in place of (w, x, y, z), and the reverse.
 Quaternion from_xyzw(const Quaternion& q) { return {q.z(), q.w(), q.x(), q.y()}; }
 Quaternion from_wxyz(const Quaternion& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-/// The numbers as `reread` has them, with the base turned by q_WB.
+/// The numbers as `reread` changes them, with the base turned by q_WB.
 template <typename Reread>
 Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
                 const Reread& reread) {
@@ -71,8 +72,8 @@ void add_columns(const Oriented& group, const Quaternion& q_WB, std::vector<Read
   }
 }
 
-/// The last joint in another unit, or counted together with one before it: a point on its axis does
-/// not show that.
+/// Adds readings in which the last joint has another unit, or counts together with an earlier
+/// joint. A point on the joint's axis does not show such mistakes.
 void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& robot,
                     std::vector<Reading>& all) {
   const int last = robot.size() - 1;
@@ -99,7 +100,7 @@ void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& 
   }
 }
 
-/// The orientation columns to write where three numbers were meant `way`.
+/// The names of the orientation columns if the three numbers follow `way`.
 std::string remedy_of(const ThreeNumbers& way, bool in_radians) {
   if (way.columns.empty()) return "write the orientation as a quaternion: qw, qx, qy, qz";
   const char* unit = in_radians ? "rad" : "deg";
@@ -120,13 +121,13 @@ Oriented some_of(const Oriented& group, std::size_t count) {
 }
 
 /// Adds the same three numbers as radians, in another order of turns, or as a rotation vector. The
-/// file may have told them in each way; of the wrong way the numbers fit nothing. Of turns only
-/// the orientation is left, and two triples of numbers that it may have been.
+/// file may contain them in any of these ways. Numbers in the wrong way fit nothing. If the file
+/// had turns, only the orientation remains, and two triples of numbers may have produced it.
 void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
   const std::vector<ThreeNumbers>& ways = ways_of_three_numbers();
   const Oriented few = some_of(group, kRowsOfFirstLook);
   for (const ThreeNumbers& was : ways) {
-    if (was.columns.empty()) continue;  // no file is read so
+    if (was.columns.empty()) continue;  // no file uses that
     const bool small = std::all_of(group.rows.begin(), group.rows.end(), [&](const Measurement* m) {
       return was.numbers(*m->R_WT)[0].cwiseAbs().maxCoeff() <= from_deg(kMostRadians);
     });
@@ -134,7 +135,7 @@ void add_three_numbers(const Oriented& group, const Quaternion& q_WB, std::vecto
       const bool same = &was == &meant;
       if (same && (!small || was.is_vector)) continue;
       const bool reversed = !same && was.axes == meant.axes && !was.is_vector;
-      if (reversed && was.from_behind) continue;  // A B C are W P R from behind
+      if (reversed && was.from_behind) continue;  // A B C is W P R in reverse order
       std::string name = same       ? "as angles"
                          : reversed ? "with the three angles from behind (A B C, W P R)"
                                     : "as " + meant.name;

@@ -7,13 +7,13 @@
 #include "server/measurement/measurement.h"
 #include "server/robot/chain.h"
 
-/// The ways in which measured orientations may have been meant.
+/// The possible meanings of measured orientations.
 namespace trammel::orientations {
 
 using Quaternion = Eigen::Quaterniond;
 using Quaternions = std::vector<Quaternion>;
 
-constexpr double kMostOff = from_deg(10);  // no nominal arm, and no mounted tool, is farther off
+constexpr double kMostOff = from_deg(10);  // no nominal arm and no mounted tool deviates more
 
 /// The measured orientations of one tool.
 struct Oriented {
@@ -22,20 +22,20 @@ struct Oriented {
   std::vector<Pose> X_BF;
 };
 
-/// One way in which the numbers may have been meant.
+/// One possible meaning of the numbers.
 struct Reading {
   std::string name;  ///< after "read "
   Quaternions q_FT;  ///< R_BF' R_WB' R_WT of each pose
   bool by_order =
-      true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
-  std::string remedy;        ///< what to write in the file; empty: nothing that holds for certain
-  Quaternions or_else = {};  ///< what each pose may be instead; empty: nothing
+      true;  ///< the same numbers in another order: a few tenths of a degree decide, row by row
+  std::string remedy;        ///< the correct entry for the file; empty: nothing is certain
+  Quaternions or_else = {};  ///< the possible correct value of each pose; empty: none
 
   [[nodiscard]] const Quaternions& second() const { return or_else.empty() ? q_FT : or_else; }
 };
 
-/// The orientations as given first, then as they may have been meant instead: the base turned by
-/// `q_WB`.
+/// The orientations as given come first, then their other possible meanings, with the base turned
+/// by `q_WB`.
 [[nodiscard]] std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB,
                                             const Chain& robot);
 
@@ -43,11 +43,11 @@ struct Reading {
   return a.angularDistance(b);
 }
 [[nodiscard]] std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about);
-/// Angle of every pose from `about`, by that of two readings which brings it nearer.
+/// The angle of every pose from `about`, under the one of two readings that is nearer.
 [[nodiscard]] std::vector<double> nearer(const Quaternions& one, const Quaternions& other,
                                          const Quaternion& about);
-/// The rotation that most poses have in common, each by the nearer of two readings. First the best
-/// of those of single poses, then the mean of the poses near it.
+/// The rotation that most poses have in common, each under the nearer of two readings. First it
+/// takes the best rotation of a single pose, then the mean of the poses near it.
 [[nodiscard]] Quaternion common(const Quaternions& one, const Quaternions& other);
 
 }  // namespace trammel::orientations

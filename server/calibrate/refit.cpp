@@ -66,8 +66,8 @@ std::vector<Index> places(const ErrorSource& before, const Cell& cell_before,
   return place;
 }
 
-/// The full name of the source that `name` means in the model; a cause means the form that is
-/// there. Where the model has none, it is added, and the indices in `place` move.
+/// The full name of the source that `name` means in the model; a cause means its present form. A
+/// missing source is added, and the indices in `place` move.
 Result<std::string> named_source(PhysicalModel& model, const std::string& name,
                                  std::vector<Index>& place) {
   std::vector<std::string> names = alternatives(name, *model.cell);
@@ -228,8 +228,8 @@ Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::stri
   return anew;
 }
 
-/// Base and tools that are anew start where the poses put them, by the arm as it is known; all else
-/// at its prior.
+/// Places new bases and tools by the poses and the known arm, as the start; all else starts at its
+/// prior.
 Status place_anew(CalibrationProblem& problem, const Anew& anew, const Refit& refit) {
   const PhysicalModel before = problem.model;
   const std::vector<Parameter> parameters = problem.model.parameters();

@@ -12,7 +12,7 @@ struct Refit {
   /// discrepancy are those of the new poses.
   CalibrationResult result;
   std::vector<Eigen::Index> place;  ///< of each parameter of the model before, in `result`
-  std::vector<Eigen::Index> anew;   ///< R, of those identified anew
+  std::vector<Eigen::Index> anew;   ///< R, indices of the parameters identified anew
   Eigen::VectorXd prior_variance;   ///< P, SI: prior variances
   Eigen::MatrixXd given_rest;  ///< R x R, SI: covariance of the new parameters if the kept ones
                                ///< were exact

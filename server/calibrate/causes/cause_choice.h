@@ -5,12 +5,11 @@
 
 namespace trammel {
 
-/// A cause that was tried beside those before it in the list.
+/// A cause that was tried in addition to those before it in the list.
 struct TriedCause {
-  std::vector<std::string> sources;  ///< as they are spelled: `joint_map:2`
-  double held_out_before =
-      0;                      ///< m, rms of positions that were left out, with the causes before it
-  double held_out_after = 0;  ///< m, held-out error with this cause
+  std::vector<std::string> sources;  ///< spelled as in a list: `joint_map:2`
+  double held_out_before = 0;        ///< m, rms of left-out positions, with the causes before it
+  double held_out_after = 0;         ///< m, held-out error with this cause
   double gain = 0;     ///< nat: the rise of the log likelihood by this cause, beside the ones taken
                        ///< before
   double freedom = 0;  ///< the number of its parameters that the batch determines

@@ -56,8 +56,8 @@ LinearEquations of_columns(const LinearEquations& all, const std::vector<Index>&
   return some;
 }
 
-/// The factor of each kind by which the stated sigmas are more precise, as a variance, than the
-/// weights.
+/// For each kind, the factor by which the stated sigmas are more precise than the weights, as a
+/// variance.
 Eigen::Vector2d of_stated_sigmas(const CalibrationProblem& problem, const Weights& weights) {
   Eigen::Vector2d stated = Eigen::Vector2d::Zero(), beside = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < problem.batch.measurements.size(); ++i) {

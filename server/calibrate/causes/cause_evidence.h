@@ -34,8 +34,8 @@ class CauseEvidence {
   [[nodiscard]] Gain gain_of(const ColumnGroup& group) const;
   /// Frees the group.
   void take(const ColumnGroup& group);
-  /// Squares of the residuals of positions, in units of their sigmas: each block predicted by the
-  /// others with the free groups. A number a block; their sum is the mean square of an axis.
+  /// Squares of the residuals of positions, in units of their sigmas. The other blocks with the
+  /// free groups predict each block. One number per block; their sum is the mean square of an axis.
   [[nodiscard]] Eigen::VectorXd left_out() const { return left_out_with(free_); }
   /// left_out() with `group` free, too.
   [[nodiscard]] Eigen::VectorXd left_out(const ColumnGroup& group) const;

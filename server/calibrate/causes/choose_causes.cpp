@@ -21,7 +21,8 @@ using causes::SearchFamily;
 
 constexpr int kHarmonics = 60;  // of a map: waves of 6 degrees; finer ones cost and bring little
 constexpr double kWorth = 3;    // nat: so much likelier must the batch be with one cause
-constexpr double kSure = 20;    // nat: then blocks left out refuse it by harm beyond chance only
+constexpr double kSure = 20;  // nat: with such a gain, left-out blocks refuse the cause only if it
+                              // harms them beyond chance
 constexpr double kStandardErrors = 2;  // chance alone exceeds them in 1 of 40 cases
 
 constexpr const char* kTaken = "the poses show it, and it predicts poses that were left out";
@@ -35,7 +36,7 @@ bool is_listed(const std::vector<std::string>& specs, const CauseRecord& record)
                      [&](const std::string& spec) { return find_cause(spec) == &record; });
 }
 
-/// The sources that are identified whatever the data say.
+/// The sources that every training identifies, whatever the data show.
 std::vector<std::string> always_identified(const Cell& cell, const std::vector<std::string>& kept) {
   std::vector<std::string> specs = spelled_out(kept, cell);
   for (const causes::Part part : {causes::Part::kBase, causes::Part::kLinks, causes::Part::kTool}) {
@@ -81,7 +82,7 @@ ColumnGroup columns_of_source(const PhysicalModel& model, const std::string& nam
   return {};
 }
 
-/// m: of one axis, of a row alone.
+/// m: of one axis, of one row alone.
 double mean_sigma(const CalibrationResult& found, const MeasurementBatch& batch) {
   const Weights weights = weights_of(found, batch);
   double square = 0;
@@ -92,13 +93,14 @@ double mean_sigma(const CalibrationResult& found, const MeasurementBatch& batch)
   return std::sqrt(square / static_cast<double>(batch.measurements.size()));
 }
 
-/// How far blocks are missed that are left out, m²: a number a block, which sum up to the mean
+/// The prediction errors of left-out blocks, m²: one number per block. They add up to the mean
 /// square of Euclidean errors.
 using Missed = Eigen::VectorXd;
 
 double rms(const Missed& missed) { return std::sqrt(missed.sum()); }
 
-/// Less is missed, or not more than by chance as the blocks differ, where the cause is `sure`.
+/// True if the error is smaller. If the cause is `sure`, the error may be larger by chance, judged
+/// by the differences between blocks.
 bool predicts(const Missed& before, const Missed& after, bool sure) {
   const Eigen::ArrayXd gain = before - after;
   if (gain.sum() > 0 || !sure) return gain.sum() > 0;
@@ -109,8 +111,8 @@ bool predicts(const Missed& before, const Missed& after, bool sure) {
 
 /// A cause that is tried: its columns in the linear arm.
 struct Candidate {
-  std::string named;   ///< as a person would name it
-  std::string source;  ///< in the model and in the list that is identified
+  std::string named;   ///< the spelling of a person
+  std::string source;  ///< the spelling in the model and in the list to identify
   ColumnGroup columns = {};
 };
 
@@ -138,8 +140,8 @@ class CauseSearch {
   }
 
  private:
-  /// Weights and the joints that give way under them are a product: both are identified together,
-  /// and the arm is made linear where they are.
+  /// Tries loads together with the compliances under them. Their effect is a product, so both are
+  /// identified together, and the arm is linearised at the result.
   void try_load() {
     const CauseRecord* yielding = nullptr;
     std::vector<std::string> load;
@@ -160,7 +162,7 @@ class CauseSearch {
     const double freedom = loaded->rank - base_.rank;
     if (!judged({load, 0, 0, gain, freedom, false, {}}, missed(*loaded))) return;
     chosen_.sources = std::move(specs);
-    // In the form that was likeliest: not to be asked again beside hundreds of parameters.
+    // The likeliest form stays. It is not compared again beside hundreds of parameters.
     for (const ErrorSourcePtr& source : loaded->model.sources) {
       if (&source->cause() != yielding) continue;
       std::replace(chosen_.sources.begin(), chosen_.sources.end(), std::string(yielding->spelling),
@@ -169,7 +171,7 @@ class CauseSearch {
     base_ = std::move(*loaded);
   }
 
-  /// Adds the cause, with which `after` is missed, to the table; returns true if it is taken.
+  /// Adds the cause to the table with the prediction errors `after`. Returns true if it is taken.
   bool judged(TriedCause tried, const Missed& after) {
     const bool shown = tried.gain > worth_;
     tried.held_out_before = rms(held_out_);
@@ -276,7 +278,7 @@ class CauseSearch {
   CalibrationResult base_;
   PhysicalModel model_;  // with all candidates
   std::vector<Candidate> candidates_;
-  double worth_ = kWorth;  // nat: so much likelier must the batch be with a cause
+  double worth_ = kWorth;  // nat: the gain of likelihood that a cause must bring
   Missed held_out_;        // with what was taken
   ChosenCauses chosen_;
 };

@@ -15,8 +15,9 @@ struct ChosenCauses {
   CauseChoice choice;
 };
 
-/// The causes that `batch` shows, beside base, geometry, tools and `kept` (README.md). All that is
-/// kept stays. Refusals as calibrate(), and when `go_on`, told the share that is done, gives up.
+/// The causes that `batch` shows, beside base, geometry, tools and `kept` (README.md). All kept
+/// causes stay. Refuses as calibrate(). `go_on` gets the finished share; the choice is also refused
+/// if it returns false.
 [[nodiscard]] Result<ChosenCauses> choose_causes(
     const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& kept,
     const MeasurementBatch& batch,

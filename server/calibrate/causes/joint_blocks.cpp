@@ -12,7 +12,8 @@ constexpr int kHalvings = 3;  // seven eighths still show the physics
 
 using Blocks = std::vector<std::vector<std::size_t>>;
 
-/// Halves the poses across the joint in which they spread widest, and each half again.
+/// Halves the poses along the joint in which they spread widest, and halves the parts in the same
+/// way.
 void halve(const MeasurementBatch& batch, std::vector<PoseGroup> poses, int times, Blocks& blocks) {
   const auto q_of = [&](const PoseGroup& pose) -> const JointVector& {
     return batch.measurements[static_cast<std::size_t>(pose.front())].context.q;

@@ -39,7 +39,7 @@ namespace {
 struct ToolPoses {
   std::vector<Vector3> points_W;
   std::vector<Pose> X_BF;
-  std::vector<Pose> oriented_X_WT, oriented_X_BF;  ///< of the poses that have an orientation
+  std::vector<Pose> oriented_X_WT, oriented_X_BF;  ///< of the poses with an orientation
 
   [[nodiscard]] Eigen::Matrix3Xd p_W() const {
     return Eigen::Map<const Eigen::Matrix3Xd>(points_W.front().data(), 3,

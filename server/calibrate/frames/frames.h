@@ -4,7 +4,7 @@
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
-/// Where base and tools are: closed forms, before anything is refined.
+/// Locates base and tools in closed form, before the refinement.
 namespace trammel {
 
 [[nodiscard]] bool has_unknown_tool(const Cell& cell);
@@ -24,12 +24,11 @@ namespace trammel {
 /// Names the turn of an unknown base that positions at one place do not determine. Empty if they
 /// determine it.
 [[nodiscard]] std::string untold_turn(const Cell& cell, const MeasurementBatch& batch);
-/// The six values by which a frame's source moves the frame by `X`: x y z, then angles about z, y,
-/// x. The angle about y stays below 90 degrees.
+/// The names of the parameters that turn the base.
 [[nodiscard]] std::vector<std::string> turn_of_base();
 
-/// The six values with which the source of a frame moves it by `X`: x y z, then angles about z, y,
-/// x, that about y below 90 degrees.
+/// The six values by which a frame's source moves the frame by `X`: x y z, then angles about z, y,
+/// x. The angle about y stays below 90 degrees.
 [[nodiscard]] Vector6 motion_values(const Pose& X);
 
 /// Sets the model's `base` source by localisation of the nominal chain with singular values, eqs.

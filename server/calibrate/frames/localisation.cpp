@@ -56,7 +56,8 @@ Result<BaseAndTool> locate_rotations(const std::vector<Pose>& X_WT, const std::v
   return found;
 }
 
-/// Both translations, the rotations known. p_WT = p_WB + R_WB (p_BF + R_BF p_FT) is linear in them.
+/// Finds both translations when the rotations are known. p_WT = p_WB + R_WB (p_BF + R_BF p_FT) is
+/// linear in them.
 Status add_translations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF,
                         BaseAndTool& found) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();

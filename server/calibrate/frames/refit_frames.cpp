@@ -14,7 +14,7 @@ namespace {
 struct FlangeAndPoints {
   std::vector<Pose> X_BF, oriented_X_BF, oriented_X_WT;
   std::vector<Vector3> points;
-  Pose X_FT = Pose::Identity();  ///< where the tool is believed to be
+  Pose X_FT = Pose::Identity();  ///< the assumed place of the tool
 
   [[nodiscard]] Eigen::Matrix3Xd p_W() const {
     return Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3,
@@ -41,8 +41,7 @@ std::map<std::string, FlangeAndPoints> poses_by_tool(const PhysicalModel& before
   return tools;
 }
 
-/// The base from tools that are known: by positions or, where they do not span a plane, by
-/// orientations.
+/// The base by known tools: from positions or, if these do not span a plane, from orientations.
 Result<Pose> base_under(const std::vector<const FlangeAndPoints*>& tools) {
   std::vector<Vector3> measured, expected;
   Matrix3 turn = Matrix3::Zero();
@@ -90,8 +89,8 @@ Result<Pose> tool_on(const Pose& X_WB, const FlangeAndPoints& tool) {
   });
 }
 
-/// Puts the model's base at `X_WB`: by the nominal frame where the cell calls the base unknown,
-/// else by the source.
+/// Places the model's base at `X_WB`. The nominal frame changes if the cell calls the base unknown,
+/// else the source.
 void place_base(PhysicalModel& model, const Pose& X_WB) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {

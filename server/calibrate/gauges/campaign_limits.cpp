@@ -17,11 +17,12 @@ namespace {
 constexpr double kSameMotion = 1e-6;   // m: singular values of a metre's arm
 constexpr double kShortStroke = 0.05;  // of the length
 
-/// The equations by which a known anchor holds a motion of all [shift; turn] in W, one a row.
+/// The equations with which a known anchor fixes a motion [shift; turn] of the whole in W, one per
+/// row.
 Eigen::MatrixXd held_by(const Anchor& anchor) {
   Eigen::Matrix<double, 3, 6> motion;  // of the anchor's point
   motion << Matrix3::Identity(), -skew(*anchor.p_W);
-  Eigen::Matrix<double, 3, 6> turned = Eigen::Matrix<double, 3, 6>::Zero();  // of its direction
+  Eigen::Matrix<double, 3, 6> turned = Eigen::Matrix<double, 3, 6>::Zero();  // of the direction
   turned.rightCols<3>() = -skew(anchor.direction_W);
   Eigen::MatrixXd rows(6, 6);
   const Vector3& n = anchor.direction_W;
@@ -98,8 +99,8 @@ void add_untold_base(const MeasurementBatch& batch, CalibrationResult& found) {
   found.unidentifiable.insert(found.unidentifiable.begin(), std::move(base));
 }
 
-/// Standard deviation of the length of all links together, as a share of itself; nothing where
-/// the model has none.
+/// Relative standard deviation of the length of all links together; empty if the model has no
+/// lengths.
 std::optional<double> stddev_of_size(const CalibrationResult& found) {
   const Chain& robot = found.model.cell->robot;
   std::map<std::string, double> lengths;
@@ -136,7 +137,7 @@ std::map<std::string, Stroke> strokes_of(const MeasurementBatch& batch) {
   return strokes;
 }
 
-/// m: as far as the links go, one after the other.
+/// m: the length of all links, one after the other.
 double reach_of(const Chain& robot) {
   double reach = 0;
   for (int j = 0; j < robot.size(); ++j)

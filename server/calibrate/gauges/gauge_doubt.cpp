@@ -107,7 +107,7 @@ std::optional<Error> doubt_of_distances(const CellPtr& cell, const MeasurementBa
   return std::nullopt;
 }
 
-/// The distances to one anchor, and where the arm as drawn has the tool's point.
+/// The distances to one anchor, and the tool points of the arm as drawn.
 struct Wire {
   std::vector<Vector3> points_W;
   std::vector<double> lengths;  ///< m
@@ -116,7 +116,7 @@ struct Wire {
 
   bool is_zero_known = false;
 
-  /// m: median by which a length is off if the anchor stands there, but for an unknown zero.
+  /// m: median of the length errors if the anchor stands there, apart from an unknown zero.
   [[nodiscard]] double off_at(const Vector3& place) const {
     std::vector<double> off, sizes;
     for (std::size_t i = 0; i < lengths.size(); ++i)
@@ -131,7 +131,7 @@ struct Wire {
   }
 };
 
-/// By anchor; empty where a tool is unknown.
+/// By anchor; empty if a tool is unknown.
 std::map<std::string, Wire> wires_of(const Cell& cell, const MeasurementBatch& distances) {
   std::map<std::string, Wire> all;
   const Anchors anchors = anchors_of(cell).value_or(Anchors{});
@@ -151,7 +151,7 @@ std::map<std::string, Wire> wires_of(const Cell& cell, const MeasurementBatch& d
   return all;
 }
 
-/// A wire that is told in another unit than the others.
+/// A wire with another unit than the others.
 std::optional<Error> doubt_of_wire_unit(const std::string& anchor, const Wire& wire) {
   if (!wire.found || wire.fits()) return std::nullopt;
   for (const UnitOfLength& unit : kUnitsOfLength) {
@@ -172,7 +172,7 @@ std::optional<Error> doubt_of_wire_unit(const std::string& anchor, const Wire& w
   return std::nullopt;
 }
 
-/// The places that may have been meant where `stated` was written.
+/// The places that may have been intended by `stated`.
 std::vector<std::pair<std::string, Vector3>> meant_places(const Vector3& stated) {
   std::vector<std::pair<std::string, Vector3>> all;
   for (int k = 0; k < 3; ++k) {
@@ -188,7 +188,7 @@ std::vector<std::pair<std::string, Vector3>> meant_places(const Vector3& stated)
   return all;
 }
 
-/// An anchor that stands elsewhere than the cell file says, and the way in which that was meant.
+/// An anchor that stands elsewhere than the cell file says, and the mistake that explains it.
 std::optional<Error> doubt_of_place(const std::string& anchor,
                                     const std::map<std::string, Wire>& wires) {
   const Wire& wire = wires.at(anchor);

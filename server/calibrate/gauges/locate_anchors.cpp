@@ -84,7 +84,7 @@ struct Refined {
   double square = std::numeric_limits<double>::infinity();  ///< m², sum
 };
 
-/// Gauss-Newton steps, damped where one leads uphill.
+/// Gauss-Newton steps, damped if one leads uphill.
 Refined refined_from(Vector3 a, const Lengths& of) {
   const auto square_at = [&](const Vector3& place) {
     double sum = 0;

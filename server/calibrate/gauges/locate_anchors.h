@@ -7,7 +7,7 @@
 #include "server/base/result.h"
 #include "server/calibrate/calibration.h"
 
-/// Where the anchors of instruments are, before anything is refined.
+/// Locates the anchors of instruments, before the refinement.
 namespace trammel {
 
 /// `specs` with `anchors` added if the batch has gauges, and with `instrument_zero` added if the
@@ -25,10 +25,10 @@ namespace trammel {
 /// solution. Refuses an anchor with fewer than 4 values, or one whose tool points lie on one line.
 [[nodiscard]] Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch);
 
-/// The point that is so far from tool points.
+/// The point at these distances from tool points.
 struct LocatedPoint {
   Vector3 p_W = Vector3::Zero();
-  double off = 0;  ///< m: median of what it leaves of a length
+  double off = 0;  ///< m: median of the remaining length errors
 };
 /// Empty for fewer than 4 points, and for points on one line.
 [[nodiscard]] std::optional<LocatedPoint> locate_point(const std::vector<Vector3>& points_W,

@@ -16,7 +16,7 @@ bool has_mass(const PoseContext& context, const Cell& cell) {
   return payload != cell.payloads.end() && payload->second.mass > 0;
 }
 
-/// The need of a source, whether a pose meets it, and the column that would record it.
+/// The need of a source, whether some pose meets it, and the column that records it.
 struct Need {
   bool needed;
   std::function<bool(const PoseContext&)> has;

@@ -15,14 +15,14 @@ namespace {
 constexpr double kSettledStep =
     0.05;  // standard deviations: a smaller step changes nothing anybody sees
 constexpr double kFirstSettledStep =
-    1;  // the same as long as residuals only serve to find the discrepancy
+    1;                            // likewise, while the fit only serves to estimate the discrepancy
 constexpr double kNoRise = 1e-6;  // of the cost, which has thousands of terms: rounding
 constexpr Eigen::Index kPosesAtATime =
-    64;  // whose Jacobians are multiplied together: they stay in the cache
+    64;  // poses whose Jacobians are multiplied together, so that they stay in the cache
 
 constexpr Eigen::Index kManyParameters = 300;  // from here on the product takes most of the time
 
-constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step leads uphill
+constexpr double kFirstDamping = 1e-3;  // share of the diagonal, for the first damped step
 constexpr double kMostDamping = 1e9;
 constexpr double kNoDamping = 1e-6;
 
@@ -30,13 +30,13 @@ constexpr double kNoDamping = 1e-6;
 // hundred steps. Only the prior's part of the cost still falls then, by less than this.
 constexpr double kIdleFall = 0.05;  // nat a step
 constexpr double kFirstIdleShare =
-    1e-3;  // of the cost, as long as residuals only serve to find the discrepancy
+    1e-3;  // share of the cost, while the fit only serves to estimate the discrepancy
 constexpr int kIdleSteps = 3;
 // A full step along such a valley leaves it, and the next ones come back, farther down.
 constexpr int kMostUphill = 5;  // steps
 
-/// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it
-/// stay.
+/// The Gauss-Newton step from the point of `at`. A parameter at its bound stays there if the step
+/// would leave the bound.
 Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x,
                              const Eigen::VectorXd& lower) {
   Eigen::VectorXd downhill = -at.gradient;
@@ -177,8 +177,8 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
 
 namespace {
 
-/// Where the search stands: the parameters, and the measurements as the instruments are believed to
-/// have stood.
+/// The present point of the search: the parameters, and the measurements with the instruments
+/// placed accordingly.
 struct Standing {
   Eigen::VectorXd x;
   CalibrationProblem problem;

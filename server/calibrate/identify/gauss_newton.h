@@ -17,7 +17,7 @@ namespace trammel {
 struct Expansion {
   double cost = 0;
   Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;  ///< P x P, second derivative without that of the priors
+  Eigen::MatrixXd information;  ///< P x P, second derivative without the part of the priors
   std::vector<SessionBlock> sessions =
       {};  ///< of several sessions: the settings of all but the newest, which is the world frame
 };
@@ -26,22 +26,22 @@ struct Expansion {
 [[nodiscard]] Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s,
                                const Weights& weights, bool robust, const Eigen::VectorXd& x);
 
-/// Where minimising ended.
+/// The end of a minimisation.
 struct Minimum {
   Eigen::VectorXd x;
-  Eigen::MatrixXd information;  ///< of an Expansion about x, or about a negligible step before it
+  Eigen::MatrixXd information;  ///< of an Expansion about x, or about a point one negligible step
+                                ///< before
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;
   std::vector<Similarity> moved = {};  ///< of several sessions: the motion that takes each into W
 };
 
-/// True if Huber's loss is used: not before the discrepancy is known, since nothing can be called
-/// an outlier then.
+/// True if Huber's loss is used. It starts when the discrepancy is known, since outliers cannot be
+/// recognised before.
 [[nodiscard]] bool is_robust(const CalibrateOptions& options, const Weights& weights);
 
-/// Full Gauss-Newton steps, which are enough where the start is near; nothing where one leads
-/// uphill.
+/// Full Gauss-Newton steps, which suffice if the start is near; empty if one leads uphill.
 [[nodiscard]] std::optional<Minimum> full_steps(const CalibrationProblem& problem,
                                                 const ScaledParameters& s, const Weights& weights,
                                                 const CalibrateOptions& options,

@@ -23,8 +23,8 @@ struct UnidentifiableCombination {
   std::string sentence;                 ///< for people
 };
 
-/// All directions that the data do not show, each with as few parameters as possible, in words.
-/// `to_typical` converts prior units into units in which parameters of one kind can be compared.
+/// Describes all directions that the data do not show in words, each with as few parameters as
+/// possible. `to_typical` converts prior units into comparable units for parameters of one kind.
 [[nodiscard]] std::vector<UnidentifiableCombination> unidentifiable_combinations(
     const Information& seen, const std::vector<Parameter>& parameters,
     const Eigen::VectorXd& to_typical);

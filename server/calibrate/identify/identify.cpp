@@ -21,7 +21,7 @@ namespace {
 constexpr int kMostReweightings =
     12;  // three or four are enough; more only where outliers come and go
 constexpr double kIdentifiedShare =
-    0.5;  // of the prior's standard deviation: the data say more than the prior did
+    0.5;  // share of the prior's standard deviation: below it the data say more than the prior
 constexpr double kFewFitted = 0.05;  // share of the equations; below it, the split of the
                                      // parameters hardly changes the discrepancies
 
@@ -169,7 +169,7 @@ struct Identified {
   std::vector<SessionSetting> sessions;
 };
 
-/// The measurements in W as the minimum has it, every session with the noise that is its own.
+/// Moves the measurements into W as at the minimum, and gives every session its own noise.
 void take_over_sessions(const MeasurementBatch& given, Identified& now, MeasurementBatch& batch,
                         const Tracker& tracker) {
   if (now.sessions.empty()) return;
@@ -184,8 +184,8 @@ double freedom_of_sessions(const CalibrationProblem& problem) {
   return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
-/// The information about the parameters in the mean positions at one joint vector, each mean as
-/// sure as one of them.
+/// The information of the mean positions at one joint vector about the parameters, each mean with
+/// the weight of one position.
 Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const ScaledParameters& s,
                                      const Weights& weights, const Residuals& r,
                                      const Eigen::VectorXd& x) {

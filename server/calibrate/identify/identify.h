@@ -5,9 +5,9 @@
 
 namespace trammel {
 
-/// Minimises and estimates the discrepancy in turns until neither changes, then adds how well every
-/// parameter is known. Sources, frames and orders are as the model has them. Refuses where the
-/// solver fails, and joints that do not lead to the positions.
+/// Alternates minimising and estimating the discrepancy until neither changes, then adds the
+/// uncertainty of every parameter. Sources, frames and orders are those of the model. Refuses if
+/// the solver fails, and joints that do not lead to the positions.
 [[nodiscard]] Result<CalibrationResult> identify(const CalibrationProblem& problem,
                                                  const CalibrateOptions& options);
 

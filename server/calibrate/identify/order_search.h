@@ -14,7 +14,7 @@ namespace trammel {
 /// stay free.
 [[nodiscard]] Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options);
 
-/// `name@order` of the sources that were searched, by name: specs with which no search is needed.
+/// `name@order` for each searched source, by name: specs that need no search.
 [[nodiscard]] std::map<std::string, std::string> found_orders(const PhysicalModel& model);
 
 }  // namespace trammel

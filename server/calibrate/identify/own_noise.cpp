@@ -8,7 +8,8 @@ namespace trammel {
 namespace {
 
 constexpr double kMedianOfChiSquare = 2.366;  // of 3 degrees of freedom
-constexpr double kSpreadOfMedian = 1.124;     // relative, times 1 / sqrt(n): of that median
+constexpr double kSpreadOfMedian = 1.124;     // relative standard deviation of that median, times
+                                              // sqrt(n)
 constexpr double kBeyondChance = 4;           // standard deviations
 constexpr std::size_t kFewestPoses = 8;       // needed to estimate the noise of a session
 constexpr double kSettled = 0.02;             // relative
@@ -30,7 +31,7 @@ struct SquaresBySession {
 
   explicit SquaresBySession(std::size_t sessions)
       : ratio(sessions), variance(sessions, 0.0), poses(sessions, 0.0) {}
-  /// One of so many of its joint vector.
+  /// Adds one row. `together`: the number of rows with its joint vector.
   void add(int session, double square, double of, int together) {
     const auto s = static_cast<std::size_t>(session);
     ratio[s].push_back(square / of);

@@ -16,7 +16,7 @@ struct ScaledParameters {
   Eigen::VectorXd typical;         ///< F, SI: the same before priors were widened
   Eigen::VectorXd prior;           ///< F, in units of scale
   std::vector<Eigen::Index> free;  ///< F: place of each among the model's P
-  Eigen::VectorXd values;          ///< P, SI: of the model, which are those of the priors
+  Eigen::VectorXd values;          ///< P, SI: the model's values, at which the priors are centred
 
   /// Bounds in units of scale; -infinity where there is none.
   [[nodiscard]] Eigen::VectorXd lower() const;

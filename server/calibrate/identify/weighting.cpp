@@ -15,14 +15,16 @@ namespace {
 
 constexpr double kSuspect = 5.5;        // norm of 3 axes that 1 in 10^6 good poses exceeds
 constexpr double kSuspectGauge = 4.89;  // the same of 1 axis
-constexpr double kSettledSigma = 2e-3;  // relative: a sigma that changes by less weighs the same
+constexpr double kSettledSigma = 2e-3;  // relative: a smaller change of a sigma does not change the
+                                        // weights
 constexpr int kBisections = 100;        // more than a double has bits
-constexpr double kLeastOwn = 0.25;      // of the stated variance, that no other position shares
+constexpr double kLeastOwn = 0.25;  // share of the stated variance that no other position shares,
+                                    // at least
 constexpr double kLeastShare =
-    0.05;  // of the axes of few poses, that no parameter is taken to be fitted to
+    0.05;  // share of the equations that no parameter is counted against, at least
 
-/// Squared residuals, each of so many axes, with their variances and how often the model's own
-/// enters them.
+/// Squared residuals with their number of axes, their variances, and how often the model's own
+/// variance enters them.
 struct WeightedSquares {
   std::vector<double> square, variance, times;
   double axes = 0;
@@ -66,8 +68,8 @@ double sigmas_of_gauge(const Residuals& r, Eigen::Index i, const Weights& weight
   return std::abs(r.gauge(i)) / std::sqrt(variance_of_gauge(r, i, weights));
 }
 
-/// Positions and gauges: the model's own error is the same in any direction. With `weights` without
-/// what is a suspect under them.
+/// Squared lengths of positions and gauges, since the model error is equal in all directions. With
+/// `weights`, suspects under them are left out.
 WeightedSquares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
   WeightedSquares lengths;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
@@ -91,7 +93,7 @@ WeightedSquares turns_of(const Residuals& r) {
 /// Positions at one joint vector: their mean, and their deviations from it.
 struct SeenTogether {
   Vector3 mean = Vector3::Zero();
-  double variance = 0;  // m², of one of them as stated
+  double variance = 0;  // m², the stated variance of one of them
   double apart = 0;     // m², sum of squares about the mean
   double count = 0;
 };
@@ -141,7 +143,7 @@ double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Inde
          1.5 * (std::log(2 * kPi * of_sum) + (seen.count - 1) * std::log(2 * kPi * own));
 }
 
-/// The share of so many axes that no parameter was fitted to.
+/// The share of `axes` that no parameter was fitted to.
 double share_left(double freedom, double axes) {
   return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0;
 }

@@ -22,11 +22,11 @@ struct Weights {
   /// sigma. A gauge that is read against another pose has twice the variance. Positions at one
   /// joint vector weigh as one pose, as far as they share the error.
   [[nodiscard]] double beside(const Measurement& m, std::size_t row) const;
-  /// m per axis: what `m` alone is off by beside its own sigma; less than beside() where it shares
-  /// its error with others.
+  /// m per axis: the error of `m` alone beside its own sigma. It is less than beside() if the row
+  /// shares its error with others.
   [[nodiscard]] double beside_alone(const Measurement& m) const;
 };
-/// Those under which `found` was found, for the rows of `batch`.
+/// The weights under which `found` was found, for the rows of `batch`.
 [[nodiscard]] Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch);
 
 /// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's
@@ -53,7 +53,7 @@ struct Residuals {
   /// columns_together() was not called.
   std::vector<std::vector<Eigen::Index>> together;
 
-  /// m: rms of the Euclidean residuals of the positions; where there are none, of the gauges.
+  /// m: rms of the Euclidean residuals of the positions; without positions, of the gauges.
   [[nodiscard]] double rms() const;
 };
 
@@ -70,7 +70,7 @@ struct Residuals {
 struct Freedom {
   double positions = 0;  ///< and gauges
   double turns = 0;
-  double means = 0;  ///< to the means of the positions at one joint vector
+  double means = 0;  ///< fitted to the means of the positions at one joint vector
 };
 
 /// The discrepancies under which the residuals have their expected size after these parameters were

@@ -13,10 +13,10 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSameAngle = 1e-6;  // rad: a joint that is held reads the same to its last digit
+constexpr double kSameAngle = 1e-6;  // rad: a held joint reads the same to its last digit
 constexpr double kPointLimit = 1e5;  // m: no instrument measures farther
 
-/// Refuses a joint that follows another, so that its axis moves.
+/// Refuses a joint that follows another one, since its axis moves.
 Status check_robot(const Chain& robot, const ArcList& arcs) {
   for (int j = 0; j < robot.size(); ++j) {
     for (int before = 0; before < j; ++before) {
@@ -66,12 +66,12 @@ Status check_slides(const Chain& robot, const ArcList& arcs) {
   return {};
 }
 
-/// Where the numbers of an arc stand.
+/// The columns of an arc's numbers.
 struct ArcColumns {
   std::size_t joint = 0, angle = 0;
   std::array<std::size_t, 3> position{};
   std::optional<std::size_t> reflector;
-  PoseColumns posture;  ///< of the joints that are held; without columns they are at zero
+  PoseColumns posture;  ///< of the held joints; without columns they are at zero
 };
 
 Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where,

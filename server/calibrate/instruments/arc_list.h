@@ -11,7 +11,7 @@ namespace trammel {
 
 /// One position of a reflector.
 struct ArcPoint {
-  int joint = 0;          ///< that turns, from 0
+  int joint = 0;          ///< the turning joint, from 0
   std::string reflector;  ///< which of several; may be empty
   JointVector q;          ///< rad, all joints as commanded
   Vector3 p_W = Vector3::Zero();

@@ -11,7 +11,7 @@ namespace trammel {
 namespace {
 
 constexpr double kMostAngleOff =
-    from_deg(1);  // turned against commanded: ten times what gears of an arm are off
+    from_deg(1);  // between turned and commanded angle: ten times the errors of an arm's gears
 constexpr double kLine =
     1e-8;  // ratio of variances across and along: below it points are on a line
 constexpr int kMostSteps = 50;       // arcs are so nearly circles that a few are enough

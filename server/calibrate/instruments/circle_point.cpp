@@ -64,14 +64,14 @@ Eigen::VectorXd deviations(const Chain& robot, const std::vector<NamedMember>& m
 struct Fits {
   Chain robot;  ///< with a Hayati row wherever axes are parallel
   TurningJoints turning;
-  JointVector held;         ///< m, of each joint that slides, where it stood; else 0
+  JointVector held;         ///< m, the position of each prismatic joint; else 0
   std::vector<int> joints;  ///< of each axis
   std::vector<AxisFit> axes;
   std::vector<double> variance;  ///< m^2, of one coordinate
   std::vector<double> widening;  ///< factors for covariances whose variance was itself estimated
 };
 
-/// One a joint; of a joint that slides none.
+/// One line per joint; empty for a prismatic joint.
 std::vector<AxisLine> lines_of(const Fits& fits) {
   std::vector<AxisLine> lines(static_cast<std::size_t>(fits.robot.size()));
   for (std::size_t k = 0; k < fits.axes.size(); ++k)
@@ -231,7 +231,7 @@ Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Fi
       .next("another robot, joint or posture?");
 }
 
-/// The kinematic table from the axes, its uncertainty, and the robot that has it.
+/// Adds the kinematic table from the axes, its uncertainty, and the robot with this table.
 Status add_links(const ArcList& arcs, const std::vector<JointArcs>& groups, const Fits& fits,
                  CirclePointResult& result) {
   const std::vector<AxisLine> lines = at_zero(fits.robot, groups, lines_of(fits));

@@ -30,7 +30,7 @@ struct CircleFit {
 struct JointAxis {
   Vector3 direction_W =
       Vector3::Zero();  ///< unit vector in the kinematic sense, the joints before it at zero
-  Vector3 point_W = Vector3::Zero();  ///< on the axis, the joints before it at zero
+  Vector3 point_W = Vector3::Zero();  ///< on the axis, with the joints before it at zero
   double direction_u = 0;             ///< rad, U(k=2) in its worst direction
   double sigma = 0;      ///< m, of one coordinate of a point: stated or from the residuals
   int freedom = 0;       ///< equations beyond unknowns
@@ -39,7 +39,7 @@ struct JointAxis {
 
 /// One number of the robot file, measured.
 struct MeasuredParameter {
-  std::string name;     ///< as the error source `geometry` names it: `a2`, `alpha1`, `q3`
+  std::string name;     ///< the name in the error source `geometry`: `a2`, `alpha1`, `q3`
   bool length = false;  ///< m, else rad
   double nominal = 0;
   double deviation = 0;   ///< measured - nominal
@@ -55,7 +55,7 @@ struct CirclePointOptions {
 
 struct CirclePointResult {
   std::vector<CircleFit> circles;  ///< in the order of joints
-  std::vector<JointAxis> axes;     ///< one a joint; of a joint that slides without direction
+  std::vector<JointAxis> axes;     ///< one per joint; without direction for a prismatic joint
   std::vector<MeasuredParameter> parameters;
   Eigen::MatrixXd
       covariance;  ///< of the deviations in the order of `parameters`, SI; zero where not measured

@@ -17,7 +17,8 @@ constexpr double kSignificant =
 constexpr double kSameLoad = 0.5e-3 + 1e-6;  // N: half the last of three decimals, and rounding
 constexpr double kSeen =
     3;  // standard deviations: a bend at the link's end that would have been seen
-constexpr double kLeastPivot = 1e-9;  // of the largest: parameters below it are not separated
+constexpr double kLeastPivot = 1e-9;  // share of the largest: parameters with a smaller pivot are
+                                      // not separated
 constexpr std::size_t kFewestLoads =
     4;  // enough to hold some out, while the least and the largest load stay in the training
 constexpr std::size_t kHeldOut =
@@ -51,7 +52,7 @@ Eigen::Vector2d along(const DeflectionElement& element) {
 /// points outward.
 Eigen::Vector2d swung(const Eigen::Vector2d& r) { return {r.y(), -r.x()}; }
 
-/// The columns of the linear model; where each element's begin.
+/// The columns of the linear model, with the first column of each element.
 struct Layout {
   struct Columns {
     int compliance = 0, flexibility = -1, offset = 0, load_bias = -1;
@@ -203,7 +204,7 @@ struct Split {
   std::vector<double> training_loads, validation_loads;
 };
 
-/// The loads that are held out for validation; nothing where the file says it of each reading.
+/// The loads that are held out for validation; empty if the file marks each reading.
 Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& data,
                                                        const DeflectionOptions& options) {
   std::set<double> all;
@@ -362,7 +363,7 @@ struct BothModels {
     return std::max(split.training_loads.back(),
                     split.validation_loads.empty() ? 0.0 : split.validation_loads.back());
   }
-  /// The largest sigma of an element's readings, as large as the residuals say.
+  /// The largest sigma of the readings of one element, scaled as the residuals demand.
   [[nodiscard]] double sigma_of_element(int element) const {
     double sigma = 0;
     for (const DeflectionReading* reading : split.train) {
@@ -372,7 +373,7 @@ struct BothModels {
   }
 };
 
-/// Judges whether the foot of the element moves with the load, where nobody asked for a load bias.
+/// Judges whether the foot of the element moves with the load, if no load bias was requested.
 void judge_load_bias(const BothModels& models, ElementResult& element) {
   if (!models.beams.contains(element.element) || models.load_biases.contains(element.element))
     return;

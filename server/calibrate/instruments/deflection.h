@@ -20,7 +20,7 @@ struct DeflectionOptions {
   bool chained = false;
   std::vector<int> load_bias = {};  ///< elements whose foot moves with the load: the B of eq. (4.4)
   std::vector<double> validation_loads =
-      {};  ///< N; empty: as the file says, else every third load from the second on
+      {};  ///< N; empty: the choice of the file, else every third load from the second on
 };
 
 /// One element under one model; intervals are U(k=2).
@@ -51,7 +51,7 @@ struct ElementResult {
   double end_bending = 0;  ///< m, the beam's share at the link's end under the largest load
   double end_bending_u = 0;
   double load_bias_p_value =
-      1;  ///< that the foot moving with the load explains nothing more; 1 where not asked
+      1;                 ///< p-value of no motion of the foot with the load; 1 if not tested
   std::string sentence;  ///< for people
 };
 

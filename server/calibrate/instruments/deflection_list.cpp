@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kMostElements = 100;  // more joints than any arm has: a larger number is a mistake
 
-/// Where the numbers of a reading stand.
+/// The columns of a reading's numbers.
 struct DeflectionColumns {
   std::map<std::string, std::size_t> required;
   std::optional<std::size_t> sigma, set;
@@ -62,7 +62,7 @@ Result<std::optional<double>> read_sigma(const CsvTable& table, std::size_t row,
   return from_mm(number);
 }
 
-/// True if the row is one of validation; empty where nothing says it.
+/// True if the row is for validation; empty if the file does not say.
 Result<std::optional<bool>> read_set(const CsvTable& table, std::size_t row,
                                      std::optional<std::size_t> column) {
   if (!column || table.field(row, *column).empty()) return std::nullopt;

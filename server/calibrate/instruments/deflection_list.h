@@ -18,7 +18,7 @@ struct DeflectionReading {
   double x = 0;                                     ///< m, along the element from its joint
   Eigen::Vector2d moved = Eigen::Vector2d::Zero();  ///< dx, dz, m
   std::optional<double> sigma;                      ///< m, of one coordinate
-  std::optional<bool> validation;                   ///< as the file says
+  std::optional<bool> validation;                   ///< the choice of the file
   int row = 0;
 };
 

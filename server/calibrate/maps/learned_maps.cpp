@@ -16,14 +16,16 @@ using Eigen::VectorXd;
 
 constexpr double kSameAngle = 1e-4;  // rad: nearer ones tell nothing of finer harmonics
 constexpr int kFewestHarmonics = 4;  // for a joint without a map: enough to learn that it has none
-constexpr int kMostOfAll =
-    580;  // harmonics of all joints: what a model has room for, and a calibration time
+constexpr int kMostOfAll = 580;      // harmonics of all joints together, a limit for the size of a
+                                     // model and the time of a calibration
 constexpr double kNoLoss = 0.5;      // nat: by which fewer harmonics may be less likely
-constexpr double kMoreLoss = 1.5;    // times as much, as long as there are too many
-constexpr double kFirstStep = 0.02;  // the inverse curvature, before anything is known of it
+constexpr double kMoreLoss = 1.5;  // factor on the allowed loss, repeated while there are too many
+                                   // harmonics
+constexpr double kFirstStep = 0.02;  // initial inverse curvature
 constexpr double kSettled = 0.05;    // nat
 
-/// A search, from where the last one ended; in the second outliers are as the maps leave them.
+/// One search, which starts at the end of the previous one; the second uses the outliers that the
+/// maps leave.
 struct Pass {
   int harmonics, evaluations;
 };
@@ -96,8 +98,8 @@ VectorXd loss_without(const MapEvidence::Posterior& found, const VectorXd& prior
   return loss;
 }
 
-/// The fewest harmonics that are less likely by no more than `allowed`, whatever more of them would
-/// be.
+/// The fewest harmonics whose likelihood is less by at most `allowed`, whatever larger numbers
+/// would gain.
 int fewest(const VectorXd& loss, double allowed) {
   Index n = loss.size() - 1;
   while (n > kFewestHarmonics && !(loss(n - 1) > allowed)) --n;
@@ -113,7 +115,7 @@ std::vector<int> orders(const std::vector<VectorXd>& losses) {
   }
 }
 
-/// The discrepancy with which a sigma is `factor` times as large.
+/// The discrepancy that makes a sigma `factor` times larger.
 double discrepancy_for(double factor, double sigma, double discrepancy) {
   const double square =
       factor * factor * (sigma * sigma + discrepancy * discrepancy) - sigma * sigma;
@@ -207,7 +209,7 @@ class MapSearch {
 
   CalibrationProblem problem_;
   Weights weights_;
-  std::map<int, int> most_;  // harmonics that the poses tell
+  std::map<int, int> most_;  // harmonics that the poses determine
   std::map<int, std::string> spelling_;
   std::vector<MapColumns> maps_;
   VectorXd logs_;

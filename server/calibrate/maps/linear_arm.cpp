@@ -21,7 +21,7 @@ class Rows {
     into_.information = Eigen::MatrixXd::Zero(parameters, parameters);
     into_.downhill = Eigen::VectorXd::Zero(parameters);
   }
-  /// `J`: one column an equation. `square`: what is expected of the square of each.
+  /// `J`: one column per equation. `square`: the expected square of each.
   void add(const Eigen::Ref<const Eigen::VectorXd>& r, const Eigen::Ref<const Eigen::MatrixXd>& J,
            double square) {
     into_.count += square * static_cast<double>(r.size());
@@ -46,8 +46,8 @@ class Rows {
   Index filled_ = 0;
 };
 
-/// The square of a coordinate of this position that its weight lets expect: less than 1 where rows
-/// at one joint vector share an error, and weigh together as one pose.
+/// The expected square of a coordinate of this position under its weight. It is less than 1 if rows
+/// at one joint vector share an error, and together weigh as one pose.
 double expected_square(const CalibrationProblem& problem, const Weights& weights, std::size_t row) {
   const Measurement& m = problem.batch.measurements[row];
   const double sigma = position_sigma(m, *problem.model.cell);

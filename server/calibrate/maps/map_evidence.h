@@ -17,9 +17,9 @@ struct MapColumns {
   int harmonics = 0;
 };
 
-/// The logarithms, three a map: rms of the map (rad), knee, power; then, of each kind of equation,
-/// the factor by which its squared residuals are divided less than their sigmas say. All have wide
-/// normal priors.
+/// The logarithms: three per map (rms of the map in rad, knee, power), then one per kind of
+/// equation, the factor on its squared residuals relative to their sigmas. All have wide normal
+/// priors.
 class MapEvidence {
  public:
   /// The arm has the maps at any values; all other parameters are held to their priors about their

@@ -16,7 +16,8 @@ SessionColumns motion_columns(const Measurement& m, const Vector3& centre_W, dou
                               double inverse_rotation_sigma, bool stretched) {
   const Eigen::Index rows = m.R_WT ? 6 : 3;
   SessionColumns columns = SessionColumns::Zero(kOfSession, rows);
-  // d(w x r) = -skew(r) w, and the residual is measured - predicted; r as measured is near enough.
+  // d(w x r) = -skew(r) w, and the residual is measured - predicted. The measured r is precise
+  // enough.
   columns.topLeftCorner<3, 3>() = -inverse_sigma * Matrix3::Identity();
   columns.block<3, 3>(3, 0) = inverse_sigma * skew(m.p_W - centre_W).transpose();
   if (stretched) columns.block<1, 3>(6, 0) = -inverse_sigma * (m.p_W - centre_W).transpose();

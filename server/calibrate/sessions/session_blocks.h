@@ -31,7 +31,7 @@ struct SessionBlock {
   SessionMotion gradient = SessionMotion::Zero();
   SessionColumns cross;  ///< 7 x P: with the shared parameters
 
-  /// curvature^-1 times `right`; directions that the rows do not show stay where they are.
+  /// curvature^-1 times `right`; undetermined directions do not move.
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& right, double damping = 0) const;
   /// The motion that goes with a step of the shared parameters.
   [[nodiscard]] SessionMotion motion(const Eigen::VectorXd& step, double damping = 0) const;

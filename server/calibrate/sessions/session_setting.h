@@ -48,13 +48,13 @@ struct SessionSetting {
 /// True if the sessions have scales of their own.
 [[nodiscard]] bool are_stretched(const std::vector<SessionSetting>& settings);
 
-/// A setting for each of several sessions of the batch, of the rows that it has: all in W. None
-/// where it is one.
+/// A setting for each session of the batch, if there are several, with its rows: all in W. Empty
+/// for one session.
 [[nodiscard]] std::vector<SessionSetting> settings_of(const MeasurementBatch& batch);
 
-/// `batch` as if all had been measured in W, with the noise of each session in the sigmas of its
-/// rows (`sigma`, m, and `sigma_rotation`, rad: where a row states none). The sessions are still
-/// told apart.
+/// `batch` as if all had been measured in W. The noise of each session enters the sigmas of its
+/// rows (`sigma`, m, and `sigma_rotation`, rad, are used where a row states none). The sessions
+/// keep their ids.
 [[nodiscard]] MeasurementBatch moved(MeasurementBatch batch,
                                      const std::vector<SessionSetting>& settings, double sigma,
                                      double sigma_rotation);
