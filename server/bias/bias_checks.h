@@ -7,10 +7,10 @@
 #include "server/bias/bias_data.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// Refuses what no bias can be learned or restored from.
+/// Refuses data from which no bias can be learned or restored.
 namespace trammel {
 
-/// Most observations of a kernel with blocks: learning from so many takes half a gigabyte.
+/// The most observations of a kernel with blocks: learning from so many takes half a gigabyte.
 inline constexpr Eigen::Index kMostCoupled = 4000;
 
 /// Limit for a bias at the flange, in numbers: 3 for each joint vector with one lever, 5 with two,
@@ -22,7 +22,7 @@ inline constexpr Eigen::Index kMostFlangeNumbers = 4000;
 /// The features of `n` observations for a kernel with blocks.
 [[nodiscard]] Status check_features(const std::string& kernel,
                                     const std::vector<BiasFeatures>& features, Eigen::Index n);
-/// Checks the same for a bias at the flange: that the joint vectors are few enough.
+/// Makes the same checks for a bias at the flange, and checks that it has few enough joint vectors.
 [[nodiscard]] Status check_flange(const Eigen::MatrixXd& q,
                                   const std::vector<BiasFeatures>& features);
 /// Checks that the hyperparameters of `state` have the shape that `bias` needs, and its features

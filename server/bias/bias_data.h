@@ -9,10 +9,10 @@
 #include "server/bias/kernels/linear_block.h"
 #include "server/robot/pose.h"
 
-/// The data that a bias learns from, that it predicts, and that must be kept to restore it.
+/// The input of a bias, its predictions, and the state that restores it.
 namespace trammel {
 
-inline constexpr Eigen::Index kCoordinates = 3;  ///< x, y, z: what a bias predicts
+inline constexpr Eigen::Index kCoordinates = 3;  ///< x, y, z: the coordinates that a bias predicts
 
 /// N observations of the residual: measured minus calibrated.
 struct BiasProblem {
@@ -34,8 +34,9 @@ struct BiasOptions {
 /// At one joint vector, for the three coordinates in B.
 struct BiasPrediction {
   Vector3 mean_B = Vector3::Zero();  ///< m
-  /// m: the part of mean_B that the kernel learned from training poses nearby; all of it for a
-  /// kernel without blocks. The rest is H w of the blocks (linear_block.h) and the mean residual.
+  /// m: the part of mean_B that the kernel learned from training poses nearby. For a kernel without
+  /// blocks it is all of mean_B. The rest is H w of the blocks (linear_block.h) and the mean
+  /// residual.
   Vector3 nearby_B = Vector3::Zero();
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one measurement with average noise

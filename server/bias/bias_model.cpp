@@ -66,7 +66,7 @@ Status check_described(const SpelledBias& bias, const BiasState& state) {
   });
 }
 
-/// The bias whose maps are as the state has them.
+/// The bias with the maps of the state.
 SpelledBias as_stored(SpelledBias bias, const BiasState& state) {
   if (bias.blocks.empty()) return bias;
   const auto harmonics =
@@ -74,7 +74,7 @@ SpelledBias as_stored(SpelledBias bias, const BiasState& state) {
   return harmonics ? with_harmonics(std::move(bias), *harmonics, *harmonics) : bias;
 }
 
-/// The bias whose maps are as the observations can tell.
+/// The bias with as many harmonics in its maps as the observations can determine.
 SpelledBias for_observations(SpelledBias bias, Index count) {
   return with_harmonics(std::move(bias), harmonics_for(count), harmonics_for(count));
 }

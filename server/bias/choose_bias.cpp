@@ -21,25 +21,25 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::array kCheap = {"se", "matern52", "se + parameters"};
-/// Where the tool's point is seen at several levers.
+/// Kernels for tool points at several levers.
 constexpr std::array kAtFlange = {"se + flange", "matern52 + flange"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
 constexpr Index kBlocks =
     8;  // eight give a standard error, and seven eighths still show the physics
 constexpr std::size_t kFewestBlocks = 4;  // half of them: of fewer the standard error means little
-constexpr Index kFewestToJudge = 30;      // joint vectors: blocks of fewer than four tell nothing
+constexpr Index kFewestToJudge = 30;      // joint vectors: blocks of fewer than four show nothing
 constexpr double kStandardErrors = 2;     // chance alone exceeds them in 1 of 40 cases
 constexpr double kHyperparametersOfNone = 3;  // the standard deviation of each coordinate
 constexpr double kFitShare =
-    0.5;  // of the time for one candidate: the rest goes into leaving out blocks
+    0.5;  // share of the time for one candidate: the rest is for leaving out blocks
 constexpr double kGainOfPhysics =
     0.9;  // rms with parameters over rms without: a tenth less is worth a diagnosis
 constexpr double kAboveNoise =
     1.3;  // rms over the instrument's noise, which a cell's file knows to a tenth
 constexpr Index kMostRows =
-    900;  // to choose by: each candidate is fitted, and conditioned for each block left out
+    900;  // rows that choose: each candidate is fitted, and conditioned for each left-out block
 constexpr Index kManyRows = 1200;  // of fewer all choose
-constexpr double kChoosing = 0.7;  // of the time, where some rows choose
+constexpr double kChoosing = 0.7;  // share of the time, if only some rows choose
 
 std::vector<Index> in_order(Index count) {
   std::vector<Index> all(static_cast<std::size_t>(count));
@@ -158,7 +158,7 @@ Mean mean_of(const VectorXd& samples) {
   return {mean, std::sqrt((samples.array() - mean).square().sum() / (n - 1) / n)};
 }
 
-/// m²: by how much the mean square error falls from `without` to `with`, mean over the blocks.
+/// m²: the reduction of the mean square error from `without` to `with`, mean over the blocks.
 Mean gain_of(const Missed& without, const Missed& with) {
   VectorXd gain(static_cast<Index>(without.size()));
   for (std::size_t b = 0; b < without.size(); ++b)
@@ -307,7 +307,7 @@ class Choosing {
     return {};
   }
 
-  /// Why the kernel cannot be asked; empty: it can.
+  /// The reason why the kernel cannot be tried; empty if it can.
   [[nodiscard]] std::string too_many_for(const SpelledBias& bias) const {
     if (!bias.blocks.empty() && most_coupled_ == 0) return "its causes are in the physics already";
     if (!bias.blocks.empty() && all_.q.rows() > most_coupled_)
@@ -382,7 +382,7 @@ class Choosing {
   int asked_ = 0;
 };
 
-/// Whole poses, evenly in the order of measuring, of so many rows that choosing does not take long.
+/// Whole poses, evenly in the order of measuring, with few enough rows for a quick choice.
 std::vector<Index> rows_to_choose_by(const BiasProblem& problem) {
   if (problem.q.rows() <= kManyRows) return in_order(problem.q.rows());
   const std::vector<PoseGroup> poses = pose_groups(problem.q);
@@ -403,7 +403,7 @@ BiasProblem rows_of(const BiasProblem& problem, const std::vector<Index>& rows) 
           at(problem.features, rows)};
 }
 
-/// The residuals by `residual_without` of the rows `some` without those at `rows` of them.
+/// The residuals by `residual_without` of the rows `some`, except those at `rows` among them.
 std::optional<MatrixXd> left_of(const ResidualWithout& residual_without,
                                 const std::vector<Index>& some, const std::vector<Index>& rows) {
   const std::optional<MatrixXd> all = residual_without(at(some, rows));

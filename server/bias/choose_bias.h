@@ -28,7 +28,7 @@ struct BiasCandidate {
 
 struct BiasChoice {
   std::string kernel;                     ///< the one taken
-  std::vector<BiasCandidate> candidates;  ///< those tried, the simplest first
+  std::vector<BiasCandidate> candidates;  ///< the tried ones, the simplest first
   std::string sentence;                   ///< for people: the chosen bias, and its gain in mm
 };
 
@@ -40,9 +40,9 @@ struct ChosenBias {
 /// Written in place of a kernel: choose_bias() decides.
 inline constexpr std::string_view kAutoBias = "auto";
 
-/// N x 3, m: the residuals of all observations with the physics identified without these; empty
-/// where it cannot be identified from the rest. Observations that helped to identify the physics
-/// fit it too well. A bias could then seem to predict what is only their imprint.
+/// N x 3, m: the residuals of all observations with the physics identified without these; empty if
+/// the others do not identify it. Observations that helped to identify the physics fit it too well,
+/// and a bias could seem to predict their imprint.
 using ResidualWithout =
     std::function<std::optional<Eigen::MatrixXd>(const std::vector<Eigen::Index>&)>;
 
@@ -56,13 +56,11 @@ using ResidualWithout =
 /// If the best of them leaves clearly more than the instrument's noise, `matern52 + joint_map +
 /// parameters` and `se + joint_map` are tried, too.
 ///
-/// One bias beats another where
+/// One bias beats another if
 /// - its leave-one-out log density, summed over the observations, is higher by more than one nat
-/// for each additional
-///   hyperparameter and twice the standard error;
+///   for each additional hyperparameter and twice the standard error;
 /// - with blocks in time left out, its mean square error is below that of `none` by more than twice
-/// the standard error
-///   over the blocks;
+///   the standard error over the blocks;
 /// - with blocks in joint space left out, its mean square error is not above that of `none` by more
 ///   than twice the standard error. A block is an eighth of the observations, all neighbours;
 ///   `problem` is in the order of measuring. The hyperparameters stay; `residual_without` gives the
@@ -74,10 +72,10 @@ using ResidualWithout =
 /// measuring; the sentence says so. The chosen bias is then fitted to all observations, and its
 /// search continues from its end.
 ///
-/// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled`
-/// observations; 0: they are not tried. At most seven fits. The same problem and seed give the same
-/// choice. Of `options` the kernel is not used. With fewer than 30 observations nothing is taken.
-/// Refuses what BiasModel::fit() refuses.
+/// Kernels with blocks are tried only where `problem` has features and at most `most_coupled`
+/// observations; 0: they are not tried. Makes at most seven fits. The same problem and seed give
+/// the same choice. The kernel in `options` is ignored. With fewer than 30 observations it chooses
+/// `none`. Refuses the same as BiasModel::fit().
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                              const ResidualWithout& residual_without = {},
                                              Eigen::Index most_coupled = kMostCoupled);

@@ -49,8 +49,8 @@ struct CoupledSolution {
                                                    const CoupledData& data,
                                                    const CoupledHyperparameters& at);
 
-/// C⁻¹ of one output with itself. Its lower triangle stands in the rows and columns from p on;
-/// before it stand -A⁻¹ and A⁻¹ Hᵀ M⁻¹.
+/// C⁻¹ of one output with itself. The rows and columns from p on contain its lower triangle. The
+/// earlier ones contain -A⁻¹ and A⁻¹ Hᵀ M⁻¹.
 [[nodiscard]] AlignedMatrix precision_of(const CoupledSolution& solution, Eigen::Index points,
                                          Eigen::Index output);
 

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index kRun =
-    10;  // poses that follow one another and are left out together: they share a drift
+    10;  // consecutive poses that are left out together, since they share a drift
 constexpr Index kThreefold = 3;  // parts of the cross-validation: two thirds still tell the weights
 constexpr Index kTargets = 64;  // targets at once: the matrices pass through the cache once for all
                                 // of them
@@ -28,7 +28,7 @@ constexpr Index kTargets = 64;  // targets at once: the matrices pass through th
 // |δ|²/σ², and the standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver
 // σ³/σ_f both stay below the noise.
 constexpr double kPassedOver = 1e-3;
-constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
+constexpr Index kWorthPassing = 8;  // leaving poses out pays if at most one in so many matters
 
 // A share of the noise variance. Few points may leave at most this share of any pose unexplained.
 // Their error in the columns then changes a posterior variance by less than this share, too.
@@ -201,7 +201,7 @@ void CoupledPosterior::explain_by_few(std::size_t output, const VectorXd& noise)
   few_[output] = {few->features().copy(), r};
 }
 
-// B: the rows and columns of C⁻¹ that belong to the poses left out. Their covariance is B⁻¹, their
+// B: the rows and columns of C⁻¹ that belong to the left-out poses. Their covariance is B⁻¹, their
 // error B⁻¹ α.
 void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledData& data) {
   const Index outputs = data.y.cols();

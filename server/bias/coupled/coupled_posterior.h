@@ -32,7 +32,7 @@ class CoupledPosterior {
   /// 46).
   [[nodiscard]] std::vector<CoupledPrediction> predict(
       const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns) const;
-  /// M x D: what the processes of the outputs add to H w.
+  /// M x D: the contribution of the outputs' own processes, in addition to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
   /// The number of outputs whose uncertainty is computed from the points near a target alone.
@@ -58,7 +58,8 @@ class CoupledPosterior {
  private:
   CoupledPosterior() = default;
   void leave_out(const CoupledSolution& solution, const CoupledData& data);
-  /// Computes R of an output from the points near a target, if these give as much as all.
+  /// Computes R of an output from the points near a target, if these are as informative as all
+  /// points.
   void explain_by_near(std::size_t output, const CoupledData& data,
                        const CoupledSolution& solution);
   /// Computes `explained_` of an output from few of its points, if these can replace all.
@@ -69,7 +70,7 @@ class CoupledPosterior {
     Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
     Eigen::VectorXd prior;  // of both parts
   };
-  // The poses whose covariance matters, rising.
+  // The poses with a relevant covariance, in rising order.
   [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
   [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns,
                              Eigen::Index d) const;
@@ -94,7 +95,7 @@ class CoupledPosterior {
   };
   std::vector<std::optional<FewPoints>> few_;  // D: u; empty: all points
   std::vector<Eigen::MatrixXd> explained_;  // D: Hᵀ M⁻¹, p x N; of few points Hᵀ M⁻¹ R_xu R_uu⁻¹
-  // D: H scaled, N x p, where R is taken from near points; else empty
+  // D: H scaled, N x p, if R is computed from near points; else empty
   std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> rows_;
   std::vector<std::vector<double>>
       inverse_;                      // D: M⁻¹, lower triangle row after row; empty: not needed

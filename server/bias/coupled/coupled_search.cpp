@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr Index kMediumPoints = 400;    // a step between the first searches and all points
 constexpr int kMostStarts = 6;          // each takes as long as twenty of a plain process
 constexpr std::size_t kRivals = 2;      // optima of the first searches that go on
-constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is zero
+constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is constantly zero
 
 CoupledData subset(const CoupledData& data, const std::vector<Index>& order, Index count) {
   const std::vector<Index> rows(order.begin(), order.begin() + count);

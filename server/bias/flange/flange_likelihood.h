@@ -9,9 +9,9 @@
 
 namespace trammel {
 
-/// Hyperparameters of a bias at the flange are CoupledHyperparameters: `outputs` of the three
-/// coordinates of the position, all with the same noise; `blocks` of the rotation: kernel
-/// parameters, log σ of one axis (rad).
+/// Hyperparameters of a bias at the flange are CoupledHyperparameters. `outputs` has the three
+/// coordinates of the position, all with the same noise; `blocks` has the rotation: kernel
+/// parameters, and log σ of one axis (rad).
 inline constexpr std::size_t kTwistKernels =
     4;  ///< x, y, z; the three axes of the rotation share the last
 

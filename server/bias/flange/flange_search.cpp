@@ -15,9 +15,9 @@ using Eigen::VectorXd;
 constexpr double kTypicalArm = 0.5;  // m: a typical distance from the tool to the parts that turn
                                      // the flange, between wrist and shoulder
 constexpr Index kStartNumbers =
-    600;  // of the first searches: a likelihood takes a fiftieth of a second
+    600;  // joint vectors of the first searches: one likelihood takes 20 ms
 constexpr Index kFewestStartPoints = 40;
-constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is zero
+constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is constantly zero
 
 double mean_log_signal(const std::vector<GpHyperparameters>& outputs) {
   double mean_square = 0;
@@ -84,7 +84,8 @@ class FlangeSearch {
     return minimise(objective, function.pack(from.at), from.inverse_hessian, limits);
   }
 
-  // Rows of several levers taken for one have much noise: one start has the instrument's.
+  // If rows of several levers are mistaken for rows of one, they have much noise. One start
+  // therefore has the noise of the instrument.
   std::optional<Start> from_few(const CoupledHyperparameters& plain) {
     const Index count =
         std::clamp(kStartNumbers * all() / views_.size, std::min(all(), kFewestStartPoints), all());

@@ -12,7 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSameLever = 1e-3;  // m: what a calibration moves a tool by teaches no rotation
+constexpr double kSameLever = 1e-3;  // m: levers that differ by less, as after a calibration of the
+                                     // tool, show no rotation
 constexpr double kLeastSeen =
     1e-9;  // singular value over the largest: a smaller one counts as not seen
 

@@ -30,7 +30,7 @@ struct FlangeViews {
   Eigen::VectorXd noise_shape;    ///< N, of the observations
   std::vector<TwistRow> seen;     ///< N
   Vector3 reference_F =
-      Vector3::Zero();  ///< where the position part of the twist is: the mean lever
+      Vector3::Zero();  ///< the reference point of the twist's position part: the mean lever
 };
 
 /// The view of the twist at `reference_F` by an observation: [I  -[R_BF (lever - reference)]x].

@@ -81,7 +81,7 @@ class CompositeKernel : public Kernel {
   }
 
  protected:
-  /// Where the parameters and features of one part stand.
+  /// The places of one part's parameters and features.
   struct Place {
     const Kernel* kernel;
     Index parameter;  // its first, after the amplitude

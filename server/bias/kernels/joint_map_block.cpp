@@ -23,9 +23,9 @@ constexpr double kAmplitudeSpread =
     2.0;  // in logs, one standard deviation: a factor between a seventh and seven
 constexpr double kKneeSpread = 0.7;       // in logs: from half to twice the harmonic
 constexpr double kPowerSpread = 0.4;      // in logs: from 1.1 to 2.4
-constexpr double kHarmonicsSpread = 1.0;  // they are not searched
+constexpr double kHarmonicsSpread = 1.0;  // without effect, since the harmonics are not searched
 
-/// The two numbers that tell the spectrum of a joint.
+/// The two numbers that define the spectrum of a joint.
 struct Spectrum {
   double knee, power;
 };

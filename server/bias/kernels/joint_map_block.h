@@ -15,8 +15,8 @@ namespace trammel {
 [[nodiscard]] std::optional<Eigen::Index> harmonics_in(const Eigen::VectorXd& block_hyperparameters,
                                                        Eigen::Index joints);
 
-/// `bias` with so many harmonics in its maps, whose power is learned. `told`: the number that
-/// stands among the hyperparameters, where a search has fewer at first.
+/// `bias` with so many harmonics in its maps and a learned power. `told`: the number stored among
+/// the hyperparameters, if a search begins with fewer.
 [[nodiscard]] SpelledBias with_harmonics(SpelledBias bias, Eigen::Index harmonics,
                                          Eigen::Index told);
 

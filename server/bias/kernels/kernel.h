@@ -87,8 +87,8 @@ using KernelPtr = std::shared_ptr<const Kernel>;
 /// 1 + Σ q q' / l²: affine functions. The 1 is the variance of their value at q = 0: no joint
 /// vector has a prior variance of 0. Parameters: log length scale of each joint, rad.
 [[nodiscard]] KernelPtr make_linear_kernel();
-/// 1 where the joint vectors are equal, else 0: an error that repeats at a pose and is not shared
-/// by its neighbours. No parameters.
+/// 1 for equal joint vectors, else 0: an error that repeats at a pose but is not shared by its
+/// neighbours. No parameters.
 [[nodiscard]] KernelPtr make_white_kernel();
 
 /// `inner`, one of the above, on (cos q, sin q), both with the parameters of their joint: q and q +

@@ -12,10 +12,10 @@ namespace trammel {
 namespace {
 
 constexpr int kMostParentheses = 20;  // inside one another: reading recurses, and nobody means more
-constexpr std::size_t kMostSpellingBytes = 1000;  // as long as 32 words with room to spare
+constexpr std::size_t kMostSpellingBytes = 1000;  // longer than any 32 words
 constexpr std::size_t kMostShownBytes = 80;       // of a spelling in a message
 constexpr std::size_t kMostWords =
-    32;  // the search for their hyperparameters takes more than twice as long for twice as many
+    32;  // the search for their hyperparameters takes more than twice the time for twice as many
 
 constexpr std::string_view kFlange = "flange";
 
@@ -191,7 +191,7 @@ class Reader {
 
 namespace {
 
-/// Asked first: nothing is built from a spelling that is too long.
+/// This check comes first, so that nothing is built from a spelling that is too long.
 Status check_length(std::string_view spelling) {
   if (spelling.size() > kMostSpellingBytes) {
     return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(),

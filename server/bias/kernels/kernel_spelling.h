@@ -20,7 +20,7 @@ struct SpelledBias {
   KernelPtr kernel;                    ///< of each coordinate by itself
   std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share
   bool flange = false;  ///< the kernel is of the flange's error, seen through the tool's lever
-  /// True if it must be told more of a pose than its joints.
+  /// True if predictions need features of a pose besides its joints.
   [[nodiscard]] bool needs_features() const { return flange || !blocks.empty(); }
   [[nodiscard]] bool has(std::string_view block) const;
 };

@@ -25,8 +25,8 @@ inline MutableStridedColumns columns_of(double* k, Eigen::Index rows, Eigen::Ind
   return {k, rows, cols, Eigen::OuterStride<>(ld)};
 }
 
-/// The number of joints that a kernel with so many parameters is for; 0 where all its parameters
-/// are shared.
+/// The number of joints of a kernel that has so many parameters. 0 if all its parameters are
+/// shared.
 inline Eigen::Index joints_of(const Kernel& kernel, Eigen::Index parameters) {
   const Eigen::Index shared = kernel.parameter_count(0);
   const Eigen::Index each = kernel.parameter_count(1) - shared;

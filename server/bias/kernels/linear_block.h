@@ -18,7 +18,7 @@ struct BiasFeatures {
       by_joint;  ///< 6 x n, per rad that the joint gives way; zero for a prismatic joint
   Eigen::MatrixXd by_parameter;        ///< 6 x P, per prior standard deviation of the parameter
   Vector3 lever_F = Vector3::Zero();   ///< m: the tool's point, seen from the flange
-  Matrix3 R_BF = Matrix3::Identity();  ///< how the flange stands
+  Matrix3 R_BF = Matrix3::Identity();  ///< orientation of the flange
   JointVector gears = {};  ///< rad: the angles of the gears; empty where they are the joints' own
 };
 
@@ -28,7 +28,7 @@ class LinearBlock {
  public:
   virtual ~LinearBlock() = default;
 
-  /// As it is written in a bias.
+  /// The spelling in a bias.
   [[nodiscard]] virtual std::string_view name() const = 0;
   /// The number of weights, and the number of hyperparameters, for features of that shape.
   [[nodiscard]] virtual Eigen::Index column_count(const BiasFeatures& shape) const = 0;

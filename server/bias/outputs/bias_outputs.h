@@ -86,9 +86,9 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 [[nodiscard]] BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
                                                    const std::vector<GpHyperparameters>& at,
                                                    VarianceForm form);
-/// The most probable hyperparameters of independent outputs; those of another unit (from the fourth
-/// on) are searched apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there
-/// are no other starts. Empty when no start gave a positive definite covariance.
+/// The most probable hyperparameters of independent outputs; outputs of another unit (from the
+/// fourth on) are searched separately. `metrology_stddev`: D, the instrument's. If `last` is given,
+/// there are no other starts. Empty if no start gave a positive definite covariance.
 [[nodiscard]] std::optional<CoupledSearchResult> search_independent(
     const KernelPtr& kernel, const OutputData& data, const Eigen::VectorXd& metrology_stddev,
     const SearchOptions& options, const CoupledHyperparameters* last);

@@ -35,7 +35,7 @@ LinearBlocks blocks_of(const SpelledBias& bias, const OutputData& data) {
   return {bias.blocks, data.features.front()};
 }
 
-/// blocks_of() with the harmonics that few points tell of; empty where there are no more.
+/// blocks_of() with only the harmonics that few points determine; empty if there are no others.
 std::optional<LinearBlocks> coarse_blocks(const SpelledBias& bias, const LinearBlocks& blocks,
                                           const OutputData& data) {
   const Index joints = data.features.front().by_joint.cols();

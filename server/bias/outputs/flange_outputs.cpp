@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kTargetsAtATime = 64;     // their covariances with all numbers are six megabytes
-constexpr double kLeastVariance = 1e-10;  // of the prior: rounding leaves no less
+constexpr double kLeastVariance = 1e-10;  // share of the prior, above the level of rounding
 
 /// The error of the flange, conditioned on the measured numbers of its twist (flange/README.md).
 class FlangeOutputs final : public BiasOutputs {
@@ -71,7 +71,7 @@ class FlangeOutputs final : public BiasOutputs {
   MatrixXd leave_one_out_variance() const override { return leave_one_out_variance_; }
   VectorXd leave_one_out_share() const override { return leave_one_out_share_; }
 
-  // All of a joint vector is left out where one of its rows is.
+  // A joint vector with a left-out row is left out completely.
   std::optional<MatrixXd> left_out_error(const MatrixXd& y,
                                          const std::vector<Index>& points) const override {
     const std::vector<std::size_t> gone = views_with(points);
@@ -138,7 +138,7 @@ class FlangeOutputs final : public BiasOutputs {
     return features;
   }
 
-  /// Weighs what each joint vector adds to the mean of each number of the twist.
+  /// Computes the weight of each joint vector in the mean of each number of the twist.
   void weigh(const VectorXd& alpha) {
     const Index count = views_.q.rows();
     weights_ = AlignedMatrix(padded_rows(count), 6);
@@ -192,8 +192,8 @@ class FlangeOutputs final : public BiasOutputs {
     return cross;
   }
 
-  // Rows: each without all of its joint vector, as every other bias leaves them out. A target has
-  // none of them.
+  // The rows are predicted without any row of their joint vector, as in every other bias. A target
+  // has no such rows.
   void leave_out(const VectorXd& z, const VectorXd& alpha, Index rows) {
     leave_one_out_mean_ = leave_one_out_variance_ = MatrixXd::Zero(rows, kOfOneUnit);
     leave_one_out_share_.resize(rows);
@@ -232,7 +232,7 @@ class FlangeOutputs final : public BiasOutputs {
   VectorXd leave_one_out_share_;
 };
 
-/// The mean of the rows of each joint vector: what a kernel without levers would learn from.
+/// The mean of the rows of each joint vector, as data for a kernel without levers.
 OutputData without_levers(const FlangeViews& views, const OutputData& data) {
   const Index count = views.q.rows();
   OutputData mean{views.q, MatrixXd::Zero(count, data.y.cols()), VectorXd(count), {}};

@@ -13,7 +13,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSilence =
-    1e-9;  // m rms: an output below it has nothing to learn, and no scale to search with
+    1e-9;  // m rms: a smaller output has nothing to learn, and no scale for a search
 
 // An output that is constant: no signal, the instrument's noise.
 GpHyperparameters silent(const VectorXd& kernel, double metrology_stddev) {

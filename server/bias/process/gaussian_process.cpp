@@ -34,8 +34,8 @@ constexpr Index kFewestToCompress = 200;  // below that the exact variance is fa
 constexpr Index kMostServedPoints =
     400;                           // with more, all points in single precision are nearly as fast
 constexpr double kFewTell = 0.02;  // of the variance: the part that few points may leave out
-constexpr Index kLeftOutPoints = 128;  // of the points, that near ones are tried at
-constexpr Index kAsked = 64;  // joint vectors between the points, that few points are tried at
+constexpr Index kLeftOutPoints = 128;  // left-out points at which near points are tested
+constexpr Index kAsked = 64;  // joint vectors between the points, for the test of few points
 // Allowance by which few points may be too small between the tested places. Measured: 0.2 % of a
 // standard deviation, and 1e-5 of the noise variance.
 constexpr double kFewSlack = 1.004;
@@ -303,7 +303,7 @@ std::vector<double> GaussianProcess::root_rows(Index more) const {
   double log_det = 0;
   const bool positive =
       numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
-  TRAMMEL_CHECK(positive);  // it was before
+  TRAMMEL_CHECK(positive);  // it was positive definite before
   return VarianceTable(features_, size_, std::move(matrix)).rows(more);
 }
 

@@ -38,7 +38,7 @@ struct GpPrior {
       0.1;  ///< in logs: the instrument's noise is known to 10 %; less noise would mean learning it
   Eigen::VectorXd parameter_centre;  ///< of the kernel's log parameters
   double parameter_spread =
-      3.0;  ///< in logs: holds the length scale of a joint that has no influence
+      3.0;  ///< in logs: wide enough for the length scale of a joint without influence
   double log_ratio_centre = -4.6;  ///< of log η: noise a tenth of the signal
   double log_ratio_spread = 5.0;
 };
@@ -86,10 +86,9 @@ struct GpHyperparameters {
 /// The ways in which a process computes its variance.
 enum class VarianceForm {
   /// From a few of its points, where few are enough: several times faster. At the data it is never
-  /// below the exact
-  /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to
-  /// be at most 0.2 %
-  /// too small (bound: decision 25). Exact where many points would be needed.
+  /// below the exact variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation
+  /// was measured to be at most 0.2 % too small (bound: decision 25). Exact where many points would
+  /// be needed.
   kCompressed,
   /// The form in which a model is served. It uses the 24 or 48 points nearest to a target if they
   /// give as much as all points, mostly for a signal below the noise. Otherwise it uses at most 400
@@ -172,7 +171,7 @@ class GaussianProcess {
   GaussianProcess() = default;
   // With the same kernel and hyperparameters, and room for `size` points.
   [[nodiscard]] GaussianProcess like(Eigen::Index size) const;
-  // Computes what follows from data, weights, inverse diagonal and root.
+  // Computes the members that follow from data, weights, inverse diagonal and root.
   void finish(VarianceForm form);
   // Leaves out the points of each joint vector together.
   void leave_poses_out();

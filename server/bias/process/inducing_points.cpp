@@ -29,7 +29,7 @@ FeatureBlock all_of(const AlignedMatrix& features, Index count) {
   return {features.data(), count, features.rows()};
 }
 
-// The points with the most variance left; of equal ones the first.
+// The points with the most remaining variance. Among equal points the first one.
 std::vector<Index> candidates(const VectorXd& left, double tolerance) {
   std::vector<Index> order(static_cast<std::size_t>(left.size()));
   std::iota(order.begin(), order.end(), Index{0});

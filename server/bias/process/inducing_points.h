@@ -26,7 +26,7 @@ namespace trammel {
 /// D_i,
 ///   mean(x) = φᵀ B⁻¹ Σ_i φ_i y_i / D_i,
 ///   share(x) = k(x, x) - φᵀφ + φᵀ B⁻¹ φ = k(x, x) - |G k(u, x)|².
-/// Learns in blocks of any size: its memory is that of B, however many points there are. For one
+/// Learns in blocks of any size, with memory for B only, however many points there are. For one
 /// thread at a time.
 class InducingPoints {
  public:

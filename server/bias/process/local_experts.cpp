@@ -17,8 +17,8 @@ using Eigen::VectorXd;
 
 constexpr Index kMostExact = 5000;  // an exact process of so many takes 100 MB per output; twice as
                                     // many points take four times that
-constexpr Index kMostOfAnExpert =
-    1200;  // neighbours: twice as many take twice the time and leave a tenth less (decision 28)
+constexpr Index kMostOfAnExpert = 1200;  // neighbours: twice as many take twice the time and lower
+                                         // the error by a tenth (decision 28)
 constexpr double kKnownExactly =
     1e-12;  // of the prior variance; keeps the precision at a training point finite
 
@@ -29,7 +29,8 @@ VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
   return wanted == VarianceForm::kLearned ? VarianceForm::kCompressed : wanted;
 }
 
-/// Groups of the rows at one joint vector, which belong to one expert to be left out together.
+/// Groups of rows at one joint vector; each group belongs to one expert, so that it can be left out
+/// as a whole.
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters,
                                                const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());

@@ -37,7 +37,7 @@ class LocalExperts {
   }
 
   void mean(const Eigen::MatrixXd& q, double* out) const;
-  /// `mean` takes the mean, too, which is cheaper than asking for both.
+  /// If `mean` is given, the call also writes the mean there. That is cheaper than two calls.
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
                                                         double* mean = nullptr) const;
 

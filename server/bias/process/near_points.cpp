@@ -29,9 +29,9 @@ Eigen::ArrayXd largest_of_lanes(const Eigen::Map<const Eigen::ArrayXd>& k, Index
   return most;
 }
 
-/// The places of the `count` largest of `k`, rising; of equal ones the first. At least `count` are
-/// as large as the `count`-th largest of the lanes, and only lanes with a large one are looked
-/// into.
+/// The places of the `count` largest elements of `k`, in rising order. Among equal elements the
+/// first one counts. At least `count` elements are as large as the `count`-th largest of the lanes,
+/// so the search enters only lanes with a large element.
 std::vector<Index> largest(const Eigen::Map<const Eigen::ArrayXd>& k, Index count) {
   const Index lanes = std::min(k.size(), kLanesOfEach * count);
   const Eigen::ArrayXd most = largest_of_lanes(k, lanes);

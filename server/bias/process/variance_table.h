@@ -50,7 +50,7 @@ class VarianceTable {
 
   PointFeatures features_;
   Eigen::Index size_ = 0;
-  AlignedMatrix packed_root_;  // as Numerics packs it; floats where is_single_
+  AlignedMatrix packed_root_;  // in the packed form of Numerics; floats if is_single_
   bool is_single_ = false;
   double factor_ = 1.0;
   double added_ = 0.0;

@@ -27,7 +27,7 @@ constexpr Index kMostSearched = 2500;  // more points would take longer than the
 constexpr Index kFinerPoints =
     400;  // at least, to look for finer length scales: fewer cannot show them
 constexpr Index kAroundPoints =
-    2000;  // at most, to look around on: each try costs as much as a start
+    2000;  // at most, for looking around: each try costs as much as a start
 // The number of optima that are kept.
 constexpr std::size_t kCarried = 5;  // from the first searches: each is carried at full cost
 constexpr std::size_t kRivals = 3;   // of one output before the last stage
@@ -46,7 +46,7 @@ constexpr double kWideSpread =
 constexpr double kGain = 0.5;  // nat: an optimum worth moving to
 constexpr double kWorseLeaveOneOut =
     1.1;  // over the least error: a likelier optimum that predicts worse won by luck
-constexpr double kRefined = 0.4;  // of the progress of one output: before looking around
+constexpr double kRefined = 0.4;  // share of one output's progress before looking around
 
 GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output,
               Index outputs) {
@@ -238,7 +238,7 @@ class Search {
     return different(std::move(honest), kCarried);
   }
 
-  // From where the last fit ended; kept as it was where the likelihood is not defined there.
+  // Continues from the end of the last fit; keeps that end if the likelihood is undefined there.
   void refit(Index d) {
     const GpHyperparameters& last = options_.last[static_cast<std::size_t>(d)];
     VectorXd start(last.kernel.size() + 1);

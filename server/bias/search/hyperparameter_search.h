@@ -27,10 +27,9 @@ struct SearchResult {
 /// - Many starts on a small subset, with the same length scales for all outputs.
 /// - The different optima are carried to more points and checked there by leave-one-out.
 /// - They are refined for each output on growing subsets, at last on all points up to 2500. The
-/// most likely one wins.
-/// - Where much more noise is left than the instrument has, shorter length scales are tried on more
-/// points. With more
-///   than 1000 points, shorter and longer ones are tried on up to 2000 of them.
+///   most likely one wins.
+/// - If much more noise remains than the instrument has, shorter length scales are tried on more
+///   points. With more than 1000 points, shorter and longer ones are tried on up to 2000 of them.
 /// One seed gives one answer, bit for bit. Empty when no start gave a positive definite
 /// covariance.
 [[nodiscard]] std::optional<SearchResult> search_hyperparameters(

@@ -14,10 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSameParameters =
-    0.1;  // in logs, of every parameter: ends so near to each other are one optimum
+    0.1;  // in logs, for every parameter: closer ends are one optimum
 constexpr double kHopeless =
     30.0;  // nat behind the best on the same points: more points will not make up for it
-constexpr double kOtherKind = 0.7;    // in logs of the noise: half or twice as much
+constexpr double kOtherKind = 0.7;    // in logs of the noise: a factor of two
 constexpr double kDifference = 0.02;  // in logs: a step over which a curvature is constant
 
 bool same(const Optimum& a, const Optimum& b) {

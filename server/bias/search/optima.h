@@ -6,7 +6,7 @@
 
 namespace trammel {
 
-/// Where a search of a ProfiledLikelihood ended.
+/// The end of a search of a ProfiledLikelihood.
 struct Optimum : BfgsResult {
   Eigen::VectorXd signal_variance;  ///< of each output at x, m²
 };
@@ -25,7 +25,7 @@ void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now);
 
 /// log σ_n (m), mean over the outputs.
 [[nodiscard]] double log_noise(const Optimum& optimum);
-/// True if one takes clearly more of the data for noise than the other.
+/// True if one of them explains clearly more of the data as noise than the other.
 [[nodiscard]] bool other_kind(const Optimum& a, const Optimum& b);
 
 /// The different optima, best first, at most `most`, without hopeless ones. It adds one more if the
