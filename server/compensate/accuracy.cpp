@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kPoses = 600;     // of the domain, drawn
 constexpr int kDraws = 16;      // of the true error at each
-constexpr int kMostDraws = 50;  // of joint vectors for each pose that is near a measured one
+constexpr int kMostDraws = 50;  // draws of joint vectors for each pose near a measured one
 constexpr std::uint64_t kSeed = 20261123;
 constexpr int kGrid = 20;        // steps on each side of 1
 constexpr double kFarthest = 4;  // standard deviations that the grids reach
@@ -36,8 +36,8 @@ Vector3 normal_vector(SeededRandom& random) {
   return {x, y, normal_pair(random).first};
 }
 
-/// L with L L' = the true error's covariance: the stated one without the tracker's noise, never
-/// negative.
+/// L with L L' = the covariance of the true error: the stated one without the tracker's noise,
+/// never negative.
 Matrix3 root_of_true(const Matrix3& covariance, double tracker_variance) {
   const Eigen::SelfAdjointEigenSolver<Matrix3> solver(covariance -
                                                       tracker_variance * Matrix3::Identity());
@@ -60,7 +60,7 @@ double share_below(const std::vector<double>& rising, double value) {
 /// Grid of ln x, x about 1, by its place.
 double grid_value(int place, double stddev) { return kFarthest * stddev * place / kGrid; }
 
-/// The log likelihood of these coordinates, if the stated deviations are wrong by `factor` and the
+/// The log likelihood of these coordinates if the stated deviations are wrong by `factor` and the
 /// tracker's sigma by `noise`.
 double log_likelihood(const std::vector<JudgingCoordinate>& coordinates, double factor,
                       double noise) {

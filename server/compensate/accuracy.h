@@ -39,16 +39,17 @@ class PositionAccuracy {
   [[nodiscard]] static std::optional<PositionAccuracy> of(
       const CompensatedModel& model, const std::optional<MeasurementBatch>& batch = {});
 
-  /// m: `share` of fresh poses in the domain are within. No radius below the arm's smallest step.
+  /// m: `share` of fresh poses in the domain are within this radius. No radius is below the arm's
+  /// smallest step.
   [[nodiscard]] double at(double share) const;
   /// Share of fresh poses in the domain whose true error is within `radius`, m; 0 below that step.
   [[nodiscard]] double within(double radius) const;
-  /// m: at(kShare) if the stated covariances were wrong by as little or as much as is likely (95 %
+  /// m: at(kShare) for the smallest and the largest likely error of the stated covariances (95 %
   /// between the two).
   [[nodiscard]] double least() const;
   [[nodiscard]] double most() const;
-  /// m: 95 % of distances between two positions are right within this. An upper bound: it takes the
-  /// errors of the two as independent, and those of near positions are alike.
+  /// m: 95 % of distances between two positions are correct within this. It is an upper bound: it
+  /// treats the errors of the two as independent, although those of near positions are similar.
   [[nodiscard]] double of_distances() const;
   /// m per axis: the lasting error that would not show, because the tracker's sigma may be
   /// overstated by kNoiseDoubt.
@@ -67,7 +68,7 @@ class PositionAccuracy {
   std::vector<double> errors_;     // m, rising: |t| of draws at poses of the domain, as stated
   std::vector<double> distances_;  // m, rising: likewise, of distances between two
   std::vector<Factor> factors_;
-  double smallest_step_ = 0;  // m, of the arm: no radius is told below it
+  double smallest_step_ = 0;  // m, of the arm: the smallest radius that may be stated
   double hidden_ = 0;
   int judged_by_ = 0;
 };

@@ -8,7 +8,8 @@ namespace trammel {
 
 namespace {
 
-/// Predictions are asked for in thousands: each thread keeps what the last robot file says.
+/// Callers request thousands of predictions, so each thread keeps the result for the last robot
+/// file.
 const ArmSteps& known_steps(const Cell& cell) {
   thread_local std::string of;
   thread_local ArmSteps steps;

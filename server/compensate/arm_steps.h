@@ -4,9 +4,9 @@
 
 namespace trammel {
 
-/// m: no smaller radius about a pose is promised, ArmSteps::smallest().
+/// m: the smallest radius about a pose that may be promised, ArmSteps::smallest().
 [[nodiscard]] double smallest_step(const CompensatedModel& model, const PoseContext& context);
-/// m: the least rms that may be told of the true error there, whose 95 % are that radius.
+/// m: the smallest rms of the true error that may be stated there. That radius contains 95 % of it.
 [[nodiscard]] double least_rms(const CompensatedModel& model, const PoseContext& context);
 
 }  // namespace trammel

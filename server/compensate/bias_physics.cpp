@@ -32,7 +32,7 @@ PhysicalModel with_standard_sources(PhysicalModel physics) {
     const auto count = static_cast<Eigen::Index>((*source)->parameters().size());
     const Eigen::Index first = add_source(physics, *std::move(source));
     physics.values.segment(first, count)
-        .setZero();  // not at the priors: the residual was taken without them
+        .setZero();  // not at the priors, since the residual was computed without them
   }
   return physics;
 }

@@ -30,7 +30,7 @@ class BiasPhysics {
   /// The arm with the tools of `now`, with all their errors. Tools that did not move stay bit
   /// for bit.
   [[nodiscard]] BiasPhysics with_tools_of(const PhysicalModel& now) const;
-  /// The rotation from B of then to B of `now`: what was learned belongs to the arm, which a source
+  /// The rotation from B at that time to B of `now`: the bias belongs to the arm, which a source
   /// may have turned in B.
   [[nodiscard]] Matrix3 turn_to(const PhysicalModel& now) const;
   /// The model with all the parameters.

@@ -308,7 +308,7 @@ Eigen::VectorXd stated_sigmas(const MeasurementBatch& batch, const Cell& cell) {
   return sigmas;
 }
 
-/// `stated`: of the rows that the errors are of.
+/// `stated`: the stated sigmas of the rows of the errors.
 GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors,
                         const Eigen::VectorXd& stated) {
   const auto rms = [](const Eigen::VectorXd& e) {

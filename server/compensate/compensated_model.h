@@ -19,7 +19,7 @@ namespace trammel {
 
 /// The error expected at one joint vector, all in B.
 struct ErrorPrediction {
-  Pose X_BT_nominal;                   ///< where the controller believes the tool to be
+  Pose X_BT_nominal;                   ///< the tool's pose by the controller's own model
   Pose X_BT_predicted;                 ///< the predicted pose
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< m, of one measurement of the position
@@ -35,12 +35,12 @@ struct ErrorPrediction {
       0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside the joints' ranges
 };
 
-/// Nominal chain, identified error sources and learned bias: what a cell is served with. An
-/// immutable value, cheap to copy, thread-safe.
+/// Nominal chain, identified error sources and learned bias, with which the requests to a cell are
+/// answered. An immutable value, cheap to copy, thread-safe.
 class CompensatedModel {
  public:
   using Parts = ModelParts;
-  /// Refuses parts that do not fit each other, and what BiasModel::restore() refuses.
+  /// Refuses parts that do not fit each other, and the same as BiasModel::restore().
   [[nodiscard]] static Result<CompensatedModel> make(Parts parts);
 
   [[nodiscard]] const Parts& parts() const { return inside_->parts; }
@@ -111,7 +111,7 @@ class CompensatedModel {
     Vector3 bias_size_B = Vector3::Zero();  // m, rms over the training poses; 0 with blocks
     Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise; 0 with the block `parameters`
   };
-  /// Restores the biases that `parts` have; `then`: the physics that they were learned beside.
+  /// Restores the biases of `parts`; `then`: the physics beside which they were learned.
   [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then,
                                              Inside* inside);
   /// True if the bias holds for this tool and payload.
@@ -125,7 +125,7 @@ class CompensatedModel {
   [[nodiscard]] PoseContext completed(PoseContext asked) const;
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked) const;
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned) const;
-  /// The arm at a pose as the calibration has it.
+  /// The arm at a pose according to the calibration.
   struct CalibratedPose {
     PoseContext context;  ///< completed
     Pose X_BW = Pose::Identity();
@@ -136,10 +136,10 @@ class CompensatedModel {
   /// (3 x P, in B); and the part of it that was identified after the bias was learned.
   [[nodiscard]] Matrix3 identified(const Eigen::MatrixXd& J_B) const;
   [[nodiscard]] Matrix3 identified_since(const Eigen::MatrixXd& J_B) const;
-  /// m²: variance of one axis that the physics leaves over at a pose.
+  /// m²: variance of one axis of the physics' residual at a pose.
   [[nodiscard]] double unlearned(const CalibratedPose& pose) const;
-  /// `covariance` of one measurement with the bias_spread as far as the bias is taken, the
-  /// instrument's part as it is.
+  /// `covariance` of one measurement with the bias_spread applied to the used part of the bias; the
+  /// instrument's part is unchanged.
   [[nodiscard]] Matrix3 spread(const Matrix3& covariance, double bias_weight) const;
   /// Adds the bias with the weight in `prediction`. Returns the new covariance, without the part of
   /// unstated quantities.
@@ -166,9 +166,9 @@ class CompensatedModel {
   /// state: the approach direction of a joint, or the temperature.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
-  /// The joints that the controller takes for the target without correction.
+  /// The joints to which the controller moves for the target without a correction.
   [[nodiscard]] Result<InverseResult> nominal_joints(const Target& target, const Pose& X_TF) const;
-  /// Where the iteration ended that looks for the joints which bring the tool to the wanted pose.
+  /// The end of the iteration for the joints that bring the tool to the target pose.
   struct Approach {
     Pose X_BT_commanded;
     InverseResult joints;  ///< the last ones; not kOk: the iteration ended there

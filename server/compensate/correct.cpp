@@ -24,7 +24,7 @@ constexpr int kJointsNamed = 2;   // joints outside their limits that a message 
 constexpr int kDecimalsTold = 9;  // more than a controller takes
 constexpr double kTurnTold = 1e-6;  // rad: a smaller remaining rotation is not reported
 
-/// A joint value with so many decimals that it differs from the limit it is beyond.
+/// A joint value with enough decimals to differ from the limit that it exceeds.
 std::string told_from(double limit, double value) {
   if (std::abs(value) > 1e6) return fmt::format("{:.6g}", value);
   std::string text;
@@ -137,7 +137,8 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
       has_blocks ? "its kernel" : "the learned bias");
 }
 
-/// The remark on a model that alone would promise less than the arm can do; empty: it does not.
+/// The remark on a model that alone would promise less error than the arm can reach; empty if it
+/// does not.
 std::string below_resolution(const CompensatedModel& model, const PoseContext& context,
                              const ErrorPrediction& at) {
   constexpr double kAtTheFloor = 1 + 1e-9;
@@ -147,7 +148,7 @@ std::string below_resolution(const CompensatedModel& model, const PoseContext& c
                      to_mm(smallest_step(model, context)));
 }
 
-/// `a; b`, without what is empty.
+/// `a; b`, without empty parts.
 std::string both_said(std::string a, const std::string& b) {
   if (!a.empty() && !b.empty()) a += "; ";
   return a + b;
@@ -165,7 +166,7 @@ PoseContext way_to(const Target& target, const std::string& tool, const std::str
   return context;
 }
 
-/// To `q`; a side of approach that is said is that of a move of kSaidMove.
+/// The approach to `q`. A stated side of approach means a move of kSaidMove.
 void come_as_said(const Chain& robot, const JointVector& q, PoseContext& context) {
   context.q = q;
   if (context.direction.empty() || context.before) return;
@@ -183,8 +184,8 @@ double rms(const Vector3& mean, const Vector3& stddev) {
   return std::sqrt(mean.squaredNorm() + stddev.squaredNorm());
 }
 
-/// The rms of a rotation vector, rad; `stddev` is of one measurement by an instrument of this
-/// sigma.
+/// The rms of a rotation vector, rad; `stddev` is that of one measurement by an instrument with
+/// this sigma.
 double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, double sigma) {
   if (!stddev) return mean.norm();
   return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
@@ -333,7 +334,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.X_BT_wanted =
       target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context)
                           : target.X_BT;
-  // Where nothing is corrected, the wanted pose is commanded.
+  // Without a correction, the target pose is commanded.
   result.X_BT_commanded = result.X_BT_wanted;
   result.q = start->q;
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
@@ -344,7 +345,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   const bool passes = in_wrist && start->status == InverseStatus::kSingular;
   if (start->status != InverseStatus::kOk && !passes) return not_reached(*start);
 
-  // The weight is that at the target: a correction moves too little to change it.
+  // The weight of the target is used: a correction moves too little to change it.
   const double bias_weight = before.bias_weight;
   const Approach found =
       approach(result.X_BT_wanted, context, before.X_BT_predicted, bias_weight, options);

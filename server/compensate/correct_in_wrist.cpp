@@ -11,7 +11,8 @@ namespace {
 constexpr double kBorder = 0.105;
 constexpr double kMostDamping =
     0.06;  // of the idle motion, at the singularity; the remaining rotation is more than its square
-constexpr int kFreeSteps = 6;  // that choose the idle motion; then it stays, and the rest settles
+constexpr int kFreeSteps = 6;  // steps that choose the idle motion; then it is fixed, and the other
+                               // joints settle
 constexpr double kMostOfOpening =
     0.9;  // share of the opening that a correction may use: the wrist never opens to the other side
 

@@ -11,7 +11,7 @@
 /// zero at the border.
 namespace trammel {
 
-/// The wrist where it is so near to its singularity that correct_in_wrist() corrects; else empty.
+/// The wrist if it is so near its singularity that correct_in_wrist() corrects; else empty.
 [[nodiscard]] std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector& q);
 
 /// From the joints `start`, where `missing_at_start` is missing.

@@ -20,7 +20,7 @@ enum class CorrectionStatus {
   kNotConverged,
   kRefused
 };
-/// As it is written in files and on the wire: `ok`, `out_of_domain`, ...
+/// The spelling in files and on the wire: `ok`, `out_of_domain`, ...
 [[nodiscard]] std::string_view to_string(CorrectionStatus status);
 
 /// A wanted pose of the tool, or the joints that a program commands.
@@ -35,10 +35,10 @@ struct Target {
   std::optional<double> time = {};         ///< s
 };
 
-/// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose
-/// is commanded. Expected errors are root mean squares of the true distance from the target,
-/// without the instrument's noise; NaN where no joints bring the tool there. Their standard
-/// deviations are those at the target, before and after: a correction moves the joints by
+/// A corrected target. If its status is neither ok nor out of domain, it is not corrected and the
+/// target pose is commanded. Expected errors are root mean squares of the true distance from the
+/// target, without the instrument's noise; NaN if no joints bring the tool there. The standard
+/// deviations before and after are both those at the target: a correction moves the joints by
 /// milliradians, and a standard deviation changes over a length scale of the bias.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
@@ -47,10 +47,10 @@ struct Correction {
   JointVector q;  ///< the controller's joints for it (nominal inverse kinematics), rad
   double error_before = kNothingToSay;  ///< m, to expect without correction
   double error_after =
-      kNothingToSay;  ///< m, to expect with it; the same where the target is not corrected
+      kNothingToSay;  ///< m, expected with the correction; equal to the one before if there is none
   double stddev = kNothingToSay;  ///< m, of the true position: root mean square of the three axes
   double measured_stddev =
-      kNothingToSay;  ///< m, likewise of one measurement of it, the instrument's noise included
+      kNothingToSay;  ///< m, likewise for one measurement, with the instrument's noise
   /// rad, expected angle between the target orientation and the true one. If the model learned no
   /// orientations, it is the angle by the error sources.
   double turn_before = kNothingToSay;

@@ -4,23 +4,23 @@
 
 namespace trammel {
 
-/// Where a model's training poses lie. Inside, the learned bias is taken in full; beyond the edge
+/// The region of a model's training poses. Inside, the learned bias counts in full; beyond the edge
 /// it fades.
 struct Domain {
   JointVector q_min, q_max;      ///< range of the training poses, rad
   double prior_share_limit = 0;  ///< of BiasPrediction::prior_share, at the edge
   double margin = 0.05;  ///< of a joint's range, for in_range(): WhatWasMeasured::range_margin()
 
-  /// True if every joint is within the range of the training poses, or at most the margin of it
-  /// beyond. Ranges alone hold poses that are far from all of them: WhatWasMeasured::is_near() is
-  /// asked beside.
+  /// True if every joint is within the range of the training poses, or within the margin beyond it.
+  /// Poses in range may still be far from all training poses, so WhatWasMeasured::is_near() is
+  /// tested as well.
   [[nodiscard]] bool in_range(const JointVector& q) const;
-  /// The share of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of
-  /// range, or where nearly as little is known as without data. Smooth in q and in `prior_share`.
+  /// The weight of the bias at a pose, in [0, 1]: 1 inside; 0 if a joint is far out of range, or if
+  /// the data say almost nothing there. Smooth in q and in `prior_share`.
   [[nodiscard]] double bias_weight(const JointVector& q, double prior_share) const;
   /// The variance by which one coordinate of the residual grows outside the range, m²: Σ_j (slope_j
-  /// d_j)², with d_j the distance_beyond() of joint j. `slope`: m per rad, of a prismatic joint per
-  /// m; empty: it does not grow.
+  /// d_j)², with d_j the distance_beyond() of joint j. `slope`: m per rad, for a prismatic joint
+  /// per m; empty: no growth.
   [[nodiscard]] double growth(const JointVector& q, const JointVector& slope,
                               const Chain& robot) const;
 };

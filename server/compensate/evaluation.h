@@ -5,7 +5,7 @@
 
 #include "server/robot/pose.h"
 
-/// Figures of how far predictions are from measurements.
+/// Figures of the differences between predictions and measurements.
 namespace trammel {
 
 /// Figures of the position errors |measured - predicted| of some poses, m.
@@ -22,7 +22,7 @@ struct ErrorFigures {
 struct OrientationFigures {
   int poses = 0;
   double nominal = 0, calibrated = 0, compensated = 0;
-  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; of
+  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; for
                                       ///< models that learned orientations
 };
 
@@ -45,12 +45,11 @@ struct Evaluation {
   double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
   int in_domain = 0;
   /// Mean over the coordinates of -log N(error; 0, stddev²), compensated, nat, positions in m; in
-  /// mm it is 6.9 more (nlpd_in_mm()). Smaller is better: it rewards small errors and honest
-  /// standard deviations. Empty where a standard deviation is 0, and in models from before it was
-  /// kept.
+  /// mm it is 6.9 more (nlpd_in_mm()). Smaller is better: it rewards small errors and correct
+  /// standard deviations. Empty if a standard deviation is 0, and in older models.
   std::optional<double> nlpd;
-  std::optional<OrientationFigures> orientation;  ///< where orientations were measured
-  std::optional<GaugeFigures> gauges;             ///< where distances or touches were
+  std::optional<OrientationFigures> orientation;  ///< if orientations were measured
+  std::optional<GaugeFigures> gauges;             ///< if distances or touches were measured
   /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models
   /// from before it was kept.
   std::optional<double> bias_gain_z;

@@ -11,7 +11,8 @@ constexpr double kPointReached = 1e-9;  // m
 constexpr int kMaxIterations = 50;      // of the nominal joints
 const double kTurnLeft = from_deg(0.01);
 
-/// The point moves as much as is missing, and the tool turns as nearly so as it can.
+/// Moves the point by the missing distance, and turns the tool as closely to the missing turn as
+/// possible.
 JointStep point_first(const Chain& robot, const Vector3& p_FT) {
   return [&robot, p_FT](const JointVector& q, const JointVector& /*so_far*/,
                         const Vector6& missing) -> JointVector {

@@ -3,9 +3,9 @@
 #include "server/compensate/joint_steps.h"
 #include "server/robot/inverse_kinematics.h"
 
-/// Arms of fewer than six joints, such as a SCARA, can bring the tool's point to its target but
-/// turn the tool in some ways only. Here the point comes first: it lands where it is wanted, and
-/// the tool is turned as nearly as the arm can.
+/// Arms with fewer than six joints, such as a SCARA, can bring the tool's point to its target, but
+/// cannot turn the tool in every way. Here the point has priority: it reaches its target, and the
+/// tool is turned as nearly as the arm can.
 namespace trammel {
 
 [[nodiscard]] bool has_few_joints(const Chain& robot);

@@ -177,7 +177,7 @@ Note measurements_rounded(const Rounding& rounding) {
 
 namespace {
 
-/// Lengths of the arm that were identified: as drawn, and by what they are off.
+/// The identified lengths of the arm: their drawn values and their deviations.
 struct Lengths {
   std::vector<Eigen::Index> parameters;
   Eigen::VectorXd drawn, off;  ///< m
@@ -216,11 +216,12 @@ Lengths identified_lengths(const PhysicalModel& model,
 std::optional<Note> lengths_scaled(const PhysicalModel& model,
                                    const std::vector<IdentifiedParameter>& parameters,
                                    const Eigen::MatrixXd& covariance) {
-  constexpr double kOfMaking = 20e-6;  // m: a length is no better known than that
+  constexpr double kOfMaking = 20e-6;  // m: no length is known better
   constexpr Eigen::Index kFewest = 3;  // lengths: two agree by chance
   constexpr double kLeast = 200e-6;    // of a length: an arm that is 17 K warmer than drawn
   constexpr double kSure = 5;          // standard deviations
-  constexpr double kLeftOver = 0.02;   // of the squares: what one share must leave at most
+  constexpr double kLeftOver = 0.02;   // of the squares: the largest part that may remain after one
+                                       // common share
   const Lengths lengths = identified_lengths(model, parameters);
   if (lengths.drawn.size() < kFewest ||
       covariance.rows() < static_cast<Eigen::Index>(parameters.size()))

@@ -26,17 +26,17 @@ constexpr const char* kOffDrawing = "robot_off_drawing";
     const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters,
     double discrepancy);
 
-/// The note on a base that the measurements put elsewhere than the cell file has it: a warning
-/// where no installer is so far off (50 mm, 5 degrees), else for information. Empty within 3 mm and
-/// half a degree, and where the cell says no base.
+/// The note on a base that the measurements place elsewhere than the cell file: a warning beyond
+/// any error of an installer (50 mm, 5 degrees), else for information. Empty within 3 mm and half a
+/// degree, and if the cell states no base.
 [[nodiscard]] std::optional<Note> base_elsewhere(const PhysicalModel& model);
 
 /// The note on measured numbers that are rounded more coarsely than their stated sigma.
 [[nodiscard]] Note measurements_rounded(const Rounding& rounding);
 
-/// The note on an arm whose lengths are all longer (or shorter) than drawn by one share: not so
-/// many errors of making, but one cause, and which one its positions do not tell. `covariance`: of
-/// `parameters`, SI.
+/// The note on an arm with lengths that are all longer (or shorter) than drawn by one share. That
+/// is one cause and not many errors of manufacture, and positions do not show which cause.
+/// `covariance`: of `parameters`, SI.
 [[nodiscard]] std::optional<Note> lengths_scaled(const PhysicalModel& model,
                                                  const std::vector<IdentifiedParameter>& parameters,
                                                  const Eigen::MatrixXd& covariance);

@@ -11,7 +11,7 @@ namespace trammel {
 
 namespace {
 
-/// The arm and the covariance of its parameters, with the anchors of its cell file where it has
+/// The arm and the covariance of its parameters, with the anchors of its cell file if the model has
 /// none of its own.
 struct Gauging {
   PhysicalModel physics;
@@ -42,7 +42,7 @@ struct Told {
   double value = 0, variance = 0;
 };
 
-/// By the tool as it is predicted with its bias.
+/// The reading by the predicted tool, with its bias.
 Told told_with_bias(const ErrorPrediction& prediction, const Gauge& gauge,
                     const PlacedAnchor& anchor, const PhysicalModel& physics) {
   const GaugedLength length = gauged_length(gauge.kind, *anchor.said, anchor.p_W(physics.values),

@@ -11,7 +11,7 @@ enum class HeldBack {
   kNo,         ///< the poses held out decide
   kFewJudges,  ///< too few poses can judge it; nothing speaks against it or its batch
   kStopNote,   ///< it has a note of severity stop: see stop_of()
-  kStepLimit   ///< it would move a pose lately asked for by more than the cell's step limit
+  kStepLimit   ///< it would move a recently requested pose by more than the cell's step limit
 };
 /// The spelling for programs: `few_judges stop_note step_limit`; empty for kNo.
 [[nodiscard]] const char* to_text(HeldBack reason);

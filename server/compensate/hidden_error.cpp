@@ -12,7 +12,7 @@ namespace {
 constexpr double kOverstated = 0.5;  // of the stated sigma
 constexpr double kFreedom = 60;      // known to a tenth
 constexpr double kAll = 0.995;
-constexpr double kChanged = 1.1;  // times what is promised
+constexpr double kChanged = 1.1;  // times the stated accuracy
 constexpr int kAsked = 40;        // poses of the domain
 
 /// m² per axis: the variance of the true error that the model states, mean over some poses of its
@@ -31,8 +31,8 @@ double left_within_sigma(const ModelParts& parts) {
   const double freedom = 3.0 * parts.training.poses - parts.rank;
   if (freedom < kFreedom) return 0;
   const double left = parts.training.calibrated.rms * std::sqrt(parts.training.poses / freedom);
-  // Rows that are means of repeats, or state a sigma of their own, have a smaller one, and do not
-  // all lie within it.
+  // Means of repeats and rows with their own sigma have a smaller one. They do not all lie within
+  // it.
   const bool all_inside = parts.training.coverage_95_stated.value_or(0) > kAll;
   return all_inside && left < kOverstated * parts.physics.cell->tracker.sigma ? left : 0;
 }

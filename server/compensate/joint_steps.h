@@ -19,7 +19,7 @@ struct CorrectedJoints {
   bool settled = false;
 };
 
-/// The step to take from the joints `q`, `so_far` from the start, where so much is missing.
+/// The step from the joints `q`, which are `so_far` from the start, given the remaining difference.
 using JointStep = std::function<JointVector(const JointVector& q, const JointVector& so_far,
                                             const Vector6& missing)>;
 
@@ -29,8 +29,7 @@ using JointStep = std::function<JointVector(const JointVector& q, const JointVec
                                             const JointStep& next, const MissingAt& missing_at,
                                             double tolerance, int max_iterations);
 
-/// The d for which ½ dᵀ H d - gᵀ d is least among those with  held d = values.  H: n x n, held: m x
-/// n.
+/// The d that minimises ½ dᵀ H d - gᵀ d under  held d = values.  H: n x n, held: m x n.
 [[nodiscard]] Eigen::VectorXd least_with_held(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
                                               const Eigen::MatrixXd& held,
                                               const Eigen::VectorXd& values);

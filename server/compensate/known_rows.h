@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// True if the model was trained with the tool and the payload of this measurement, and both are
-/// still in its cell.
+/// True if the model was trained with the tool and the payload of this measurement, and its cell
+/// still has both.
 [[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
 
 /// Tests whether the model learned from a row of a batch. This is so if the batch is one that it

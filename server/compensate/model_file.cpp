@@ -27,7 +27,7 @@ using Members = std::map<std::string, std::string_view>;
 /// Text of a file as a message may show it.
 std::string excerpt(std::string_view text) { return shown_short(text, 120); }
 
-/// Checks that the file is of the format that is read.
+/// Checks that the file has the supported format.
 Status check_format(const Members& members, const std::string& where) {
   const auto said = members.find("trammel_model");
   if (said == members.end())
@@ -57,7 +57,7 @@ Status check_keys(const Members& members, const std::string& where) {
   return {};
 }
 
-/// Checks that `by` is the hash of `of`, both as their bytes stand in the file.
+/// Checks that `by` is the hash of `of`. Both are taken as bytes from the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by,
                   const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
@@ -67,8 +67,8 @@ Status check_hash(const Members& members, const std::string& of, const std::stri
       .of(by);
 }
 
-/// Checks that no byte was changed since the file was written. Looks at the bytes, before anything
-/// is made of them.
+/// Checks that no byte has changed since the file was written. Looks at the bytes, before anything
+/// is parsed.
 Status check_undamaged(const Members& members, const std::string& where) {
   TRY(check_format(members, where));
   TRY(check_keys(members, where));

@@ -22,8 +22,8 @@ enum class ModelTexts {
                                                    const std::string& where,
                                                    ModelTexts texts = ModelTexts::kChecked);
 [[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
-/// The hash of a model's content. Refuses a text with a byte that was changed since it was written,
-/// by the text's own hashes. Cheap: makes no model of it.
+/// The hash of a model's content. Refuses a text with a changed byte, by the text's own hashes.
+/// Cheap, since it does not build a model.
 [[nodiscard]] Result<std::string> undamaged_hash(const std::string& text, const std::string& where);
 
 }  // namespace trammel

@@ -23,10 +23,9 @@ using Severity = Note::Severity;
 
 constexpr double kNothing =
     1e-9;  // m, rad: a parameter whose prior moves the tool by less has no effect
-constexpr double kElsewhere =
-    1e-3;  // m: a tool that moved by more turns through other errors of the arm
-constexpr double kSameRms = 1e-9;  // relative
-constexpr int kAskedPoses = 5;     // enough that each source acts at one of them
+constexpr double kElsewhere = 1e-3;  // m: a smaller move of the tool needs no note
+constexpr double kSameRms = 1e-9;    // relative
+constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
 constexpr int kAfterEverything =
     1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
@@ -100,7 +99,7 @@ std::string what_would_give_way() {
   return text;
 }
 
-/// Adds notes on sources that training added by itself.
+/// Adds notes on sources that training added automatically.
 void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto& added = source->cause().added_by_data;
@@ -153,8 +152,8 @@ struct LeftOver {
   bool is_of_gauges = false;
 };
 
-/// `rms` is of all rows. The discrepancy counts neither what the rows' own sigmas explain nor
-/// single bad poses, and the rms counts no bias.
+/// `rms` is that of all rows. The discrepancy excludes the effect of the rows' own sigmas and of
+/// single bad poses, and the rms excludes the bias.
 LeftOver left_over(const CompensatedModel::Parts& parts, double rms, double stated) {
   return {std::min(rms, std::hypot(parts.discrepancy, stated)), stated};
 }
@@ -185,7 +184,7 @@ LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
 
 void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   constexpr double kLeads = 3, kStops = 30;  // times the stated sigma
-  constexpr double kRounded = 0.3;           // of what is left: rounding may be much of it
+  constexpr double kRounded = 0.3;           // of the remainder: rounding may be a large part of it
   const LeftOver worst = worst_left_over(parts);
   const double times = worst.left / worst.stated;
   if (!(times >= kLeads)) return;
@@ -211,7 +210,8 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                    to_mm(worst.stated), what)});
 }
 
-/// Orientations are held against their own sigma, which is often not stated: far above it says so.
+/// Compares orientations with their own sigma, which is often not stated. The note says so if they
+/// are far above it.
 void add_left_of_orientations(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   constexpr double kFar = 10;  // times the stated sigma
   const double stated = parts.physics.cell->tracker.sigma_rotation;
@@ -327,8 +327,8 @@ long measured_numbers(const Evaluation& training) {
   return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);
 }
 
-/// The drawing knows no number of the batch, so nothing can make its errors small; an identified
-/// arm makes them small where the numbers are few.
+/// The drawing was not fitted to the batch, so its errors are small only if the positions were
+/// computed from it. An identified arm may have small errors because its numbers are few.
 void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const Evaluation& training = parts.training;
   auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma,

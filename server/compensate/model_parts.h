@@ -22,7 +22,7 @@ namespace trammel {
 /// The sources of a finished model that were identified anew.
 struct RefitRecord {
   std::string model;                 ///< id of the model that it started from
-  std::vector<std::string> sources;  ///< as they were named
+  std::vector<std::string> sources;  ///< in the caller's spelling
   std::string batch_id;
   std::string batch_hash;
   int poses = 0;
@@ -74,7 +74,7 @@ struct ModelParts {
       false;  ///< false: no clock gave their order, so they are in the given one
   std::vector<LeftOutSession> sessions_left_out;
   std::vector<Change>
-      changes;  ///< of the arm between these sessions; their sources are among those of the physics
+      changes;             ///< of the arm between these sessions; the physics has their sources
   double discrepancy = 0;  ///< m per axis, see CalibrationResult
   std::optional<CauseChoice>
       cause_choice;                       ///< with error sources `auto`: the trials and their gains
@@ -110,7 +110,7 @@ struct ModelParts {
   ModelProvenance provenance;            ///< id and hash are filled in by make()
   Evaluation training;                   ///< on its training poses
   std::optional<Evaluation> validation;  ///< on poses held out from training
-  std::optional<ErrorBudget> budget;     ///< at the training poses; empty where they tell none
+  std::optional<ErrorBudget> budget;     ///< at the training poses; empty if they allow none
 };
 
 }  // namespace trammel

@@ -12,7 +12,7 @@ namespace trammel {
 
 namespace {
 
-/// The statistic of ranks; 0 where nothing differs or a difference is not finite.
+/// The statistic of ranks; 0 if all differences are zero or one is not finite.
 double signed_rank_z(const Eigen::VectorXd& differences) {
   if (!differences.allFinite()) return 0;
   std::vector<double> d;
@@ -25,7 +25,7 @@ double signed_rank_z(const Eigen::VectorXd& differences) {
     const double rank = 0.5 * static_cast<double>(first + 1 + last);
     for (std::size_t i = first; i < last; ++i) sum += std::copysign(rank, d[i]);
   }
-  // The variance of ranks without ties. That of mean ranks would be smaller, and nine equal
+  // The variance of ranks without ties. The variance of mean ranks would be smaller, and nine equal
   // differences would pass in 2 of 100 cases.
   const auto n = static_cast<double>(d.size());
   return d.empty() ? 0 : sum / std::sqrt(n * (n + 1) * (2 * n + 1) / 6);

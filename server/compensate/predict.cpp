@@ -152,7 +152,8 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
 
 namespace {
 
-/// True if it is known where the joint came from. A request may say the sides of some joints alone.
+/// True if the side from which the joint came is known. A request may state the sides of only some
+/// joints.
 bool says_where_from(const PoseContext& context, int joint) {
   if (!context.before) return false;
   return context.direction.empty() || context.direction[static_cast<std::size_t>(joint)] != 0;
@@ -198,8 +199,8 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
 
 namespace {
 
-/// The uncertainty of a pose beside its bias: of the position, m and m², or of the rotation, rad
-/// and rad².
+/// The uncertainty of a pose apart from its bias: of the position, m and m², or of the rotation,
+/// rad and rad².
 struct Uncertainty {
   Matrix3 identified;  ///< covariance that the parameters leave
   Matrix3 since;       ///< the part of it that was identified after the bias was learned
@@ -211,13 +212,13 @@ struct Uncertainty {
 
 /// Covariance of one measurement.
 /// - Noise is never less than the instrument's: a fit to few poses takes some of the noise for
-/// signal.
+///   signal.
 /// - Covariance of the parameters: a bias with blocks of parameters (`has_parameters`) contains it.
 ///   Any other bias corrects it to the extent that the bias is applied and knows the pose; the rest
 ///   counts in full.
 /// - No bias corrects parameters that were identified after it was learned.
-/// - What of the bias is not taken may be missing. It is as large as the bias is there, or was at
-/// the training poses.
+/// - The part of the bias that is not applied may be missing. It is as large as the bias at that
+///   pose, or as it was at the training poses.
 /// - The bias' own covariance stays: far from its poses a kernel has its prior, and blocks have
 ///   what the data left them.
 Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters,
@@ -277,7 +278,8 @@ Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const Bi
   return with_bias(bias, weight, inside_->bias_has_parameters, of);
 }
 
-// No slope is learned of rotations: far out a map may miss as much as there was to learn.
+// Training learns no slope for rotations. Far outside, a map may therefore be wrong by the whole
+// learned effect.
 void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias,
                                          ErrorPrediction* prediction) const {
   const double weight = prediction->bias_weight;
@@ -298,8 +300,8 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
 
 namespace {
 
-/// Raises the covariance of one measurement so that its true part has an rms of no less. What is
-/// added is the same along each axis.
+/// Raises the covariance of one measurement until its true part has at least this rms. The addition
+/// is the same along each axis.
 void raise_to(double least_rms, double metrology, Matrix3& covariance) {
   const Vector3 known = (covariance.diagonal().array() - metrology).max(0.0);
   const double missing = least_rms * least_rms - known.sum();

@@ -10,7 +10,7 @@ namespace trammel {
 
 /// The change of the arm between two sessions that a model was made from.
 struct SessionChange {
-  /// A number of the change, in the unit that people read: an angle in degrees, a length in mm.
+  /// A number of the change, in the unit for people: an angle in degrees, a length in mm.
   struct Size {
     std::string name, unit;
     double value = 0, u95 = 0;  ///< U(k = 2)

@@ -9,13 +9,13 @@ namespace trammel {
 
 namespace {
 
-constexpr int kSeenAt = 20;                  // of the model's range, to see the play at
-constexpr double kShortestLever = 0.1;       // m: nearer to the axis play does not show
-constexpr double kNoPlay = 1e-7;             // rad: 0.2 µm at 2 m
-constexpr double kTimesPlay = 5;             // a servo turns back by less than the way it is sent
+constexpr int kSeenAt = 20;             // of the model's range, over which the play is evaluated
+constexpr double kShortestLever = 0.1;  // m: nearer to the axis, play has no visible effect
+constexpr double kNoPlay = 1e-7;        // rad: 0.2 µm at 2 m
+constexpr double kTimesPlay = 5;        // a servo turns back by less than the commanded way
 constexpr double kLeastWay = from_deg(0.1);  // likewise
 
-/// rad (m): how far the joint stands off its motor at the most, by the way it moves the tool.
+/// rad (m): the largest distance of the joint from its motor, by the way it moves the tool.
 double largest_play(const CompensatedModel& model, int joint,
                     const std::vector<PoseContext>& poses) {
   const PhysicalModel& physics = model.parts().physics;

@@ -8,14 +8,14 @@
 
 namespace trammel {
 
-/// The move that a request is taken to end with where it says its side of approach, rad (m): the
-/// shortest way by which a measuring pose is come to. Hysteresis depends on it, play does not.
+/// The last move, rad (m), that is assumed if a request states its side of approach: the shortest
+/// approach to a measuring pose. Hysteresis depends on it, play does not.
 constexpr double kSaidMove = from_deg(1);
 
-/// Joints of which the model knows that the side of approach decides where they stand, each with
-/// the way that takes this up: five times the play itself (2 b, the largest in the model's range),
-/// at least 0.1 deg; of hysteresis kSaidMove. The side is the one from which more training poses
-/// came.
+/// The joints whose position depends on the side of approach, as far as the model knows, each with
+/// the way that takes this up. For play the way is five times the play (2 b, the largest in the
+/// model's range), at least 0.1 deg; for hysteresis it is kSaidMove. The side is the one from which
+/// more training poses came.
 [[nodiscard]] std::vector<TakeUp> take_ups(const CompensatedModel& model);
 
 }  // namespace trammel

@@ -23,7 +23,7 @@ constexpr double kLeastReach = 0.05;  // of the region's diagonal, if poses form
 constexpr Eigen::Index kFewestOfTail = 12, kLeastTail = 2,
                        kMostTail = 6;  // places; of a tail the outermost ones
 constexpr double kTailScales =
-    7;  // 1 of 1000 places is farther out; the reach ends it sooner where they are many
+    7;  // 1 of 1000 places is farther out; with many places the reach limits this earlier
 constexpr double kUsualMargin = 0.05;  // of a joint's range
 constexpr double kMarginOfFew =
     45;  // over n² places, in addition: a Latin hypercube of n places leaves this at its edges
@@ -63,11 +63,11 @@ Eigen::MatrixXd along_outline(const Eigen::Matrix3Xd& places) {
   return directions * places.topRows<2>();
 }
 
-/// 16, m: how far others of the same kind come beyond the outermost place in each direction of the
-/// outline, by how thinly the last places there are spread: times the mean by which they exceed the
-/// next one (of a tail that falls off exponentially, its scale). As far as the direction leads away
-/// from the base's axis: what lies behind it is another region, however few the places in front
-/// are.
+/// 16, m: for each direction of the outline, the distance that other poses of the same kind may go
+/// beyond the outermost place. It depends on the spacing of the last places there: a factor times
+/// the mean by which they exceed the next one (the scale of an exponential tail). It applies only
+/// where the direction leads away from the base's axis: behind the axis is another region, however
+/// few places are in front.
 Eigen::VectorXd beyond_outermost(const Eigen::MatrixXd& along) {
   const Eigen::VectorXd outermost = along.rowwise().maxCoeff();
   const double farthest = outermost.maxCoeff();
@@ -102,7 +102,7 @@ void add_reach(WhatWasMeasured& measured) {
                      beyond_outermost(along).array().max(std::max(within(0.5), least)) + kRounding;
 }
 
-/// One row of each joint vector, evenly chosen where there are too many.
+/// One row per joint vector, chosen evenly if there are too many.
 std::vector<Eigen::Index> rows_to_keep(const MeasurementBatch& batch) {
   const std::vector<PoseGroup> groups = pose_groups(batch);
   const std::size_t step = groups.size() / static_cast<std::size_t>(kPlaces) + 1;
@@ -155,8 +155,8 @@ std::optional<std::string> joints_of(const WhatWasMeasured& measured, Side side)
   return fmt::format(" in joint{} {}", joints.size() == 1 ? "" : "s", fmt::join(joints, " "));
 }
 
-/// `from both sides in joints 1 2, from above in joint 3`, of these sides; `every` begins what
-/// holds for all joints.
+/// `from both sides in joints 1 2, from above in joint 3`, for the sides in `sides`. `every` begins
+/// the text if all joints share a side.
 std::string sides_text(const WhatWasMeasured& measured,
                        const std::vector<std::pair<Side, const char*>>& sides, const char* every) {
   std::string text;

@@ -10,11 +10,11 @@
 #include "server/measurement/measurement.h"
 #include "server/measurement/resolution.h"
 
-/// The training poses of a model, as far as its promise rests on them.
+/// The training poses of a model, as far as its stated accuracy rests on them.
 namespace trammel {
 
 struct WhatWasMeasured {
-  /// Poses that a joint rose into and fell into; the others do not say.
+  /// Poses at which a joint arrived rising, and falling. The other poses do not say how it arrived.
   struct Approaches {
     int rising = 0, falling = 0;
   };
@@ -29,14 +29,15 @@ struct WhatWasMeasured {
   /// m: a pose whose flange is farther than this from all places is in another region of the robot.
   /// Empty if only one joint vector was measured, since that gives no distance.
   std::optional<double> reach;
-  /// m: how far the places go in 16 horizontal directions, x of B first, and a little farther. A
-  /// pose beyond is out of the outline that they have from above: where places are few, their reach
-  /// alone goes round to the robot's other side. Empty without a reach, and in models from before
-  /// it was kept.
+  /// m: the extent of the places in 16 horizontal directions, x of B first, and a little farther. A
+  /// pose beyond is outside the outline seen from above. The outline is needed because with few
+  /// places their reach alone extends to the robot's other side. Empty without a reach, and in
+  /// older models.
   Eigen::VectorXd outline;
   std::optional<double> stated;  ///< m: median sigma of the positions; empty: no row has its own
-  std::optional<Rounding> rounding;  ///< of what was measured, where it is coarse
-  /// Joints that are whole multiples of a step, and what rounding to it would move the tool by.
+  std::optional<Rounding> rounding;  ///< resolution of the measured numbers, if it is coarse
+  /// Joints with angles that are whole multiples of a step, and the effect of that rounding on the
+  /// tool.
   struct JointRounding {
     double step = 0;    ///< rad
     double stddev = 0;  ///< m, of one axis
@@ -61,7 +62,7 @@ struct WhatWasMeasured {
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics,
                                                 const MeasurementBatch& batch);
 
-/// Adds what the file of `batch` states of its numbers, and how finely they are written.
+/// Adds the statements of `batch`'s file on its numbers, and their resolution.
 void add_what_is_stated(const PhysicalModel& physics, const MeasurementBatch& batch,
                         WhatWasMeasured& measured);
 
@@ -75,7 +76,7 @@ struct MeasuredWords {
 };
 [[nodiscard]] MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured,
                                      const Cell& cell);
-/// All of it: `80 training poses; sides of approach: every joint from both sides; ...`
+/// All parts: `80 training poses; sides of approach: every joint from both sides; ...`
 [[nodiscard]] std::string in_words(const std::optional<WhatWasMeasured>& measured,
                                    const Cell& cell);
 

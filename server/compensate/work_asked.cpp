@@ -52,7 +52,7 @@ void compare(const std::vector<PoseContext>& poses, const std::vector<ErrorPredi
   work.farthest.resize(std::min(work.farthest.size(), kFarthest));
 }
 
-/// The least sure first, those left out that are near one chosen before.
+/// The least certain poses first, without those near an earlier choice.
 std::vector<PoseContext> least_sure(const std::vector<PoseContext>& poses,
                                     const std::vector<ErrorPrediction>& predictions) {
   JointVector low = poses.front().q, high = low;

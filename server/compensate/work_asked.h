@@ -20,7 +20,7 @@ struct WorkAsked {
   std::optional<PromisedAtWork> other;
   /// The distance between the predictions of the two, m; 0 without another one.
   double difference_rms = 0, difference_max = 0;
-  /// Where they are farthest apart, the farthest first.
+  /// The poses at which the two are farthest apart, the farthest first.
   struct Step {
     PoseContext pose;
     double difference = 0;  ///< m
@@ -30,7 +30,7 @@ struct WorkAsked {
   std::vector<PoseContext> measure_next;
 };
 
-/// `other`: null where there is none to compare with.
+/// `other`: null if there is no model to compare with.
 [[nodiscard]] WorkAsked work_asked(const CompensatedModel& in_force, const CompensatedModel* other,
                                    const std::vector<PoseContext>& poses);
 

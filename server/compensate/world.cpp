@@ -32,7 +32,7 @@ const SessionSetting* known_session(const CompensatedModel& model, const Measure
   return nullptr;
 }
 
-/// Where the rows themselves put the session's world.
+/// The place of the session's world by the rows themselves.
 Result<Pose> located(const CompensatedModel& model, const MeasurementBatch& session) {
   const MeasurementBatch rows = known_rows(model, session);
   if (rows.measurements.empty())

@@ -6,19 +6,19 @@
 
 #include "server/compensate/budget/between.h"
 
-/// The check whether a repair helped: the model of the measurements after it, held against the one
+/// Checks whether a repair helped: compares the model of the measurements after it with the one
 /// before.
 namespace trammel {
 
-/// The outcome of a line that was to be put right.
+/// The outcome of a line that was to be repaired.
 struct LineOutcome {
   enum class Helped {
-    kPutRight,    ///< no longer beyond its U, or beyond what is usual
+    kPutRight,    ///< no longer beyond its U, or beyond the usual size
     kPartly,      ///< nearer to the drawing than before
     kTooFar,      ///< beyond the drawing to the other side
     kNotMoved,    ///< it is where it was
     kWrongWay,    ///< farther off than before
-    kCannotTell,  ///< these poses do not tell it so well as it was off
+    kCannotTell,  ///< these poses do not determine it precisely enough
   };
   std::string line, name, action;  ///< as the budget before had them
   BudgetNumber before, moved, now;

@@ -25,9 +25,9 @@ enum class LineKind {
   kRest,        ///< the model's residual beyond the noise of the instrument
   kInstrument,  ///< the stated noise of the instrument
 };
-/// As JSON and the wire spell it: `joint_zero`.
+/// The spelling in JSON and on the wire: `joint_zero`.
 [[nodiscard]] std::string_view to_string(LineKind kind);
-/// Its inverse; empty: no kind is spelled so.
+/// The inverse of it; empty if no kind has that spelling.
 [[nodiscard]] std::optional<LineKind> line_kind(std::string_view spelled);
 
 /// A number of a line, in the unit that people read.
@@ -38,7 +38,7 @@ struct BudgetNumber {
   std::string unit;
 };
 
-/// One thing that a person can point at.
+/// One physical thing on which a person can put a finger.
 struct BudgetLine {
   std::string line;  ///< `zero:4`, `length:2`, `twist:3`, `base`, `tool`, `compliance:2`, else as
                      ///< in a cell file
@@ -69,8 +69,8 @@ struct BudgetView {
   std::vector<BudgetLine> lines;
 };
 
-/// The error that is left when this and all before it is put right, with base and tool frames
-/// touched again each time.
+/// The error that is left after this repair and all before it, with base and tool frames touched
+/// again each time.
 struct PutRight {
   std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `loads`, `trammel`
   std::string name;     ///< for people
@@ -85,8 +85,8 @@ struct ErrorBudget {
   /// to the error is removed from it and from every line. Lines of frames are absent here.
   BudgetView beyond_frames;
   std::vector<PutRight> put_right;  ///< one after the other
-  /// The changes of the arm between several sessions, each line at the poses where it
-  /// acts. The lines stand in `as_it_stands`, too, at all poses. Empty: nothing changed.
+  /// The changes of the arm between sessions, each line at the poses where it acts. `as_it_stands`
+  /// contains the same lines at all poses. Empty if nothing changed.
   std::vector<BudgetLine> between_sessions;
 
   [[nodiscard]] const BudgetLine* line(std::string_view name) const;

@@ -15,13 +15,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAlwaysShown =
-    0.1;  // of the error: a line beyond the first ones that has more is shown as well
+constexpr double kAlwaysShown = 0.1;  // share of the error: later lines with more are shown as well
 
 constexpr std::ptrdiff_t kMostToLead = 3;
 
 constexpr std::size_t kFewestWrongLengths =
-    2;  // that stand out: one may be a link, more are another arm
+    2;  // lines that stand out: one may be a link, more suggest another arm
 
 std::string joined(const std::vector<std::string>& all) {
   return fmt::format("{}", fmt::join(all, ", "));
@@ -43,8 +42,8 @@ std::optional<BudgetNumber> turn_of(const BudgetLine& line) {
 
 bool stands_out(const BudgetLine& line) { return !line.action.empty(); }
 
-/// True of what began while the poses were measured. It is no error of the drawing, and is told as
-/// a finding.
+/// True for a change that began while the poses were measured. It is no error of the drawing, so it
+/// is reported as a finding.
 bool is_a_change(const BudgetLine& line) {
   const CauseRecord* record = find_cause(line.cause);
   return record != nullptr && record->lasting == causes::Lasting::kFromAPose;

@@ -51,7 +51,7 @@ Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
   return told;
 }
 
-/// The directions that are not told, as columns (F x R), in units of the sizes.
+/// The undetermined directions, as columns (F x R), in units of the sizes.
 Eigen::MatrixXd untold_directions(const Eigen::MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
   Eigen::Index count = 0;
@@ -140,7 +140,8 @@ void widen(Datum& datum, const std::vector<Eigen::Index>& kept,
   if (whole <= 0 || left.size() < 2 * std::ssize(kept)) return;
   const Eigen::MatrixXd J = jacobian_of(datum.model, poses)(Eigen::all, kept);
   const Eigen::MatrixXd C = datum.covariance(kept, kept);
-  const Eigen::MatrixXd weights = C * J.transpose();  // K x 3N: what a position moves
+  const Eigen::MatrixXd weights = C * J.transpose();  // K x 3N: the effect of each coordinate on
+                                                      // the parameters
   Eigen::VectorXd wider = Eigen::VectorXd::Ones(std::ssize(kept));
   for (Eigen::Index k = 0; k < wider.size(); ++k) {
     double moved = 0;

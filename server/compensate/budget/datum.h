@@ -22,8 +22,8 @@ struct Datum {
     std::vector<Eigen::Index> with;
   };
   std::vector<OnDrawing> on_drawing;
-  /// Parameters that the poses tell together only, though each has a value: their lines name each
-  /// other.
+  /// Parameters that the poses determine only together, though each has a value: their lines name
+  /// each other.
   std::vector<std::vector<Eigen::Index>> told_together = {};
 };
 

@@ -6,7 +6,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNoMotion = 1e-9;  // of the largest: a motion of a frame that another one can do
+constexpr double kNoMotion = 1e-9;  // share of the largest: a frame's motion that another frame can
+                                    // also make
 
 Eigen::Matrix3Xd positions_by(const PhysicalModel& model, const MeasurementBatch& rows) {
   Eigen::Matrix3Xd all(3, std::ssize(rows.measurements));

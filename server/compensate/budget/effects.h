@@ -5,13 +5,14 @@
 #include "server/compensate/budget/datum.h"
 #include "server/compensate/budget/items.h"
 
-/// Inside of the room: what each line does to the poses, as vectors.
+/// Inside of the room: the effects of the lines on the poses, as vectors.
 namespace trammel {
 
 /// 3 x N each, m, in W. `total` = the sum of all others, exactly.
 struct Effects {
   Eigen::Matrix3Xd total;               ///< measured minus the drawing
-  std::vector<Eigen::Matrix3Xd> lines;  ///< of each item: the model minus the model without it
+  std::vector<Eigen::Matrix3Xd> lines;  ///< of each item: the model minus the model without the
+                                        ///< item
   Eigen::Matrix3Xd learned;             ///< of the bias
   Eigen::Matrix3Xd rest;                ///< measured minus compensated
   Eigen::Matrix3Xd together;            ///< the remainder, because lines act on one another

@@ -140,7 +140,7 @@ void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold
       const std::ptrdiff_t partner = item_with(items, place);
       if (partner >= 0 && partner != own) partners.insert(partner);
     }
-    if (of_frame && partners.empty()) continue;  // its other numbers are told
+    if (of_frame && partners.empty()) continue;  // other lines contain its other numbers
     name_partners(item, partners, items, untold);
     if (!of_frame) std::erase(item.places, one.parameter);
   }
@@ -309,7 +309,8 @@ std::vector<Eigen::Index> where_it_acts(const Eigen::Matrix3Xd& effect) {
   return columns;
 }
 
-/// A change between sessions is named by its session: rows of several files say nothing to people.
+/// A change between sessions is named by its session, because row numbers of several files mean
+/// nothing to people.
 void tell_since(const Since& since, const ErrorSource& source, BudgetLine& line) {
   const auto found = since.find(source.name());
   if (found == since.end()) return;
@@ -407,7 +408,9 @@ ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& 
 ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseContext>& targets) {
   MeasurementBatch as_predicted;
   std::vector<PoseContext> at = targets;
-  for (PoseContext& one : at) one.served = true;  // what began at a training pose has happened
+  for (PoseContext& one : at)
+    one.served = true;  // a change that began at a training pose has
+                        // happened
   const std::vector<ErrorPrediction> predictions = model.predict_all(at);
   for (std::size_t i = 0; i < at.size(); ++i) {
     Measurement m;

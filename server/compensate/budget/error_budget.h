@@ -14,13 +14,14 @@ namespace trammel {
 [[nodiscard]] bool tells_a_budget(const MeasurementBatch& measured);
 
 /// `measured`: rows with positions in the world of the model (in_world_of()), checked against its
-/// cell; others are left out. Without rows that have a position the budget has no line.
+/// cell; other rows are left out. Without any position the budget has no line.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const MeasurementBatch& measured);
-/// The budget at targets, where the error is the predicted one: nothing is left beyond the model.
+/// The budget at targets. There the error is the predicted one, so no residual is left beyond the
+/// model.
 [[nodiscard]] ErrorBudget error_budget(const CompensatedModel& model,
                                        const std::vector<PoseContext>& targets);
-/// The session since which a change of the arm acts, by the name of its error source.
+/// The session at which a change of the arm began, by the name of its error source.
 using Since = std::map<std::string, std::string>;
 /// The budget of a calibration, at its own poses; no bias is learned beside it.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& calibration,

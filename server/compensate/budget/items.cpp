@@ -22,8 +22,7 @@ Symbol symbol_of(const std::string& parameter) {
   return {parameter.substr(0, digit), std::stoi(parameter.substr(digit)) - 1};
 }
 
-/// The line that a parameter of the links is part of: the zero of its joint, or the lengths or the
-/// angles of its link.
+/// The line of a link parameter: the zero of its joint, or the lengths or the angles of its link.
 BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
   const auto [letters, joint] = symbol_of(parameter);
   const bool slides = robot.joint(joint).type == JointType::kPrismatic;
@@ -98,8 +97,8 @@ void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index 
   }
 }
 
-/// `joint_map:4` of `joint_map:4@8+20`: numbers that say how a cause is described are not its name;
-/// the pose that it begins at is.
+/// `joint_map:4` for `joint_map:4@8+20`: numbers that describe a cause are not part of its name,
+/// but the pose at which it begins is.
 std::string line_of(const ErrorSource& source) {
   const std::string name = source.name();
   return source.cause().lasting == causes::Lasting::kFromAPose ? name
@@ -131,7 +130,7 @@ bool is_own_weight(const ErrorSource& source) {
   return source.cause().acts.on == causes::ActsOn::kLoad && source.cause().added_by_data;
 }
 
-/// The model without those of its sources for which `goes` is true.
+/// The model without the sources for which `goes` is true.
 template <typename Goes>
 PhysicalModel without_sources(const PhysicalModel& model, const Goes& goes) {
   PhysicalModel rest = model;

@@ -82,7 +82,7 @@ std::string signed_value(double value, double u95, const std::string& unit) {
 }  // namespace
 
 std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget) {
-  // What a joint lost while it was measured is added to what it was off before.
+  // Adds the zero that a joint lost during the measurement to its earlier error.
   std::map<int, ZeroRemedy> by_joint;
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     if (!is_of_step(line, "zeros") || !line.value) continue;

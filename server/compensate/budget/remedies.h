@@ -29,12 +29,12 @@ struct RemedyValue {
   double add = 0, u95 = 0;
   std::string unit;
 };
-/// Those of a step that are off by more than their U.
+/// The values of a step that are off by more than their U.
 [[nodiscard]] std::vector<RemedyValue> remedy_values(const ErrorBudget& budget,
                                                      std::string_view step);
 
-/// Where a maker's controller keeps zeros, lengths and load data, in the maker's own words. By the
-/// name of the robot file; general words where no maker is known.
+/// The places of zeros, lengths and load data in a maker's controller, in the maker's own words,
+/// chosen by the name of the robot file. General words for an unknown maker.
 struct MakersWords {
   std::string maker, zeros, lengths, load;
   std::vector<std::string> axes = {};  ///< the names of the first ones; empty: `joint 4`

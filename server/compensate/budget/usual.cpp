@@ -12,7 +12,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kKilo = 1e3;        // a gearbox is told in deg/kNm
+constexpr double kKilo = 1e3;        // the unit of a gearbox is deg/kNm
 constexpr double kFrameShift = 0.1;  // m
 constexpr double kFrameTurn = 0.1;   // rad
 constexpr double kToolShift = 0.02;  // m
@@ -26,8 +26,8 @@ double reach_of(const Chain& robot) {
   return reach;
 }
 
-/// What the joints of an arm give way by, with the bearings and links that give way beside their
-/// gears; by the stretch of its links. The README of the room has the gears behind the numbers.
+/// The usual compliance of an arm's joints, including the bearings and links beside their gears, by
+/// the reach of the arm. The README of the room has the figures of gears behind these numbers.
 struct GearsOfSize {
   double up_to;        // m
   double gear, wrist;  // deg/kNm

@@ -12,7 +12,8 @@ struct UsualSizes {
   double rail_zero = 0;        ///< m
   double length = 0;           ///< m
   double tool = 0;             ///< m, of its point
-  double gear = 0, wrist = 0;  ///< rad/Nm, of a joint that gives way: up to the wrist, of the wrist
+  double gear = 0, wrist = 0;  ///< rad/Nm, the compliance of a joint: up to the wrist, and of the
+                               ///< wrist
 };
 [[nodiscard]] UsualSizes usual_sizes(const Chain& robot);
 
@@ -22,7 +23,7 @@ struct UsualSizes {
 
 /// The sizes by which parameters are compared if the poses cannot distinguish them, SI, one for
 /// each parameter of the model. For the arm they are the usual sizes. For frames they are far
-/// larger, so that a shared effect is counted as the frame's.
+/// larger, so a shared effect counts as an effect of the frame.
 [[nodiscard]] Eigen::VectorXd sizes_to_compare_by(const PhysicalModel& model);
 
 /// A line stands out from this multiple of the usual size on.

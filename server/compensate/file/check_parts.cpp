@@ -121,7 +121,7 @@ Status check_bias(const BiasState& bias) {
   return {};
 }
 
-/// The physics that a kept bias was learned beside: it has all the standard sources.
+/// Checks the physics beside which a kept bias was learned: it has all the standard sources.
 Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
   for (const std::string& name : standard_sources()) {
     const auto& sources = origin.physics.sources;

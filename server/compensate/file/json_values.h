@@ -21,14 +21,14 @@ using Json = nlohmann::json;
 /// 3 x 4: rotation and translation, m.
 [[nodiscard]] Json pose_json(const Pose& X);
 
-/// Ends the reading: `what` was expected or is wrong.
+/// Ends the reading with an error: `what` was expected or is wrong.
 [[noreturn]] void wrong(const char* what, const Json& json);
 
 /// A number, finite.
 [[nodiscard]] double number_from(const Json& json);
 [[nodiscard]] double number_from(const Json& json, const char* key);
 
-/// Within what `Whole` can hold.
+/// Checks that the number fits into `Whole`.
 template <typename Whole>
 [[nodiscard]] Whole whole_from(const Json& json) {
   if (json.is_number_unsigned()) {

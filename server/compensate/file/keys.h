@@ -5,9 +5,9 @@ namespace trammel::model_file {
 
 /// The format that is written and read.
 inline constexpr int kFormat = 2;
-/// The way in which a bias with blocks fades beyond the domain: its kernel alone does.
+/// The way in which a bias with blocks fades beyond the domain: only its kernel fades.
 inline constexpr const char* kFades = "kernel";
-/// The angles that causes of coupled joints are functions of, and turn: those of the gears
+/// The angles on which causes of coupled joints depend, and which they turn: those of the gears
 /// (server/robot/README.md).
 inline constexpr const char* kAngles = "gears";
 

@@ -80,7 +80,7 @@ struct Difference {
 /// The worst of pose, error and standard deviation, each by its own limit.
 Difference worst_of(const ErrorPrediction& now, const Json& stated) {
   const auto largest = [](const Eigen::MatrixXd& difference) {
-    // A maximum passes over what is no number.
+    // maxCoeff() ignores values that are not numbers.
     return difference.allFinite() ? difference.cwiseAbs().maxCoeff()
                                   : std::numeric_limits<double>::infinity();
   };
@@ -101,7 +101,7 @@ Difference worst_of(const ErrorPrediction& now, const Json& stated) {
                            });
 }
 
-/// True if the numbers are lengths of this world.
+/// True if the numbers are possible lengths.
 bool possible(const ErrorPrediction& prediction) {
   const double most = prediction.X_BT_predicted.matrix().norm() + prediction.error_B.norm() +
                       prediction.stddev_B.norm();

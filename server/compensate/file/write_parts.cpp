@@ -249,7 +249,7 @@ Json json_of(const WhatWasMeasured& measured) {
   return json;
 }
 
-/// Where the training poses lie.
+/// Adds the region of the training poses.
 void add_domain(const ModelParts& parts, Json& content) {
   content["q_min"] = matrix_json(parts.q_min);
   content["q_max"] = matrix_json(parts.q_max);

@@ -11,7 +11,7 @@ namespace trammel::model_file {
 /// its origin, except the time when it was made.
 [[nodiscard]] nlohmann::json content_of(const ModelParts& parts);
 
-/// The `stamp`: when the model was made, and by which program.
+/// The `stamp`: the time when the model was made, and the program that made it.
 [[nodiscard]] nlohmann::json stamp_of(const ModelProvenance& provenance);
 
 /// SHA-256 of the content, in hexadecimal digits.
