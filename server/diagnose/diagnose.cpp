@@ -32,9 +32,9 @@ namespace trammel::cause_search {
 namespace {
 
 constexpr std::size_t kFewestPoses =
-    12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
+    12;  // poses: base and tool have 12 numbers, so fewer leave little to examine
 
-/// A batch of several sessions, with where its instruments stood.
+/// A batch of several sessions, and the places of its instruments.
 struct Placed {
   CalibrationResult calibration;  ///< its sessions: where the instrument of each stood
   std::vector<Change> changes;    ///< of the arm between them
@@ -43,8 +43,8 @@ struct Placed {
   [[nodiscard]] const std::vector<SessionSetting>& sessions() const { return calibration.sessions; }
 };
 
-/// The cell's sources, and the frames that the cell does not say: a base that was stood by these
-/// very poses is free beside whatever else explains them.
+/// The cell's sources, and the frames that the cell leaves open. A base that was placed by these
+/// very poses stays free beside any other explanation.
 std::vector<std::string> with_unknown_frames(const Cell& cell) {
   constexpr const char* kBase = "base";
   std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
@@ -53,8 +53,8 @@ std::vector<std::string> with_unknown_frames(const Cell& cell) {
   return sources;
 }
 
-/// The cell's sources, and play of every joint that was approached from both sides: sessions that
-/// came from different sides differ by it, and nothing changed between them.
+/// The cell's sources, and the play of every joint that was approached from both sides. Sessions
+/// that came from different sides differ by play, which is not a change between them.
 std::vector<std::string> sources_with_play(const Cell& cell, const MeasurementBatch& batch) {
   std::vector<std::string> sources = spelled_out(with_unknown_frames(cell), cell);
   for (const std::string& source : candidate_sources(cell, batch, nullptr)) {
@@ -65,8 +65,8 @@ std::vector<std::string> sources_with_play(const Cell& cell, const MeasurementBa
   return sources;
 }
 
-/// By the arm as the cell's sources have it, and what changed on it between two sessions: what a
-/// change does is no noise of the sessions after it.
+/// The sessions placed by the arm with the cell's sources, and the changes on the arm between them.
+/// A change must not count as noise of the sessions after it.
 Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                       const DiagnoseOptions& options) {
   if (!has_sessions(batch.rows())) return Placed();
@@ -84,7 +84,7 @@ Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatc
       });
 }
 
-/// The cause that stands for an instrument that was set up anew.
+/// The cause for an instrument that was set up anew.
 const CauseRecord& set_up_anew() {
   const std::vector<const CauseRecord*> all = all_causes();
   const auto found = std::find_if(all.begin(), all.end(), [](const CauseRecord* cause) {
@@ -94,14 +94,14 @@ const CauseRecord& set_up_anew() {
   return **found;
 }
 
-/// True if the search has no cause that acts as the change does: it looks for what begins at a pose
-/// and stays.
+/// True if the search has no cause for a change of this kind, because it looks for changes that
+/// begin at a pose and stay.
 bool is_beside_the_search(const Change& change) {
   return is_of_one_session(change) || change.rate > 0;
 }
 
-/// The cell's sources, and from each session on a tracker that was set up anew: nothing that this
-/// explains is evidence. So is what the search could not name of what changed between the sessions.
+/// The cell's sources, and a tracker that was set up anew from each session on, so that its effect
+/// is not evidence. Changes between sessions that the search cannot name are added as well.
 std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
   std::vector<std::string> sources = with_unknown_frames(cell);
   for (std::size_t s = 1; s < placed.sessions().size(); ++s)
@@ -119,7 +119,7 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
   if (auto doubt = reading_doubt(batch.rows(), cell))
     return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
-  // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
+  // If rows were moved, the beginning of a cause is reported by pose id, not by row.
   prepared.sorted = !batch.is_in_order_of_time();
   const CheckedBatch ordered = batch.in_order_of_time(cell.robot);
   prepared.sessions = with_noise_as_repeated(sessions, ordered.rows(), cell.tracker);
@@ -156,7 +156,7 @@ MeasurementBatch as_recorded(const Surrogates& surrogates, MeasurementBatch batc
 /// One part of the work after the search.
 struct Step {
   std::string what;            ///< for the line of progress
-  double share = 0;            ///< of all the work, done before it
+  double share = 0;            ///< share of the work that is done before it
   std::function<void()> tell;  ///< fills its part of the diagnosis
 };
 
@@ -169,8 +169,8 @@ Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
   return {};
 }
 
-/// Causes that a training adds by itself, and that the search cannot see: without any payload the
-/// gears that give way do nothing until the links weigh something. Their own effect is no evidence
+/// Causes that a training adds by itself and that the search cannot see: without a payload,
+/// compliant gears have no effect until the links have a weight. Their own effect is not evidence
 /// of another cause.
 std::vector<const CauseRecord*> added_unseen(const std::shared_ptr<const Cell>& cell,
                                              const std::vector<std::string>& sources,
@@ -208,8 +208,8 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell,
   return result;
 }
 
-/// Where all rows together lead to no arm: takes those out that fit none on which the others agree,
-/// as a training does, and lists them. Whether there are any.
+/// If no arm fits all rows together, removes the rows that fit no arm on which the others agree, as
+/// a training does, and lists them as suspects. Returns true if there are any.
 bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, const Error& refusal,
                PreparedBatch& prepared, Diagnosis& diagnosis) {
   const std::vector<std::string> sources = sources_of(*cell, placed);
@@ -235,7 +235,7 @@ bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, co
   return true;
 }
 
-/// Tells what changed on the arm between two sessions, and on what that rests.
+/// Reports the changes on the arm between sessions, and whether they rest on an unknown order.
 void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
   const CalibrationResult& by = placed.calibration;
   diagnosis.between_sessions = session_changes(
@@ -244,7 +244,8 @@ void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
     diagnosis.limits.push_back(std::move(*order));
 }
 
-/// The changes that are no findings: what the search has no cause for, or did not name.
+/// The changes that are not findings, because the search has no cause for them or did not name
+/// them.
 std::string told_of_sessions(const Diagnosis& diagnosis) {
   std::string text;
   for (const SessionChange& change : diagnosis.between_sessions) {
@@ -258,8 +259,8 @@ std::string told_of_sessions(const Diagnosis& diagnosis) {
   return text;
 }
 
-/// The sentence about what began in the middle of the batch, where nothing known explains it: too
-/// large for the search, whose effects are held against what is left.
+/// The sentence about a jump in the middle of the batch, if no known cause explains it. Such a jump
+/// is too large for the search, which judges effects against the remaining residual.
 std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                          const Diagnosis& diagnosis) {
   if (diagnosis.verdict != Verdict::kUnknown) return "";
@@ -271,7 +272,7 @@ std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedB
       in_words(*jump));
 }
 
-/// Tells what was done to which files.
+/// Records the files and the seed of the diagnosis.
 void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed,
                      Diagnosis& diagnosis) {
   diagnosis.batch_hash = batch.hash();
@@ -279,8 +280,8 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
   diagnosis.seed = seed;
 }
 
-/// `sources`, and all that was found beside them, its name sure or not: what a link would have to
-/// make up for without it is no number of the link.
+/// `sources`, and all causes found beside them, with or without a certain name. Without them, a
+/// link length would absorb their effects.
 std::vector<std::string> with_all_found(std::vector<std::string> sources,
                                         const SearchResult& found) {
   for (const Accepted& one : found.accepted) {
@@ -293,8 +294,8 @@ std::vector<std::string> with_all_found(std::vector<std::string> sources,
   return sources;
 }
 
-/// Where the error of the drawing comes from: by what the cell lists, what was found, and the
-/// geometry in any case.
+/// Reports the origin of the drawing's error, by the cell's sources, the findings, and the geometry
+/// in any case.
 void tell_budget(const std::shared_ptr<const Cell>& cell, const SearchResult& searched,
                  const MeasurementBatch& batch, Diagnosis& diagnosis) {
   std::vector<std::string> sources = with_all_found(with_unknown_frames(*cell), searched);
@@ -312,12 +313,12 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const SearchResult& se
   diagnosis.budget = error_budget(*found, batch, since);
 }
 
-/// The findings of a batch, with all that the rest of its diagnosis is asked of.
+/// The findings of a batch, with the inputs for the rest of its diagnosis.
 struct Answered {
   Placed together;
   PreparedBatch prepared;
   std::unique_ptr<const Explained> explained;
-  Diagnosis diagnosis;  ///< as far as findings and verdict
+  Diagnosis diagnosis;  ///< up to findings and verdict
 };
 
 Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
@@ -351,7 +352,7 @@ Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const Checked
   return all;
 }
 
-/// The sizes from which effects are named: proved in the batch's own residuals, or in simulated
+/// The sizes from which effects are named, proved in the batch's own residuals or in simulated
 /// noise.
 void tell_sizes(const std::shared_ptr<const Cell>& cell, const Explained& explained,
                 const std::vector<FamilyPtr>& families, const PreparedBatch& prepared,

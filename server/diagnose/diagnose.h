@@ -8,10 +8,10 @@
 
 namespace trammel {
 
-/// Shows what `cell`'s error sources do not explain of the training rows of `batch` (checked
-/// against it), names the causes that do, and says what cannot be told. Refuses what calibrate()
-/// does and orientations that do not follow the joints; busy where `options.progress` gives up.
-/// Same batch, cell and seed, same diagnosis.
+/// Finds the part of the training rows of `batch` (checked against `cell`) that the cell's error
+/// sources do not explain, names the causes, and states what the data cannot tell. Refuses the same
+/// as calibrate(), and orientations that do not follow the joints. Returns busy if
+/// `options.progress` gives up. Same batch, cell and seed give the same diagnosis.
 [[nodiscard]] Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell,
                                          const CheckedBatch& batch, const DiagnoseOptions& options);
 

@@ -1,32 +1,32 @@
-// Batch triage. The model: a measured pose, six numbers or three of a position alone, differs from
-// what the model in force predicts by
+// Batch triage. The model: a measured pose (six numbers, or three for a position alone) differs
+// from the prediction of the model in force by
 //
 //   r_i = J_i delta + A_i theta + e_i,    delta ~ N(0, C),    e_i ~ N(0, S_i),
 //
-// with delta what calibration left uncertain of the model's own parameters (C is its posterior
-// covariance), S_i the variance that the model expects of this very pose (measurement, learned
-// bias, discrepancy; not below what its own held-out poses showed, of positions and of
-// orientations), and theta what one alternative sets free: six numbers of the base, six of the
-// tool, four of the payload, one zero of a joint, or all that the model knows of the arm. Every
-// alternative is fitted in full (the sources' exact derivatives, Gauss-Newton) and scored by
+// Here delta is the error that calibration left in the model's own parameters (C is its posterior
+// covariance). S_i is the variance that the model expects of this very pose (measurement, learned
+// bias, discrepancy; at least that of its own held-out poses, for positions and for orientations).
+// theta has the parameters that one alternative frees: six numbers of the base, six of the tool,
+// four of the payload, one zero of a joint, or all parameters of the arm. Every alternative is
+// fitted in full (the sources' exact derivatives, Gauss-Newton) and scored by
 //
 //   sum_i min(|S_i^-1/2 r_i|^2, c_i) + delta' C^-1 delta + k log m,    c_i = m_i log m + 2 log n,
 //
-// m_i numbers of pose i and m of all:
-// minus twice the log likelihood with Schwarz's price for the k directions of theta that the poses
-// show. A pose that costs more than c_i is cheaper as one with m_i free numbers of its own: a
-// single bad pose, chosen among n.
+// where m_i is the count of numbers of pose i, and m that of all. The score is minus twice the log
+// likelihood with Schwarz's price for the k directions of theta that the poses show. A pose that
+// costs more than c_i is cheaper with m_i free numbers of its own: it is a single bad pose, chosen
+// among n.
 //
-// An alternative *explains* the batch by its inliers' chi^2, not by its rank among alternatives;
-// among those that explain it the lowest score wins, and whatever comes within kDoubt of it could
-// be it as well. Simple stories come first: one cause; then one cause while the tracker stands
-// elsewhere, as it does whenever it was set up again; then one cause that begins in the middle of
+// An alternative *explains* the batch by the chi^2 of its inliers, not by its rank among
+// alternatives. Among those that explain it the lowest score wins, and every other within kDoubt of
+// it counts as possible as well. Simple alternatives come first: one cause; then one cause while
+// the tracker stands elsewhere, as after every set-up; then one cause that begins in the middle of
 // the batch.
 //
-// The limits of what is identifiable: a turned base is a slipped joint 1 (both turn about its
-// axis), a shifted tool is the last link; the payload shows through compliance only and is no
-// alternative where the model has none. A tool that is turned about its own point shows in the
-// orientations alone; a model that never saw one says nothing of them.
+// Limits of what is identifiable: a turned base equals a slipped joint 1 (both turn about its
+// axis), and a shifted tool equals the last link. The payload shows through compliance only, so it
+// is no alternative for a model without compliance. A tool that is turned about its own point shows
+// in the orientations alone; a model that never saw an orientation cannot judge it.
 #include "server/diagnose/triage.h"
 
 #include <algorithm>
@@ -91,7 +91,7 @@ class Judge {
       keep({std::move(one), std::move(fit)});
     }
   }
-  /// Causes that begin at a pose: where on a grid they fit best, then nearer.
+  /// Tries causes that begin at a pose: first on a grid, then near the best place.
   void try_steps() {
     const int n = comparison_.poses();
     const std::size_t kinds = alternatives_.from(1, "").size();
@@ -122,15 +122,15 @@ class Judge {
     return comparison_.batch().measurements[static_cast<std::size_t>(pose)].pose_id;
   }
 
-  /// The fit that the best alternative is to be held against: where the tracker stands elsewhere
-  /// too, that alone.
+  /// The fit against which the best alternative is judged: if the tracker stands elsewhere too, the
+  /// fit with that alone.
   [[nodiscard]] Fit without_the_cause(const Tried& none, const Alternative& best) const;
   [[nodiscard]] Triage told(const Tried& none) const;
   [[nodiscard]] std::string sentence(const Triage& triage) const;
 
   const Comparison& comparison_;
   const Alternatives& alternatives_;
-  std::vector<Tried> tried_;  // that explain the batch
+  std::vector<Tried> tried_;  // alternatives that explain the batch
 };
 
 Fit Judge::without_the_cause(const Tried& none, const Alternative& best) const {

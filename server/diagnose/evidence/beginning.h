@@ -12,9 +12,9 @@ namespace trammel::cause_search {
 constexpr double kBeginning95 = 7.35;
 
 /// Places in the batch, ascending, at which a step may have begun, with 95 % confidence. `found`,
-/// where it was found, is always among them. `always` (R x m, whitened, per prior): the step as if
-/// it acted at all poses. `data` (R): what is left when everything but the step is taken off.
-/// `rest`: all that is free beside it.
+/// the place where it was found, is always among them. `always` (R x m, whitened, per prior): the
+/// step as if it acted at all poses. `data` (R): the residual without any effect but the step.
+/// `rest`: all free columns beside it.
 [[nodiscard]] std::vector<Eigen::Index> possible_beginnings(const LinearProblem& problem,
                                                             const Eigen::MatrixXd& always,
                                                             const Background& rest,

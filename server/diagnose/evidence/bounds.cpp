@@ -25,8 +25,8 @@ std::vector<const Parameter*> parameters_at(const LinearProblem& problem,
   return all;
 }
 
-/// The lower bound of each number in units of its prior; minus infinity where it has none, or says
-/// only where an effect is.
+/// The lower bound of each number in units of its prior. It is minus infinity if the number has
+/// none, or if the number only gives the place of an effect.
 VectorXd bounds_of(const std::vector<const Parameter*>& parameters) {
   VectorXd bounds(static_cast<Index>(parameters.size()));
   for (Index k = 0; k < bounds.size(); ++k) {
@@ -37,8 +37,8 @@ VectorXd bounds_of(const std::vector<const Parameter*>& parameters) {
   return bounds;
 }
 
-/// The numbers nearest to the estimate, by its precision, of which none is below its bound: one
-/// after the other.
+/// The numbers nearest to the estimate, in the metric of its precision, with none below its bound,
+/// found one after the other.
 VectorXd nearest_within(const OwnEstimate& own, const VectorXd& bounds) {
   VectorXd x = own.size.cwiseMax(bounds);
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -50,8 +50,8 @@ VectorXd nearest_within(const OwnEstimate& own, const VectorXd& bounds) {
   return x;
 }
 
-/// The circumstances with which an effect of the cause changes. `joints`: 1-based, whose numbers
-/// are beyond their bounds.
+/// The circumstances with which an effect of the cause changes. `joints`: the joints with numbers
+/// beyond their bounds, 1-based.
 std::vector<std::string> circumstances_of(const CauseRecord& record,
                                           const std::vector<int>& joints) {
   if (record.gives_way) return {"torque"};
@@ -64,8 +64,8 @@ std::vector<std::string> circumstances_of(const CauseRecord& record,
   return on;
 }
 
-/// The joint of a number that is a joint's: `early3`. That of the cause where it has one, 0 where
-/// neither has.
+/// The joint to which a number belongs: `early3`. Otherwise the joint of the cause, or 0 if there
+/// is none.
 int joint_of(const Parameter& parameter, const Cause& cause) {
   if (cause.joint >= 0) return cause.joint + 1;
   const std::size_t end = parameter.name.find_last_not_of("0123456789") + 1;

@@ -6,23 +6,24 @@
 #include "server/diagnose/diagnosis.h"
 #include "server/diagnose/evidence/effect.h"
 
-/// The bounds of a cause's numbers (Parameter::lower) are part of its name. Friction that takes a
-/// joint too far, a gear that lifts its load are not those causes, however well they fit. Play has
+/// The bounds of a cause's numbers (Parameter::lower) are part of its meaning. Friction that takes
+/// a joint too far, or a gear that lifts its load, is another cause, however well it fits. Play has
 /// a rule of its own (play_sign.h).
 namespace trammel::cause_search {
 
 /// A cause whose numbers came out beyond their bounds.
 struct WrongSign {
   Cause cause;
-  std::vector<Estimate> numbers;        ///< those beyond their bounds, each by itself beyond chance
-  std::vector<std::string> depends_on;  ///< what the effect changes with: `q2`, `dir2`, `torque`
-  double strength = 0;                  ///< of all numbers as they came out
-  double lost = 0;                      ///< what of it goes where no number is beyond its bound
+  std::vector<Estimate> numbers;        ///< those beyond their bounds, each beyond chance by itself
+  std::vector<std::string> depends_on;  ///< quantities that change the effect: `q2`, `dir2`,
+                                        ///< `torque`
+  double strength = 0;                  ///< of all numbers, unrestricted
+  double lost = 0;                      ///< the part of its strength that is lost within the bounds
 
   /// More numbers, or larger ones, are beyond their bounds than chance and the shape of real causes
   /// make.
   [[nodiscard]] bool is_beyond_chance() const;
-  /// Most of what the cause would explain needs numbers that it cannot have.
+  /// Most of the explained effect needs numbers that the cause cannot have.
   [[nodiscard]] bool is_another_cause() const;
 };
 

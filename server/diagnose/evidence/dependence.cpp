@@ -67,7 +67,7 @@ std::vector<double> spectrum(const MatrixXd& centred) {
 /// The upper tail of sum w_k z_k^2, z_k standard normal: saddlepoint, after Lugannani and Rice.
 class WeightedChiSquare {
  public:
-  /// The weights are the products of one number of each.
+  /// The weights are all products of a number of `one` and a number of `other`.
   WeightedChiSquare(const std::vector<double>& one, const std::vector<double>& other)
       : largest_(one.front() * other.front()) {
     for (const double a : one) {
@@ -92,7 +92,7 @@ class WeightedChiSquare {
   }
 
  private:
-  /// Where the slope of the cumulant is x.
+  /// The point at which the slope of the cumulant is x.
   double saddlepoint(double x) const {
     double low = 0;
     double high = 0.5 / largest_;
@@ -138,8 +138,8 @@ double p_value_in_tail(const MatrixXd& a, const MatrixXd& b, double observed, do
   return std::max(kLeastPValue, share * std::exp(std::min(0.0, beyond)));
 }
 
-/// The p-value of two centred distance matrices: the share of permutations that are as large, or
-/// its tail where too few are.
+/// The p-value of two centred distance matrices: the share of permutations with at least this
+/// covariance, or the tail estimate if there are too few.
 double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Index> order(static_cast<std::size_t>(a.rows()));
@@ -158,8 +158,8 @@ double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   return p_value_in_tail(a, b, observed, drawn[kAsLarge - 1]);
 }
 
-/// N x 3: the positions of `poses` in S⁻¹ y, scaled to unit covariance of each if there is nothing
-/// but noise. The covariance of S⁻¹ y is S⁻¹ = 1 - U Uᵀ.
+/// N x 3: the positions of `poses` in S⁻¹ y, scaled to unit covariance for pure noise. The
+/// covariance of S⁻¹ y is S⁻¹ = 1 - U Uᵀ.
 MatrixXd standardised(const LinearProblem& problem, const Background& background,
                       const VectorXd& left, const std::vector<Index>& poses) {
   MatrixXd rows(static_cast<Index>(poses.size()), 3);

@@ -51,7 +51,7 @@ OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source
   OwnEstimate own{VectorXd(change(places)), Eigen::MatrixXd(covariance(places, places))};
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Parameter& parameter = problem.nuisance_parameters()[static_cast<std::size_t>(places[k])];
-    // An order says where an oscillation is, not how large.
+    // An order gives the place of an oscillation, not its size.
     if (parameter.is_place) {
       own.size(static_cast<Index>(k)) = 0;
     } else {

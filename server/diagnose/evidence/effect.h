@@ -6,10 +6,10 @@
 
 namespace trammel::cause_search {
 
-/// `model` without the source of that name.
+/// `model` without the source of this name.
 [[nodiscard]] PhysicalModel without_source(const PhysicalModel& model, const std::string& source);
 
-/// R: what the source of that name does to the poses in the problem's model, whitened.
+/// R: the whitened effect of that source on the poses in the problem's model.
 [[nodiscard]] Eigen::VectorXd effect_of_source(const LinearProblem& problem,
                                                const std::string& source);
 
@@ -19,8 +19,8 @@ namespace trammel::cause_search {
 
 /// The parameters of one source in a joint estimate, in units of priors.
 struct OwnEstimate {
-  Eigen::VectorXd
-      size;  ///< their values; 0 for an order, which says where an oscillation is and not how large
+  Eigen::VectorXd size;  ///< their values; 0 for an order, which gives the place of an oscillation
+                         ///< and not its size
   Eigen::MatrixXd
       precision;  ///< the inverse of their covariance with everything else free, priors included
   [[nodiscard]] double strength() const { return size.dot(precision * size); }

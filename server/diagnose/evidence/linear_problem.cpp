@@ -22,11 +22,11 @@ constexpr double kCut =
     3;  // standard deviations, beyond which a row's size no longer counts in the noise
 constexpr double kMeanBelowCut = 0.9950;  // of min(z^2, kCut^2), z standard normal
 constexpr double kLeastFreedom =
-    0.05;                      // share that a fit is taken to leave, however many parameters it has
-constexpr int kHalvings = 60;  // of an interval: all that a double can hold
+    0.05;  // smallest assumed share of freedom, however many parameters a fit has
+constexpr int kHalvings = 60;  // of an interval: the full precision of a double
 
-/// The surplus s at which the rows' squares, cut off at kCut, average to what white noise has,
-/// given the share of freedom that the fit leaves. Zero where there is none.
+/// The surplus s at which the mean of the rows' squares, cut off at kCut, is that of white noise,
+/// given the share of freedom that the fit leaves. Zero if there is no surplus.
 double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double share) {
   const double wanted = kMeanBelowCut * share * static_cast<double>(residual.size());
   const auto excess = [&](double s) {
@@ -43,7 +43,7 @@ double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double sh
   return high;
 }
 
-/// The source that `spec` names, if this model can have it beside its own.
+/// The source that `spec` names, if this model can have it in addition to its own.
 Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& model) {
   Result<ErrorSourcePtr> source = make_error_source(spec, *model.cell);
   if (!source) return source;
@@ -64,8 +64,8 @@ Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
   return first;
 }
 
-/// Adds `source` so that it does nothing yet. What is expected of some is not nothing (the weight
-/// of the links).
+/// Adds `source` with no effect yet. A source with an expected effect (the weight of the links)
+/// starts with that effect.
 void add_at_zero(PhysicalModel& model, const ErrorSourcePtr& source,
                  const MeasurementBatch& batch) {
   const Pose without = model.pose_W(batch.measurements.front().context);
@@ -84,7 +84,7 @@ VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
   return distance;
 }
 
-/// `nuisance`: what the parameters do, SI, in units of their `scales`. `sigma`: of each row.
+/// `nuisance`: the effects of the parameters, SI, in units of their `scales`. `sigma`: of each row.
 LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance,
                                     const VectorXd& scales, const VectorXd& sigma) {
   MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
@@ -108,7 +108,7 @@ VectorXd scales_of(const std::vector<Parameter>& parameters) {
   return scales;
 }
 
-/// The model with every wanted source in it, each at zero: then none changes what another does.
+/// The model with every wanted source at zero, so that no source changes the effect of another.
 struct LinearProblem::Extended {
   PhysicalModel model;
   std::vector<Index> joints;   // place of each joint's own angle among the parameters
@@ -204,8 +204,8 @@ VectorXd LinearProblem::residual_of(const PhysicalModel& model) const {
   return residual.cwiseProduct(weight_);
 }
 
-/// From what was measured to rows of unit variance: adds to every standard deviation what is left
-/// beyond it, and divides by it.
+/// Scales the measurements to rows of unit variance: adds the surplus to every standard deviation,
+/// and divides by it.
 void LinearProblem::whiten(Weighed weighed) {
   std::vector<Index> position, rotation;
   for (Index i = 0; i < poses(); ++i) {
@@ -213,8 +213,7 @@ void LinearProblem::whiten(Weighed weighed) {
       (k < 3 ? position : rotation).push_back(first_row(i) + k);
   }
   const VectorXd scales = scales_of(priors_);
-  // The noise is what no parameter explains, whether the model stands at its best fit already or
-  // not.
+  // Noise is the part that no parameter explains, whether or not the model is at its best fit.
   const Leftover left = leftover_of(residual_, nuisance_, scales, sigma_);
   const auto surplus_of = [&](const std::vector<Index>& rows) {
     return weighed == Weighed::kAsStated
@@ -235,8 +234,8 @@ void LinearProblem::whiten(Weighed weighed) {
   }
 }
 
-/// Weighs `rows` by their stated standard deviation with `surplus` (SI) on top. `share`: of freedom
-/// that the fit leaves.
+/// Weighs `rows` by their stated standard deviation plus `surplus` (SI). `share`: the share of
+/// freedom that remains after the fit.
 LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, double surplus,
                                            double share) {
   if (rows.empty()) return {};
@@ -251,8 +250,8 @@ LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, doubl
   return {std::sqrt(sum / count), stated, share * count};
 }
 
-/// Weighs positions at one joint vector as one pose as far as their means are off by more than
-/// chance makes of what is left of each (design effect), and counts their freedom so.
+/// Weights positions at one joint vector as one pose, as far as their means are off by more than
+/// the scatter of single rows suggests (design effect), and counts their freedom accordingly.
 void LinearProblem::weigh_together(const Leftover& left) {
   const std::vector<PoseGroup> groups = groups_seen_together(*batch_);
   if (std::ssize(groups) == poses()) return;
@@ -280,7 +279,7 @@ void LinearProblem::weigh_together(const Leftover& left) {
     for (const Index i : group) {
       auto weight = weight_.segment<3>(first_row(i));
       const auto own = sigma_.segment<3>(first_row(i));
-      // No more than if all that is left were shared.
+      // The sigma rises at most to its value if the poses of a group shared the whole residual.
       const Vector3 most = std::sqrt(count) * weight.cwiseInverse();
       const Vector3 together = (own.array().square() + count * of_pose * of_pose).sqrt();
       if (group.size() > 1)

@@ -10,14 +10,14 @@ namespace trammel::cause_search {
 
 /// A candidate's effect on the poses: one column a parameter, in units of its prior.
 struct Effect {
-  std::string source;                 ///< as a cell file spells it
+  std::string source;                 ///< in the spelling of a cell file
   std::vector<Parameter> parameters;  ///< one a column
   Eigen::MatrixXd columns;            ///< R x m, whitened
 };
 
-/// By what a row's residual is weighed.
+/// The standard deviation by which a row's residual is weighted.
 enum class Weighed {
-  kByWhatIsLeft,  ///< the noise that is stated, and what is left beyond it
+  kByWhatIsLeft,  ///< the stated noise, and the surplus of the residual
   kAsStated
 };
 
@@ -26,10 +26,10 @@ enum class Weighed {
 /// has unit variance.
 class LinearProblem {
  public:
-  /// The noise is that of the measurement and, on top, a robust estimate of what is left beyond it,
-  /// whatever its reason: as long as something large is unexplained, nothing small is claimed.
-  /// `further` names sources whose effect is wanted too; those that the cell or the model cannot
-  /// have are left out. `batch` outlives the problem.
+  /// The noise is that of the measurement plus a robust estimate of the surplus in the residual,
+  /// whatever its cause: as long as something large is unexplained, no small effect is claimed.
+  /// `further` names additional sources with a wanted effect. Sources that the cell or the model
+  /// cannot have are left out. `batch` outlives the problem.
   LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
                 const std::vector<Parameter>& priors, const std::vector<std::string>& further,
                 Weighed weighed = Weighed::kByWhatIsLeft);
@@ -47,7 +47,7 @@ class LinearProblem {
 
   [[nodiscard]] const PhysicalModel& model() const { return model_; }
   [[nodiscard]] const MeasurementBatch& batch() const { return *batch_; }
-  /// n: of the gears at that pose (Chain::gear_angles), which causes of joints act on.
+  /// n: the gear angles at that pose (Chain::gear_angles), on which causes of joints act.
   [[nodiscard]] JointVector gear_angles(Eigen::Index pose) const {
     return model_.cell->robot.gear_angles(
         batch_->measurements[static_cast<std::size_t>(pose)].context.q);
@@ -56,15 +56,15 @@ class LinearProblem {
   [[nodiscard]] const Eigen::VectorXd& residual() const { return residual_; }
   /// R: measured - `model`, by the same weights.
   [[nodiscard]] Eigen::VectorXd residual_of(const PhysicalModel& model) const;
-  /// R x P: what the model's own parameters do, whitened, a column per prior scale.
+  /// R x P: the whitened effects of the model's own parameters, a column per prior scale.
   [[nodiscard]] const Eigen::MatrixXd& nuisance() const { return nuisance_; }
   [[nodiscard]] const std::vector<Parameter>& nuisance_parameters() const { return priors_; }
   /// The wanted sources, in the order of `further`.
   [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
-  /// R x n: what one radian (metre) of each joint's gear does, whitened.
+  /// R x n: the whitened effect of one radian (metre) of each joint's gear.
   [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
   /// R: 1 / standard deviation of each row, in 1/m and 1/rad. Positions at one joint vector weigh
-  /// together as one pose as far as they share what is left.
+  /// as one pose, as far as they share their residual.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
   /// m per axis: noise of a typical position, whatever its reason. A root mean square.
   [[nodiscard]] double noise() const { return position_.noise; }
@@ -77,8 +77,8 @@ class LinearProblem {
     double freedom =
         0;  ///< 0 where none were measured; positions of a pose that share an error count as fewer
   };
-  /// The rest of the residual (SI) beside the model's own parameters, and the share of freedom
-  /// that they leave.
+  /// The part of the residual (SI) that the model's own parameters leave, and the share of freedom
+  /// left.
   struct Leftover {
     Eigen::VectorXd residual;
     double share = 1;
@@ -108,7 +108,7 @@ class LinearProblem {
   std::vector<Eigen::Index> first_row_;
   Eigen::VectorXd residual_;
   Eigen::VectorXd sigma_;   // as stated, m and rad
-  Eigen::VectorXd weight_;  // 1 / standard deviation with what is left beyond the stated one
+  Eigen::VectorXd weight_;  // 1 / standard deviation including the surplus
   Eigen::MatrixXd nuisance_, by_joint_;
   std::vector<Effect> effects_;
   Spread position_, rotation_;

@@ -5,16 +5,16 @@
 
 #include "server/diagnose/evidence/linear_problem.h"
 
-/// The sign of play. A joint with play hangs back from where its motor is: after moving up it lies
-/// below. So the play b + k |tau| is positive by definition (backlash.cpp). With the other sign the
-/// joint goes beyond where it was sent, which no gap between teeth does.
+/// The sign of play. A joint with play lags behind its motor: after moving up it is too low. So the
+/// play b + k |tau| is positive by definition (backlash.cpp). With the other sign the joint would
+/// go beyond its command, which no gap between teeth does.
 namespace trammel::cause_search {
 
 /// Play of one joint over the poses that were approached from a known side.
 struct PlaySign {
   int joint = 0;
   double mean = 0, stddev = 0;  ///< rad: of b + k |tau| over those poses
-  bool negative = false;        ///< beyond chance, in the mean or at a quarter of those poses
+  bool negative = false;        ///< beyond chance, on average or at a quarter of those poses
 };
 
 /// The play of `joint`, which the model has as `source`. `change`, `covariance`: the joint estimate

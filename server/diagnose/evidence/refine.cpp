@@ -16,14 +16,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 5;   // of Gauss and Newton; one and a chord settle what is nearly linear
+constexpr int kMostSteps = 5;   // of Gauss-Newton; one and a chord are enough for a nearly linear
+                                // problem
 constexpr int kMostChords = 4;  // steps by one derivative
 constexpr double kStraight =
-    1;  // standard deviations, of all rows together: what a derivative may mistake
+    1;  // standard deviations, of all rows together: the tolerated error of a derivative
 constexpr double kSettled =
     0.05;  // standard deviations, of all parameters together: a step that changes no result
 
-/// The distance of each parameter from its prior, in units of it.
+/// The distance of each parameter from its prior, in prior units.
 VectorXd from_prior(const PriorModel& at) {
   VectorXd distance(at.model.values.size());
   for (Index k = 0; k < distance.size(); ++k) {
@@ -40,8 +41,8 @@ struct NormalEquation {
   VectorXd right;
 };
 
-/// The step that lowers the sum of squares most and takes every parameter that is `held` to its
-/// bound: `room` from where it stands, at any price.
+/// The step that lowers the sum of squares most and moves every `held` parameter exactly to its
+/// bound, which is `room` away.
 VectorXd step_to_bounds(const NormalEquation& equation, const std::vector<bool>& held,
                         const VectorXd& room) {
   MatrixXd left = equation.information;
@@ -70,9 +71,9 @@ VectorXd room_of(const PriorModel& at) {
   return room;
 }
 
-/// The step that lowers the sum of squares most without leaving a parameter below its bound. What
-/// would go beyond stops there, and everything else is solved for anew: a step that is cut off
-/// afterwards leaves the others where they made up for what was cut.
+/// The step that lowers the sum of squares most without any parameter below its bound. Parameters
+/// that would go beyond stop at the bound, and all others are solved anew. Cutting the step
+/// afterwards would leave the others compensating for the part that was cut.
 VectorXd bounded_step(const PriorModel& at, const NormalEquation& equation) {
   VectorXd step = equation.inverse_factor.transpose() * (equation.inverse_factor * equation.right);
   const VectorXd room = room_of(at);

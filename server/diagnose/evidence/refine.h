@@ -6,13 +6,13 @@
 
 namespace trammel::cause_search {
 
-/// An anonymous function that explains what no named cause does.
+/// An anonymous function for an effect that no named cause explains.
 struct Unnamed {
   std::vector<std::string> depends_on;  ///< `q4`, `time`
   Eigen::MatrixXd columns;  ///< R x m over the poses that are not out, SI, of the fitted size
   double score = 0;         ///< nat
   double p_value = 1;
-  std::string wanderer = {};  ///< what moves slowly, for people, where it says no more than that
+  std::string wanderer = {};  ///< the slowly moving part, for people, if nothing more is known
 };
 
 /// All columns of a background, whitened, R x p: the model's own parameters, then the anonymous
@@ -29,13 +29,13 @@ struct PriorModel {
 /// Adds the source that `spec` names (in its first form), at its prior. Refused as
 /// make_error_source().
 [[nodiscard]] Status add_to(PriorModel& prior_model, const std::string& spec);
-/// Takes the source of that name out.
+/// Removes the source of that name.
 void remove_from(PriorModel& prior_model, const std::string& source);
 
-/// Identifies all parameters anew, from where they stand, beside the anonymous functions:
-/// Gauss-Newton on the whitened rows, maximum a posteriori. Weighed by what is left, an effect that
-/// is much larger than its prior can stay where it was: it is noise itself, beside which its prior
-/// weighs more. Weighed as stated, it comes to where the data want it.
+/// Identifies all parameters anew from their present values, beside the anonymous functions:
+/// Gauss-Newton on the whitened rows, maximum a posteriori. If the weights include the surplus, an
+/// effect much larger than its prior may not move: the effect itself counts as noise, and its prior
+/// outweighs the data. With the stated weights it moves to the value that the data support.
 void refine(PriorModel& prior_model, const MeasurementBatch& batch,
             const std::vector<Unnamed>& unnamed, Weighed weighed = Weighed::kByWhatIsLeft);
 

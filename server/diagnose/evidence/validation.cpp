@@ -15,11 +15,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFarthest =
-    400;  // of chi-square: beyond it no chance is left that a double tells from 0
-constexpr int kChanceHalvings = 60;  // of an interval: all that a double can hold
+constexpr double kFarthest = 400;    // of chi-square: beyond it the chance is 0 in double precision
+constexpr int kChanceHalvings = 60;  // of an interval: the full precision of a double
 
-/// The value that chi-square of three degrees of freedom exceeds with that chance.
+/// The quantile of chi-square with three degrees of freedom that is exceeded with that chance.
 double chi_square_3(double chance) {
   const auto beyond = [](double x) {
     return std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);

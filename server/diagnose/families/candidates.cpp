@@ -84,8 +84,8 @@ std::string lacking(const ContextNeeds& needs, const Cell& cell, const Measureme
   return "";
 }
 
-/// Each cause with each joint that it may be of (-1 where it is of none), in the order of looking:
-/// causes of a joint that follow one another in the catalogue are taken joint by joint.
+/// Each cause with each of its possible joints (-1 for a cause without joint), in the order of the
+/// search: consecutive causes of a joint in the catalogue are taken joint by joint.
 template <typename Take>
 void for_each_cause(const Chain& robot, const Take& take) {
   const std::vector<const CauseRecord*> all = all_causes();
@@ -107,7 +107,7 @@ void for_each_cause(const Chain& robot, const Take& take) {
   }
 }
 
-/// As a list of error sources spells it, without the pose at which it begins.
+/// The spelling in a list of error sources, without the first pose.
 std::string spelled(const CauseRecord& record, int joint) {
   return to_string(cause_at(record, joint));
 }
@@ -129,7 +129,7 @@ const Effect* effect_of(const LinearProblem& problem, std::string_view source) {
   return found == problem.effects().end() ? nullptr : &*found;
 }
 
-/// nat: how much less it is to be expected while a simpler cause is not in the model.
+/// nat: by how much the cause is less expected while the model lacks a simpler cause.
 double surprise_of(const CauseRecord& record, const LinearProblem& problem) {
   double surprise = 0;
   for (const causes::Rival& rival : record.rivals) {
@@ -139,7 +139,7 @@ double surprise_of(const CauseRecord& record, const LinearProblem& problem) {
   return surprise;
 }
 
-/// R: what the whole arm growing by kPriorOfSize does, whitened: everything moves away from the
+/// R: the whitened effect of the whole arm growing by kPriorOfSize: everything moves away from the
 /// base.
 VectorXd size_of_arm(const LinearProblem& problem) {
   VectorXd column = VectorXd::Zero(problem.rows());
@@ -242,7 +242,7 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
       if (make_error_source(spec, cell)) sources.push_back(spec);
       return;
     }
-    // That nothing is carried is said once, of the payload itself.
+    // An absent payload is reported once, for the payload itself.
     const bool said_elsewhere = record.needs.payload && (record.part != Part::kPayload);
     if (unseen != nullptr && !said_elsewhere)
       unseen->push_back({cause_at(record, joint), 0, {}, {}, lacks});
@@ -262,7 +262,7 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
   const Chain& robot = problem.model().cell->robot;
   Families families(problem);
   for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add(record, joint); });
-  // Along such a path a lag goes on as smoothly.
+  // Along such a path a lag continues just as smoothly.
   if (!is_path_without_times(problem.batch())) {
     for_each_cause(robot,
                    [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });

@@ -7,9 +7,9 @@
 
 namespace trammel::cause_search {
 
-/// The error sources whose effect on the poses is wanted: all that `cell` can have and `batch` can
-/// show. What a batch does not record rules causes out: those are added to `unseen`, with what they
-/// would need.
+/// The error sources whose effect on the poses is needed: all that `cell` can have and `batch` can
+/// show. Causes that the batch rules out by a missing quantity are added to `unseen`, with that
+/// quantity.
 [[nodiscard]] std::vector<std::string> candidate_sources(const Cell& cell,
                                                          const MeasurementBatch& batch,
                                                          std::vector<Unseen>* unseen);
@@ -18,9 +18,9 @@ namespace trammel::cause_search {
 /// nobody recorded when.
 [[nodiscard]] bool is_path_without_times(const MeasurementBatch& batch);
 
-/// Every cause that may be lacking, and its anonymous rivals: a smooth function of each joint, of
-/// each pair of joints and of time, and what moves slowly. `problem` was made with
-/// candidate_sources() and outlives them.
+/// Every cause that may be missing, and its anonymous rivals: smooth functions of each joint, of
+/// each pair of joints and of time, and slow motions. `problem` was made with candidate_sources()
+/// and outlives them.
 [[nodiscard]] std::vector<FamilyPtr> make_families(const LinearProblem& problem);
 
 /// True if the model has a source of that cause and joint.

@@ -80,7 +80,7 @@ class FixedFamily : public Family {
     const MatrixXd shared = transposed_product(view.background.root(), C);
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C -
                                                         shared.transpose() * shared);
-    // Directions that at their prior's size change less than the noise cannot be told from none.
+    // Directions that change less than the noise at their prior's size are invisible.
     Index hidden = 0;
     while (hidden < C.cols() && eigen.eigenvalues()(hidden) < 1) ++hidden;
     const Index seen = C.cols() - hidden;
@@ -115,8 +115,7 @@ class AttitudeFamily final : public FixedFamily {
   std::vector<std::string> depends_on() const override { return {kAttitude}; }
 };
 
-/// The motion of the tool along each of its axes where gravity has a part along each of them: nine
-/// columns.
+/// The motion of the tool along each of its axes, for gravity along each of them: nine columns.
 MatrixXd sags(const LinearProblem& problem) {
   const PhysicalModel& model = problem.model();
   MatrixXd columns = MatrixXd::Zero(problem.rows(), 9);

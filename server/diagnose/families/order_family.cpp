@@ -16,15 +16,15 @@ using Eigen::VectorXd;
 
 constexpr double kAmplitude = 1e-3;                            // rad, prior: wide, the data choose
 constexpr double kPriorShare = 1 / (kAmplitude * kAmplitude);  // of the information, per rad^2
-constexpr double kLowestOrder = 2;  // below lie eccentricity and geometry
+constexpr double kLowestOrder = 2;  // eccentricity and geometry lie below
 constexpr double kHighestOrder =
     400;  // cycles a joint turn: two waves a motor turn at a ratio of 200
 constexpr double kStep =
-    0.2;  // of what two orders differ by that the joint's range just tells apart
-constexpr double kFineSteps = 5;   // to a coarse one, about the best
+    0.2;  // of the smallest difference between orders that the joint's range resolves
+constexpr double kFineSteps = 5;   // in a coarse step, near the best order
 constexpr Index kFineOrders = 11;  // a coarse step to either side
 constexpr double kOrdersOfMaps =
-    60;  // cycles a joint turn: a map of 48 harmonics takes over what is below
+    60;  // cycles a joint turn: a map of 48 harmonics contains the lower ones
 constexpr double kMostAbsorbed = 0.75;
 constexpr double kSameStep = 1e-6;  // of a step: rounding
 constexpr double kTypicalOrder =
@@ -71,7 +71,8 @@ class OrderFamily final : public Family {
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     const bool one = projected.cols() == 1;
     scan_orders(shares, one ? promising_orders(shares) : all_orders(), best);
-    // Once more about the best of the data itself, which stands in the first column.
+    // Refines once more around the best order for the data themselves. The data are the first
+    // column.
     if (one) {
       const double fine = step_ / kFineSteps;
       const double from = std::max(kLowestOrder, best[0].order - step_);
@@ -109,8 +110,8 @@ class OrderFamily final : public Family {
   struct Waves {
     MatrixXd sine, cosine;
   };
-  /// The waves of `orders`. Where orders are a step apart each comes from the one before, by
-  /// turning it.
+  /// The waves of `orders`. If orders are one step apart, each wave comes from the previous one by
+  /// a rotation.
   Waves waves_of(const VectorXd& orders) const {
     Waves waves{MatrixXd(q_.size(), orders.size()), MatrixXd(q_.size(), orders.size())};
     for (Index k = 0; k < orders.size(); ++k) {
@@ -142,10 +143,10 @@ class OrderFamily final : public Family {
             kPriorShare + cosine.cwiseAbs2().dot(square), sine.cwiseProduct(cosine).dot(square)};
   }
 
-  /// The orders among which the strongest is. What an order would explain if nothing of it were in
-  /// the background is soon computed, and explains no more than it does. Beyond what maps of the
-  /// joint take over, the background makes kMostAbsorbed of a wave at most: what is weaker even so
-  /// is not the strongest.
+  /// The orders among which the strongest one must be. The gain of an order without the background
+  /// is cheap to compute, and the real gain is at most that. Beyond the orders in the joint's maps,
+  /// the background absorbs at most kMostAbsorbed of a wave. An order that is weaker even so is not
+  /// the strongest.
   VectorXd promising_orders(const Shares& shares) const {
     const VectorXd orders = all_orders();
     VectorXd least(orders_);
@@ -197,7 +198,7 @@ class OrderFamily final : public Family {
   const int joint_;
   VectorXd q_;
   double step_ = 0;
-  Waves turn_;  // by one step
+  Waves turn_;  // the rotation by one step
   Index orders_ = 0;
 };
 

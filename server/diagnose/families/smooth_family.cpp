@@ -16,13 +16,12 @@ using Eigen::VectorXd;
 
 constexpr double kBox = 1.2;  // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr Index kFunctionsOfOne = 16;
-constexpr Index kFunctionsOfEach = 7;  // of two
-constexpr Index kSlowFunctions = 8;    // of the time: what is faster is not slow
-constexpr double kLeastTime = 1e-6;    // s
-constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
-constexpr double kTelling =
-    1e-4;                   // of the largest deviation: what a function may have and be left out
-constexpr int kSizes = 17;  // a quarter of a decade apart
+constexpr Index kFunctionsOfEach = 7;                      // of two
+constexpr Index kSlowFunctions = 8;                        // of time: faster functions are not slow
+constexpr double kLeastTime = 1e-6;                        // s
+constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // per turn of the joint, all of one size
+constexpr double kTelling = 1e-4;  // of the largest deviation: functions below this are left out
+constexpr int kSizes = 17;         // a quarter of a decade apart
 constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
 
 /// Angular frequency of a sine of the box.
@@ -112,11 +111,11 @@ class SmoothFamily : public Family {
  protected:
   const LinearProblem& problem_;
   std::vector<VectorXd> g_;           // R each
-  std::vector<std::string> g_names_;  // what each is called among the families
+  std::vector<std::string> g_names_;  // the name of each among the families
   MatrixXd functions_;                // N x k
-  std::size_t looked_for_ = 0;        // how many of the length scales; 0: all
+  std::size_t looked_for_ = 0;        // the number of length scales to search; 0: all
   std::vector<VectorXd>
-      deviations_;  // one for every length scale, of the functions that it takes: the first ones
+      deviations_;  // for each length scale, the deviations of the first functions, which it uses
   double smallest_ = 1e-6;
   double typical_ = 1e-4;
   bool pose_by_pose_ = true;  // g is shared with other families, or there are many functions
@@ -215,7 +214,7 @@ class AnonymousFamily final : public SmoothFamily {
     const Index count = x.size() == 1 ? kFunctionsOfOne : kFunctionsOfEach;
     functions_ = sines(x[0], count);
     if (x.size() == 2) functions_ = products(functions_, sines(x[1], count));
-    // A part that is the same at all poses depends on nothing: a shifted base is no function of a
+    // A part that is equal at all poses depends on nothing: a shifted base is not a function of a
     // joint.
     functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
     for (const double length_scale : {0.2, 0.45, 1.0}) {
@@ -254,7 +253,7 @@ class SlowFamily final : public SmoothFamily {
              const VectorXd& time)
       : SmoothFamily(problem), wanderer_(std::move(wanderer)), joint_(joint) {
     functions_ = sines(time, kSlowFunctions);
-    // Where it stands on average is another cause: a zero, a base.
+    // The mean place belongs to another cause: a zero, a base.
     functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
     for (const double length_scale : {0.3, 0.6, 1.2})
       deviations_.push_back(deviations(kSlowFunctions, length_scale));
@@ -276,8 +275,7 @@ class SlowFamily final : public SmoothFamily {
   int joint_;
 };
 
-/// [-1, 1] over the poses; by the row where not every pose has its time. Empty where no time goes
-/// by.
+/// [-1, 1] over the poses; by the row if some pose has no time. Empty if no time passes.
 VectorXd times_of(const LinearProblem& problem) {
   VectorXd time = VectorXd::LinSpaced(problem.poses(), 0, static_cast<double>(problem.poses() - 1));
   const auto& poses = problem.batch().measurements;

@@ -111,7 +111,7 @@ class PoseFamily final : public Family {
  private:
   static constexpr double kPriorSigmas = 100;
 
-  /// `count` rows of a pose: its position, or all of it.
+  /// `count` rows of a pose: its position, or position and orientation.
   static void consider(const View& view, const MatrixXd& projected, Index pose, Index row,
                        Index count, std::vector<Best>& best) {
     const auto U = view.background.root().middleRows(row, count);

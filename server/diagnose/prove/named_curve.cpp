@@ -15,9 +15,9 @@ constexpr double kWeakestPutIn = 5;
 constexpr double kCoverage = 0.95;
 constexpr Eigen::Index kMiddles = 48;
 constexpr double kWidths[] = {0.1, 0.2, 0.4, 0.8};  // of log strength
-/// Shares named however strong it is; the last one is above kProvedShare. None is 0 or 1: a few
-/// diagnoses in a hundred go either way for a reason of their own. Finer steps would tell a share
-/// of 0.85 from one of 0.95 after a hundred diagnoses only.
+/// Possible shares for very strong effects. The last one is above kProvedShare. None is 0 or 1,
+/// because a few diagnoses in a hundred differ for other reasons. Finer steps are useless: a
+/// hundred diagnoses are needed to distinguish a share of 0.85 from one of 0.95.
 constexpr double kMost[] = {0.005, 0.3, 0.6, 0.8, 0.97};
 
 struct Curve {
@@ -60,7 +60,7 @@ double strength_put_in(Eigen::Index place) {
 }
 
 NamedCurve::NamedCurve() : log_weight_(static_cast<Eigen::Index>(curves().size())) {
-  // Even odds, whatever number of curves of the grid reach kProvedShare.
+  // Even odds, whatever number of curves in the grid reach kProvedShare.
   const auto reaches = [](const Curve& curve) {
     return curve.strength_at(kProvedShare).has_value();
   };

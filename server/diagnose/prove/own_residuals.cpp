@@ -10,7 +10,7 @@ namespace trammel::cause_search {
 
 namespace {
 
-constexpr Eigen::Index kBlocks = 30;  // of a batch: 2^30 draws that differ
+constexpr Eigen::Index kBlocks = 30;  // of a batch: 2^30 different draws
 constexpr double kLeastFreeOfAFit =
     0.05;  // share of freedom, however many parameters the model has
 

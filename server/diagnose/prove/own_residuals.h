@@ -5,12 +5,12 @@
 
 namespace trammel::cause_search {
 
-/// The residuals that the model of a problem leaves of its batch, as noise to draw from. In a draw,
-/// blocks of poses that follow one another keep or change their sign together (wild bootstrap:
-/// Cameron, Gelbach, Miller 2008). So each residual stays at its pose with its size and its
-/// direction, what lasts a few poses lasts, and nothing is left that goes with joints or time. Rows
-/// of one joint vector have one sign. The fit has taken some of the noise; the draws are as much
-/// larger.
+/// The residuals of a problem's batch under its model, as noise to draw from. In a draw, blocks of
+/// poses that follow one another keep or change their sign together (wild bootstrap: Cameron,
+/// Gelbach, Miller 2008). So each residual stays at its pose and keeps its size and its direction.
+/// Correlations over a few poses remain, and dependence on joints or time vanishes. Rows of one
+/// joint vector have one sign. The fit has absorbed a part of the noise, so the draws are scaled up
+/// to the full noise.
 class OwnResiduals {
  public:
   /// `problem` outlives it.
@@ -18,7 +18,7 @@ class OwnResiduals {
 
   /// R, whitened.
   [[nodiscard]] Eigen::VectorXd drawn(SeededRandom& random) const;
-  /// The batch as it would have been measured if `whitened` (R) were what the model leaves over.
+  /// The batch that would have been measured if `whitened` (R) were the residual of the model.
   [[nodiscard]] MeasurementBatch measured(const Eigen::VectorXd& whitened) const;
 
  private:

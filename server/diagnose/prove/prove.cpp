@@ -15,26 +15,26 @@ namespace trammel::cause_search {
 
 namespace {
 
-/// Shares of the curve that are looked for in turn: where it reaches the one that is wanted, and
-/// how steep it is.
+/// The two shares at which the search tries strengths in turn: one at the wanted share, and one
+/// that shows how steep the curve is.
 constexpr double kSharesTried[] = {kProvedShare, kProvedShare, 0.5};
-constexpr double kCloseEnough = 1.3;  // upper to lower bound of a size: 15 % to either side
+constexpr double kCloseEnough = 1.3;  // upper to lower bound of a size: 15 % in either direction
 constexpr double kSureOfNever = 0.975;
 constexpr double kLowestOrderPutIn = 8;  // cycles a joint turn, as harmonic and strain wave gears
 constexpr double kHighestOrderPutIn = 100;
 constexpr double kEarliestPutIn = 0.2;  // share of the poses after which something begins
-constexpr int kDrawsOfAnEffect = 20;    // until one stands out of what the model absorbs
+constexpr int kDrawsOfAnEffect = 20;    // until one exceeds the part that the model absorbs
 
-/// The answer of a diagnosis about an effect that was put in.
+/// The result of a diagnosis of an added effect.
 struct Said {
   bool found = false, named = false, misnamed = false, refused = false;
 };
 
-/// A cause on its way to a proof.
+/// A cause during its proof.
 struct CauseTried {
   const Family* family = nullptr;
   const Unseen* predicted = nullptr;
-  std::vector<bool> positive;  ///< which of its numbers cannot be below zero
+  std::vector<bool> positive;  ///< its numbers that cannot be negative
   NamedCurve curve;
   std::array<PutIn, kStrengthsPutIn> sizes = {};
 
@@ -48,16 +48,16 @@ struct CauseTried {
   }
 };
 
-/// An effect as it was drawn.
+/// An effect that was drawn.
 struct Drawn {
   Cause cause;             ///< with its order, and the pose at which it begins
   Eigen::VectorXd effect;  ///< R, whitened
 };
 
-/// One diagnosis to make. Nothing is put in where there is no candidate.
+/// One diagnosis to make. Without a candidate no effect is added.
 struct DiagnosisToMake {
   CauseTried* candidate = nullptr;
-  Eigen::Index strength = 0;  ///< its place among those put in
+  Eigen::Index strength = 0;  ///< its place among the added effects
   std::uint64_t seed = 0;
 };
 
@@ -73,7 +73,7 @@ double standard_normal(SeededRandom& random) {
   return radius * std::cos(random.uniform(0, 2 * kPi));
 }
 
-/// The numbers of a cause that are physical from zero on only: bounds are part of its name.
+/// The numbers of a cause that are physical only from zero on: bounds are part of its name.
 std::vector<bool> positive_numbers(const Family& family, const Cell& cell) {
   const Best typical = family.typical();
   const auto count = static_cast<std::size_t>(family.columns(typical).cols());
@@ -110,7 +110,7 @@ class Proving {
   }
 
  private:
-  /// Causes that the poses cannot show have no size to put in.
+  /// Causes that the poses cannot show are left out, since they have no size to try.
   void add(const Family& family) {
     if (!family.named() || !family.predicts()) return;
     const Cause cause = family.cause(family.typical());
@@ -125,8 +125,8 @@ class Proving {
     candidates_.push_back(std::move(candidate));
   }
 
-  /// A diagnosis for each cause that is not decided, and one into which nothing is put. None once
-  /// all are decided.
+  /// Returns a diagnosis for each undecided cause, and one without an added effect. Returns none
+  /// once all causes are decided.
   [[nodiscard]] std::vector<DiagnosisToMake> trials_of(int round) {
     SeededRandom random(options_.seed + kProofDraw + static_cast<std::uint64_t>(round) * 0x10001U);
     const double share = kSharesTried[static_cast<std::size_t>(round) % std::size(kSharesTried)];
@@ -169,7 +169,7 @@ class Proving {
     MeasurementBatch batch = residuals_.measured(left);
     take_out_surrogates(what_.surrogates, batch);
     for (Measurement& m : batch.measurements) {
-      m.session_id.clear();  // all are in one world by now
+      m.session_id.clear();  // all rows are in one world at this point
       m.session = 0;
       m.set = MeasurementSet::kUnassigned;
     }
@@ -184,8 +184,8 @@ class Proving {
     return judged(*diagnosis, put_in ? &put_in->cause : nullptr);
   }
 
-  /// Its numbers are drawn from their priors, and scaled to `strength` beside all that the model
-  /// can make up for.
+  /// Draws the numbers from their priors, and scales them to `strength` after removal of the parts
+  /// that the model can compensate.
   [[nodiscard]] Drawn drawn_of(const CauseTried& candidate, double strength,
                                SeededRandom& random) const {
     const Family& family = *candidate.family;
@@ -207,8 +207,8 @@ class Proving {
     return drawn;
   }
 
-  /// A member whose order, harmonics, or the pose at which it begins, are drawn among those that a
-  /// diagnosis looks for.
+  /// A member with a drawn order, number of harmonics or first pose. They are drawn among those for
+  /// which a diagnosis searches.
   [[nodiscard]] Best member_of(const Family& family, SeededRandom& random) const {
     Best member = family.typical();
     const auto scales = static_cast<double>(member.length_scale + 1);
@@ -222,7 +222,7 @@ class Proving {
     return member;
   }
 
-  /// The same cause of the same joint and, of a gear, of the same order.
+  /// The same cause of the same joint and, for a gear, of the same order.
   [[nodiscard]] static bool is_named(const Cause& cause, const Cause& put_in) {
     const bool is_of_its_order = !cause.order || !put_in.order ||
                                  std::abs(*cause.order - *put_in.order) < thresholds::kSameOrder;
@@ -230,7 +230,7 @@ class Proving {
            is_of_its_order;
   }
 
-  /// `put_in`: null where nothing was.
+  /// `put_in`: null if no effect was added.
   [[nodiscard]] static Said judged(const Diagnosis& diagnosis, const Cause* put_in) {
     Said said;
     for (const Finding& finding : diagnosis.findings) {
@@ -250,7 +250,7 @@ class Proving {
   [[nodiscard]] static ProvedCause told(const CauseTried& candidate) {
     ProvedCause told;
     told.cause = candidate.predicted->cause;
-    told.cause.pose_id.clear();  // drawn anew each time, as is an order
+    told.cause.pose_id.clear();  // drawn anew each time, like an order
     told.cause.order.reset();
     told.predicted = candidate.predicted->identifiable;
     for (Eigen::Index k = 0; k < kStrengthsPutIn; ++k) {

@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kFolds = 8;
-constexpr Index kRunsPerFold = 5;  // so that every fold has poses of the whole batch
+constexpr Index kRunsPerFold = 5;  // so that every fold has poses from all of the batch
 
 VectorXd ones_without(Index rows, const std::vector<Index>& held) {
   VectorXd keep = VectorXd::Ones(rows);

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr int kFewestHarmonics = 4;  // of a map: the fewest that the search looks for
+constexpr int kFewestHarmonics = 4;  // of a map: the smallest number that the search tries
 
 /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics
 /// of a map.

@@ -2,20 +2,20 @@
 
 #include "server/diagnose/search/search_result.h"
 
-/// The forms in which a cause can go into a model: one of those of its record, as compliance has
-/// them, or a map of more or fewer harmonics. Poses held out decide between them.
+/// The forms that a cause can have in a model: the forms in its record, as for compliance, or a map
+/// with more or fewer harmonics. Held-out poses decide between them.
 namespace trammel::cause_search {
 
-/// Adds the source of `one` to `result.after`, in place of that of `poorer` where there is one, in
-/// the form that predicts poses held out best, and identifies all parameters anew. False, and
-/// nothing is changed, where they are predicted no better than without it.
+/// Adds the source of `one` to `result.after` in the form that predicts held-out poses best, and
+/// identifies all parameters anew. The source replaces that of `poorer`, if given. Returns false,
+/// without any change, if held-out poses are predicted no better with it.
 [[nodiscard]] Result<bool> add_in_best_form(SearchResult& result, Accepted& one,
                                             const Accepted* poorer);
 
-/// Chooses the form of each cause in the model that has several, anew beside all that was found
-/// since. A form that was chosen while other causes were missing may be the wrong one, and what it
-/// leaves over would be given other names. A cause of the cell's own list is changed only where
-/// that list (`own_sources`) leaves its form open. False where none is changed.
+/// Chooses again the form of each cause in the model that has several, beside all later findings. A
+/// form chosen while other causes were missing may be wrong, and its residual would be given other
+/// names. A cause of the cell's own list changes its form only if that list (`own_sources`) leaves
+/// it open. Returns false if none changed.
 [[nodiscard]] bool choose_forms_again(SearchResult& result,
                                       const std::vector<std::string>& own_sources);
 

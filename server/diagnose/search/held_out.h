@@ -9,7 +9,7 @@ namespace trammel::cause_search {
                                         const MeasurementBatch& batch);
 
 /// Sum of squares of the poses held out, each predicted from the others by `prior_model` and the
-/// functions `unnamed`, in units of `weight`: the same for all models that are compared.
+/// functions `unnamed`, in units of `weight`, which is equal for all compared models.
 [[nodiscard]] double held_out_square(const PriorModel& prior_model, const MeasurementBatch& batch,
                                      const std::vector<Unnamed>& unnamed,
                                      const Eigen::VectorXd& weight);

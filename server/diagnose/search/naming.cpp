@@ -22,7 +22,7 @@ bool no_rival(const Cause& named, const Cause& other) {
   return is_description_of(other, named) || is_whole_of(named, other);
 }
 
-/// A step so near to the first pose that it stands for something that always acted.
+/// True for a step so near the first pose that it means an effect that always acted.
 bool begins_at_once(const Cause& cause, const Best& best, Index poses) {
   return !cause.pose_id.empty() &&
          static_cast<double>(best.pose) < thresholds::kAtOnce * static_cast<double>(poses);
@@ -34,8 +34,9 @@ VectorXd fitted(const Background& background, const MatrixXd& columns, const Vec
   return columns * information.llt().solve(columns.transpose() * background.project(data));
 }
 
-/// True if `rival`, as the record of `own` has it, means `other`: of the same joint where it is of
-/// one, and the number that it names. `or_whole`: the cause as a whole counts for its number.
+/// True if `rival`, from the record of `own`, means `other`. A rival with a joint must be at the
+/// same joint, and its number must agree. With `or_whole`, the whole cause counts for any of its
+/// numbers.
 bool means(const causes::Rival& rival, const Cause& own, const Cause& other, bool or_whole) {
   if (other.cause != rival.cause) return false;
   if (record_of(other).scope == causes::Scope::kJoint && other.joint != own.joint) return false;
@@ -52,7 +53,7 @@ bool has_rival(const Cause& own, const Cause& other, std::initializer_list<Liken
   });
 }
 
-/// True if two numbers of this cause are two causes.
+/// True if two numbers of this cause count as two causes.
 bool numbers_are_causes(const CauseRecord& record) {
   return record.numbers == causes::Numbers::kApart || record.numbers == causes::Numbers::kOneAJoint;
 }
@@ -91,8 +92,8 @@ bool is_doubtful_case(const Cause& general, const Cause& special) {
 
 namespace {
 
-/// Where links are off and the tool stays where it is, base and tool make up for each other, and
-/// links for both.
+/// Where link errors leave the tool in place, base and tool compensate for each other, and links
+/// for both.
 std::vector<Cause> rivals_at_one_point(const Cause& cause) {
   std::vector<Cause> rivals;
   if (record_of(cause).part != causes::Part::kLinks) return rivals;
@@ -121,8 +122,8 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
     if (own.goes_with_time && other->goes_with_time && other != &own && lacks(other->needs))
       rivals.push_back(cause_at(*other));
   }
-  // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on
-  // the way.
+  // Along a path a lag changes smoothly, so it looks like an effect of a joint, or like a change
+  // that began on the way.
   if (!is_path_without_times(batch) || own.search == causes::SearchFamily::kPose) return rivals;
   for (const CauseRecord* other : all_causes()) {
     if (other->needs.velocity) rivals.push_back(cause_at(*other));
@@ -152,7 +153,8 @@ class Doubt {
                         draw_null(background_, kRepetitions, seed).colwise() + effect_, chance,
                         [&](std::size_t f) { return contends(f); });
   }
-  /// Share of the repetitions that give the name, or that of something that is no rival for it.
+  /// The share of the repetitions with this name, or with the name of a cause that is not its
+  /// rival.
   [[nodiscard]] double frequency() const {
     double sum = 0;
     for (std::size_t f = 0; f < families_.size(); ++f) {
@@ -176,7 +178,7 @@ class Doubt {
                std::count(repeated_.family.begin(), repeated_.family.end(), static_cast<int>(f))) /
            static_cast<double>(repeated_.family.size());
   }
-  /// Repetitions tell how often such data decide; these data may have decided.
+  /// Repetitions show how often such data decide; these data may have decided already.
   [[nodiscard]] bool is_decided(std::size_t f, double frequency) const {
     const double margin =
         frequency < thresholds::kSureFrequency ? thresholds::kDecidedUnsure : thresholds::kDecided;
@@ -202,13 +204,13 @@ bool Doubt::is_rival(std::size_t f, double frequency) const {
     return false;
   const Cause other = families_[f]->cause(seen_.best[f]);
   const bool decided = is_decided(f, frequency);
-  // A more general description that is as likely says that the special one is not sure.
+  // If a more general description is equally likely, the special one is not certain.
   const bool only_describes =
       no_rival(cause(), other) && (decided || !is_doubtful_case(other, cause()));
   if (only_describes || begins_at_once(other, seen_.best[f], problem_.poses())) return false;
   const double made = families_[f]->scan({background_}, projected_).front().strength;
   if (is_as_good(f, made)) return true;
-  // Another cause may be there as well: only what makes much of this effect is a rival for it.
+  // Another cause may exist as well; it is a rival only if it explains much of this effect.
   const bool related = made > thresholds::kRelatedShare * whole_;
   const bool wins = frequency < thresholds::kSureFrequency &&
                     share_of(f) > thresholds::kRivalFrequency &&
@@ -216,8 +218,8 @@ bool Doubt::is_rival(std::size_t f, double frequency) const {
   return !decided && (related || wins);
 }
 
-/// True if the cause at `f`, which makes so much of the effect's strength, does the same to the
-/// poses and explains the data nearly as well.
+/// True if the cause at `f`, which explains the share `made` of the effect's strength, has the same
+/// effect on the poses and explains the data nearly as well.
 bool Doubt::is_as_good(std::size_t f, double made) const {
   const Best& best = seen_.best[place_];
   const double lacks =

@@ -20,8 +20,7 @@ LinearProblem problem_of(const SearchResult& result) {
   return {result.after.model, result.batch, result.after.priors, {}};
 }
 
-/// nat: log marginal likelihood of `columns` (R x m, per prior) against none of them, beside
-/// `rest`.
+/// nat: log marginal likelihood of `columns` (R x m, per prior) relative to none, beside `rest`.
 double evidence_of(const MatrixXd& columns, const Background& rest, const VectorXd& data) {
   const MatrixXd information = columns.transpose() * rest.project(columns) +
                                MatrixXd::Identity(columns.cols(), columns.cols());
@@ -31,10 +30,10 @@ double evidence_of(const MatrixXd& columns, const Background& rest, const Vector
   return 0.5 * (right.dot(factor.solve(right)) - log_det);
 }
 
-/// By how much less the squares of poses held out are with a cause than without it.
+/// The reduction of the squares of held-out poses by a cause.
 struct Gain {
   double gain = 0, without = 0;  // sums over the poses
-  double chance = 0;             // what the gain is uncertain by, one standard deviation
+  double chance = 0;             // one standard deviation of the gain
   [[nodiscard]] bool is_none() const { return gain < thresholds::kLeastGain * without; }
   [[nodiscard]] bool is_by_chance() const { return gain < thresholds::kGainBeyondChance * chance; }
 };
@@ -63,8 +62,8 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-/// The first of the causes that always act with which poses held out are predicted no better. What
-/// begins at a pose may act at few of them.
+/// The first cause that always acts and does not improve the prediction of held-out poses. Causes
+/// that begin at a pose are skipped, since they may act at few of them.
 std::optional<std::size_t> idle_cause(const SearchResult& result, const LinearProblem& problem,
                                       double limit) {
   const MatrixXd columns = background_columns(problem, result.unnamed);

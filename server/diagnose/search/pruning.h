@@ -4,9 +4,9 @@
 
 namespace trammel::cause_search {
 
-/// The place in `result.accepted` of the first cause that does not pass `limit` (nat) any more
-/// beside all the rest, or, where all pass, of one with which poses held out are predicted no
-/// better: a name that gains nothing is none. Empty where all do.
+/// The place in `result.accepted` of the first cause that fails `limit` (nat) beside all the
+/// others. If all pass, it is that of a cause that does not improve the prediction of held-out
+/// poses. Empty if every cause gains.
 [[nodiscard]] std::optional<std::size_t> weak_cause(const SearchResult& result, double limit);
 
 /// The place in `result.unnamed` of the first anonymous function that is weak likewise.

@@ -20,8 +20,8 @@ struct Hidden {
   MatrixXd data;
 };
 
-/// The direction within the cause is that of equal shares of its priors. Empty where the effect
-/// does not stand out of the background.
+/// The direction within the cause has equal shares of its priors. Empty if the effect is not
+/// visible above the background.
 std::optional<Hidden> hidden_in(const MatrixXd& noise, const LinearProblem& problem,
                                 const Family& family, const Background& background) {
   const Best typical = family.typical();

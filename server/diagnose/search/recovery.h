@@ -5,7 +5,7 @@
 namespace trammel::cause_search {
 
 /// Hides causes of several sizes in simulated noise at these very poses, and counts how often each
-/// is named. `places`: which of the families to hide.
+/// is named. `places`: the families to hide.
 [[nodiscard]] std::vector<Recovery> recovery_of(const LinearProblem& problem,
                                                 const std::vector<FamilyPtr>& families,
                                                 const Background& background, const Chance& chance,

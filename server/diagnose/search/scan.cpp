@@ -25,7 +25,7 @@ double quantile(const VectorXd& ascending, double share) {
          (place - static_cast<double>(below)) * (ascending(above) - ascending(below));
 }
 
-/// The draws above `threshold` fall off exponentially; `scale` is their mean distance from it.
+/// The draws above `threshold` fall off exponentially; `scale` is their mean excess.
 struct Tail {
   double threshold, scale;
 };

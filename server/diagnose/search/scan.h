@@ -11,12 +11,12 @@
 
 namespace trammel::cause_search {
 
-/// The scores that chance alone brings at these poses, from a parametric bootstrap of the
+/// The scores that chance alone gives at these poses, from a parametric bootstrap of the
 /// background.
 struct Chance {
   std::map<std::string, double>
-      penalty;  ///< nat, by a family's label: the median of what it reaches by chance (it may
-                ///< search far), and how much less it is to be expected than others
+      penalty;  ///< nat, by a family's label: the median of its score by chance (its search may be
+                ///< wide), plus its prior improbability against other causes
   Eigen::VectorXd null_score;  ///< nat: the best score of all families in each draw, ascending
   double limit = 0;  ///< nat: the line, which the best of all passes in 3 of 1000 batches by chance
 
@@ -29,7 +29,7 @@ struct Chance {
   [[nodiscard]] double p_value(double score) const;
 };
 
-/// R x draws: samples of whitened rows in which nothing but the background acts.
+/// R x draws: samples of whitened rows with the background as their only effect.
 [[nodiscard]] Eigen::MatrixXd draw_null(const Background& background, Eigen::Index draws,
                                         std::uint64_t seed);
 

@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 constexpr int kMostSteps = 40;        // forward and backward: no batch has needed half of them
 constexpr double kShareOfWork = 0.6;  // of a diagnosis, for the line of progress
 constexpr double kTellingColumn =
-    0.1;  // standard deviations over all rows together: what moves them less is left out
+    0.1;  // standard deviations over all rows together: smaller effects are left out
 
 std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   std::vector<Parameter> priors;
@@ -39,7 +39,7 @@ void drop_rows(MatrixXd& columns, Index first, Index count) {
   columns = std::move(kept);
 }
 
-/// As the model names the source of a cause that it has: the cause in one of its forms.
+/// The name of the cause's source in the model, which may have one of its forms.
 std::string name_in(const PhysicalModel& model, const Cause& cause) {
   const auto source =
       std::find_if(model.sources.begin(), model.sources.end(),
@@ -52,8 +52,8 @@ std::vector<Measurement>::const_iterator place_in(const MeasurementBatch& batch,
                       [&](const Measurement& m) { return m.row == row; });
 }
 
-/// Forward and backward selection. Every step leaves `result_` a model that is identified beside
-/// all that was found.
+/// Forward and backward selection. After every step `result_` has a model that is identified beside
+/// all findings.
 class Search {
  public:
   Search(std::shared_ptr<const Cell> cell, const DiagnoseOptions& options)
@@ -61,26 +61,25 @@ class Search {
 
   [[nodiscard]] Status start(const std::vector<std::string>& sources,
                              const MeasurementBatch& batch);
-  /// Accepts one more cause or function, or closes one that does not hold; false where nothing
+  /// Accepts one more cause or function, or closes one that does not hold. Returns false if nothing
   /// passes.
   [[nodiscard]] Result<bool> step();
-  /// Drops one that does not pass any more beside all the rest; false where all pass.
+  /// Drops a cause that no longer passes beside all others; false if all pass.
   [[nodiscard]] bool prune();
-  /// Chooses the form of each cause in the model anew; false where all stay what they are.
+  /// Chooses the form of each cause in the model anew; false if none changes.
   [[nodiscard]] bool choose_forms_again() {
     return cause_search::choose_forms_again(result_, own_sources_);
   }
   /// Puts a cause of the list in the place of all that has no name; false where none explains it.
   [[nodiscard]] bool name_functions();
-  /// True if so much was found since the forms were chosen that they may be others.
+  /// True if so many findings are new since the forms were chosen that the forms may change.
   [[nodiscard]] bool is_time_for_forms();
-  /// Asks of every finding again what it is, all others in place: while they were missing another
-  /// cause may have looked more like it.
+  /// Asks for the best name of every finding again with all others in place. While they were
+  /// missing, another cause may have fitted better.
   [[nodiscard]] Status reconsider();
-  /// Poses that were out while a cause was missing, and fit now that it is there, come back.
+  /// Returns outliers to the batch that fit now that the missing cause was found.
   void take_back_outliers();
-  /// Turns what has the shape of a cause and a sign that it cannot have into a dependence that has
-  /// no name.
+  /// Turns a cause whose numbers have an impossible sign into a nameless dependence.
   [[nodiscard]] Status open_wrong_signs();
   [[nodiscard]] SearchResult take();
 
@@ -129,11 +128,12 @@ class Search {
   SearchResult result_;
   Chance chance_;
   std::vector<std::string> own_sources_;  // as the cell lists them
-  std::size_t renewed_for_ = 0;           // how much had been found when chance_ was drawn
+  std::size_t renewed_for_ = 0;           // the number of findings when chance_ was drawn
   std::size_t formed_for_ = 0;            // the same when the forms were chosen last
   std::vector<Cause> closed_;             // were tried and did not hold
-  std::vector<std::vector<std::string>> dropped_functions_;  // by what they depend on
-  std::vector<Accepted> wrong_;  // of them, those whose sign was wrong at the time
+  std::vector<std::vector<std::string>> dropped_functions_;  // by the quantities on which they
+                                                             // depend
+  std::vector<Accepted> wrong_;  // those of them with the wrong sign at the time
 };
 
 struct Search::Together {
@@ -173,8 +173,8 @@ Result<bool> Search::step() {
   return true;
 }
 
-/// Draws the line anew where it was never drawn, and where the best is so near to it that it must
-/// be known for the present background.
+/// Draws the chance limit anew if it was never drawn, and if the best score is so near to it that
+/// the limit for the present background is needed.
 Scan Search::scan_beside_all(const Standing& standing) {
   if (chance_.null_score.size() == 0) renew_chance(standing);
   Scan seen = standing.scan(chance_);
@@ -201,7 +201,8 @@ Choice Search::choice_of(const Standing& standing, Scan seen) const {
   return {std::move(seen), [open = std::move(open)](std::size_t f) { return open[f]; }};
 }
 
-/// A function that passed and then did not pass beside all the rest would do so again for ever.
+/// True for a function that passed once, and later failed beside the others. Without this check it
+/// would repeat that forever.
 bool Search::is_dropped(const Family& family) const {
   return !family.named() && std::find(dropped_functions_.begin(), dropped_functions_.end(),
                                       family.depends_on()) != dropped_functions_.end();
@@ -216,8 +217,8 @@ bool Search::is_closed(const Cause& cause) const {
   });
 }
 
-/// True if an anonymous function explains more than any named cause, and more than a few of them
-/// together.
+/// True if an anonymous function explains more than any named cause, and more than a few named
+/// causes together.
 bool Search::is_function(const Standing& standing, const Choice& choice, std::size_t best,
                          std::optional<std::size_t> named) const {
   if (standing.families[best]->named()) return false;
@@ -229,14 +230,14 @@ bool Search::is_function(const Standing& standing, const Choice& choice, std::si
          named_path_score(standing, choice.open) < score[best];
 }
 
-/// nat: what the best few named causes, taken one after the other, explain together.
+/// nat: the joint gain of the best few named causes, taken one after the other.
 double Search::named_path_score(const Standing& standing, const Admitted& open) const {
   MatrixXd columns = standing.columns;
   std::vector<std::size_t> steps;  // taken already
   double total = 0;
   for (int k = 0; k < thresholds::kNamedPath; ++k) {
     const Background background(columns);
-    // A second step of one cause makes a better ramp of the first, and says no more.
+    // A second step of one cause only turns the first step into a better ramp.
     const auto is_new = [&](std::size_t f) {
       const Cause cause = standing.families[f]->cause(standing.families[f]->typical());
       return cause.pose_id.empty() || std::find(steps.begin(), steps.end(), f) == steps.end();
@@ -272,8 +273,8 @@ bool Search::holds_in_folds(const Standing& standing, const Choice& choice,
   return gain.after < gain.before;
 }
 
-/// The slow rival of the family at `place`. Both are judged to first order, of which a large step
-/// falls short; so the step is refined, and its gain by that counts for it.
+/// The slow rival of the family at `place`. Both are judged to first order, which underestimates a
+/// large step. So the step is refined, and counts with its refined gain.
 std::optional<SlowRival> Search::slow_instead(const Standing& standing, const Scan& seen,
                                               std::size_t place) const {
   std::optional<SlowRival> slow = slow_rival(standing, seen, place);
@@ -343,8 +344,8 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
   return {};
 }
 
-/// The pose at `place` of the scan, and those that are out nearly as far: they need no look of
-/// their own.
+/// The pose at `place` of the scan, and the other poses that are nearly as far out: they need no
+/// scan of their own.
 std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen,
                                       std::size_t place) const {
   const Family& family = *standing.families[place];
@@ -366,7 +367,7 @@ std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen
 }
 
 void Search::take_outliers(const LinearProblem& problem, std::vector<Accepted> out) {
-  // The last first: the places of the others stay what they are.
+  // The last first, so that the places of the others stay valid.
   std::sort(out.begin(), out.end(),
             [](const Accepted& a, const Accepted& b) { return a.best.pose > b.best.pose; });
   for (Accepted& one : out) take_outlier(problem, std::move(one));
@@ -422,7 +423,7 @@ Status Search::take_cause(Accepted one) {
   return {};
 }
 
-/// The map of that joint among what is accepted.
+/// The map of that joint among the accepted causes.
 std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
   const bool is_map = record_of(cause).search == causes::SearchFamily::kMap;
   return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
@@ -430,7 +431,7 @@ std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
   });
 }
 
-/// The more there is, the less one more changes: half as much again.
+/// With more parts, one additional part changes less. So the number rises by half each time.
 bool Search::is_time_for_forms() {
   const std::size_t found = result_.accepted.size() + result_.unnamed.size();
   if (2 * found <= 3 * formed_for_ && found >= formed_for_) return false;
@@ -528,9 +529,9 @@ void Search::take_back_outliers() {
   }
 }
 
-/// True if the pose, which was out, fits where it is learned from as well; then it is one of the
-/// batch again. A pose that stands alone is where something is largest that is missing, and nothing
-/// else says where it should be.
+/// True if the outlier fits when the model learns from it as well; then it returns to the batch. An
+/// isolated pose may show the largest part of a missing effect, since no other pose determines its
+/// place.
 bool Search::fits_beside_the_others(const Measurement& pose) {
   MeasurementBatch batch = result_.batch;
   auto& all = batch.measurements;
@@ -569,8 +570,8 @@ Status Search::open_wrong_signs() {
   return {};
 }
 
-/// True if `one`, which is in the model, is another cause by its sign; then it is among what has no
-/// name. Where only a part of it is, it may be something unknown.
+/// True if the sign shows that `one`, which is in the model, is another cause; then it becomes a
+/// nameless function. If only a part of it has the wrong sign, an unknown effect becomes its rival.
 bool Search::open_wrong_sign(Accepted& one) {
   if (record_of(one.cause).search == causes::SearchFamily::kPlay) {
     const PlaySign sign = play_of(one);
@@ -590,10 +591,10 @@ bool Search::open_wrong_sign(Accepted& one) {
   return false;
 }
 
-/// Asks whether `one`, which was put away for its sign, is there now that all else is known: with a
-/// name or without.
+/// Tests again, with all other findings in place, whether `one`, which was removed for its sign, is
+/// there. It may return with a name or as a nameless function.
 Status Search::ask_again_for(const Accepted& one) {
-  if (!add_to(result_.after, one.in_model)) return {};  // another form of it is in the model
+  if (!add_to(result_.after, one.in_model)) return {};  // the model has another form of it
   refine_all();
   const Together now(result_);
   const OwnEstimate own = own_estimate(now.problem, one.in_model, now.change, now.covariance);
@@ -621,7 +622,7 @@ WrongSign Search::sign_of(const Accepted& one) const {
   return wrong_sign_of(now.problem, one.in_model, one.cause, now.change, now.covariance);
 }
 
-/// Turns what `one` does to the poses into a function that has no name.
+/// Turns the effect of `one` on the poses into a nameless function.
 void Search::make_unnamed(const Accepted& one, const std::vector<std::string>& depends_on) {
   const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
   const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
@@ -640,7 +641,7 @@ SearchResult Search::take() {
     result_.reformed.clear();
     refine_all();
   }
-  // Nothing was learned of the pose itself, and by now all else is known.
+  // The model did not learn from the outlier itself, and by now all other effects are known.
   for (Accepted& one : result_.accepted) {
     const auto pose = place_in(result_.all, one.pose.row);
     if (one.is_outlier() && pose != result_.all.measurements.end())

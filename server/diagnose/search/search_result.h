@@ -13,10 +13,10 @@ namespace trammel::cause_search {
 /// A cause that was accepted.
 struct Accepted {
   Cause cause;
-  std::string source;    ///< as a cell file spells it; empty for an outlier
-  std::string in_model;  ///< as the model names it
+  std::string source;    ///< the spelling in a cell file; empty for an outlier
+  std::string in_model;  ///< the name in the model
   Best best;
-  double penalty = 0;  ///< nat: what its family reaches by chance
+  double penalty = 0;  ///< nat: the score that its family reaches by chance
   double p_value = 1;
   double naming_frequency =
       1;  ///< share of simulated repetitions of the batch that name this cause
@@ -26,7 +26,7 @@ struct Accepted {
   [[nodiscard]] bool is_outlier() const { return source.empty(); }
 };
 
-/// A form of a cause of the model's own that gave way to another beside what was found.
+/// A form of one of the model's own causes that another form replaced beside the findings.
 struct Reformed {
   std::string from, to;
 };
@@ -34,13 +34,13 @@ struct Reformed {
 /// The result of forward and backward selection.
 struct SearchResult {
   PriorModel before;       ///< calibrated, as the cell has it
-  PriorModel after;        ///< with all that was accepted
+  PriorModel after;        ///< with all accepted causes
   MeasurementBatch all;    ///< the poses that were searched
   MeasurementBatch batch;  ///< the same without outliers
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
-  /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not
-  /// among the accepted.
+  /// Joints with an impossible sign of `backlash`: they are among the unnamed functions, not among
+  /// the accepted causes.
   std::vector<PlaySign> negative_play;
   /// Other causes with numbers beyond their bounds.
   std::vector<WrongSign> wrong_signs;

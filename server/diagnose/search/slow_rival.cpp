@@ -16,12 +16,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSoon = 1e-3;  // of the batch's time: too early for a drift to have gone anywhere
+constexpr double kSoon = 1e-3;       // share of the batch's time: too early for a drift to show
 constexpr double kLeastTime = 1e-6;  // s
 constexpr double kChoice =
-    1.5;  // nat: what choosing one of five courses is worth; a step has its places instead
-constexpr int kRounds = 2;  // of motion and course by turns
-/// The lags of warming up, in shares of the batch's time; with the last one it goes on steadily.
+    1.5;  // nat: the price of choosing one of five courses; a step pays for its place instead
+constexpr int kRounds = 2;  // rounds that alternate between motion and course
+/// The lags of warming up, in shares of the batch's time; the last one is a steady motion.
 constexpr double kLags[] = {0.1, 0.2, 0.4, 0.8, 100};
 
 bool is_step(const Cause& cause) {
@@ -69,8 +69,7 @@ struct Course {
   bool of_temperature = false;
 };
 
-/// The share of the batch's time that had gone by at each pose; of its poses where not every one
-/// has its time.
+/// The elapsed share of the batch's time at each pose; the share of its poses if some have no time.
 VectorXd shares_of_time(const LinearProblem& problem) {
   const auto& poses = problem.batch().measurements;
   const VectorXd by_row = VectorXd::LinSpaced(problem.poses(), 0, 1);
@@ -114,7 +113,7 @@ MatrixXd on_course(const LinearProblem& problem, const MatrixXd& always, const V
   return columns;
 }
 
-/// Columns as fitted to the data, and what they are worth.
+/// Columns fitted to the data, and their gain.
 struct Fitted {
   VectorXd size;
   double evidence = 0;  // nat
@@ -148,16 +147,16 @@ std::string wanderer_of(const Cause& cause) {
                           : "the instrument or the base";
 }
 
-/// A step or a drift, and what moves in it.
+/// A step or a drift, and the part that it moves.
 struct Mover {
   const Family& family;
   const Best& best;
   Cause cause;
-  MatrixXd always;  // as if it had gone all the way at every pose
+  MatrixXd always;  // the full motion at every pose
 };
 
-/// The best of a few courses that things take as they warm up. The temperature is said where it
-/// says clearly more than the time.
+/// The best of a few courses of warming up. The recorded temperature is named if it fits clearly
+/// better than the time.
 SlowRival warming_up(const Standing& standing, const Mover& mover) {
   SlowRival best;
   double least = -std::numeric_limits<double>::infinity();
@@ -173,8 +172,8 @@ SlowRival warming_up(const Standing& standing, const Mover& mover) {
   return best;
 }
 
-/// Any smooth course; both as if the motion were known, as the cause was fitted with. Empty where
-/// no time goes by.
+/// Tries any smooth course of the motion. Both are scored as if the motion were known, because the
+/// cause was fitted with a known motion. Empty if no time passes.
 std::optional<SlowRival> moving_smoothly(const Standing& standing, const Mover& mover) {
   const LinearProblem& problem = standing.problem;
   const VectorXd projected = standing.background.project(problem.residual());
@@ -186,7 +185,7 @@ std::optional<SlowRival> moving_smoothly(const Standing& standing, const Mover& 
     if (!family) return std::nullopt;
     best = family->scan({standing.background}, projected).front();
     if (mover.always.cols() == 1 || best.evidence <= 0 || round + 1 == kRounds) break;
-    // The motion anew, as it is by this course: it was fitted to another one.
+    // Fits the motion again with this course, since it was fitted to another one.
     const MatrixXd slow = family->columns(best);
     const VectorXd course = course_of(problem, motion, slow * fitted(standing, slow).size);
     motion = mover.always * fitted(standing, course.asDiagonal() * mover.always).size;

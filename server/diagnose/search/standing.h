@@ -7,7 +7,8 @@
 
 namespace trammel::cause_search {
 
-/// The residual of the model found so far, and all that may explain it. `found` outlives it.
+/// The residual of the model found so far, and all families that may explain it. `found` outlives
+/// it.
 struct Standing {
   explicit Standing(const SearchResult& found);
   Standing(const Standing&) = delete;  // the families look at the problem
@@ -31,9 +32,9 @@ struct Choice {
   [[nodiscard]] std::optional<std::size_t> best() const { return seen.strongest(open); }
 };
 
-/// The best named cause. A step gives way to the same cause from the first pose on where that
-/// explains nearly as much, and a cause to a simpler case of it: a map of a joint's angle to an
-/// off-centre encoder.
+/// The best named cause. A step is replaced by the same cause from the first pose on if that
+/// explains nearly as much. A cause is replaced by a simpler case of it in the same way: a map of a
+/// joint's angle by an off-centre encoder.
 [[nodiscard]] std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families,
                                                     const Choice& choice);
 

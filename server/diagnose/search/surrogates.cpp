@@ -10,9 +10,8 @@ namespace trammel::cause_search {
 
 namespace {
 
-constexpr double kBetweenPoses =
-    30;                         // s, as a tracker and a robot take that measure one after the other
-constexpr double kWarming = 5;  // K over the batch
+constexpr double kBetweenPoses = 30;  // s, the usual time between poses of a tracker and a robot
+constexpr double kWarming = 5;        // K over the batch
 constexpr double kUnrecorded = 1e9;
 constexpr double kWarmingScale = 0.5;  // of the batch: the time constant of its approach
 
@@ -107,13 +106,13 @@ bool has_one_temperature(const MeasurementBatch& recorded) {
          *high->context.temperature - *low->context.temperature < thresholds::kSameTemperature;
 }
 
-/// True if what a cause of `joint` depends on was recorded, and never changed.
+/// True if the quantity on which a cause of `joint` depends was recorded and never changed.
 bool is_constant(const ContextNeeds& needs, const MeasurementBatch& recorded, int joint) {
   return (needs.direction && joint >= 0 && has_one_side(recorded, joint)) ||
          (needs.temperature && has_one_temperature(recorded));
 }
 
-/// True if `model` identifies what takes the effect over: one number, or all of a cause.
+/// True if `model` identifies the parameter, or the whole cause, that absorbs the effect.
 bool is_free(const PhysicalModel& model, const Cause& cause) {
   const std::vector<Parameter> own = model.parameters();
   if (!cause.parameter.empty())

@@ -29,7 +29,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kPeriodogramLine =
-    0.01;  // share of the batches in which chance passes the line of a periodogram
+    0.01;  // share of batches in which chance exceeds the threshold of a periodogram
 constexpr std::size_t kRecoveries = 3;  // curves on the page
 
 LinearProblem problem_of(const Cell& cell, const PriorModel& model, const MeasurementBatch& batch) {
@@ -84,14 +84,14 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
   const Index count = numbers.size() - P;
-  // Only the part of it counts that the model's own parameters cannot do.
+  // Only the part that the model's own parameters cannot have counts.
   const VectorXd function = all.columns().rightCols(count) * numbers.tail(count);
   unexplained.rms = problem.position_rms(Background(problem.nuisance()).project(function));
   return unexplained;
 }
 
 /// The error that is left after the nominal chain, the cell's own sources and each finding in turn;
-/// at last what none explains.
+/// the last step is the unexplained rest.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
                                         const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
@@ -102,8 +102,8 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   }
   steps.push_back({"nominal", figures_of(nominal).rms});
   steps.push_back({"calibrated", before.position_rms(before.residual())});
-  // Each finding in turn, everything else refitted: the later ones' effects are put back into what
-  // is left.
+  // Adds each finding in turn with everything else refitted: the effects of the later ones return
+  // to the residual.
   VectorXd data = after.residual();
   std::vector<Index> chosen(static_cast<std::size_t>(after.nuisance().cols()));
   std::iota(chosen.begin(), chosen.end(), Index{0});
@@ -123,14 +123,14 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   return steps;
 }
 
-/// The best known shape of something does to the poses what that does.
+/// A finding that is only the best known shape of an effect still has that effect on the poses.
 bool is_sure(const Finding& finding) {
   return !finding.whole || differ_in_form_only(finding.cause, finding.could_also_be);
 }
 
 bool is_outlier(const Finding& finding) { return finding.source.empty(); }
 
-/// True if the finding is a pose that is out, or may be part of something unknown that is larger.
+/// True if the finding is an outlier, or may be part of a larger unknown effect.
 bool is_less_than_what_is_left(const Finding& finding, const Unexplained& left) {
   const auto& rivals = finding.could_also_be;
   return is_outlier(finding) || (finding.effect_rms < left.rms &&
@@ -224,8 +224,8 @@ void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) 
     diagnosis.sources_before.push_back(source->name());
   diagnosis.sources_after = diagnosis.sources_before;
   for (const Finding& finding : diagnosis.findings) {
-    // A list of sources says by its row where a cause begins; in a batch whose rows were moved that
-    // row is another.
+    // A list of sources gives the first row of a cause; in a batch with moved rows that row is
+    // another one.
     const bool at_a_row = !sorted || finding.cause.pose_id.empty();
     if (!finding.source.empty() && is_sure(finding) && at_a_row)
       diagnosis.sources_after.push_back(finding.source);

@@ -15,7 +15,7 @@ using Eigen::Index;
 
 constexpr int kFewestRepeated = 12;  // degrees of freedom: a standard deviation is known to a fifth
 
-/// The noise of one axis that repeats vouch for beyond what is stated.
+/// The noise of one axis beyond the stated one that repeats confirm.
 double beyond_stated(double repeated, double stated, int freedom) {
   if (repeated > thresholds::kRepeatsVouch * stated) return 0;
   return freedom < kFewestRepeated
@@ -41,7 +41,7 @@ bool are_warm_unseen(const MeasurementBatch& rows) {
                      [](const Measurement& m) { return !m.context.temperature; });
 }
 
-/// True if a session begins with that pose.
+/// True if that pose is the first of a session.
 bool begins_a_session(const MeasurementBatch& rows, const std::string& pose_id) {
   const auto& all = rows.measurements;
   for (std::size_t i = 1; i < all.size(); ++i)

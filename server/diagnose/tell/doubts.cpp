@@ -22,9 +22,9 @@ bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }
 
-/// The causes that describe several of its kind better than one by one, where there are too many of
-/// them at its joint to be believed or where that stands beside them: a map of the joint's angle
-/// for the orders of a gear.
+/// The causes that describe several causes of this kind better than one by one, such as a map of
+/// the joint's angle for the orders of a gear. They apply if the joint has too many of this kind to
+/// be credible, or if the general cause was found beside them.
 std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Cause>& found) {
   const auto at_joint = [&](std::string_view name) {
     return std::count_if(found.begin(), found.end(), [&](const Cause& other) {
@@ -41,11 +41,11 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
-/// True if more is left than is stated, and not so much that it is unknown: a name may be a part of
-/// that.
+/// True if the residual is larger than stated, but not so large that it is unknown: the name may be
+/// a part of the rest.
 bool is_a_little_more(const Beside& beside) { return beside.larger && !beside.more_than_noise; }
 
-/// True if a cause of one joint has so many numbers that it fits a part of much else.
+/// True if a cause of one joint has so many numbers that it fits parts of many other effects.
 bool is_flexible(const Cause& cause, const Evidence& evidence) {
   const CauseRecord& record = record_of(cause);
   return record.scope == causes::Scope::kJoint && record.search == causes::SearchFamily::kColumns &&
@@ -70,9 +70,8 @@ bool goes_with_time(const Unexplained& unexplained) {
                      [](const auto& one) { return one == "time" || one == "temperature"; });
 }
 
-/// True if lengths that go with the temperature may be the instrument's own: its scale moves the
-/// base as well, about the instrument, so that something else is there that moves in the course of
-/// the batch.
+/// True if lengths that change with the temperature may be the instrument's own. Its scale also
+/// moves the base, about the instrument, so another effect must move during the batch.
 bool may_be_scale(const Cause& cause, const Beside& beside) {
   const CauseRecord& own = record_of(cause);
   if (own.acts.on != causes::ActsOn::kLinks || !own.needs.temperature) return false;
@@ -83,14 +82,15 @@ bool may_be_scale(const Cause& cause, const Beside& beside) {
          });
 }
 
-/// Adds what is told by the time alone.
+/// Adds causes that depend on time alone.
 void add_going_with_time(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
     if (record->goes_with_time && record->needs.time) add(rivals, cause_at(*record));
   }
 }
 
-/// Adds what a cause that was found by a surrogate may be instead. It is never sure.
+/// Adds the alternatives to a cause that was found by a substitute quantity. Such a cause is never
+/// certain.
 void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   const ContextNeeds& needs = record_of(cause).needs;
   if (needs.direction) return add(rivals, unknown_cause(cause.joint));
@@ -98,7 +98,7 @@ void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
-/// Adds what pulls at the joints as a payload does.
+/// Adds causes that load the joints as a payload does.
 void add_what_weighs(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
     if (record->acts.on == causes::ActsOn::kLoad && record->search == causes::SearchFamily::kNone)

@@ -36,7 +36,7 @@ void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis) {
       if ((cause.joint != joint && cause.joint != joint + 1) || !acts_by_angles(record_of(cause)))
         continue;
       finding.could_also_be.push_back(tilt_of(joint));
-      finding.whole = true;  // what may be a row of the robot file goes into no model
+      finding.whole = true;  // a possible error of a row of the robot file enters no model
       finding.action = fmt::format(
           "write `hayati: true` in row {} of the robot file and diagnose again: the tilt of its "
           "axis against the next one has no number without it",

@@ -9,12 +9,12 @@
 /// The words of a diagnosis about the robot file.
 namespace trammel::cause_search {
 
-/// Without a Hayati row between parallel axes no number of the model is their tilt: what always
-/// acts in one of the two joints may be that. Its name is in doubt.
+/// Marks causes that always act in one of two parallel axes without a Hayati row as uncertain. No
+/// number of the model describes the tilt of these axes, and the cause may be that tilt.
 void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis);
 
-/// Adds to the notes what is doubtful of the robot file: by itself, and by what is identified on
-/// `batch` with `sources`.
+/// Adds the doubts about the robot file to the notes: from the file alone, and from an
+/// identification on `batch` with `sources`.
 void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
                       const std::vector<std::string>& sources, const MeasurementBatch& batch,
                       Diagnosis& diagnosis);

@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 
 constexpr std::ptrdiff_t kMostAccidents = 3;  // poses that are out beside something unexplained
 constexpr Index kBlocksOfHalves =
-    16;  // of poses one after the other, taken by turns: each half has all of the day
+    16;  // of consecutive poses, taken alternately: each half covers the whole day
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -39,7 +39,7 @@ Estimate in_units(const Parameter& parameter, double value, double stddev) {
           parameter.scale * kExpanded * stddev};
 }
 
-/// The common amplitude of a sine and a cosine, and what it is uncertain by.
+/// The common amplitude of a sine and a cosine, and its uncertainty.
 Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value,
                       const Eigen::Matrix2d& covariance) {
   const double amplitude = value.norm();
@@ -49,8 +49,8 @@ Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value,
           1e6 * kExpanded * std::sqrt(slope.dot(covariance * slope))};
 }
 
-/// The change that a map makes of a joint's angle between the two poses that it moves farthest
-/// apart. `values`: a sine and a cosine of every harmonic, rad.
+/// The difference of a joint's error between the two poses where its map differs most. `values`: a
+/// sine and a cosine of every harmonic, rad.
 Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd& values,
                          const MatrixXd& covariance) {
   const auto functions = [&](double q) {
@@ -107,7 +107,7 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
       const Parameter& parameter =
           priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
       if (parameter.name != cause.parameter) continue;
-      // The others of its source at zero: it is this one that is named.
+      // The others of its source are set to zero, since this one is named.
       const double alone = own.precision.row(i).dot(own.size) / own.precision(i, i);
       return {in_units(parameter, parameter.prior_scale * alone,
                        parameter.prior_scale / std::sqrt(own.precision(i, i)))};
@@ -123,8 +123,8 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   return estimates;
 }
 
-/// True if other numbers of its source than the one that a cause is named by are there as well.
-/// That one is estimated with the others at zero, which then would be wrong.
+/// True if other numbers of the source are present besides the number that names the cause. That
+/// number was estimated with the others at zero, which would then be wrong.
 bool others_speak(const LinearProblem& problem, const Accepted& one, const Estimated& estimated) {
   if (one.cause.parameter.empty()) return false;
   const OwnEstimate own =
@@ -150,8 +150,8 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-/// In what a pose may lie at the edge of all: the angles of the gears, the torques on them, how far
-/// the arm reaches.
+/// The quantities in which a pose may lie at the edge of all poses: the angles of the gears, the
+/// torques on them, and the reach of the arm.
 VectorXd posture_of(const PhysicalModel& model, const PoseContext& context) {
   const ArmState state = model.state(context);
   const JointVector gears = model.cell->robot.gear_angles(context.q);
@@ -179,15 +179,15 @@ class Findings {
   /// True if the pose may be where something is large that the simulation lacks.
   [[nodiscard]] bool may_show_what_lacks(const Accepted& one) const;
   [[nodiscard]] Finding cause(const Accepted& one) const;
-  /// As it is told: by one number only where that is alone.
+  /// The reported cause: with one number only if that number is alone.
   [[nodiscard]] Cause named(const Accepted& one) const;
-  /// The poses at which `one` may have begun, given its `effect` and everything else that is free
+  /// The poses at which `one` may have begun, given its `effect` and all other free columns
   /// (`rest`).
   [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one,
                                                           const VectorXd& effect,
                                                           const Background& rest) const;
-  /// True if the poses of every second block, and the others, show `one` by themselves. `effect`:
-  /// what it does, with the columns `others` free.
+  /// True if every second block of poses, and the remaining blocks, each show `one` by themselves.
+  /// `effect`: that of `one`, with the columns `others` free.
   [[nodiscard]] bool is_in_both_halves(const Accepted& one, const VectorXd& effect,
                                        const std::vector<Index>& others) const;
   /// True if `one`, which does `effect` and always acts, did so more at some times or temperatures
@@ -197,7 +197,7 @@ class Findings {
   [[nodiscard]] const Family* step_family(const Accepted& one) const;
 
   const LinearProblem& problem_;
-  const MeasurementBatch& all_;  // with the poses that are out
+  const MeasurementBatch& all_;  // including the outliers
   const Surrogates& surrogates_;
   std::vector<Cause> causes_;
   double limit_;  // nat: the line of a finding
@@ -206,7 +206,7 @@ class Findings {
   Estimated estimated_;
   Folds folds_;
   VectorXd held_out_;
-  std::vector<FamilyPtr> families_;     // none where nothing begins at a pose
+  std::vector<FamilyPtr> families_;     // empty if no finding begins at a pose
   bool more_than_accidents_ = false;    // are out
   bool several_beyond_others_ = false;  // poses that are out stand beyond all others
 };
@@ -274,7 +274,8 @@ bool Findings::may_show_what_lacks(const Accepted& one) const {
                                      one.pose.distance < thresholds::kFarOut * beside_.left);
 }
 
-/// True if the pose lies beyond all others in some way, where nothing says what the arm does.
+/// True if the pose lies beyond all others in some quantity, so that no other pose shows the arm's
+/// error there.
 bool Findings::is_beyond_others(const Accepted& one) const {
   const auto& all = all_.measurements;
   const auto out = std::find_if(all.begin(), all.end(),

@@ -5,17 +5,16 @@
 
 namespace trammel::cause_search {
 
-/// The rest beside all that was found and has a name.
+/// The remainder after all findings that have a name.
 struct Remainder {
   bool more_than_noise = false;
   double rms = 0;       ///< m
   bool larger = false;  ///< than stated, and not by chance: perhaps more than noise
 };
 
-/// The findings of a search, each built once: its numbers beside everything else that was found
-/// (parameters by generalised least squares, effects, strengths, what it gains on poses held out),
-/// and how sure its name is. `problem`: about the extended model. `recorded`: the batch without
-/// surrogates.
+/// The findings of a search, each built once: its numbers beside all other findings (parameters by
+/// generalised least squares, effects, strengths, the gain on held-out poses), and the certainty of
+/// its name. `problem`: about the extended model. `recorded`: the batch without surrogates.
 [[nodiscard]] std::vector<Finding> findings_of(
     const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
     const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder);

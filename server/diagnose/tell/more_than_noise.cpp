@@ -19,11 +19,11 @@ constexpr double kCut = 3;  // standard deviations, beyond which the size of a r
 
 double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / left.stated : 1; }
 
-/// Standard deviation of the logarithm of what is left over what is stated, by chance alone.
+/// Standard deviation, by chance alone, of the logarithm of the residual over the stated noise.
 double by_chance(const LeftOver& left) { return 1 / std::sqrt(2 * left.freedom); }
 
-/// The number of standard uncertainties, of sigma and of chance, by which what is left is beyond
-/// what is stated.
+/// The excess of the residual over the stated noise, in standard uncertainties of sigma and of
+/// chance.
 double deviations(const LeftOver& left) {
   return std::log(ratio_of(left)) / std::hypot(thresholds::kSigmaKnownTo, by_chance(left));
 }
@@ -32,9 +32,8 @@ LeftOver left_of(const LinearProblem::Spread& spread) {
   return {spread.noise, spread.stated, spread.freedom};
 }
 
-/// The rest that the model leaves in position with its numbers within their bounds. A spread is
-/// what no number explains wherever it would have to stand: a gearbox that lifts its load explains
-/// away what then is left.
+/// The residual in position with the model's numbers within their bounds. The spread of a problem
+/// ignores the bounds, so there a gearbox that lifts its load would explain the residual away.
 LeftOver left_within_bounds(const LinearProblem& served) {
   LeftOver left = left_of(served.position_spread());
   double square = 0;
@@ -45,8 +44,8 @@ LeftOver left_within_bounds(const LinearProblem& served) {
   return left;
 }
 
-/// The rest in positions: what has no name is told by itself, and the model cannot be held to what
-/// it leaves without that.
+/// The residual in positions. A nameless function is reported by itself, so the model is not judged
+/// by the residual without it.
 LeftOver left_in_position(const Explained& explained) {
   return explained.found.unnamed.empty() ? left_within_bounds(explained.served)
                                          : left_of(explained.after.position_spread());
@@ -57,7 +56,7 @@ NoiseVerdict worst_of(const Explained& explained) {
                   judge_noise(left_of(explained.after.rotation_spread())));
 }
 
-/// The causes that the model has and whose numbers would have to stand beyond their bounds.
+/// The causes of the model whose numbers would have to be beyond their bounds.
 std::vector<WrongSign> wrong_signs_of(const LinearProblem& served) {
   const Background all(served.nuisance());
   const Eigen::VectorXd change = all.estimate(served.residual());
@@ -100,7 +99,7 @@ bool scatter_beyond_noise(const RepeatStatistics& repeats) {
   return repeats.sigma_factor > thresholds::kRepeatsVouch;
 }
 
-/// The action that would show more, given what repeated poses say.
+/// The measurement that would show more, given the scatter of repeated poses.
 std::string what_shows_more(const PreparedBatch& prepared) {
   if (prepared.repeats.degrees_of_freedom == 0)
     return "measure some poses repeatedly, which tells a noisy measurement from something that the "
@@ -124,8 +123,8 @@ std::vector<LeftBySession> sessions_beyond_noise(const Explained& explained,
   return sessions;
 }
 
-/// "session day-2 leaves 1.8 times the stated noise": those of several sessions; empty where none
-/// does.
+/// "session day-2 leaves 1.8 times the stated noise": the sentences about several sessions. Empty
+/// if no session leaves more noise.
 std::string said_of_sessions(const std::vector<LeftBySession>& beyond) {
   std::vector<std::string> all;
   for (const LeftBySession& one : beyond)
@@ -134,12 +133,12 @@ std::string said_of_sessions(const std::vector<LeftBySession>& beyond) {
   return fmt::format("{}", fmt::join(all, ", "));
 }
 
-/// m, of the three axes: what is left beyond what is stated.
+/// m, of the three axes: the residual beyond the stated noise.
 double rms_beyond(const LeftOver& left) {
   return std::sqrt(3 * std::max(0.0, left.left * left.left - left.stated * left.stated));
 }
 
-/// Tells what repeated poses show that is no noise.
+/// Reports the scatter of repeated poses if it is more than noise.
 void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   const RepeatStatistics& repeats = prepared.repeats;
   if (!scatter_beyond_noise(repeats)) return;
@@ -160,7 +159,7 @@ void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   unexplained = {true, {}, rms_beyond(scatter), chance_of_noise(scatter), as_sentence(hint)};
 }
 
-/// True if some joint came to the poses from one side only, as far as anybody recorded.
+/// True if some joint came to the poses from one side only, by the record.
 bool has_unseen_side(const MeasurementBatch& recorded) {
   const auto& rows = recorded.measurements;
   const auto comes_from = [&](std::size_t joint, int side) {
@@ -174,8 +173,8 @@ bool has_unseen_side(const MeasurementBatch& recorded) {
   return false;
 }
 
-/// Adds what the effects of the model's own causes with a wrong sign change with; what they mean,
-/// and what to measure.
+/// Adds the quantities that change the effect of the model's own causes with a wrong sign. Returns
+/// the meaning of these signs and the next measurement.
 std::optional<std::string> tell_wrong_signs(const LinearProblem& served,
                                             const MeasurementBatch& recorded,
                                             Unexplained& unexplained) {

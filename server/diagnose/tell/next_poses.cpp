@@ -28,10 +28,10 @@ constexpr int kRandomSets = 20;  // of poses, to compare with on average
 struct Member {
   const Family* family = nullptr;
   Best best;
-  bool begins = false;  ///< at a pose: all that is measured later lies after it
+  bool begins = false;  ///< it begins at a pose: all later measurements lie after it
 };
 
-/// The index of a pose in a batch, 0 where it has none of that name.
+/// The index of a pose in a batch, 0 if it has no pose of that name.
 Index index_of(const MeasurementBatch& batch, const std::string& pose_id) {
   const auto& all = batch.measurements;
   const auto found = std::find_if(all.begin(), all.end(),
@@ -121,7 +121,7 @@ class Uncertainty {
 
 struct Candidate {
   JointVector q;
-  MatrixXd rows;  // what it would measure of everything that is free
+  MatrixXd rows;  // the rows that it would measure, for all free columns
 };
 using Candidates = std::vector<Candidate>;
 
@@ -159,8 +159,8 @@ class Measuring {
   }
 
  private:
-  /// Those that a plan takes as they will be written: on the grid of programs, with a way to be
-  /// approached on.
+  /// The candidates that a plan accepts, in their written form: on the grid of programs, with room
+  /// for an approach.
   Candidates measurable(MatrixXd all) {
     for (Index i = 0; i < all.rows(); ++i)
       all.row(i) = on_program_grid(cell().robot, all.row(i).transpose());
@@ -175,7 +175,8 @@ class Measuring {
 
   const Cell& cell() const { return *found_.before.model.cell; }
 
-  /// As if measured where the model has them, in the context of the batch, after it.
+  /// The candidates as measurements at the model's predicted poses. They continue the batch in its
+  /// context.
   Candidates seen(const MatrixXd& q) {
     MeasurementBatch batch;
     batch.id = "next";
@@ -245,7 +246,7 @@ Candidates chosen_from(Candidates pool, int count, Uncertainty uncertainty) {
   return chosen;
 }
 
-/// Every pose in turn gives way to a variant of it that tells more beside the others.
+/// Replaces each pose in turn by a variant that gives more information beside the others.
 void move(Candidates& chosen, Measuring& measuring, const Uncertainty& now) {
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     Candidates others = chosen;
@@ -307,7 +308,8 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
                         finding->could_also_be.end());
   next.stddev_now = std::sqrt(now.variance());
   next.stddev_expected = std::sqrt(with(now, chosen).variance());
-  // Causes that no pose tells apart need something else, as the finding's action says.
+  // If no pose distinguishes the causes, another measurement is needed, which the finding's action
+  // names.
   if (next.stddev_expected > thresholds::kWorthMeasuring * next.stddev_now) return {};
   for (const Candidate& one : chosen) next.q.push_back(one.q);
   next.stddev_random = stddev_with_random(*pool, chosen.size(), now, options.seed);

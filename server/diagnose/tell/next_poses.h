@@ -5,10 +5,10 @@
 
 namespace trammel::cause_search {
 
-/// Poses of the cell that tell apart what a finding could be: greedily, each the one that lowers
-/// the uncertainty of its effect most while everything that imitates it stays free (T-optimal for
-/// the effect as fitted), then moved while that lowers it further. Empty where nothing is
-/// confounded, or where no poses help.
+/// Poses of the cell that distinguish the alternatives of a finding. They are chosen greedily: each
+/// lowers the uncertainty of the finding's effect most while all its imitators stay free (T-optimal
+/// for the fitted effect). Then they are moved while that lowers it further. Empty if nothing is
+/// confounded, or if no poses help.
 [[nodiscard]] NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
                                        const DiagnoseOptions& options);
 

@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kMostIds = 40;  // that a sentence lists
-constexpr int kMostRounds = 20;       // of sides and play by turns: each lowers the misfit
+constexpr std::size_t kMostIds = 40;  // most ids in a sentence
+constexpr int kMostRounds = 20;  // alternating between sides and play: each round lowers the misfit
 
 std::string listed(std::vector<std::string> ids) {
   const std::size_t more = ids.size() - std::min(ids.size(), kMostIds);
@@ -38,7 +38,7 @@ class Misread {
     std::erase(out_, nullptr);
   }
 
-  /// The mistake of that pose, for people; empty where it has none that is known.
+  /// The mistake of that pose, for people; empty if none is known.
   [[nodiscard]] std::string reason(const SuspectedPose& pose) {
     const Measurement* m = measured_at(pose);
     if (m == nullptr) return "";
@@ -48,7 +48,7 @@ class Misread {
     if (text.empty()) text = as_other_row(*m);
     return text;
   }
-  /// Pose ids by what was found of them, `poses that ...`.
+  /// Pose ids by the mistake found in them, `poses that ...`.
   [[nodiscard]] const std::map<std::string, std::vector<std::string>>& groups() const {
     return groups_;
   }
@@ -63,7 +63,7 @@ class Misread {
   [[nodiscard]] double distance(const Measurement& m, const PoseContext& context) const {
     return (m.p_W - model_.pose_W(context).translation()).norm();
   }
-  /// True if `m` fits that context, and its own far worse.
+  /// True if `m` fits that context far better than its own.
   [[nodiscard]] bool fits(const Measurement& m, const PoseContext& context) const {
     const double other = distance(m, context);
     return other < thresholds::kFitsOtherwise * noise_ &&
@@ -132,8 +132,8 @@ class Misread {
   std::map<std::string, std::vector<std::string>> groups_;
 };
 
-/// Sides of approach, +1 as marked or -1 from the other side, found together with the play that
-/// they make.
+/// Sides of approach: +1 as marked, -1 from the other side. The fit finds them together with the
+/// resulting play.
 class Sides {
  public:
   Sides(const LinearProblem& problem, const Background& all, const std::string& source)
@@ -177,7 +177,7 @@ class Sides {
     const VectorXd rest = data_ - play_;
     left_ = rest - beside.columns() * beside.estimate(rest);
   }
-  /// The play at a pose, as it stands: its square, and how much of what is there lies along it.
+  /// The play at a pose as recorded: its square, and the component of the data along it.
   [[nodiscard]] std::pair<double, double> of_pose(Index i) const {
     const auto play = play_.segment(problem_.first_row(i), problem_.row_count(i));
     const auto left = left_.segment(problem_.first_row(i), problem_.row_count(i));
@@ -211,14 +211,14 @@ bool are_one(const Explained& explained, const Measurement& m, const std::string
          after < thresholds::kFitsBetter * apart(explained.found.before.model);
 }
 
-/// Doubts the findings of `record`, of that joint.
+/// Marks the findings of `record` at that joint as doubtful.
 void doubt(Diagnosis& diagnosis, const CauseRecord& record, const Cause& rival,
            const std::string& action) {
   for (Finding& finding : diagnosis.findings) {
     if (&record_of(finding.cause) != &record || finding.cause.joint != rival.joint) continue;
     auto& others = finding.could_also_be;
     if (std::find(others.begin(), others.end(), rival) == others.end()) others.push_back(rival);
-    finding.whole = true;  // what is wrong goes into no model, not even as the best known shape
+    finding.whole = true;  // a mistake enters no model, not even as the best known shape
     finding.action = action;
   }
   if (diagnosis.verdict == Verdict::kNamed) diagnosis.verdict = Verdict::kAmbiguous;
@@ -253,8 +253,8 @@ void tell_wrong_sides(const Explained& explained, Diagnosis& diagnosis) {
   }
 }
 
-/// Tools that are two in the cell and one by what was found: then the rows of the rarer one may
-/// have the wrong name.
+/// Reports tools that are two in the cell but equal by the findings: then the rows of the rarer one
+/// may have the wrong name.
 void tell_tools_that_are_one(const Explained& explained, Diagnosis& diagnosis) {
   const auto& rows = explained.found.batch.measurements;
   std::map<std::string, std::vector<const Measurement*>> by_tool;
@@ -300,7 +300,7 @@ void tell_times(const MeasurementBatch& recorded, Diagnosis& diagnosis) {
 }  // namespace
 
 std::vector<std::size_t> rows_against_time(const MeasurementBatch& batch) {
-  // The longest sequence that does not fall (patience sorting); whatever is not in it has to go.
+  // The longest sequence that does not fall (patience sorting); all other rows must go.
   std::vector<std::size_t> known, tails, before(batch.measurements.size());
   const auto time = [&](std::size_t i) { return *batch.measurements[i].context.time; };
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {

@@ -18,14 +18,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kMostSingles =
-    8;  // parameters of a cause that are asked about one by one; a map has a hundred
+    8;  // parameters of a cause that are tested one by one; a map has a hundred
 
 /// A family's effect, on average over the sizes that its priors allow.
 struct Average {
   MatrixXd columns;     // R x m, whitened, per prior
-  MatrixXd projected;   // R x m: what the background leaves of them
+  MatrixXd projected;   // R x m: their part outside the background
   MatrixXd inverse;     // m x m: L⁻¹ of their information beside the background, priors included
-  double strength = 0;  // what stands out of it
+  double strength = 0;  // the part of its strength that stands out
   double share = 0;     // of its length
   double rms = 0;       // m
 };

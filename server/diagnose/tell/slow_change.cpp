@@ -16,13 +16,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kMostSteps = 6;  // more of them are no steps
+constexpr std::size_t kMostSteps = 6;  // with more steps the change is not stepwise
 constexpr double kLeastLeft = 1e-9;    // share: rounding
 
 /// Something that moves, and which of all columns are its functions.
 struct Mover {
   std::string what;  // for people
-  int joint = -1;    // 0-based, whose zero it is
+  int joint = -1;    // 0-based, the joint of the zero
   std::vector<Index> columns;
 };
 
@@ -67,8 +67,7 @@ VectorXd explained_from(const LinearProblem& problem, const VectorXd& always,
   return explained;
 }
 
-/// The distance that the mover went, as its function has it: rad of a joint's zero, m of anything
-/// else.
+/// The size of the motion by its function: rad for a joint's zero, m for anything else.
 double size_of(const LinearProblem& problem, const Mover& mover, const VectorXd& effect) {
   if (mover.joint < 0) return problem.positions(effect).colwise().norm().maxCoeff();
   double low = 0;
@@ -131,7 +130,7 @@ std::string said(const LinearProblem& problem, const Background& all, const Move
 
 std::vector<Index> steps_along(const LinearProblem& problem, const VectorXd& always,
                                const Background& rest, const VectorXd& data, double smooth_leaves) {
-  // Twice the log likelihood, by what is left: how large noise is, is asked of the data as well.
+  // Twice the log likelihood of the residual; the noise is estimated from the data as well.
   const auto gain = [&](double from, double to) {
     return static_cast<double>(data.size()) * std::log(from / to);
   };

@@ -7,16 +7,15 @@
 
 namespace trammel::cause_search {
 
-/// The part that moved in the course of the batch, for people, by its size and its course: what
-/// warms up moves slowly and little, what slips moves in steps. Empty where nothing moved. `all`:
-/// the background of `problem`, with the functions found.
+/// The part that moved during the batch, for people, from its size and its course: warming moves
+/// slowly and little, slipping moves in steps. Empty if nothing moved. `all`: the background of
+/// `problem`, with the functions found.
 [[nodiscard]] std::string what_moves(const SearchResult& found, const LinearProblem& problem,
                                      const Background& all, const Surrogates& unrecorded);
 
-/// The poses at which a motion along `always` (R, whitened: the motion if it had gone all the way
-/// at every pose) goes on by steps, ascending; empty where steps do not explain `data` better than
-/// a smooth course that leaves `smooth_leaves` of it (a squared whitened size). `rest`: all that is
-/// free beside it.
+/// The poses, ascending, at which a motion along `always` (R, whitened: the full motion at every
+/// pose) takes steps. Empty if steps do not explain `data` better than a smooth course whose
+/// residual is `smooth_leaves` (a squared whitened size). `rest`: all free columns beside it.
 [[nodiscard]] std::vector<Eigen::Index> steps_along(const LinearProblem& problem,
                                                     const Eigen::VectorXd& always,
                                                     const Background& rest,

@@ -30,7 +30,7 @@ std::string listed_clauses(const std::vector<std::string>& clauses) {
   return all;
 }
 
-/// Where a step may have begun besides the pose where it was found.
+/// The other poses at which a step may have begun.
 std::string beginning_said(const Finding& finding) {
   if (finding.may_begin_at.size() < 2) return "";
   return fmt::format(", or at another of {} to {},", finding.may_begin_at.front().pose_id,
@@ -57,7 +57,7 @@ std::string said(const Finding& finding) {
   return fmt::format("{} ({})", name_of(finding), size_of(finding));
 }
 
-/// The known causes of which a finding in doubt may be one, itself first.
+/// The known causes that a finding in doubt may be, itself first.
 std::vector<Cause> candidates_of(const Finding& finding) {
   std::vector<Cause> all = {finding.cause};
   for (const Cause& other : finding.could_also_be) {
@@ -124,7 +124,8 @@ std::string why_no_next_poses(const std::vector<Finding>& findings) {
 
 namespace {
 
-/// The findings by how sure they are; of those in doubt that may be the same causes the first only.
+/// The findings by certainty. Of several in doubt that may be the same causes, only the first is
+/// listed.
 struct Told {
   std::vector<const Finding*> sure, parts, doubtful, bad_poses;
 };

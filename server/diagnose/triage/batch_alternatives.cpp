@@ -15,8 +15,8 @@ bool is_of_the_arm(const CauseRecord& record) {
          (record.scope == Scope::kArm || record.scope == Scope::kJoint);
 }
 
-/// The source that a step of `joint` is when it acts at all poses: that of the whole, or the step
-/// itself where it is but one of the whole's numbers.
+/// The source that acts at all poses in place of a step of `joint`: the source of the whole cause,
+/// or the step itself if it is only one number of that cause.
 std::string as_a_whole(const CauseRecord& record, int joint) {
   const causes::Rival& whole = *whole_of(record);
   if (whole.parameter.empty()) return std::string(whole.cause);
@@ -33,7 +33,7 @@ Alternative started(const Cause& cause, const PhysicalModel& model) {
   return one;
 }
 
-/// Frees the source that `spec` names in `set`, which it is added for where the model has none.
+/// Frees the source that `spec` names in `set`, and adds it if the model lacks it.
 bool set_free(Alternative& one, const std::string& spec, std::vector<bool>& set) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : one.model.sources) {

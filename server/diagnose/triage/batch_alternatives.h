@@ -7,7 +7,7 @@
 
 namespace trammel::batch_triage {
 
-/// True if the cause is told by the base standing elsewhere, as the tracker sees it.
+/// True if the tracker sees the cause as a displaced base.
 [[nodiscard]] bool moves_base(const CauseRecord& record);
 
 /// The alternatives that a model and a batch allow.

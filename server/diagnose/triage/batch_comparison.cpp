@@ -20,9 +20,9 @@ constexpr double kFarthest =
 constexpr double kGoodMisfit =
     2.25;  // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
 constexpr double kWeakPrior =
-    1e-8;  // of what an alternative sets free, per squared scale of the parameter
+    1e-8;  // of the free parameters' information, per squared scale of the parameter
 
-/// Directions of the free parameters that the poses show: more of them than the prior does.
+/// The number of directions of the free parameters that the poses determine better than the prior.
 int shown_directions(const Alternative& alternative, const Eigen::MatrixXd& information) {
   std::vector<Eigen::Index> free;
   for (std::size_t k = 0; k < alternative.free.size(); ++k) {
@@ -108,11 +108,11 @@ void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd&
   }
 }
 
-/// The prior precision of all parameters in units of their scales: the model's own as calibration
-/// left them, those set free hardly any.
+/// The prior precision of all parameters in units of their scales. The model's own parameters keep
+/// the precision after calibration. The freed parameters have almost none.
 Eigen::MatrixXd Comparison::prior_precision(const Alternative& alternative,
                                             const Eigen::VectorXd& scale) const {
-  constexpr double kRounding = 1e-10;  // a covariance may be flat: what is known for certain
+  constexpr double kRounding = 1e-10;  // a covariance may be singular, for exactly known directions
   const Eigen::Index p = scale.size();
   std::vector<Eigen::Index> held, held_in_model;
   std::map<std::string, Eigen::Index> place;  // of the calibrated model's parameters
@@ -154,9 +154,9 @@ struct Fitting {
   Eigen::MatrixXd prior;                  ///< precision, in units of scale
   std::vector<Eigen::VectorXd> residual;  ///< of each pose, m and rad
   std::vector<Eigen::MatrixXd>
-      rows;  ///< as many x P a pose: derivative over expected deviation, in units of scale
-  std::vector<double> square;   ///< |residual over expected deviation|^2
-  Eigen::MatrixXd information;  ///< of the poses that count
+      rows;                    ///< P columns: derivative over expected deviation, in units of scale
+  std::vector<double> square;  ///< |residual over expected deviation|^2
+  Eigen::MatrixXd information;  ///< of the poses that count as inliers
 };
 
 Fitting Comparison::begun(const Alternative& alternative) const {
@@ -235,7 +235,7 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   }
   const auto outliers = static_cast<double>(fit.outliers.size());
   const int k = shown_directions(alternative, fitting.information);
-  const int places = alternative.first > 0 ? 2 : 0;  // where it begins was chosen
+  const int places = alternative.first > 0 ? 2 : 0;  // the first pose was chosen, which has a price
   fit.score =
       inside + bad + off.dot(fitting.prior * off) + k * std::log(all_rows()) + places * std::log(n);
   const double freedom = judged_rows - k;
@@ -251,7 +251,7 @@ Fit Comparison::fit(const Alternative& alternative) const {
   Fitting fitting = begun(alternative);
   for (int iteration = 0;; ++iteration) {
     linearise(alternative, fitting);
-    // First all poses, so that what has begun is followed; then only those that are not much
+    // First uses all poses, so that the fit follows the change; then only those that are not much
     // farther off than others.
     const auto changed = fitting.square.begin() + alternative.first;
     const double farthest =

@@ -11,14 +11,15 @@ namespace trammel::batch_triage {
 
 constexpr int kFewOutliers = 2;  ///< more than these may be a step
 
-/// An explanation: which parameters of which model are free, from which pose on.
+/// An explanation: the model and its free parameters, and the pose from which they are free.
 struct Alternative {
   Cause cause;  ///< `cause` empty: none
   bool harmful = false;
   bool tracker_elsewhere = false;
   int first = 0;
   PhysicalModel model;
-  std::vector<bool> free;  ///< of the model's parameters: by this alternative, from pose `first` on
+  std::vector<bool> free;  ///< the model's parameters that this alternative frees from pose `first`
+                           ///< on
   std::vector<bool> base;  ///< by the tracker, at all poses
   Eigen::VectorXd known;   ///< values to start from
 };
@@ -35,7 +36,7 @@ struct Fit {
 
 struct Fitting;
 
-/// The batch against one model: what the alternatives share.
+/// One batch against one model: the data that all alternatives share.
 class Comparison {
  public:
   Comparison(const CompensatedModel& model, const MeasurementBatch& batch);
@@ -45,8 +46,8 @@ class Comparison {
   [[nodiscard]] const CompensatedModel& model() const { return model_; }
 
   [[nodiscard]] Fit fit(const Alternative& alternative) const;
-  /// Where the base would have to stand for the batch as it is; where it stands in `model` when
-  /// that cannot be told.
+  /// The base that fits the batch as it is; the base of `model` if the batch does not determine
+  /// one.
   [[nodiscard]] Pose located_base(const PhysicalModel& model) const;
 
  private:
@@ -56,10 +57,9 @@ class Comparison {
     if (!context.temperature) context.temperature = model_.parts().temperature_mean;
     return context;
   }
-  /// Deviations of the orientations that the model expects; none are judged where it was never told
-  /// any.
+  /// Sets the expected deviations of the orientations; a model without orientations judges none.
   void expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors);
-  /// The count of the numbers that are judged: of a pose, 6 or 3 without an orientation; of all.
+  /// The number of judged numbers: 6 for a pose, 3 without an orientation, or all.
   [[nodiscard]] Eigen::Index rows(int pose) const {
     return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3;
   }
@@ -84,7 +84,7 @@ class Comparison {
   Eigen::Matrix3Xd bias_B_;                 // m
   std::vector<Matrix3> rotation_bias_B_;    // of each pose
   Eigen::Matrix<double, 6, -1> deviation_;  // m, rad
-  std::vector<bool> is_turned_;             // whether its orientation is judged
+  std::vector<bool> is_turned_;             // true: its orientation is judged
   std::vector<PoseContext> contexts_;
 };
 
