@@ -8,12 +8,12 @@ namespace trammel {
 namespace {
 
 constexpr double kDay = 86400;      // s
-constexpr double kSurprise = 2.71;  // of twice the log likelihood: 95 % from one side
+constexpr double kSurprise = 2.71;  // of twice the log likelihood: 95 %, one side
 constexpr double kLeastVariance = 1e-14, kMostVariance = 1e-4;  // m^2
-constexpr int kOfADecade = 12;                                  // variances; of rates twice as many
+constexpr int kOfADecade = 12;  // grid of variances; rates have twice as many
 constexpr int kDecades = 10;
 
-/// At any variance, m^2, between those that are given.
+/// The misfit at any variance, m^2, interpolated between the given ones.
 double misfit_at(const DriftSeen& seen, double variance) {
   const double at = kOfADecade * std::log10(std::max(variance, kLeastVariance) / kLeastVariance);
   const auto last = static_cast<double>(seen.misfit.size() - 1);

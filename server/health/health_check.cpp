@@ -24,7 +24,7 @@ HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options,
   return check;
 }
 
-/// True where lost zeros are named, and leave nothing beyond chance.
+/// True if the check names lost zeros, and nothing beyond chance remains.
 bool is_all_by_zeros(const HealthCheck& check) {
   const auto leaves_nothing = [](const SeenChange& change) {
     const auto& others = change.could_also_be;

@@ -13,24 +13,24 @@
 namespace trammel {
 
 enum class HealthVerdict {
-  kHealthy,    ///< as the model has it, and no change above the tolerance could be hidden
+  kHealthy,    ///< unchanged; a change above the tolerance could not be hidden
   kChanged,    ///< beyond chance
   kCannotTell  ///< these poses could hide a change above the tolerance, or it may be chance
 };
 /// `healthy`, `changed`, `cannot_tell`.
 [[nodiscard]] std::string_view to_string(HealthVerdict verdict);
 
-/// Where a cell file says nothing.
+/// The default if a cell file states none.
 inline constexpr double kUsualTolerance = 1e-4;  // m
 
 struct HealthOptions {
   double tolerance = kUsualTolerance;  ///< m, of an effect over the working poses, rms
   bool new_tool =
       false;  ///< the tool sits elsewhere than in the model: it is refitted with the base
-  double false_alarm = 0.003;  ///< chance that a healthy robot is said to have changed
+  double false_alarm = 0.003;  ///< chance that the verdict on a healthy robot is a change
   double power = 0.95;         ///< chance with which an effect of the stated smallest size is seen
   std::uint64_t seed = 1;
-  std::vector<DriftSeen> earlier = {};  ///< what checks before this one saw of the arm's drift
+  std::vector<DriftSeen> earlier = {};  ///< the arm's drift by earlier checks
 };
 
 /// A zero that a joint lost.
@@ -38,8 +38,9 @@ struct LostZero {
   int joint = 0;          ///< 0-based
   double by = 0;          ///< rad
   double u95 = 0;         ///< rad, U(k=2)
-  double effect_rms = 0;  ///< m: what this zero alone does, where the change's effect is told
-  double effect_u95 = 0;  ///< m, U(k=2) of it
+  double effect_rms = 0;  ///< m: the effect of this zero alone; set where the change's effect is
+                          ///< known
+  double effect_u95 = 0;  ///< m, U(k=2) of the effect
 };
 
 /// A change that was seen.
@@ -47,11 +48,11 @@ struct SeenChange {
   SingleCause
       cause;  ///< `unknown`: no single cause fits; a lost zero of no joint: those of several
   double effect_rms = 0;  ///< m, base (and tool) refitted, over the working poses
-  double u95 = 0;         ///< m, U(k=2) of it
+  double u95 = 0;         ///< m, U(k=2) of the effect
   bool at_these_poses =
-      false;  ///< `effect_rms` is at the check's: they do not show how large it is elsewhere
-  std::vector<LostZero> zeros{};  ///< of lost zeros: which, and by how much
-  double p_value = 1;  ///< chance that the best of all causes explains as much in a healthy robot
+      false;  ///< `effect_rms` is at the check's poses, which do not show its size elsewhere
+  std::vector<LostZero> zeros{};  ///< for lost zeros: the joints and the sizes
+  double p_value = 1;  ///< chance that the best cause explains as much in a healthy robot
   std::vector<SingleCause> could_also_be = {};
 };
 
@@ -70,10 +71,10 @@ struct HealthCheck {
   std::vector<std::string> suspects;  ///< pose ids that fit nothing, left out
   std::vector<CauseNotAsked> not_asked;
   std::string model;                    ///< id of the one that it was held against
-  std::optional<DriftSeen> drift;       ///< what this check says of it; empty: nothing
+  std::optional<DriftSeen> drift;       ///< the drift by this check; empty: it shows none
   std::optional<DriftRate> drift_rate;  ///< by this check and the earlier ones
   std::string due;          ///< date of the next check (ISO 8601, UTC); empty: cannot be said
-  std::string due_because;  ///< from what that follows, or why it cannot be said
+  std::string due_because;  ///< the basis of the date, or the reason why there is none
 };
 
 }  // namespace trammel

@@ -15,19 +15,20 @@ namespace {
 using Eigen::Index;
 
 constexpr double kShared =
-    0.2;  // of a joint's range: poses nearer than that share what the model leaves over
-constexpr double kOfJoints = 0.5;  // of the variance that a model leaves over: as errors of joints,
-                                   // the rest in any direction
-constexpr double kFarOff = 6;  // times the median: a pose that does not say where the base stands
-constexpr int kLocalisations = 4;  // without the poses that were far off the last time
-constexpr double kThin =
-    0.02;  // of how far the poses are away: within less of a line they turn the base anyhow
-constexpr double kJitter = 1e-6;  // of the instrument's variance: what is certain is so to rounding
+    0.2;  // of a joint's range: poses nearer than that share their model error
+constexpr double kOfJoints = 0.5;  // share of the model-error variance that acts as errors of
+                                   // joints; the rest acts in any direction
+constexpr double kFarOff = 6;      // times the median: such a pose does not help to locate the base
+constexpr int kLocalisations = 4;  // each without the poses that were far off the last time
+constexpr double kThin = 0.02;  // relative to the distance of the poses: if they are this close to
+                                // a line, they do not determine the turn about it
+constexpr double kJitter = 1e-6;  // of the instrument's variance: keeps exact values positive
+                                  // definite under rounding
 constexpr double kUnmoved =
-    0.02;  // of how far the poses are away: a zero of a degree moves them no farther
-constexpr double kTurned = 0.002;  // rad: of a base that is turned as the model has it
+    0.02;  // relative to the distance of the poses: a zero of a degree moves them no farther
+constexpr double kTurned = 0.002;  // rad: uncertainty of an assumed turn of the base
 
-/// Where the base stands by the positions, those left out that are much farther off than others.
+/// The base that fits the positions, without positions much farther off than the others.
 Result<Pose> located(const MeasurementBatch& batch,
                      const std::vector<ErrorPrediction>& predictions) {
   const std::size_t n = predictions.size();
@@ -57,7 +58,7 @@ Result<Pose> located(const MeasurementBatch& batch,
   return X_WB;
 }
 
-/// True where all poses are at about one place, or on one line: any error of theirs turns the base.
+/// True if all poses lie near one place or on one line. Then any error of the poses turns the base.
 bool are_thin(const std::vector<ErrorPrediction>& predictions) {
   Eigen::Matrix3Xd p_B(3, static_cast<Index>(predictions.size()));
   for (std::size_t i = 0; i < predictions.size(); ++i)
@@ -68,7 +69,7 @@ bool are_thin(const std::vector<ErrorPrediction>& predictions) {
   return across < kThin * mean.norm() * std::sqrt(static_cast<double>(predictions.size()));
 }
 
-/// Where the base stands by orientations, and by the mean of the positions.
+/// The base by the orientations, and by the mean of the positions.
 Pose turned_by_orientations(const MeasurementBatch& batch,
                             const std::vector<ErrorPrediction>& predictions) {
   Matrix3 turned = Matrix3::Zero();
@@ -85,8 +86,7 @@ Pose turned_by_orientations(const MeasurementBatch& batch,
   return make_pose(R_WB, measured_W - R_WB * predicted_B);
 }
 
-/// Where the base stands if it is turned as in `X_WB`, by the mean of the positions; empty: it
-/// stands elsewhere.
+/// The base with the turn of `X_WB`, by the mean of the positions; empty: it stands elsewhere.
 std::optional<Pose> turned_as_before(const MeasurementBatch& batch,
                                      const std::vector<ErrorPrediction>& predictions,
                                      const Pose& X_WB) {
@@ -122,8 +122,8 @@ Result<Stand> base_of(const MeasurementBatch& batch,
       "workspace (`trammel plan --check`)");
 }
 
-/// The base is no more turned than by kTurned, about the mean of where the poses were measured: its
-/// place is refitted.
+/// Limits the turn of the base to kTurned, about the mean of the measured positions; its place is
+/// refitted.
 void hold_turn(CheckRows& rows) {
   const auto measured_B = [&](std::size_t i) {
     return Vector3(rows.predicted[i].translation() + rows.residual.segment<3>(rows.first[i]));
@@ -147,7 +147,7 @@ double rotation_shown(const ModelParts& parts) {
          std::sqrt(3.0);
 }
 
-/// The share of what the model leaves over that two poses have in common.
+/// The correlation of the model errors of two poses.
 double shared(const PoseContext& one, const PoseContext& other, const JointVector& range) {
   double square = 0;
   for (Index j = 0; j < range.size(); ++j) {
@@ -157,8 +157,8 @@ double shared(const PoseContext& one, const PoseContext& other, const JointVecto
   return std::exp(-0.5 * square);
 }
 
-/// Standard deviations of each row: the measurement's noise, and what the model leaves over beyond
-/// its parameters.
+/// Standard deviations of each row: the measurement's noise, and the model error beyond its
+/// parameters.
 struct RowDeviations {
   Eigen::VectorXd noise, left;
   Eigen::MatrixXd J;  ///< R x P: by the parameters, as far as they count
@@ -171,8 +171,8 @@ void add_position(const ErrorPrediction& prediction, const Measurement& m, doubl
   const Vector3 variance = (prediction.covariance_B.diagonal().array() - sigma * sigma).max(0.0);
   auto J = rows.J.middleRows<3>(first);
   const Vector3 identified = (J * covariance * J.transpose()).diagonal();
-  // A bias corrects part of what the parameters leave uncertain: they count no more than the model
-  // says in all.
+  // A bias corrects a part of the parameters' errors, so their variance counts no more than the
+  // model's total.
   const double counts =
       identified.sum() > 0 ? std::min(1.0, variance.sum() / identified.sum()) : 0.0;
   J *= std::sqrt(counts);
@@ -207,9 +207,9 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
   return 0.5 * (S + S.transpose());
 }
 
-/// The covariance of what the model leaves over as an error of each joint's own angle by any
-/// function of it, all joints alike and together as large as what is left over: R x R. Gears that
-/// the model does not know look like that, and not alike in all axes.
+/// The covariance of the model error if it acts as an error of each joint's angle by an arbitrary
+/// function, equal for all joints and of the total size of the model error: R x R. Unknown gear
+/// errors look like that, and differ between axes.
 Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations,
                                const CauseEffects& effects, const JointVector& range) {
   const Index R = rows.residual.size();
@@ -239,7 +239,8 @@ Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& devia
   return S;
 }
 
-/// The model's held-out poses say how large its errors really are.
+/// The factor by which the model's held-out poses show larger errors than its covariance states. At
+/// least 1.
 double held_out_factor(const CheckRows& rows, const ModelParts& parts) {
   if (!parts.validation || parts.validation->poses == 0) return 1;
   double expected = 0;

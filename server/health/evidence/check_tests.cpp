@@ -14,16 +14,17 @@ namespace {
 using Eigen::Index;
 
 constexpr int kSimulated = 3000;              // healthy checks
-constexpr double kLookCloser = 2e-4;          // p-value from which on bad poses are looked for
+constexpr double kLookCloser = 2e-4;          // the search for bad poses begins at this p-value
 constexpr std::size_t kMostHeld = 8'000'000;  // numbers of sets of bad poses that are kept: 64 MB
-constexpr double kBadPoseShare = 1 / 6.0;     // at most, at least one: more are no single bad poses
+constexpr double kBadPoseShare = 1 / 6.0;     // of the poses, at least one; more are not single bad
+                                              // poses
 
 double normal(SeededRandom& random) {
   const double radius = std::sqrt(-2 * std::log(random.uniform(1e-300, 1)));
   return radius * std::cos(2 * kPi * random.uniform(0, 1));
 }
 
-/// The factor by which one pose's errors are larger than usual, mean square 1.
+/// A random factor on one pose's errors, mean square 1.
 double disturbance(int freedom, SeededRandom& random) {
   if (freedom <= 2) return 1;
   double square = 0;

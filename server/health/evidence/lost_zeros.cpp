@@ -18,7 +18,7 @@ constexpr int kMostSteps = 12;
 constexpr double kSettled = 1e-3;      // whitened square of a step
 constexpr double kFarthestTurn = 0.3;  // rad, of a step: beyond it nothing is linear
 
-/// Leaves of both what is across `free`, which may be anything.
+/// Keeps only the parts of both that are orthogonal to `free`, which is unrestricted.
 void take_out(const MatrixXd& free, MatrixXd& J, VectorXd& residual) {
   if (free.cols() == 0) return;
   const Eigen::HouseholderQR<MatrixXd> qr(free);

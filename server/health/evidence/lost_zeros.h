@@ -4,12 +4,12 @@
 
 #include "server/health/evidence/check_rows.h"
 
-/// Zeros that several joints lost at once, as in a robot that was mastered anew, and beside them
-/// perhaps a tool that sits elsewhere: one explanation of a check.
+/// Zeros that several joints lost at once, as in a robot that was mastered anew, perhaps together
+/// with a displaced tool: one explanation of a check.
 ///
-/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by
-/// Gauss-Newton steps. Each number has a prior width, the most that it can be off; it bounds what
-/// the poses do not tell.
+/// A zero that is off by degrees does not act linearly, so base, zeros and tool are found together
+/// by Gauss-Newton steps. Each number has a prior width, its largest credible value, which bounds
+/// undetermined numbers.
 namespace trammel::health {
 
 /// One set of zeros, with or without the tool, as the poses have it.
@@ -17,9 +17,9 @@ struct ZerosFit {
   std::vector<std::size_t> zeros;  ///< indices in CauseEffects::causes(), ascending
   bool tool = false;               ///< sits elsewhere as well
   std::vector<int> bad = {};       ///< poses that do not count
-  int numbers = 0;                 ///< that are free and show at the poses
-  double left = 0;                 ///< whitened square of what they do not explain
-  Pose X_BB = Pose::Identity();    ///< the base, seen from where the rows have it
+  int numbers = 0;                 ///< free numbers that show at the poses
+  double left = 0;                 ///< whitened square of the unexplained part
+  Pose X_BB = Pose::Identity();    ///< the base, relative to the base of the rows
 
   std::vector<Eigen::Index> columns;  ///< of the numbers: zeros, then tool
   Eigen::VectorXd at;                 ///< K, in prior scales; 0 where `columns` are not
@@ -33,10 +33,10 @@ class ZerosSearch {
               bool new_tool);
 
   [[nodiscard]] const std::vector<std::size_t>& causes() const { return zeros_; }
-  /// Each set of zeros, without and with the tool, and the tool alone. Empty of arms with so many
-  /// joints that they are too many. `bad`: poses that do not count.
+  /// Each set of zeros, without and with the tool, and the tool alone. Empty for arms with too many
+  /// joints. `bad`: poses that do not count.
   [[nodiscard]] std::vector<ZerosFit> all(const std::vector<int>& bad = {}) const;
-  /// The check's rows, linear around the fit: what its numbers do there included.
+  /// The check's rows, linearised at the fit, with its effects included.
   [[nodiscard]] CheckRows around(const ZerosFit& fit) const;
 
  private:
@@ -44,10 +44,10 @@ class ZerosSearch {
     Eigen::VectorXd residual;
     Eigen::MatrixXd by_base, by_cause;
   };
-  /// `warmth`: with what it does, which no zero needs.
+  /// `warmth`: adds the effect of warmth, which no zero needs.
   [[nodiscard]] Linear linear(const Eigen::VectorXd& at, const Pose& X_BB, bool warmth) const;
   [[nodiscard]] ZerosFit begun(unsigned chosen, bool tool, const std::vector<int>& bad) const;
-  /// R x m: what frees these poses, whitened.
+  /// R x m: whitened columns that free these poses.
   [[nodiscard]] Eigen::MatrixXd freeing(const std::vector<int>& bad) const;
   void fit(ZerosFit& one) const;
 

@@ -37,7 +37,7 @@ double log_of_square(const Eigen::VectorXd& diagonal) {
 double gained_beside_noise(const CheckRows& rows, const Eigen::MatrixXd& covariance,
                            const Eigen::MatrixXd& refitted, const Eigen::MatrixXd& cause,
                            RowKind kind) {
-  // The columns that count, as they are before whitening: the same for every noise.
+  // The remaining columns before whitening, which are equal for every noise.
   const Eigen::MatrixXd basis =
       RefittedRows(covariance, Eigen::MatrixXd(rows.residual.size(), 0)).kept(refitted);
   double without = std::numeric_limits<double>::infinity(), with = without;

@@ -22,7 +22,7 @@ Eigen::VectorXd lengths(const Eigen::MatrixXd& columns) {
   return columns.colwise().norm().transpose();
 }
 
-/// One column a pose: a function of the joint's angle may be anything at each.
+/// One column per pose, since a function of the joint's angle may have any value at each pose.
 Eigen::MatrixXd by_pose(const CheckRows& rows, Index column) {
   Eigen::MatrixXd columns =
       Eigen::MatrixXd::Zero(rows.residual.size(), static_cast<Index>(rows.poses()));

@@ -8,15 +8,15 @@
 
 namespace trammel::health {
 
-/// Share of a column: less that is left of it is rounding, or made up for.
+/// Share of a column: with less left, the column is absorbed by the refit up to rounding.
 inline constexpr double kLeastLeft = 1e-3;
 
-/// The farthest that numbers of a cause can be off at all, in units of their prior scales (standard
-/// deviations): 20 mm and 50 mrad of links and tools, 0.1 rad of a zero, 2 mrad of an error that
-/// goes with the angle.
+/// The largest credible numbers of a cause, in units of their prior scales (standard deviations):
+/// 20 mm and 50 mrad for links and tools, 0.1 rad for a zero, 2 mrad for an error that depends on
+/// the angle.
 inline constexpr double kWidest = 10, kWidestZero = 50, kWidestFunction = 1;
 
-/// Numbers fitted to residuals: what these do not tell is not known beyond the prior.
+/// Numbers fitted to residuals; undetermined ones keep their prior uncertainty.
 struct Estimate {
   Eigen::VectorXd numbers;
   Eigen::MatrixXd covariance;
@@ -38,10 +38,10 @@ struct Hypothesis {
 /// For every pose.
 [[nodiscard]] std::vector<Hypothesis> pose_hypotheses(const CheckRows& rows);
 
-/// The rest of residuals and effects after whitening, and after what is refitted anyway.
+/// Residuals and effects after whitening, and after removing the refitted parameters.
 class RefittedRows {
  public:
-  /// `nuisance`: R x f, refitted: base, tool, bad poses, what was found before.
+  /// `nuisance`: R x f, refitted columns: base, tool, bad poses, earlier findings.
   RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance);
 
   [[nodiscard]] Eigen::Index size() const { return nuisance_.rows(); }
@@ -54,10 +54,9 @@ class RefittedRows {
   [[nodiscard]] Eigen::VectorXd refitted(const Eigen::VectorXd& whitened) const {
     return whitened - nuisance_ * (nuisance_.transpose() * whitened);
   }
-  /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up
-  /// for are none.
+  /// R x r, orthonormal: the directions that columns have outside the nuisance columns.
   [[nodiscard]] Eigen::MatrixXd directions(const Eigen::MatrixXd& columns) const;
-  /// R x r, in their own units: columns that span the same as those.
+  /// R x r, in their own units: columns with the same span as those.
   [[nodiscard]] Eigen::MatrixXd kept(const Eigen::MatrixXd& columns) const {
     return unwhitened(directions(columns));
   }

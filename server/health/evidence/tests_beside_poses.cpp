@@ -57,7 +57,7 @@ TestsBesidePoses::Beside TestsBesidePoses::beside(const std::vector<int>& bad) c
   return beside;
 }
 
-/// By the eigenvalues 1 - d of I - M M', or those d of M' M, whichever is smaller.
+/// Uses the eigenvalues 1 - d of I - M M', or d of M' M, whichever matrix is smaller.
 TestsBesidePoses::Beside::Part TestsBesidePoses::part_of(const Eigen::MatrixXd& M) {
   Beside::Part part;
   part.freedom = static_cast<int>(M.rows());
@@ -72,7 +72,7 @@ TestsBesidePoses::Beside::Part TestsBesidePoses::part_of(const Eigen::MatrixXd& 
     const double taken = std::max(spectrum.eigenvalues()(k), 0.0);
     const bool is_lost = 1 - taken <= kLeastSquare;
     part.freedom -= is_lost ? 1 : 0;
-    // A row of `turn` is as long as sqrt(taken) where M is tall, else as 1.
+    // The length of a row of `turn` is sqrt(taken) if M is tall, else 1.
     const double weight = is_lost ? -1 : taken / (1 - taken);
     part.weight(k) = is_tall && taken > 0 ? weight / taken : is_tall ? 0 : weight;
   }

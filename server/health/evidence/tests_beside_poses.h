@@ -10,10 +10,10 @@ namespace trammel::health {
 /// The view of the tests of a check once some of its poses are refitted as bad, found without
 /// touching its R rows again.
 ///
-/// With D_h the orthonormal directions of hypothesis h beside the frames, and l the residuals
-/// whitened and refitted with the frames, everything follows from D_h' l and D_h' D_g: bad poses
-/// with the orthonormal directions Z leave of l the part (I - Z Z') l, and of h the columns (I - Z
-/// Z') D_h. With M = D_h' Z and v = D_h' (I - Z Z') l it explains
+/// Let D_h be the orthonormal directions of hypothesis h beside the frames, and l the residuals
+/// whitened and refitted with the frames. Then everything follows from D_h' l and D_h' D_g. Bad
+/// poses with the orthonormal directions Z leave the part (I - Z Z') l of l, and the columns (I - Z
+/// Z') D_h of h. With M = D_h' Z and v = D_h' (I - Z Z') l the hypothesis explains
 ///   v' (I - M M')^+ v,
 /// and loses the directions that Z makes up for. A set of bad poses costs a few matrices as small
 /// as h and Z, whatever the number of rows; a check of 60 poses looks at thousands of sets.
@@ -32,7 +32,7 @@ class TestsBesidePoses {
     [[nodiscard]] int whole_freedom() const { return whole_freedom_; }
     /// The residuals beside the bad poses.
     [[nodiscard]] Seen left(const Seen& seen) const;
-    /// The part of what is left() that a hypothesis explains.
+    /// The part of left() that a hypothesis explains.
     [[nodiscard]] double explained(std::size_t hypothesis, const Seen& left) const;
     /// Numbers that it holds.
     [[nodiscard]] std::size_t size() const;
@@ -53,8 +53,8 @@ class TestsBesidePoses {
     int whole_freedom_ = 0;
   };
 
-  /// `directions`: of each hypothesis beside the frames; those from `causes` on are of single
-  /// poses. `freedom`: of the residuals there.
+  /// `directions`: those of each hypothesis beside the frames; from `causes` on they belong to
+  /// single poses. `freedom`: that of the residuals there.
   TestsBesidePoses(const std::vector<Eigen::MatrixXd>& directions, std::size_t causes, int freedom);
 
   /// `left`: R, whitened, refitted with the frames.

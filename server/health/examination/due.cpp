@@ -10,7 +10,7 @@ namespace trammel::health {
 
 namespace {
 
-constexpr int kFewestChecks = 3;  // that say how fast an arm drifts
+constexpr int kFewestChecks = 3;  // needed to estimate the drift of an arm
 
 std::string date_of(std::int64_t unix_s) {
   const std::time_t time = unix_s;
@@ -19,7 +19,7 @@ std::string date_of(std::int64_t unix_s) {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-/// From what the next check follows; `since`: s from the model to this check.
+/// The basis of the next check's date; `since`: s from the model to this check.
 std::string because_of(const DriftRate& rate, double since) {
   constexpr double kDay = 86400;  // s
   constexpr double kMonth = 30 * kDay;

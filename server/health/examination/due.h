@@ -15,15 +15,15 @@ struct CheckTimes {
   std::optional<std::int64_t> model, check;
 };
 
-/// The misfit of each of drift_variances() to the residuals: the effects of all single causes are
-/// normal, alike. `drift`: R x S, what signals of 1 m rms do at the check's poses. Both whitened
-/// and refitted.
+/// The misfit of each of drift_variances() to the residuals, if the effects of all single causes
+/// are normal with equal variance. `drift`: R x S, the effects of signals of 1 m rms at the check's
+/// poses. Both whitened and refitted.
 [[nodiscard]] std::vector<double> misfits_of_drift(Eigen::MatrixXd drift,
                                                    const Eigen::VectorXd& residual);
 
-/// The effect of the drift may be above the tolerance (95 %) when it has grown that large at the
-/// highest rate that all checks together leave likely (95 %). `misfits`: misfits_of_drift(), asked
-/// for where times are known.
+/// Sets the date of the next check: when the effect of the drift may exceed the tolerance (95 %) at
+/// the highest rate that all checks together leave likely (95 %). `misfits`: misfits_of_drift(),
+/// called if times are known.
 void tell_due(const HealthOptions& options, const CheckTimes& times,
               const std::function<std::vector<double>()>& misfits, HealthCheck& check);
 

@@ -86,7 +86,7 @@ double Examination::distance_of(const RefittedRows& refitted) const {
   return std::sqrt(square / static_cast<double>(rows_.poses()));
 }
 
-/// Tells the rms of the poses that count, as they are and as a healthy robot's would be.
+/// Sets the rms of the counted poses, and that of a healthy robot.
 void Examination::tell_rms(const RefittedRows& refitted) {
   const Eigen::VectorXd left = refitted.unwhitened(refitted.left(rows_.residual));
   const Eigen::MatrixXd expected = refitted.unwhitened_covariance();

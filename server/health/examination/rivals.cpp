@@ -1,4 +1,4 @@
-// The rivals that explain the poses as well as what was named does.
+// The rivals that explain the poses as well as the named cause.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -11,7 +11,7 @@ namespace trammel::health {
 namespace {
 
 constexpr double kCredible =
-    0.99;  // of all single causes' odds: those that could be it have it together
+    0.99;  // of all single causes' odds: the candidates together have this share
 
 }  // namespace
 
@@ -26,8 +26,8 @@ void Examination::tell_rivals_beside(const CheckRows& there, const Eigen::Matrix
               tests.scores(tests.rows().left(there.residual)), change);
 }
 
-/// The most likely single causes that together have kCredible of the odds: many that are each
-/// unlikely may hold the true one.
+/// The most likely single causes with kCredible of the odds in total. The true cause may be among
+/// many unlikely ones.
 std::vector<bool> Examination::credible(const std::vector<double>& scores) const {
   std::vector<std::size_t> order(questions_.causes);
   std::iota(order.begin(), order.end(), 0);
@@ -50,8 +50,8 @@ std::vector<bool> Examination::credible(const std::vector<double>& scores) const
 
 void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests,
                               const std::vector<double>& scores, SeenChange& change) const {
-  // The evidence that a cause explains, whatever it costs: one with more numbers may be the true
-  // one all the same.
+  // The gain of a cause without the price of its numbers, since a cause with more numbers may still
+  // be the true one.
   const auto explained = [&](std::size_t h) { return scores[h] + price(tests.freedom(h)); };
   const std::vector<bool> likely = credible(scores);
   for (std::size_t h = 0; h < questions_.causes; ++h) {

@@ -10,9 +10,10 @@ namespace trammel::health {
 /// True if the cause is the zero of one joint, or of several.
 [[nodiscard]] bool is_zero(const SingleCause& cause);
 [[nodiscard]] SingleCause unknown_cause();
-/// Unless it stands there already.
+/// Does nothing if the list already contains it.
 void add_rival(const SingleCause& rival, SeenChange& change);
-/// An instrument that tells all lengths too long is like an arm that grew, and the tool with it.
+/// Adds the instrument as a rival: if it measures all lengths too long, it looks like an arm, with
+/// its tool, that grew.
 void tell_instrument(std::vector<SeenChange>& changed);
 
 }  // namespace trammel::health

@@ -13,8 +13,8 @@ using Eigen::Index;
 
 namespace {
 
-constexpr int kMostCauses = 3;       // that a check may name
-constexpr int kRounds = 3;           // of looking at each of them again beside the others
+constexpr int kMostCauses = 3;       // most causes that a check names
+constexpr int kRounds = 3;           // in which each named cause is tested again beside the others
 constexpr double kEven = 1e-3;       // of scores: rounding
 constexpr double kUnlinear = 0.003;  // of an effect
 constexpr double kNearlySeen =
@@ -54,8 +54,8 @@ void Examination::look_for_changes(const CheckTests& healthy) {
   if (!named_.empty()) tell_what_is_left();
 }
 
-/// Adds to each change that several zeros explain as much, and that something is left beside all of
-/// them.
+/// Adds a note to each change if several zeros explain as much, and if a residual is left beside
+/// all changes.
 void Examination::tell_what_is_left() {
   const CheckTests tests(covariance_, nuisance_, questions_);
   const bool is_all =
@@ -118,7 +118,7 @@ std::optional<std::size_t> Examination::likeliest(const CheckTests& tests,
                                                   const Eigen::VectorXd& left) const {
   std::vector<double> scores = tests.scores(left);
   scores.resize(questions_.causes);
-  // Where a joint stays at one angle, anything over that angle acts like its zero, which is
+  // If a joint stays at one angle, every function of that angle acts like its zero, which is
   // simpler.
   for (std::size_t h = 0; h < scores.size(); ++h)
     if (is_zero(effects_.causes()[questions_.hypotheses[h].cause].cause)) scores[h] += kEven;
@@ -150,7 +150,8 @@ bool Examination::is_scatter(std::size_t hypothesis, const CheckTests& tests,
          gained_beside_noise(rows_, covariance_, nuisance_, own, RowKind::kOrientations) < least;
 }
 
-/// A cause of any form fits nearly anything in part, so it is named only where nothing is left.
+/// A cause of any form explains a part of nearly everything, so it is named only if it leaves no
+/// residual.
 bool Examination::may_be_named(std::size_t hypothesis, const CheckTests& tests,
                                const Eigen::VectorXd& left) const {
   if (!effects_.causes()[questions_.hypotheses[hypothesis].cause].cause.any_function) return true;

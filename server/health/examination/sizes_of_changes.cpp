@@ -11,7 +11,7 @@ using Eigen::Index;
 namespace {
 
 constexpr double kExtrapolated =
-    10;  // times what the poses are off by: an effect that large is not seen in them
+    10;  // times the deviation of the poses: they do not show an effect that large
 
 }  // namespace
 

@@ -9,7 +9,7 @@ namespace trammel::health {
 
 namespace {
 
-constexpr double kDoubtful = 0.02;  // chance from which on nothing is said for certain
+constexpr double kDoubtful = 0.02;  // chance above which the verdict is uncertain
 
 /// `2, 4 and 5`, `2 to 5`; joints are 0-based.
 std::string joints_in_words(const std::vector<LostZero>& zeros) {
@@ -55,7 +55,7 @@ std::string seen_in_words(const HealthCheck& check) {
   return text;
 }
 
-/// The measurement that would decide between what was named and what stands beside it.
+/// The measurement that would decide between the named change and its rivals.
 std::string what_tells_more(const Doubt& doubt, const HealthCheck& check) {
   const auto is_open = [&](const SingleCause& rival) {
     return !is_zero(rival) || std::find(doubt.in_tool.begin(), doubt.in_tool.end(), rival.joint) ==

@@ -12,10 +12,9 @@ using Eigen::Index;
 
 namespace {
 
-constexpr double kZeroGains =
-    10;  // beyond its price: a zero that is named beside others is so once in 5000
-constexpr double kMadeUpFor =
-    0.01;  // of an effect: so little left of it is not told from what makes up for it
+constexpr double kZeroGains = 10;    // beyond its price: by chance a zero reaches this once in 5000
+constexpr double kMadeUpFor = 0.01;  // of an effect: with less left, it cannot be distinguished
+                                     // from the effects that absorb it
 constexpr std::size_t kMostBadBeside = 2,
                       kPosesToOneBad = 6;  // bad poses that are looked for beside zeros
 
@@ -68,7 +67,7 @@ std::optional<ZerosFit> Examination::lost_zeros() {
 }
 
 std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad) {
-  constexpr int kFewestLeft = 3;  // numbers that can speak against it
+  constexpr int kFewestLeft = 3;  // fewest numbers that can contradict it
   const double limit = healthy_.limit(options_.false_alarm);
   const auto cost = [&](const ZerosFit& fit) {
     return fit.left + price(fit.numbers) +
@@ -82,7 +81,7 @@ std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad
   const Eigen::VectorXd left = tests.rows().left(rows_.residual),
                         all_left = of_all.rows().left(rows_.residual);
   const double off = distance_of(tests.rows());
-  // To first order a zero of a degree leaves what another cause then explains.
+  // To first order, a zero of a degree leaves a residual that another cause then explains.
   const auto is_linear = [&](std::size_t zero) {
     for (std::size_t h = 0; h < questions_.causes; ++h)
       if (questions_.hypotheses[h].cause == zero)
@@ -179,7 +178,7 @@ void Examination::tell_zeros(const ZerosFit& fit) {
   if (fit.tool) tell_tool_beside(fit, there);
 }
 
-/// The tool of `fit`, and zeros that it makes up for.
+/// The tool of `fit`, and zeros that it compensates.
 void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) {
   const auto& columns = effects_.tool_columns();
   const auto count = static_cast<Index>(columns.size());
@@ -223,7 +222,8 @@ void Examination::tell_zeros_in_tool(const CheckRows& there, const Eigen::Matrix
 bool Examination::has_not_turned(const CheckRows& there, const Eigen::MatrixXd& others,
                                  std::size_t zero, const SeenChange& tool) const {
   constexpr int kShifts = 3;       // the first numbers of a tool
-  constexpr double kHidden = 0.2;  // of the tool's effect: a zero that does less changes no name
+  constexpr double kHidden = 0.2;  // share of the tool's effect: a zero with less does not change
+                                   // the name
   const std::vector<Index> column = effects_.causes()[zero].columns;
   const std::vector<Index> shifts(effects_.tool_columns().begin(),
                                   effects_.tool_columns().begin() + kShifts);
