@@ -14,15 +14,14 @@ namespace {
 
 constexpr double kBumpAngle = from_deg(5);   // source section 3.2.4.2
 constexpr double kBumpLength = from_mm(50);  // of a rail
-constexpr double kLeastBump = 0.2;           // of the bump: 1 deg takes up any play
+constexpr double kLeastBump = 0.2;           // share of the bump: 1 deg takes up any play
 constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of programs
 
 double longest_way(const Joint& joint) {
   return joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
 }
 
-/// Where the arm starts to come to `q` with its gears turning as `sides` say, kept within the
-/// limits.
+/// The start of the approach to `q` within the limits; the gears turn as `sides` states.
 JointVector start_of(const Chain& robot, const JointVector& q, const Sides& sides) {
   JointVector way(robot.size());
   for (int j = 0; j < robot.size(); ++j) {
@@ -36,8 +35,8 @@ JointVector start_of(const Chain& robot, const JointVector& q, const Sides& side
   return start;
 }
 
-/// True where the gear of the joint turns far enough from `start` to `q` to take up its play on
-/// this side. A passive joint has none, and takes up nothing.
+/// True if the gear of the joint turns far enough from `start` to `q` to take up its play on this
+/// side. False for a passive joint, which has no gear.
 bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint,
              int side) {
   if (is_passive(robot.joint(joint))) return true;
@@ -48,8 +47,8 @@ bool has_way(const Chain& robot, const JointVector& q, const JointVector& start,
 
 Sides planned_sides(const Chain& robot, int number) {
   Sides sides;
-  // Columns of a Hadamard matrix: joint j has the binary digits of j + 1, and the last digit turns
-  // all of them.
+  // Columns of a Hadamard matrix: joint j uses the binary digits of j + 1, and the last digit
+  // reverses all of them.
   for (int j = 0; j < robot.size(); ++j)
     sides.push_back(
         std::popcount(static_cast<unsigned>(number) & static_cast<unsigned>(2 * j + 3)) % 2 == 0

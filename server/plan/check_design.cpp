@@ -12,7 +12,7 @@ using Eigen::Index;
 constexpr double kWorstCounts =
     4;  // power of the mean over the signals: towards the largest of them
 constexpr double kWeakPrior =
-    1e-6;  // of base and tool, per squared sigma: so that few poses have an inverse
+    1e-6;  // of base and tool, per squared sigma: so that few poses have an invertible matrix
 constexpr int kRounds = 3;                 // of exchanges
 constexpr double kWorthAnExchange = 1e-3;  // of the criterion
 
@@ -67,7 +67,7 @@ class NeededVariances {
  public:
   explicit NeededVariances(Eigen::VectorXd needed) : needed_(std::move(needed)) {}
   [[nodiscard]] double of(const Sums& sums) const {
-    constexpr double kBlind = 1e-6;  // of what is needed
+    constexpr double kBlind = 1e-6;  // share of the needed strength
     const Eigen::ArrayXd strength = sums.strengths().array().max(kBlind * needed_.array());
     return (needed_.array() / strength).pow(kWorstCounts).sum();
   }
@@ -94,7 +94,7 @@ std::size_t best_of(const NeededVariances& criterion, const Sums& sums,
   return best;
 }
 
-/// Takes one pose out after the other and puts the best one in.
+/// Removes one pose after the other and adds the best one instead.
 void exchange(const NeededVariances& criterion, const std::vector<Whitened>& poses, Sums& sums,
               std::vector<bool>& taken, std::vector<std::size_t>& chosen) {
   double value = criterion.of(sums);

@@ -7,15 +7,15 @@
 #include "server/base/result.h"
 #include "server/plan/detectable.h"
 
-/// Which few poses show most of what may have changed.
+/// The choice of few poses that show most of the possible changes.
 namespace trammel {
 
-/// The test that a check makes, as far as a plan must know it.
+/// The parameters of a check's test that a plan needs.
 struct CheckTest {
   double sigma = 0, sigma_rotation = 0;  ///< m, rad: of one measurement, one axis
   bool orientation = true;
   bool new_tool = false;      ///< the tool is refitted with the base
-  double false_alarm = 1e-4;  ///< of the test of one cause
+  double false_alarm = 1e-4;  ///< of the test of a single cause
   double power = 0.95;
 };
 
@@ -31,7 +31,7 @@ struct SmallestEffect {
 
 struct CheckDesign {
   std::vector<std::size_t> chosen;       ///< indices of candidates, in the order of choice
-  std::vector<SmallestEffect> smallest;  ///< of every cause that can be asked for
+  std::vector<SmallestEffect> smallest;  ///< of every testable cause
 };
 
 /// Chooses `count` of `candidates` so that the largest of the smallest effects seen is small:

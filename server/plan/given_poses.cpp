@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The recorded sides where each joint has one, else those of the plan that the limits allow.
+/// The recorded sides if each joint has one; otherwise the planned sides that the limits allow.
 Sides sides_of(const Chain& robot, const PoseContext& context, int number) {
   const Sides& recorded = context.direction;
   const bool known = !recorded.empty() && std::count(recorded.begin(), recorded.end(), 0) == 0;

@@ -29,7 +29,7 @@ bool is_name(const std::string& text, std::size_t longest) {
          std::all_of(text.begin(), text.end(), allowed);
 }
 
-/// The name with a prefix, so that it is no reserved word and none of the names inside.
+/// The name with a prefix, so that it collides with no reserved word and no name inside.
 std::string module_name(const std::string& name) {
   std::string text = "T_" + name;
   for (char& c : text) {
@@ -38,8 +38,7 @@ std::string module_name(const std::string& name) {
   return text.substr(0, kRapidName);
 }
 
-/// Text that may stand in a comment: one line of plain letters, of the length that controllers
-/// take.
+/// Text for a comment: one line of plain letters, within the length that controllers accept.
 std::string comment(const std::string& sign, std::string text) {
   for (char& c : text) {
     if (c < ' ' || c > '~') c = '_';
@@ -47,7 +46,7 @@ std::string comment(const std::string& sign, std::string text) {
   return (sign + " " + text).substr(0, kLineLength - 4);
 }
 
-/// The joints that are the six axes, and the one that is the rail.
+/// The six axes among the joints, and the rail.
 struct Axes {
   std::vector<int> turning;
   std::optional<int> rail;

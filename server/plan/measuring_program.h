@@ -21,16 +21,15 @@ struct ProgramOptions {
 };
 
 /// ABB RAPID: a module `T_name` (letters that RAPID does not take become `_`) of jointtargets and
-/// MoveAbsJ. A rail that comes before or after the six axes is eax_a in mm. Refuses a robot that is
-/// not six turning joints with at most one rail at either end, a tool name that is no RAPID
-/// identifier (32 letters, digits or `_`, a letter first), and a wait that is negative or not
-/// finite.
+/// MoveAbsJ. A rail before or after the six axes is eax_a in mm. Refuses a robot that is not six
+/// turning joints with at most one rail at either end, a tool name that is no RAPID identifier (32
+/// letters, digits or `_`, a letter first), and a wait that is negative or not finite.
 [[nodiscard]] Result<std::string> to_rapid(const Chain& robot, const Plan& plan,
                                            const ProgramOptions& options);
 
 /// KUKA KRL: a .src of PTP motions. A rail is E1 in mm. Refuses as to_rapid(), a tool number
-/// outside 0 to 16, and a name that is no KRL name (24 letters, digits or `_`, a letter first),
-/// because it must be the file's.
+/// outside 0 to 16, and a name that is not a KRL name (24 letters, digits or `_`, a letter first),
+/// because the file must have the same name.
 [[nodiscard]] Result<std::string> to_krl(const Chain& robot, const Plan& plan,
                                          const ProgramOptions& options);
 
@@ -41,8 +40,8 @@ struct ProgramOptions {
                                            const ProgramOptions& options);
 
 /// Universal Robots script of movej to joints in rad, in a function of the program's name (letters
-/// that a script does not take become `_`). Where tool or payload must be changed a popup waits.
-/// Refuses as to_rapid(), and a rail.
+/// that a script does not take become `_`). A popup waits for each change of tool or payload.
+/// Refuses the same as to_rapid(), and a rail.
 [[nodiscard]] Result<std::string> to_urscript(const Chain& robot, const Plan& plan,
                                               const ProgramOptions& options);
 

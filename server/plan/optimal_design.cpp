@@ -11,7 +11,7 @@ namespace trammel {
 namespace {
 
 constexpr double kLeastGain =
-    1e-3;  // nat: exchanges for less never end, and nobody measures the difference
+    1e-3;  // nat: exchanges for less would never end, and the difference does not matter
 constexpr int kMostExchangeScans = 200;  // poses looked at: bounds the time of a plan
 constexpr double kOffTheBound = 0.3;     // of the prior scale: an ordinary value of the parameter
 
@@ -111,8 +111,7 @@ std::vector<std::size_t> greedy(Criterion& criterion, std::size_t candidates, in
   return chosen;
 }
 
-/// Takes out one candidate after the other and puts in the best one instead, until a round gains
-/// nothing.
+/// Replaces one chosen candidate after the other by the best one, until a round gains nothing.
 int exchange(Criterion& criterion, std::size_t candidates, std::vector<std::size_t>& chosen) {
   std::vector<bool> taken(candidates, false);
   for (const std::size_t i : chosen) taken[i] = true;

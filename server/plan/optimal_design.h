@@ -5,9 +5,9 @@
 #include "server/base/result.h"
 #include "server/error_sources/physical_model.h"
 
-/// Which poses tell most about a model's parameters. Parameters are in units of their priors,
-/// measurements in units of the tracker's sigma: information 1 means that the data tell as much as
-/// the prior.
+/// The choice of poses with the most information about a model's parameters. Parameters are in
+/// units of their priors, measurements in units of the tracker's sigma: with information 1, the
+/// data tell as much as the prior.
 namespace trammel {
 
 /// R x P: d(measurement) / d(parameters) of one pose at the model's values; R is 6 ([position;
@@ -24,9 +24,9 @@ namespace trammel {
 /// log det of a symmetric positive definite matrix.
 [[nodiscard]] double log_det(const Eigen::MatrixXd& matrix);
 
-/// The values at which to linearise a model before any measurement: its own, but a parameter at its
-/// lower bound (a compliance of 0) moved off by 0.3 of its prior scale. Else causes that act
-/// through it, as a payload through compliance, would not show.
+/// The values at which to linearise a model before any measurement: its own, with each parameter at
+/// its lower bound (a compliance of 0) moved off by 0.3 of its prior scale. Otherwise causes that
+/// act through such a parameter, as a payload through compliance, would not show.
 [[nodiscard]] Eigen::VectorXd planning_values(const PhysicalModel& model);
 
 /// The candidates of an experiment: `rows` is (R n) x P; candidate i has the R rows from R i on.
@@ -52,18 +52,19 @@ struct Design {
 
 /// Chooses `count` candidates so that log det(information + sum of JᵀJ) is large: D-optimal. First
 /// greedily, then by exchanging one candidate at a time while that gains. `information` (P x P,
-/// positive definite) is what is known before, the prior included. Parameters in the columns
-/// `nuisance` are estimated but not asked for (D_s-optimal): log det of all minus log det of the
-/// nuisance block. Directions that no candidate shows stay at their prior and cost nothing. Refuses
-/// a count above the number of candidates, and an information matrix that is not positive definite.
+/// positive definite) is the initial one, including the prior. Parameters in the columns `nuisance`
+/// are estimated but not of interest (D_s-optimal): the criterion is log det of all minus log det
+/// of the nuisance block. Directions that no candidate shows stay at their prior and cost nothing.
+/// Refuses a count above the number of candidates, and an information matrix that is not positive
+/// definite.
 [[nodiscard]] Result<Design> optimal_design(const DesignCandidates& candidates,
                                             const Eigen::MatrixXd& information, int count,
                                             const std::vector<Eigen::Index>& nuisance = {});
 
-/// Which `count` of `candidates` to measure next: their indices, the most telling first. The model
-/// is linearised at its values. `information` is the inverse of the posterior covariance in prior
-/// units: identity before any measurement, `D C⁻¹ D` with D the prior scales and C the covariance
-/// of a calibration. D-optimal, and refuses, as optimal_design().
+/// The indices of the `count` of `candidates` to measure next, the most informative first. The
+/// model is linearised at its values. `information` is the inverse of the posterior covariance in
+/// prior units: the identity before any measurement, `D C⁻¹ D` with D the prior scales and C the
+/// covariance of a calibration. D-optimal; refuses the same as optimal_design().
 [[nodiscard]] Result<std::vector<std::size_t>> next_best_poses(
     const PhysicalModel& model, const Eigen::MatrixXd& information,
     const std::vector<PoseContext>& candidates, int count, bool orientation = true);

@@ -49,14 +49,14 @@ Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint6
 
 namespace {
 
-constexpr int kCandidates = 4000;          // to choose from: the time of a plan grows with them
+constexpr int kCandidates = 4000;  // candidates to choose from: the time of a plan grows with them
 constexpr int kCheckCandidates = 800;      // likewise, of a check: each is held against every cause
-constexpr int kWorkingPoses = 200;         // at which an effect is measured
-constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is hardly one
+constexpr int kWorkingPoses = 200;         // poses over which the size of an effect is measured
+constexpr int kCandidatesForEachPose = 4;  // at least: fewer leave hardly a choice
 // The factor by which a hypercube is drawn larger than wanted at most.
 constexpr int kLargestFactor = 512;  // of poses: fewer than 1 in 1000 fits then
 constexpr int kLargestDesignFactor =
-    64;  // of candidates: they are more already, and each is linearised
+    64;  // factor on the candidates: they are numerous already, and each is linearised
 
 /// The poses that the cell allows, for every tool that will be used.
 class Filter {
@@ -71,7 +71,7 @@ class Filter {
     return filter;
   }
 
-  /// True where the candidate may be planned and approached in each of these ways. Counts the
+  /// True if the candidate may be planned and approached in each of these ways. Counts the
   /// candidate.
   bool keeps(const JointVector& q, const std::vector<Sides>& ways, DrawCount& count) const {
     ++count.drawn;
@@ -112,10 +112,9 @@ struct Drawn {
   DrawCount count;
 };
 
-/// `wanted` joint vectors that the filter keeps, from a Latin hypercube that doubles until it is
-/// large enough, up to `largest_factor` times as many as wanted. Refuses where even that one has
-/// fewer than `needed`. `ways_of` tells how the next one that is kept, with this number, would be
-/// approached.
+/// `wanted` joint vectors that pass the filter, from a Latin hypercube. The hypercube doubles until
+/// it is large enough, up to `largest_factor` times as many as wanted. Refuses if even the largest
+/// one has fewer than `needed`. `ways_of` gives the approaches of the next one, by its number.
 template <typename Prepare, typename WaysOf>
 Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed,
                    int largest_factor, std::uint64_t seed, const Prepare& prepare,
@@ -166,7 +165,7 @@ struct Planning {
   bool twice = false;    // each pose from above and from below
   bool one_way = false;  // each pose from below
 
-  /// The ways in which the pose with this number is approached.
+  /// The ways to approach the pose with this number.
   [[nodiscard]] std::vector<Sides> ways(const JointVector& q, std::size_t number) const {
     const auto joints = static_cast<std::size_t>(q.size());
     if (twice) return {Sides(joints, -1), Sides(joints, 1)};
@@ -186,7 +185,7 @@ Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<st
   return names;
 }
 
-/// Each pose once for every way that it is approached in; tools and payloads in turn.
+/// Each pose once for each way of approach. Tools and payloads take turns.
 std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector<JointVector>& q) {
   std::vector<PoseContext> contexts;
   for (std::size_t i = 0; i < q.size(); ++i) {
@@ -202,8 +201,8 @@ std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector
   return contexts;
 }
 
-/// Poses that were chosen come from the sides of their place in the plan, as far as the arm stays
-/// in the workspace on the way: the choice alone would leave some joint more often on one side.
+/// Gives each chosen pose the sides of its place in the plan, if the arm stays in the workspace on
+/// the way. Otherwise the choice would leave some joint more often on one side.
 void come_in_turn(const Planning& planning, const Filter& filter, std::vector<PoseContext>& poses) {
   if (planning.twice) return;
   DrawCount count;
@@ -263,7 +262,8 @@ Plan::Separation separation_of(const CausePair& pair, const Separability& plan,
   const bool any_shows =
       std::any_of(candidates.parameters.begin(), candidates.parameters.end(), shows);
   for (const ParameterSeparation& parameter : candidates.parameters) {
-    // The order of a gear's error shows only once its amplitude is known, so it is not asked for.
+    // The order of a gear's error shows only once its amplitude is known, so the plan does not
+    // optimise it.
     if (any_shows && !shows(parameter)) continue;
     const bool told = parameter.strength >= kLeastStrength && parameter.share >= kLeastShare;
     if (!told) separation.hopeless.push_back(parameter.parameter);
@@ -311,7 +311,7 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
   return plan;
 }
 
-/// Chooses among `candidates`, which also stand for the poses that the cell works at.
+/// Chooses among `candidates`. They also represent the poses at which the cell works.
 Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
                            const Filter& filter, const Drawn& candidates) {
   const CausePair pair = TRY(pair_of(planning, options));

@@ -30,7 +30,7 @@ using JointRanges =
 [[nodiscard]] Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count,
                                               std::uint64_t seed);
 
-/// The criterion by which poses are chosen among those that the cell allows.
+/// The criterion for the choice among the poses that the cell allows.
 enum class PlanCriterion {
   kLatinHypercube,  ///< evenly over the joint ranges
   kObservability,   ///< D-optimal for the parameters of the cell's error sources
@@ -48,23 +48,23 @@ struct PlanOptions {
   std::vector<std::string> tools = {};  ///< to measure with in turn; empty: the cell's only one
   std::vector<std::string> payloads = {};
   bool one_way = false;  ///< all joints come to each pose from below: play in the gears does not
-                         ///< show, and costs no way
+                         ///< show, and costs no extra travel
 };
 
-/// `count` poses of the cell (rows, rad): a Latin hypercube, of which the poses inside the
-/// workspace and in sight of the tracker, with the first tool, are kept (source section 6.1.2). The
-/// hypercube is drawn larger until they are enough. Refuses a cell where fewer than 1 in 1000
-/// candidates fits, and what Visibility::of() refuses. Of the options only count and seed matter.
+/// `count` poses of the cell (rows, rad) from a Latin hypercube, keeping the ones inside the
+/// workspace and in sight of the tracker, with the first tool (source section 6.1.2). The hypercube
+/// is enlarged until enough are left. Refuses a cell where fewer than 1 in 1000 candidates fits,
+/// and the same as Visibility::of(). Of the options only count and seed matter.
 [[nodiscard]] Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options);
 
-/// For each row of `q` (rad) whether plan_poses() could have given it and it can be approached from
-/// one side at least. Refuses what plan_poses() refuses of the cell.
+/// For each row of `q` (rad), whether plan_poses() could have chosen it and whether it can be
+/// approached from at least one side. Refuses the same cells as plan_poses().
 [[nodiscard]] Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q);
 
 /// The fate of the candidates drawn; each counts for the first reason against it.
 struct DrawCount {
   int drawn = 0;
-  int outside = 0;  ///< the pose, or that of its approach, is outside the workspace
+  int outside = 0;  ///< the pose, or its approach, is outside the workspace
   int unseen = 0;   ///< not in sight of the tracker
   int no_way = 0;   ///< beyond a joint limit, or too near to one to be approached
   int kept = 0;
@@ -73,38 +73,38 @@ struct DrawCount {
 struct PlannedPose {
   std::string id;       ///< its number; `12+` and `12-` for a pose approached from both sides
   PoseContext context;  ///< joints, approach directions, tool, payload
-  JointVector bump;     ///< where it is approached from
+  JointVector bump;     ///< the pose from which it is approached
 };
 
 struct Plan {
   std::vector<PlannedPose> poses;
   DrawCount draw;
   /// For kObservability and kSeparation: the criterion (nat) of this plan, and of a Latin hypercube
-  /// of as many poses.
+  /// with equally many poses.
   double criterion = 0, criterion_of_latin_hypercube = 0;
-  /// For kSeparation: how well the causes are told apart by this plan, by a Latin hypercube, and by
-  /// all candidates together.
+  /// For kSeparation: the separation of the causes by this plan, by a Latin hypercube, and by all
+  /// candidates together.
   struct Separation {
     Separability plan, latin_hypercube, candidates;
     std::vector<std::string>
         hopeless;       ///< parameters that not even all candidates together separate
-    std::string needs;  ///< what would separate them; empty where nothing is hopeless
+    std::string needs;  ///< the measurement that would separate them; empty if nothing is hopeless
   };
   std::optional<Separation> separation;
-  /// For kCheck: how small a change of each cause this plan shows with 95 % chance, beside the
+  /// For kCheck: the smallest change of each cause that this plan shows with 95 % chance, given the
   /// tracker's noise.
   std::vector<SmallestEffect> smallest;
 };
 
 /// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach:
-/// from the recorded sides where every joint has one, else from planned_sides() as far as the
-/// limits allow. Refuses a pose that is too near to a limit to be approached.
+/// from the recorded sides if every joint has one, otherwise from planned_sides() as far as the
+/// limits allow. Refuses a pose that is too near a limit for an approach.
 [[nodiscard]] Result<Plan> plan_of(const Cell& cell, const JointList& list);
 
-/// A plan as the options say, each pose with the pose of its approach (source section 3.2.4.2):
-/// each joint comes from above as often as from below, see planned_sides(). Poses of one tool and
-/// payload come together, the most telling first. Refuses what plan_poses() refuses, unknown
-/// causes, tools and payloads, and a check with every pose twice.
+/// Makes a plan by the options, each pose with the pose of its approach (source section 3.2.4.2).
+/// Each joint comes from above as often as from below, see planned_sides(). Poses of one tool and
+/// payload are consecutive, the most informative first. Refuses the same as plan_poses(), and
+/// unknown causes, tools and payloads, and a check with every pose twice.
 [[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell,
                                      const PlanOptions& options);
 

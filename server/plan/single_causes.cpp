@@ -17,7 +17,8 @@ using causes::Scope;
 using causes::SearchFamily;
 using Eigen::Index;
 
-/// The rival that a cause is from the first pose on, of every cause that begins at a pose.
+/// The rival among causes that begin at a pose that equals this cause when it begins at the first
+/// pose.
 const causes::Rival* begun_before(const CauseRecord& whole, const std::string& parameter,
                                   int joint) {
   for (const CauseRecord* step : all_causes()) {
@@ -34,8 +35,8 @@ bool may_have_changed(const CauseRecord& record) {
   if (record.scope == Scope::kPose || record.scope == Scope::kSession || record.part == Part::kBase)
     return false;
   if (record.search == SearchFamily::kNone || record.search == SearchFamily::kPose) return false;
-  // A cause that always acts and the one that begins at a pose are asked for as one. Maps of an
-  // angle are asked for as "any function".
+  // A cause that always acts and the one that begins at a pose are tested as one. Maps of an angle
+  // are tested as "any function".
   return record.search != SearchFamily::kMap && begun_before(record, "", -1) == nullptr;
 }
 
@@ -52,10 +53,11 @@ bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
   });
 }
 
-constexpr std::size_t kMostNumbers = 6;  // of one cause: what needs more is not seen by few poses
+constexpr std::size_t kMostNumbers = 6;  // of one cause: few poses do not show a cause with more
 constexpr double kWarmer = 2;            // K between poses, from which on temperature shows
-constexpr double kUnrecorded = 10;  // K: so much warmer may an arm be where no temperature says it
-constexpr double kOfDrawings = 20;  // degrees Celsius
+constexpr double kUnrecorded = 10;       // K: the possible warming of an arm without a recorded
+                                         // temperature
+constexpr double kOfDrawings = 20;       // degrees Celsius
 
 bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
   std::optional<double> low = learned_at, high = learned_at;
@@ -67,7 +69,7 @@ bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_
   return low && *high - *low > kWarmer;
 }
 
-/// True where a temperature shows though it is the same at all poses, since all lengths differ.
+/// True if a temperature shows although it is equal at all poses, since all lengths differ.
 bool shows_alike_at_all(const CauseRecord& record) {
   return record.scope == Scope::kArm && record.needs.temperature && !record.needs.history;
 }
@@ -168,7 +170,7 @@ void CauseEffects::add_numbers(const CauseRecord& record, int joint, const Error
   }
   for (const Index k : all) {
     const std::string& name = parameters[static_cast<std::size_t>(k)].name;
-    bool begins = false;  // asked for by itself, as what it is when it begins at a pose
+    bool begins = false;  // tested by itself, in the form that begins at a pose
     for (int j = 0; j < model_.cell->robot.size(); ++j)
       begins = begins || begun_before(record, name, j) != nullptr;
     if (begins) continue;

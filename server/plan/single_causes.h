@@ -10,11 +10,11 @@
 /// The effect on the tool of each single cause that may have changed.
 namespace trammel {
 
-/// A cause of the arm, its load or its tool that may be another than it was.
+/// A cause of the arm, its load or its tool that may have changed.
 struct SingleCause {
   const CauseRecord* record = nullptr;  ///< of the catalogue
   int joint = -1;                       ///< 0-based; -1 where it concerns the whole arm
-  std::string parameter = {};           ///< `d6`: where one number of it is meant; else empty
+  std::string parameter = {};           ///< `d6` if one number of the cause is meant; else empty
   bool any_function = false;  ///< an error of the joint's angle by any function of that angle
 };
 /// `joint_slip:2`, `geometry:d6`.
@@ -23,7 +23,7 @@ struct SingleCause {
 [[nodiscard]] std::string in_words(const SingleCause& cause);
 [[nodiscard]] bool same_cause(const SingleCause& one, const SingleCause& other);
 
-/// A cause that cannot be asked for, and what would have to be recorded.
+/// A cause that cannot be tested, and the quantity that a record would need.
 struct CauseNotAsked {
   SingleCause cause;
   std::string needs;
@@ -42,12 +42,13 @@ class CauseEffects {
   struct Entry {
     SingleCause cause;
     std::vector<Eigen::Index>
-        columns;  ///< of PoseEffects::by_cause; one for any function: that of the joint's zero
+        columns;  ///< of PoseEffects::by_cause; for "any function" the one of the joint's zero
   };
-  /// The causes that `poses` could show by what was recorded with them: others are listed as not
-  /// asked. `learned_at`, degrees Celsius: where the model knows the arm's lengths; heat shows by
-  /// the difference. Empty: by differences between the poses alone. Where these are none, an arm
-  /// that grew as a whole is asked for all the same: nobody may have recorded how warm it is.
+  /// The causes that `poses` could show with their recorded quantities; others are listed as not
+  /// tested. `learned_at`, degrees Celsius: the temperature at which the model knows the arm's
+  /// lengths; heat shows by the difference. Empty: only differences between the poses count.
+  /// Without any difference, an arm that grew as a whole is still tested, since its temperature may
+  /// not have been recorded.
   CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses,
                std::optional<double> learned_at = {});
 
@@ -61,9 +62,9 @@ class CauseEffects {
   [[nodiscard]] double scale(Eigen::Index column) const { return scale_(column); }
   /// At the values of the model.
   [[nodiscard]] PoseEffects at(const PoseContext& context) const;
-  /// Where the causes have these numbers (K, in units of their prior scales).
+  /// The effects where the causes have these numbers (K, in units of their prior scales).
   [[nodiscard]] PoseEffects at(const PoseContext& context, const Eigen::VectorXd& numbers) const;
-  /// at() with the columns of warmth 0: a third of the work where no temperature is recorded.
+  /// at() with the columns of warmth set to 0: a third of the work if no temperature is recorded.
   [[nodiscard]] PoseEffects without_warmth(const PoseContext& context,
                                            const Eigen::VectorXd& numbers) const;
 
@@ -76,11 +77,11 @@ class CauseEffects {
   void add(const CauseRecord& record, int joint);
   void add_numbers(const CauseRecord& record, int joint, const ErrorSource& source);
   void ask(SingleCause cause, const std::string& source, const std::vector<Eigen::Index>& numbers);
-  /// The source of that cause in the model, which gets it where it has none; null where the cell
-  /// cannot have it.
+  /// The source of that cause in the model, added if the model lacks it; null if the cell cannot
+  /// have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
-  /// The values of the model with these numbers of the causes.
+  /// The values of the model when the causes have these numbers.
   [[nodiscard]] Eigen::VectorXd values_at(const Eigen::VectorXd& numbers) const;
   [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context,
                                             const Eigen::VectorXd& values, Pose* X_WT) const;
@@ -98,7 +99,7 @@ class CauseEffects {
   std::vector<Eigen::Index> place_;  // of each column among the model's parameters
   Eigen::VectorXd scale_;            // likewise
   std::vector<Eigen::Index> tool_;
-  std::vector<Eigen::Index> warm_;  // columns of what goes with the temperature
+  std::vector<Eigen::Index> warm_;  // columns of causes that depend on the temperature
 };
 
 }  // namespace trammel

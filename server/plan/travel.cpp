@@ -20,7 +20,7 @@ double time_between(const Chain& robot, const JointVector& from, const JointVect
   return longest;
 }
 
-/// Poses [first, last) of a plan that follow each other in any order of it.
+/// Poses [first, last) of a plan that stay consecutive in any order of it.
 struct Stop {
   std::size_t first = 0, last = 0;
 };
@@ -50,7 +50,7 @@ class Tour {
     return time_between(robot_, poses_[from.last - 1].context.q, poses_[to.first].bump);
   }
 
-  /// Turns parts of the way round; true where that made it shorter.
+  /// Reverses parts of the route; true if that made it shorter.
   bool improve(std::vector<Stop>& stops, std::size_t first, std::size_t to) const {
     bool better = false;
     for (std::size_t a = first; a + 1 < to; ++a) {

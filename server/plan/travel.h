@@ -4,14 +4,14 @@
 
 namespace trammel {
 
-/// The travel of the arm from pose to pose of a plan, each by way of its approach: the sum of the
-/// times of its motions where every joint moves at its greatest speed, s; at 1 rad/s and 1 m/s
-/// where a speed is not known.
+/// The travel time of the arm from pose to pose of a plan, each with its approach: the sum of the
+/// times of its motions with every joint at its greatest speed, s. An unknown speed counts as 1
+/// rad/s or 1 m/s.
 [[nodiscard]] double travel_of(const Chain& robot, const Plan& plan);
 
-/// The poses in an order in which the arm travels little: it begins as the plan does, poses of
-/// one tool and payload stay together, and so do those that are approached from both sides. Plans
-/// of more than 5000 poses stay.
+/// The poses in an order with little travel. It begins as the plan does; poses of one tool and
+/// payload stay together, and so do poses that are approached from both sides. Plans of more than
+/// 5000 poses are unchanged.
 [[nodiscard]] Plan ordered_for_travel(const Chain& robot, Plan plan);
 
 }  // namespace trammel

@@ -18,8 +18,8 @@ namespace trammel {
 /// known.
 class Visibility {
  public:
-  /// Where the cell has no tracker position or no aperture, everything is visible. Where it has
-  /// both, refuses an unknown base or tool: there is no line of sight to tell.
+  /// Without a tracker position or an aperture in the cell, everything is visible. With both,
+  /// refuses an unknown base or tool, since the line of sight is then unknown.
   [[nodiscard]] static Result<Visibility> of(const Cell& cell, const std::string& tool);
 
   /// True if the nominal robot at `q` (rad, m) shows its target within the aperture, edge included.
