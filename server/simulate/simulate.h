@@ -52,8 +52,8 @@ struct SimulateOptions {
 /// joints outside their limits, and an unknown tool or payload.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
                                                 const SimulateOptions& options);
-/// simulate() for poses with their own direction, time, temperature, tool and payload; what they
-/// leave open comes from the course and the options.
+/// simulate() for poses with their own direction, time, temperature, tool and payload; the course
+/// and the options fill the missing ones.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot,
                                                 const std::vector<PoseContext>& poses,
                                                 const SimulateOptions& options);

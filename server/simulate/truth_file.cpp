@@ -86,7 +86,7 @@ VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& c
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
   if (!model) {
     Error wrong = model.error();
-    wrong.field.clear();  // it is the key's
+    wrong.field.clear();  // the fault belongs to the key
     map.refuse("error_sources", Failure(std::move(wrong)).as(ErrorCode::kRefused));
   }
   VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
