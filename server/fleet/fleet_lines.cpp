@@ -15,10 +15,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kAsIfUsual = 3;        // that have what is usual for a line
-constexpr double kUsualDeviations = 2;  // what is usual is exceeded in one of twenty cases
+constexpr double kAsIfUsual = 3;        // imaginary robots with the usual size of a line
+constexpr double kUsualDeviations = 2;  // standard deviations: one of twenty robots exceeds the
+                                        // usual size
 
-/// Where base and tool stand is no matter of the arm; what is left has no value.
+/// False for base and tool, which do not belong to the arm, and for the rest, which has no value.
 bool is_of_the_arm(const BudgetLine& line) {
   return line.value && line.kind != LineKind::kBase && line.kind != LineKind::kTool;
 }
@@ -27,7 +28,7 @@ std::vector<BudgetNumber> numbers_of(const BudgetLine& line) {
   return line.numbers.empty() ? std::vector{*line.value} : line.numbers;
 }
 
-/// The number that is called so in the line of the same name; null: the budget has none.
+/// The number of the same name in the line of the same name; null: the budget has none.
 const BudgetNumber* same_number(const ErrorBudget& budget, const std::string& line,
                                 const std::string& name) {
   const BudgetLine* found = budget.line(line);
@@ -49,7 +50,7 @@ LineAmongSisters held_against(const BudgetNumber& own, const std::vector<BudgetN
   }
   const double mean = sum / n;
   for (const BudgetNumber& one : sisters) squares += (one.value - mean) * (one.value - mean);
-  // The uncertainty of each sister is part of what they differ by.
+  // The spread contains the uncertainty of each sister.
   const double as_if = usual > 0 ? kAsIfUsual : 0;
   const double spread = (squares + as_if * std::pow(usual / kUsualDeviations, 2)) / (n - 1 + as_if);
   const double next = std::max(spread * (1 + 1 / n), uncertain / (n * n));
@@ -92,7 +93,8 @@ std::optional<LineAmongSisters> farthest_of(const BudgetLine& line,
 std::vector<LineAmongSisters> lines_among_sisters(const ErrorBudget& own,
                                                   const std::vector<const ErrorBudget*>& sisters) {
   std::vector<LineAmongSisters> all;
-  std::vector<double> chance;  // of each, that it is so far off in a fleet of equal robots
+  std::vector<double> chance;  // for each: the chance of such a deviation in a fleet of equal
+                               // robots
   for (const BudgetLine& line : own.as_it_stands.lines) {
     if (!is_of_the_arm(line)) continue;
     const double usual =

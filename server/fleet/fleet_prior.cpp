@@ -15,9 +15,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kTails = 4;  // degrees of freedom of a deviation from the mean
-constexpr double kAsIfRobots =
-    3;  // of a parameter's kind, that are added to those of the parameter
+constexpr double kTails = 4;        // degrees of freedom of a deviation from the mean
+constexpr double kAsIfRobots = 3;   // for the parameter's kind, added to those of the parameter
 constexpr double kCorrelated = 10;  // likewise, without any correlation
 constexpr int kRounds = 60;
 
@@ -189,7 +188,7 @@ Result<FleetPrior> learn_fleet_prior(const Chain& robot, const std::vector<Fleet
     for (const auto& [name, place] : arm_parameters(parts.physics)) {
       if (twins.empty() || common.contains(name)) own.insert(name);
     }
-    if (own.empty()) continue;  // a model without an arm of its own says nothing
+    if (own.empty()) continue;  // a model without an arm of its own contributes nothing
     common = std::move(own);
     twins.push_back(&parts);
   }

@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 
-/// The common parameters of robots of one type, learned from the models of those that were trained.
+/// The common parameters of robots of one type, learned from the models of trained robots.
 namespace trammel {
 
 /// A robot of the fleet: its name for people, and its model.
@@ -20,11 +20,12 @@ struct FleetParameter {
   std::string name;   ///< `C3`, `d4`
   double mean = 0;    ///< SI, over the robots
   double spread = 0;  ///< SI, standard deviation from robot to robot
-  int robots = 0;     ///< that showed it
-  /// Standard deviation of the next robot's value where robots are normal: the spread is the scale
-  /// of Student's t with four degrees of freedom, which is sqrt(1.45) below that of normal values,
-  /// and few robots make it smaller than it is; and what is uncertain of the mean. To be held
-  /// against Student's t with `robots - 1` degrees of freedom: few robots hardly know their spread.
+  int robots = 0;     ///< the number of robots that showed it
+  /// Standard deviation of the next robot's value, for normal robots, including the uncertainty of
+  /// the mean. The spread is the scale of Student's t with four degrees of freedom, which is
+  /// smaller than that of normal values by sqrt(1.45), and few robots underestimate it. Compare
+  /// with Student's t with `robots - 1` degrees of freedom, since few robots hardly determine their
+  /// spread.
   [[nodiscard]] double next_stddev() const;
 };
 
@@ -36,19 +37,19 @@ struct FleetPrior {
   [[nodiscard]] const FleetParameter* find(const std::string& name) const;
 };
 
-/// Fewer robots say nothing of a spread.
+/// Fewer robots show no spread.
 inline constexpr int kFewestTwins = 3;
 
 /// True if both cells have robots of one type: the same drawing.
 [[nodiscard]] bool same_type(const Chain& one, const Chain& other);
 
-/// The model: robot r's parameters theta_r ~ N(mean, spread²), each parameter's deviations with
+/// The model: robot r has parameters theta_r ~ N(mean, spread²). Each parameter's deviations have
 /// Student's tails (four degrees of freedom, as a scale mixture), so that one odd robot does not
-/// widen the spread; its poses say theta_r ~ N(m_r, L_r⁻¹), where the prior of its own training is
-/// taken out again. Mean and spread by expectation maximisation; the spread of a parameter is drawn
+/// widen the spread. Its poses say theta_r ~ N(m_r, L_r⁻¹), where the prior of its own training is
+/// removed. Mean and spread come from expectation maximisation. The spread of a parameter is shrunk
 /// to that of its kind (lengths, angles, compliances, in units of the priors) as if three more
-/// robots had it. Base, tools and payloads are no part of it. Refuses fewer than kFewestTwins
-/// members of the type of `robot`; members of another type are left out.
+/// robots had it. Base, tools and payloads are excluded. Refuses fewer than kFewestTwins members of
+/// the type of `robot`; members of another type are left out.
 [[nodiscard]] Result<FleetPrior> learn_fleet_prior(const Chain& robot,
                                                    const std::vector<FleetMember>& members);
 
@@ -60,10 +61,10 @@ struct Unlike {
          fleet_stddev = 0;  ///< in that unit; value: by its own poses alone
   double z = 0;             ///< standard deviations apart
 };
-/// The unusual parameters of a robot, the most unusual first: parameters that its own poses put
-/// beyond the prediction interval of the fleet's next robot, so wide that of the fleets whose
-/// robots are all of one law at most kFalseFleets have one that is called unlike (Student's t,
-/// Bonferroni over parameters and robots). `fleet` should be learned without it.
+/// The unusual parameters of a robot, the most unusual first. A parameter is unusual if the robot's
+/// own poses put it beyond the prediction interval of the fleet's next robot. Among fleets whose
+/// robots follow one law, at most kFalseFleets have a parameter that is called unlike (Student's t,
+/// Bonferroni over parameters and robots). `fleet` should be learned without this robot.
 [[nodiscard]] std::vector<Unlike> unlike_twins(const ModelParts& parts, const FleetPrior& fleet);
 [[nodiscard]] std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& parameters,
                                                const Eigen::MatrixXd& covariance,
