@@ -27,8 +27,7 @@ bool same_robot(const Chain& a, const Chain& b) {
 
 enum class Payloads { kTheSame, kAny };
 
-/// The tools and payloads that the model was trained with and that are no longer what the cell says
-/// they are.
+/// The tools and payloads of the model's training that the cell now describes differently.
 std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& cell,
                                      Payloads payloads) {
   const auto same_pose = [](const std::optional<Pose>& a, const std::optional<Pose>& b) {

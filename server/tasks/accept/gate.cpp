@@ -17,12 +17,13 @@ namespace {
 
 constexpr double kMedianOfChiSquare = 2.366;  // of 3 degrees of freedom
 constexpr double kStillFits = 2;              // times the expected deviation, of the median pose
-constexpr double kRangeMargin = 0.1;  // of a joint's range: a pose this far outside is still in it
+constexpr double kRangeMargin = 0.1;  // of a joint's range: a pose this far outside still counts as
+                                      // inside
 constexpr int kFewestOutside =
     10;                          // judges beyond the ranges of the model in force, to gain by them
 constexpr double kUnclear = -1;  // z: a loss that is smaller may be chance
 
-/// The errors that models leave at the same rows, all sessions one after the other.
+/// The errors of models at the same rows, all sessions in sequence.
 struct Rows {
   Eigen::Matrix3Xd position, rotation;       // m, rad
   Eigen::VectorXd expected, expected_truth;  // m
@@ -85,8 +86,8 @@ bool not_worse(const PairedGain& gain, double accept_ratio) {
          (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
 }
 
-/// True if orientations are worse beside positions that gain: beyond chance, or by half. What is
-/// left of a turn is never held to be less than the instrument's own `sigma` an axis.
+/// True if orientations are worse although positions gain: beyond chance, or by half. The residual
+/// of a turn counts as at least the instrument's own `sigma` per axis.
 bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
   if (turns.poses == 0) return false;
   const double before = std::max(turns.rms_before, std::sqrt(3.0) * sigma);
@@ -108,7 +109,7 @@ int distinct(const std::vector<const Measurement*>& judges, const Columns& among
   return static_cast<int>(poses.size());
 }
 
-/// `version 3`; without a number it is what a candidate would add to.
+/// `version 3`; a model without a number is the basis of a candidate.
 std::string name_of(const ServedModel& model) {
   return model.version > 0 ? fmt::format("version {}", model.version)
                            : "the model without what was found";
@@ -246,8 +247,8 @@ class Duel {
                        to_mm(gain.rms_after));
   }
 
-  /// The verdict on a candidate that predicts what the one in force does: it may know one tool
-  /// more.
+  /// The verdict on a candidate whose predictions equal those of the one in force; it may know one
+  /// more tool.
   [[nodiscard]] GateVerdict of_the_same() const {
     const std::string same = fmt::format("it predicts what {} predicts, within {:.4f} mm",
                                          name_of(present_), to_mm(apart()));
@@ -263,7 +264,7 @@ class Duel {
     return gain.rms_after > limit ? stays(text, figures) : yes(text, figures);
   }
 
-  /// The verdict on a candidate that differs in where the base stands at most.
+  /// The verdict on a candidate that differs only in the place of the base.
   [[nodiscard]] GateVerdict of_the_base(const std::string& same) const {
     MeasurementBatch newest = sessions_.back().judges;
     std::erase_if(newest.measurements, [&](const Measurement& m) {
@@ -330,8 +331,8 @@ class Duel {
                        to_deg(turns.rms_before));
   }
 
-  /// The model that was served once and is better than the candidate on the same poses; empty where
-  /// none is. Sets the limit that it is.
+  /// The name of a formerly served model that is better than the candidate on the same poses; empty
+  /// if there is none. Sets the resulting limit.
   [[nodiscard]] std::string better_before(GateFigures& figures) const {
     for (const ServedModel& other : served_before_) {
       const PairedGain gain =
@@ -355,8 +356,8 @@ class Duel {
   Columns shared_, inside_, outside_, new_tools_;
 };
 
-/// The judges whose tools the candidate knows, in its world: each set-up of the instrument from
-/// where the candidate found that it stood.
+/// The judging rows whose tools the candidate knows, in its world: each set-up of the instrument is
+/// placed where the candidate found it.
 MeasurementBatch judges_in_world(const GateQuestion& question) {
   MeasurementBatch all = question.sessions.back().judges;
   all.measurements.clear();
@@ -373,8 +374,8 @@ MeasurementBatch judges_in_world(const GateQuestion& question) {
   return all;
 }
 
-/// The first of its cell: it must beat the nominal model as the cell file has it, and not be worse
-/// than the nominal arm in the same place.
+/// Judges the first model of a cell: it must beat the cell file's nominal model, and must not be
+/// worse than the nominal arm placed by the same rows.
 GateVerdict judge_first(const GateQuestion& question, const GateOptions& options) {
   const MeasurementBatch all = judges_in_world(question);
   if (all.measurements.empty()) return no("no pose that was held out has its tools", {}, kAdvice);
@@ -407,8 +408,8 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   return yes(text, figures);
 }
 
-/// The factor by which the median judge of the session is farther off than expected; not a number
-/// where it knows none.
+/// The ratio of actual to expected error for the median judging row of the session; not a number if
+/// the model knows none of them.
 double misfit(const CompensatedModel& model, const JudgingSession& session) {
   const LocatedErrors errors = located_errors(model, session);
   std::vector<double> squares;
@@ -427,8 +428,8 @@ double misfit(const CompensatedModel& model, const JudgingSession& session) {
 
 namespace {
 
-/// The names of the sessions before the last change that the model knows of; none where it knows of
-/// none.
+/// The names of the sessions before the last change that the model knows; empty without such a
+/// change.
 std::set<std::string> before_last_change(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   std::size_t last = 0;
@@ -447,7 +448,7 @@ std::set<std::string> measured_apart(const CompensatedModel& model) {
   return names;
 }
 
-/// `session` without the rows of those sessions.
+/// `session` without rows of those sessions.
 JudgingSession without(const std::set<std::string>& names, JudgingSession session) {
   const bool divided = has_sessions(session.judges);
   std::erase_if(session.judges.measurements, [&](const Measurement& m) {
@@ -458,8 +459,8 @@ JudgingSession without(const std::set<std::string>& names, JudgingSession sessio
   return session;
 }
 
-/// The sessions that were measured since the arm changed for the last time, by either model: rows
-/// before it do not judge, and none that were measured with a reflector that sat elsewhere.
+/// The sessions measured since the last change of the arm, according to either model. Earlier rows
+/// do not judge, and neither do sessions with a displaced reflector.
 std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
   std::set<std::string> before = before_last_change(question.candidate);
   std::set<std::string> apart = measured_apart(question.candidate);
@@ -476,7 +477,7 @@ std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
     };
     if (!has_sessions(session.judges)) {
       if (is_before(session.batch_id)) {
-        since.clear();  // what came before it in time is older still
+        since.clear();  // earlier sessions are older still
         continue;
       }
     } else {

@@ -100,8 +100,8 @@ class JudgeRows {
   std::multimap<double, Measurement> rows_;  // by the first coordinate
 };
 
-/// Where the base stands for predictions `p_B` of `p_W`, without the rows that are far off the
-/// others; `otherwise` where that cannot be told.
+/// The base that fits the predictions `p_B` to `p_W`, without rows far off the others; `otherwise`
+/// if it is undetermined.
 Pose located_base(const Eigen::Matrix3Xd& p_W, const Eigen::Matrix3Xd& p_B, const Pose& otherwise) {
   constexpr int kRounds = 5;
   constexpr double kFar = 6;  // times the median distance
@@ -217,8 +217,8 @@ LocatedErrors errors_of_one(const CompensatedModel& model, const JudgingSession&
     const Eigen::Matrix3Xd p_W = measured_W(training);
     X_WB = located_base(p_W, X_BW * p_W - at_level(model.errors_B(training)), X_WB);
   }
-  const Pose change = X_WB.inverse() *
-                      X_BW.inverse();  // of a pose in B as the model has it, to where B stands here
+  const Pose change =
+      X_WB.inverse() * X_BW.inverse();  // takes a pose in the model's B to B as placed here
   const CompensatedModel::LevelErrors errors = model.errors_B(judges);
   const Eigen::Matrix3Xd p_W = measured_W(judges);
   const double instrument = 3 * model.cell().tracker.sigma * model.cell().tracker.sigma;

@@ -11,8 +11,8 @@ namespace trammel {
 
 namespace {
 
-/// Where among `sessions` those begin that came after `model` was trained: behind its own batches,
-/// or, where none of these is among them, behind all that was measured before it.
+/// The first session that came after the training of `model`: behind its own batches or, if none of
+/// these is in `sessions`, behind all that were measured before it.
 std::size_t first_new(const std::vector<JudgingSession>& sessions, const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
   const auto behind = [&](const auto& is_old) {
@@ -33,8 +33,8 @@ std::size_t first_new(const std::vector<JudgingSession>& sessions, const Compens
   });
 }
 
-/// Where the version marked in force cannot be asked: against what its own held-out poses said when
-/// it was made.
+/// Judges against the record of the version marked in force, if that version cannot be loaded: by
+/// the held-out poses from its training.
 GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInForce& record,
                             const std::vector<JudgingSession>& sessions, double accept_ratio,
                             GateVerdict otherwise) {
@@ -62,7 +62,8 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
           {{}, rms, limit}};
 }
 
-/// Whatever the judges say: its notes keep it from being put in force by itself.
+/// The verdict if the notes of the candidate keep it from being put in force automatically,
+/// whatever the judges say.
 GateVerdict left_to_a_person(const Note& stop, GateFigures figures) {
   return {false,
           "not in force: " + stop.text + "; activate it if it is right",

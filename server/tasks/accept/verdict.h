@@ -27,15 +27,16 @@ struct Opponents {
   std::optional<ModelText>
       in_force;  ///< none: it is the first model of its cell, or that one cannot be loaded
   std::vector<ModelText>
-      served_before;                    ///< the last one first; those that do not load do not count
-  std::size_t most_before = 0;          ///< of those that load, how many count
-  std::optional<RecordInForce> record;  ///< of a version marked in force that cannot be loaded
+      served_before;            ///< the last one first; versions that do not load are skipped
+  std::size_t most_before = 0;  ///< the number of loadable ones that count
+  std::optional<RecordInForce> record;  ///< of a version marked in force that does not load
 };
 
-/// judge() of the candidate with the sessions that came after `in_force` (null: none) told from
-/// those before; and where the version marked in force cannot be asked, against its record. A model
-/// with a stop_of() is never put in force: it is undecided, a person decides, or not better; its
-/// HeldBack says so in both cases. `sessions`: oldest first.
+/// Calls judge() for the candidate, with the sessions after `in_force` (null: none) separated from
+/// those before. If the version marked in force cannot be loaded, it judges against its record. A
+/// model with a stop_of() is never put in force: the verdict is undecided, so that a person
+/// decides, or not better, and its HeldBack gives the reason in both cases. `sessions`: oldest
+/// first.
 [[nodiscard]] GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
                                      std::vector<ServedModel> served_before,
                                      const std::optional<RecordInForce>& record,

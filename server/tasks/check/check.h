@@ -11,11 +11,11 @@ namespace trammel {
 struct CheckAsked {
   std::optional<double> tolerance = {};  ///< m; empty: the cell's
   bool new_tool = false;                 ///< HealthOptions::new_tool
-  std::vector<DriftSeen> earlier = {};   ///< what checks before it saw
+  std::vector<DriftSeen> earlier = {};   ///< the drift that earlier checks saw
 };
 
-/// check_health() as every door asks it. The tolerance is that of `cell`: the model's, or as its
-/// file is now.
+/// check_health() with the same rules for all callers. `cell` gives the tolerance: the model's
+/// cell, or the present cell file.
 [[nodiscard]] Result<HealthCheck> check_robot(const CompensatedModel& model, const Cell& cell,
                                               const CheckedBatch& batch, CheckAsked asked);
 

@@ -7,10 +7,12 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostUnlike = 8;     // parameters; a robot that differs in more is none of this fleet
-constexpr double kWorseFit = 0.7;  // of what is left anyway: a prior may leave so much more
+constexpr int kMostUnlike = 8;  // parameters; a robot that differs in more does not belong to the
+                                // fleet
+constexpr double kWorseFit = 0.7;  // of the residual without the prior: the prior may add this
+                                   // share
 
-/// A source whose parameters are expected where the fleet has them.
+/// A source with the fleet's values as the expectation of its parameters.
 class Expected final : public ErrorSource {
  public:
   Expected(ErrorSourcePtr source, std::vector<Parameter> parameters)
@@ -32,7 +34,7 @@ class Expected final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// The sources of `model` as they are, with the fleet's priors; its values at these.
+/// Gives the unchanged sources of `model` the fleet's priors, and its values the prior means.
 void expect(PhysicalModel& model, const std::vector<FleetParameter>& priors) {
   for (ErrorSourcePtr& source : model.sources) {
     std::vector<Parameter> parameters = source->parameters();
@@ -91,9 +93,8 @@ Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell,
   return std::move(*best);
 }
 
-/// The parameters that the poses by themselves found, drawn towards the twins: linear, so that a
-/// prior that is far off shows in full. Where it was fitted anew, its misfit would be taken for
-/// noise.
+/// The parameters found from the poses alone, shrunk linearly towards the twins, so that a wrong
+/// prior shows in full. In a new fit, its misfit would pass for noise.
 struct Drawn {
   std::vector<IdentifiedParameter> parameters;
   Eigen::MatrixXd covariance;
@@ -108,7 +109,8 @@ Drawn drawn_to(const CalibrationResult& alone, const std::vector<FleetParameter>
   }
   const Eigen::VectorXd shrink = scale.cwiseInverse();
   Eigen::MatrixXd covariance = shrink.asDiagonal() * alone.covariance * shrink.asDiagonal();
-  covariance.diagonal().array() += 1e-12;  // what is certain is so to rounding
+  covariance.diagonal().array() += 1e-12;  // keeps a certain parameter positive definite under
+                                           // rounding
   Eigen::MatrixXd precision = covariance.llt().solve(Eigen::MatrixXd::Identity(P, P));
   Eigen::VectorXd weighted = precision * value;
   Drawn drawn{alone.parameters, {}};

@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostBlocks = 5;
 constexpr std::size_t kLeastBlocks = 3;
 constexpr std::size_t kLeastRows =
-    12;  // of a block: the instrument's place takes six numbers of their 36
+    12;  // poses of a block: six of their 36 numbers locate the instrument
 constexpr Index kNeighbours = 10;  // rows that count as one for the interval
 constexpr double kPlace = 6;       // numbers that are fitted to each block
 
@@ -47,9 +47,9 @@ std::vector<int> beginnings_of(const std::vector<std::string>& sources,
   return all;
 }
 
-/// Number of the block of each row. A block is contiguous within each stretch between two
-/// beginnings, and takes the same share of each: so much as a model has seen of the robot as it is
-/// now, it sees in every fold. None goes across sessions.
+/// Number of the block of each row. Between two first poses of causes, a block is contiguous, and
+/// takes the same share of each such stretch. So every fold sees the same share of the robot's
+/// present state. No block spans sessions.
 std::vector<std::size_t> blocks_of(const std::vector<Measurement>& rows,
                                    const std::vector<int>& beginnings) {
   const std::size_t n = rows.size();
@@ -78,7 +78,7 @@ MeasurementBatch without_session(const MeasurementBatch& rows, int session) {
   return only_sessions(rows, kept);
 }
 
-/// As train() does it.
+/// Identifies the sources as train() does.
 Result<CalibrationResult> identified(const std::shared_ptr<const Cell>& cell,
                                      const std::vector<std::string>& sources,
                                      const MeasurementBatch& train) {
@@ -97,8 +97,8 @@ Vector3 seen_standing(const PhysicalModel& model, const Measurement& m) {
   return X_moved.inverse() * m.p_W;
 }
 
-/// The errors that a model leaves of a block, wherever the instrument stands. Fewer numbers than
-/// errors: brought to the size that rows have which nothing was fitted to.
+/// The errors that a model leaves in a block, wherever the instrument stands. With fewer numbers
+/// than errors, the errors are scaled to the size they would have on rows that no fit has seen.
 Result<Matrix3Xd> left_of(const PhysicalModel& model, const MeasurementBatch& block) {
   const auto n = static_cast<Index>(block.measurements.size());
   Matrix3Xd measured(3, n);

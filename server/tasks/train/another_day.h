@@ -14,10 +14,10 @@
 /// The gain of causes on a day that nobody measured yet.
 namespace trammel {
 
-/// The error on another day, without and with some causes, and what share of it they take off.
+/// The error on another day, without and with some causes, and the share that they remove.
 struct DayGain {
   PairedGain gain;              ///< the physics alone, on all rows judged
-  int blocks = 0;               ///< that were held out one after the other
+  int blocks = 0;               ///< the number of blocks held out in turn
   double share = 0;             ///< 1 - rms after / rms before
   double lower = 0, upper = 0;  ///< 95 % of `share`
 
@@ -32,20 +32,20 @@ struct DayGain {
 /// mm: 16 % less, 95 % between 10 and 21 %`.
 [[nodiscard]] std::string to_string(const DayGain& day);
 
-/// Rows of a batch as another day would show them. Blocks of time, or whole sessions, are held out
-/// one after the other; the physics is identified on the rest. A block is judged as a service on
-/// another day is: what began at a pose has begun, earlier rows do not judge, and the instrument
+/// Shows rows of a batch as another day would. Blocks of time, or whole sessions, are held out in
+/// turn, and the physics is identified on the rest. A block is judged as a service would on another
+/// day: causes that begin at a pose have begun, earlier rows do not judge, and the instrument
 /// stands somewhere else.
 class AnotherDay {
  public:
-  /// `with`: all that was found, by which the instrument's own motion is taken out of the rows.
-  /// `suspects`: rows that fit no model. Empty where there are too few rows for three blocks, or
-  /// gauges among them, or no block can be predicted.
+  /// `with`: all found causes, whose instrument effects are removed from the rows. `suspects`: rows
+  /// that fit no model. Empty if there are too few rows for three blocks, if some rows are gauges,
+  /// or if no block can be predicted.
   [[nodiscard]] static std::optional<AnotherDay> make(const std::shared_ptr<const Cell>& cell,
                                                       const MeasurementBatch& rows,
                                                       const std::vector<std::string>& with,
                                                       const std::set<int>& suspects);
-  /// 3 x N, m: what the sources leave of all rows judged. Refusals as calibrate().
+  /// 3 x N, m: the residuals of all judged rows with these sources. Refusals as calibrate().
   [[nodiscard]] Result<Eigen::Matrix3Xd> left_by(const std::vector<std::string>& sources) const;
   [[nodiscard]] int blocks() const { return static_cast<int>(folds_.size()); }
 

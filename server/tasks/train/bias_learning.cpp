@@ -14,11 +14,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kDomainQuantile = 0.995;  // of the training poses, each left out, count as known
+constexpr double kDomainQuantile = 0.995;  // quantile over the left-out training poses, which count
+                                           // as known
 constexpr int kLeastBiasPoses = 10;
 
-/// A pose counts as known when its posterior-to-prior share is what training poses have when each
-/// is left out.
+/// A pose counts as known if its posterior-to-prior share is within that of left-out training
+/// poses.
 double domain_limit(const BiasModel& bias) {
   Eigen::VectorXd share = bias.leave_one_out_prior_share();
   std::sort(share.begin(), share.end());
@@ -27,8 +28,8 @@ double domain_limit(const BiasModel& bias) {
   return share(place);
 }
 
-/// The data that a bias is learned from: what the physics of `parts` leaves over of `batch`,
-/// described as far as `kernel` asks.
+/// The training data of a bias: the residuals of the physics of `parts` on `batch`, with the
+/// features that `kernel` needs.
 BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBatch& batch,
                        bool described) {
   BiasProblem problem = leftover(parts.physics, batch);
@@ -57,8 +58,9 @@ std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics,
   return rotation;
 }
 
-/// The bias that is worth it, with the physics identified anew where observations are left out.
-/// Beside causes that the measurements chose, kernels with blocks would only choose them again.
+/// Chooses the bias, with the physics identified anew wherever observations are left out. Beside
+/// causes chosen by the measurements, kernels with blocks are skipped, since they would only choose
+/// the same again.
 Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts,
                                              const BiasProblem& problem, const BiasOptions& options,
                                              const LeftOut& left_out) {
@@ -72,8 +74,8 @@ Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts,
   return std::move(chosen.model);
 }
 
-/// The orientation by a process of its own, of the same kernel: what is learned of the positions
-/// stays what it is. Where the kernel was chosen for the positions, it must be worth it here too.
+/// Learns the orientation by a separate process with the same kernel, so that the learned positions
+/// stay unchanged. A kernel that was chosen for the positions must gain here, too.
 Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch,
                          const BiasProblem& problem, const BiasOptions& options) {
   const std::optional<BiasProblem> rotation = rotation_problem(parts.physics, batch, problem);
@@ -105,8 +107,8 @@ void forget_bias(CompensatedModel::Parts& parts) {
   parts.bias_spread = 1;
 }
 
-/// The batch without suspects. Rows that do not fit the others are not learned: a smooth function
-/// would spread them over their neighbours.
+/// The batch without suspects. A smooth function would spread the error of such rows over their
+/// neighbours.
 MeasurementBatch without_suspects(const CompensatedModel::Parts& parts, MeasurementBatch batch) {
   std::erase_if(batch.measurements, [&](const Measurement& m) {
     return std::any_of(parts.suspects.begin(), parts.suspects.end(), [&](const SuspectPose& pose) {
@@ -135,7 +137,7 @@ Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBa
   return Learned{std::move(problem), std::move(fitted)};
 }
 
-/// The context without what came before the pose, where no source asks for it: it is long, and few
+/// The context without the history before the pose, unless a source needs it: it is long, and few
 /// sources do.
 PoseContext without_what_nobody_asks(PoseContext context, const PhysicalModel& physics) {
   const auto asked = [&](bool ContextNeeds::*need) {
@@ -186,7 +188,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all,
   BiasOptions options;
   options.kernel = kernel;
   options.seed = seed;
-  // By the time that they take: the orientations as long as the positions, where there are any.
+  // Shares by their times: the orientations, if there are any, take as long as the positions.
   const bool oriented = std::all_of(batch.measurements.begin(), batch.measurements.end(),
                                     [](const Measurement& m) { return m.R_WT.has_value(); });
   const double positions = oriented ? 0.5 : 0.95, with_spread = oriented ? 0.55 : 1;

@@ -9,9 +9,9 @@
 
 namespace trammel {
 
-/// Learns the bias of `kernel` or, for `auto`, the one that is worth it from what the physics of
-/// `parts` leaves over of `all`, and puts it into `parts`. `left_out`: of `all`, without suspects.
-/// `progress`: the share done; false gives up.
+/// Learns the bias of `kernel` or, for `auto`, the best one, from the residuals of the physics of
+/// `parts` on `all`, and puts it into `parts`. `left_out`: of `all`, without suspects. `progress`:
+/// the share done; false gives up.
 [[nodiscard]] Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all,
                               const std::string& kernel, const LeftOut& left_out,
                               std::uint64_t seed,

@@ -11,17 +11,18 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kFewObservations = 200;  // of more the hyperparameters stay: they are known well
-constexpr Index kMostAsked = 1000;       // more say no more of one number
+constexpr Index kFewObservations = 200;  // with more observations the hyperparameters stay, because
+                                         // they are known well
+constexpr Index kMostAsked = 1000;       // more poses do not improve one number
 constexpr Index kFolds = 5;
-constexpr int kStarts = 5;            // of each search: the poses that are left are much like all
-constexpr double kPriorSpread = 0.3;  // of log f: what is usual of kernels that fit
+constexpr int kStarts = 5;            // of each search: the remaining poses resemble the whole set
+constexpr double kPriorSpread = 0.3;  // of log f: usual among kernels that fit
 constexpr double kLargestLog = 2.3;   // f 10: beyond it the bias is wrong, not uncertain
-constexpr int kThirds = 40;           // of that interval that the search narrows down
+constexpr int kThirds = 40;           // steps by a third of that interval
 constexpr double kNothing = 1e-4;     // of log f
 
-/// The errors at the poses left out: squares of what is missed, and what is said of them. All m²,
-/// sums of three coordinates.
+/// The errors at left-out poses: actual squares, and stated variances. All m², sums of three
+/// coordinates.
 struct Missed {
   std::vector<double> square, uncertain, instrument;
 };
@@ -34,15 +35,16 @@ std::vector<BiasFeatures> at(const std::vector<BiasFeatures>& all, const std::ve
   return some;
 }
 
-/// The uncertainty of a pose left out: the bias, what it takes for noise beyond the instrument's,
-/// and the parameters as far as it does not know them (`identified`, m² of a coordinate).
+/// The variance of a left-out pose: the bias, the noise that the bias attributes beyond the
+/// instrument's, and the parameters as far as the bias lacks them (`identified`, m² of a
+/// coordinate).
 double uncertain(const BiasPrediction& bias, double instrument, double identified) {
   const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();
   return bias.covariance_B.trace() + (noise.array() - instrument).max(0.0).sum() +
          3 * bias.prior_share * identified;
 }
 
-/// The bias of these observations; of many the hyperparameters of `all` stay.
+/// The bias of these observations. With many observations the hyperparameters of `all` stay.
 Result<BiasModel> learned_from(const BiasProblem& fewer, const BiasModel& all, Index of,
                                const BiasOptions& options) {
   if (of <= kFewObservations) return BiasModel::fit(fewer, options);
@@ -84,7 +86,7 @@ bool add_fold(const BiasProblem& problem, const BiasModel& all, const BiasOption
   return true;
 }
 
-/// -2 log of the likelihood of f and of its prior, but for what does not depend on it.
+/// -2 log of the likelihood of f and of its prior, without constant terms.
 double misfit(const Missed& missed, double log_f) {
   double sum = std::pow(log_f / kPriorSpread, 2);
   for (std::size_t k = 0; k < missed.square.size(); ++k) {
@@ -94,8 +96,8 @@ double misfit(const Missed& missed, double log_f) {
   return sum;
 }
 
-/// The likeliest f from 1 on. Where what is uncertain is small beside the instrument's noise,
-/// hundreds of poses say little of it, and it stays near 1.
+/// The likeliest f, at least 1. If the uncertainty is small beside the instrument's noise, hundreds
+/// of poses determine f poorly, and it stays near 1.
 double likeliest_spread(const Missed& missed) {
   double low = 0, high = kLargestLog;
   for (int k = 0; k < kThirds; ++k) {

@@ -8,18 +8,18 @@
 
 namespace trammel {
 
-/// The factor by which a bias misses poses that it was not learned from farther than its covariance
-/// says; at least 1. Hyperparameters that were found from few poses are taken for exact by every
-/// prediction, and fit these poses better than others; and what the physics fitted of the noise is
-/// missing in what the bias is learned from. Fifths of the poses are left out by turns, the physics
-/// found without them (Stone 1974); of up to 200 observations the hyperparameters, too.
+/// The factor by which the errors of a bias at left-out poses exceed its covariance; at least 1.
+/// There are two reasons: predictions treat hyperparameters from few poses as exact, although they
+/// fit these poses better than others; and the physics has absorbed a part of the noise before the
+/// bias is learned. Fifths of the poses are left out in turn, and the physics is identified without
+/// them (Stone 1974). With up to 200 observations the hyperparameters are learned anew, too.
 ///
-/// Model: what is missed of a coordinate is normal with the variance f² v + sigma², v what bias and
-/// parameters leave uncertain, sigma the instrument's. f is as large as makes the sum of squares
-/// what it is expected to be.
+/// Model: the error of a coordinate is normal with the variance f² v + sigma², where v is the
+/// variance of bias and parameters and sigma the instrument's. f makes the sum of squares equal to
+/// its expectation.
 ///
-/// `problem`: what `bias` was fitted to; `left_out`: of the same poses. 1 where too little is left
-/// to identify from, or where `progress` gives up.
+/// `problem`: the fit data of `bias`; `left_out`: of the same poses. 1 if too little is left to
+/// identify from, or if `progress` gives up.
 [[nodiscard]] double bias_spread(const BiasProblem& problem, const BiasModel& bias,
                                  const LeftOut& left_out, std::uint64_t seed,
                                  const std::function<bool(double share)>& progress);

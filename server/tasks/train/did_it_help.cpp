@@ -8,7 +8,7 @@ namespace trammel {
 
 namespace {
 
-/// The error sources that do not begin at a pose of the batch that the model was made from.
+/// The model's error sources except those that begin at a pose of its own batch.
 std::string lasting_level(const CompensatedModel& model) {
   std::string level;
   for (const ErrorSourcePtr& source : model.parts().physics.sources)

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kSupportShare =
     0.25;  // of the progress of an extended model; the rest is its training
-constexpr double kExtendedShare = 0.6;  // of that of an extension; the rest is the model beside it
+constexpr double kExtendedShare = 0.6;  // of an extension's progress; the rest is the model beside
+                                        // it
 
 bool contains(const std::vector<std::string>& list, const std::string& word) {
   return std::find(list.begin(), list.end(), word) != list.end();
@@ -29,8 +30,8 @@ TrainOptions as_part(TrainOptions options, double from, double to) {
   return options;
 }
 
-/// From a batch that the diagnosis has looked at: another tool, which a training refuses, may be
-/// what it found.
+/// Trains on a batch that the diagnosis has examined. A training would refuse another tool, which
+/// may be the finding itself.
 Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                  const std::vector<std::string>& sources, TrainOptions options) {
   options.looked_at = true;
@@ -50,14 +51,14 @@ std::set<int> suspected_rows(const Diagnosis& diagnosis) {
   return rows;
 }
 
-/// Where the base stands is found anew on another day.
+/// True for the base, which is located anew on another day.
 bool is_of_the_base(const std::string& source) {
   const CauseRecord* cause = find_cause(source);
   return cause != nullptr && cause->part == causes::Part::kBase;
 }
 
-/// Leaves out of `supported` what another day does as well without, and says what the rest is worth
-/// on it. Causes that go with the batch anyway, and the base, are not asked.
+/// Removes causes from `supported` that another day does not need, and measures the gain of the
+/// others there. Causes that belong to the batch alone, and the base, are not tested.
 std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell,
                              const std::vector<std::string>& own, const CheckedBatch& batch,
                              const Diagnosis& diagnosis, Supported& supported) {
@@ -99,8 +100,8 @@ std::vector<std::string> added_sources(const std::vector<std::string>& own,
   std::vector<std::string> added;
   std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(),
                std::back_inserter(added), [&](const std::string& source) {
-                 // Another form of what the cell has already, such as the compliance: training
-                 // chooses it again.
+                 // Another form of a source that the cell has, such as the compliance; training
+                 // chooses the form again.
                  const bool form = as_listed(source, own) != source;
                  return !form && !contains(diagnosis.sources_before, source) &&
                         !contains(own, source);

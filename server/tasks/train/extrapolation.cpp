@@ -16,21 +16,21 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeftOut = 1.0 / 3.0;  // of a joint's range, at one end
+constexpr double kLeftOut = 1.0 / 3.0;  // share of a joint's range that is left out, at one end
 constexpr double kLeastRange = 0.02;    // rad or m; over less a slope is noise
 constexpr Index kLeastAsked = 5;
 constexpr Index kLeastRest = 10;
 
-/// The surplus by which poses left out miss beyond what is claimed of them, sum of squares of one
-/// coordinate, m²; empty where the rest does not tell.
+/// The surplus of the errors at left-out poses over their stated variance, sum of squares of one
+/// coordinate, m²; empty if the rest does not determine it.
 using Surplus = std::function<std::optional<double>(
     const LeftOut::Without& anew, const std::vector<Index>& asked, const std::vector<Index>& rest)>;
 
 std::optional<double> surplus_of_physics(const LeftOut::Without& anew,
                                          const std::vector<Index>& asked,
                                          const std::vector<Index>& rest) {
-  // About the rest's mean: a constant is known, and what of it is not taken outside is counted
-  // there.
+  // Uses the kernel mean about the mean of the rest: a constant is known, and the part of it that
+  // is not applied outside is counted there.
   const MatrixXd known = anew.residual_B(rest, Eigen::all);
   const Eigen::RowVector3d mean = known.colwise().mean();
   const MatrixXd missed = anew.residual_B(asked, Eigen::all).rowwise() - mean;
@@ -40,8 +40,8 @@ std::optional<double> surplus_of_physics(const LeftOut::Without& anew,
          anew.variance.sum();
 }
 
-/// The surplus that the bias's blocks do not tell of poses out of its range, with the
-/// hyperparameters as they are.
+/// The surplus of the errors at out-of-range poses that the bias's blocks do not explain, with
+/// unchanged hyperparameters.
 std::optional<double> surplus_of_blocks(const BiasState& state, const LeftOut::Without& anew,
                                         const std::vector<Index>& asked,
                                         const std::vector<Index>& rest) {
@@ -68,7 +68,7 @@ std::optional<double> surplus_of_blocks(const BiasState& state, const LeftOut::W
   return surplus;
 }
 
-/// The worse of both ends; empty where they cannot be asked.
+/// The worse of both ends; empty if neither can be tested.
 std::optional<double> squared_slope(const LeftOut& poses, Index j, const Joint& joint,
                                     const Surplus& surplus) {
   const double low = poses.q().col(j).minCoeff();

@@ -10,11 +10,11 @@
 
 namespace trammel {
 
-/// The reason against learning from a batch of which no model in force can judge: it was not read
-/// as it was meant (batch_doubt()), or something began in the middle of it (jump_within(); `text`
-/// is the pose, `row` its row). The command line, the library, Python and the daemon ask this
-/// before a model is trained from nothing, unless somebody has looked at the batch. `batch` is
-/// checked against `cell`; `level`: instead of the cell's error sources.
+/// The reason against learning from a batch that no model in force can judge: it was misread
+/// (batch_doubt()), or something changed in the middle of it (jump_within(); `text` is the pose,
+/// `row` its row). The command line, the library, Python and the daemon call this before a model is
+/// trained from nothing, unless a person has looked at the batch. `batch` is checked against
+/// `cell`; `level` replaces the cell's error sources.
 [[nodiscard]] std::optional<Error> doubt_of_first_batch(
     const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
     const std::optional<std::string>& level = {});

@@ -29,7 +29,7 @@ std::vector<std::string> sources_in_force(const CompensatedModel& model, const C
 
 std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force,
                                                 const MeasurementBatch& batch) {
-  if (cell.model.beside_auto) return std::nullopt;  // the data say it each time
+  if (cell.model.beside_auto) return std::nullopt;  // the data decide each time
   std::vector<std::string> level = spelled_out(cell.model.error_sources, cell);
   const auto listed = [&](const std::string& name) {
     return std::find(level.begin(), level.end(), as_listed(name, level)) != level.end();

@@ -13,9 +13,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no
-/// part in it. Each is taken in its own standard deviation: beside hundreds of kg m a square root
-/// would lose angles and compliances.
+/// J R with R Rᵀ the covariance, which may be singular or empty. Exact parameters have no part in
+/// it. Each parameter is scaled by its own standard deviation: beside hundreds of kg m an unscaled
+/// square root would lose angles and compliances.
 MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
   std::vector<Index> open;
   for (Index k = 0; k < covariance.rows(); ++k) {
@@ -86,8 +86,8 @@ std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses
       J.middleRows<6>(6 * i) = J_.middleRows<6>(row);
       residual.segment<6>(6 * i) = residual_.segment<6>(row);
     }
-    // The precision of the parameters without these poses. With them the gradient was 0, so they
-    // answer for its rest.
+    // The precision of the parameters without these poses. The total gradient is 0 at the optimum,
+    // so the gradient of the left-out poses is the negative of the gradient of the others.
     MatrixXd precision = MatrixXd::Identity(J.cols(), J.cols());
     if (count > 0) precision.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), -1.0);
     const Eigen::LLT<MatrixXd> factor(precision);

@@ -7,10 +7,10 @@
 
 namespace trammel {
 
-/// The result that identification would have had of a batch without some of its poses: to first
-/// order about what it found with all, by a downdate of the covariance, so without another search.
-/// Where the covariance is 0 nothing moves. Suspects and gauges are no observations here.
-/// Immutable, thread-safe.
+/// The result of identification without some of the batch's poses, to first order about the result
+/// with all. It comes from a downdate of the covariance, so there is no new search. A parameter
+/// with covariance 0 does not move. Suspects and gauges are no observations here. Immutable,
+/// thread-safe.
 class LeftOut {
  public:
   LeftOut(const CalibrationResult& found, const MeasurementBatch& batch);
@@ -22,15 +22,15 @@ class LeftOut {
 
   struct Without {
     Eigen::MatrixXd residual_B;  ///< N x 3, m: of all observations
-    Eigen::VectorXd variance;    ///< of each one left out, m², mean of its coordinates: what the
-                                 ///< parameters make of it
+    Eigen::VectorXd variance;  ///< of each left-out pose, m², mean of its coordinates: the variance
+                               ///< from the parameters
   };
-  /// Without these observations; empty where too little is left to identify from.
+  /// The result without these observations; empty if too little is left to identify from.
   [[nodiscard]] std::optional<Without> without(const std::vector<Eigen::Index>& poses) const;
 
  private:
-  // Residuals and derivatives in units of their standard deviations, six rows a pose, zero where it
-  // has no orientation; the parameters in directions in which they are independent with unit
+  // Residuals and derivatives in units of their standard deviations, six rows per pose, zero
+  // without an orientation. The parameters are expressed in independent directions with unit
   // variance.
   Eigen::MatrixXd q_;
   Eigen::VectorXd residual_;  // 6 N

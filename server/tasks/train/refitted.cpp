@@ -15,12 +15,12 @@ using Eigen::MatrixXd;
 
 namespace {
 
-constexpr double kSameFrame = 1e-6;    // m and rad: below what a file says
+constexpr double kSameFrame = 1e-6;    // m and rad: below the precision of a file
 constexpr int kMostRounds = 5;         // of taking off the bias and finding the base again
 constexpr double kSettledTurn = 1e-9;  // rad
 constexpr double kBeyondChance = 3;    // standard deviations of chi^2
 
-/// A frame that the cell knows, and that is not named, must be the model's.
+/// A frame that the cell states, and that `only` does not list, must equal the model's.
 Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said,
                         const Pose& kept, const std::string& source) {
   if (!said) return {};
@@ -96,15 +96,15 @@ CalibrationResult known_of(const CompensatedModel::Parts& parts) {
   return known;
 }
 
-/// The bias at each pose, seen from the arm's base as it really stands (A), and with what
-/// sigma a measurement is met there that it has been taken off.
+/// The bias at each pose, seen from the arm's true base (A), and the sigma of a measurement from
+/// which the bias was subtracted.
 struct BiasAt {
   std::vector<Vector3> shift_A;
   std::vector<Matrix3> turn_A;
   std::vector<double> sigma;
 };
 
-/// `parts` as if all parameters were exact: what is uncertain of them is told apart.
+/// `parts` with all parameters treated as exact: their uncertainty is stated separately.
 Result<BiasAt> bias_at(CompensatedModel::Parts parts, const MeasurementBatch& poses) {
   parts.covariance.setZero();
   if (parts.bias_origin) parts.bias_origin->covariance.setZero();
@@ -141,8 +141,8 @@ MeasurementBatch without_bias(MeasurementBatch poses, const BiasAt& bias, const 
   return poses;
 }
 
-/// True if the poses are missed by more than their sigmas, `fitted` parameters being theirs, let
-/// chance miss them.
+/// True if the residuals of the poses are larger than their sigmas make likely. `fitted`: the
+/// number of parameters fitted to these poses.
 bool is_beyond_chance(const PhysicalModel& model, const MeasurementBatch& poses,
                       std::size_t fitted) {
   const BiasProblem left = leftover(model, poses);
@@ -177,7 +177,7 @@ Status take_over(CompensatedModel::Parts& parts, const CompensatedModel& from, c
   return {};
 }
 
-/// `own`: the model has now sources that began during this batch, and is of it.
+/// `own`: the model now has sources that began during this batch, so it belongs to the batch.
 void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const CheckedBatch& batch,
             const MeasurementBatch& trained, const std::vector<std::string>& only, bool own) {
   ModelProvenance& provenance = parts.provenance;
@@ -192,8 +192,8 @@ void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const 
   provenance.training_poses = poses;
 }
 
-/// The poses as the sources meet them: as of another batch than the model's where they are, and no
-/// better known than what the model leaves unexplained.
+/// The poses as the sources see them: as poses of another batch if they are not the model's own,
+/// and with a sigma no smaller than the residual of the model.
 MeasurementBatch as_met(const CompensatedModel& from, const Cell& cell, MeasurementBatch poses,
                         bool own) {
   for (Measurement& m : poses.measurements) {
@@ -204,8 +204,8 @@ MeasurementBatch as_met(const CompensatedModel& from, const Cell& cell, Measurem
   return poses;
 }
 
-/// Refits, and where the model has a bias takes it off and refits until the base no longer turns.
-/// Fills `parts`.
+/// Refits. If the model has a bias, it subtracts the bias and refits until the base no longer
+/// turns. Fills `parts`.
 Result<Refit> refit_beside_bias(CompensatedModel::Parts& parts, const CompensatedModel& from,
                                 const std::shared_ptr<const Cell>& cell,
                                 const MeasurementBatch& poses,

@@ -14,9 +14,9 @@ struct Successor {
   std::string note;  ///< for people; empty where the whole model was trained anew
 };
 
-/// Trains from `batch`. Where it covers much less of the joint ranges than `present` (null: none),
-/// or fewer of its tools, it teaches base and tool only: the rest of that model stays. Refusals as
-/// train().
+/// Trains from `batch`. If the batch covers much less of the joint ranges than `present` (null:
+/// none), or fewer of its tools, it only updates base and tool, and the rest of that model stays.
+/// Refusals as train().
 [[nodiscard]] Result<Successor> train_successor(const std::shared_ptr<const Cell>& cell,
                                                 const CheckedBatch& batch,
                                                 const ServedModel* present, TrainOptions options);

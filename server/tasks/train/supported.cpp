@@ -12,7 +12,7 @@ namespace trammel {
 
 namespace {
 
-/// 3 x N, m: what the sources, identified on `train`, leave of `judges`.
+/// 3 x N, m: the residuals of `judges` with the sources identified on `train`.
 Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell,
                                  const std::vector<std::string>& sources,
                                  const MeasurementBatch& train, const MeasurementBatch& judged_by) {
@@ -67,8 +67,7 @@ Result<Supported> supported_by(const SupportQuestion& question) {
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
       const auto without = question.left_by(others);
       if (!without) continue;  // the rest cannot do without it
-      // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at
-      // which it does nothing.
+      // The score by ranks is not used: it would outvote a cause that acts at a tenth of the poses.
       const double z = paired_gain(*without, with).z_sum;
       if (z > least.z || (z == least.z && !least.source.empty())) continue;
       least = {supported.sources[k], z};

@@ -18,20 +18,20 @@ struct Unsupported {
   /// sum(d) / sqrt(sum(d²)), d the difference of a pose's squared errors without and with it
   /// (Efron, Student's t-test under symmetry conditions, JASA 64, 1969): not above 0.
   double z = 0;
-  bool another_day = false;  ///< it is rows held out in blocks of time that do without it
+  bool another_day = false;  ///< rows held out in blocks of time do without it
 };
 
 struct Supported {
-  std::vector<std::string> sources;   ///< of those found, in their order
+  std::vector<std::string> sources;   ///< the supported ones of those found, in their order
   std::vector<Unsupported> left_out;  ///< in the order in which they were dropped
 };
 
-/// Which of the sources `found` lower the squared error of the poses in `judges` by themselves, so
-/// that no false one rides on a true one: `own` and all of them are identified on `train`, and
-/// again without each in turn. While one is there that the poses do without as well or better, the
-/// least is dropped and the rest is asked again. Physics only: a bias would take over what is
-/// missing. A single one is not asked: it is what the whole is judged by. `progress`: the share
-/// done; false gives up. Refusals as calibrate().
+/// Selects the sources of `found` that each lower the squared error of the poses in `judges`, so
+/// that no false one benefits from a true one. `own` and all of them are identified on `train`, and
+/// again without each in turn. While the poses do equally well or better without some source, the
+/// weakest is dropped and the others are tested again. It uses physics only, since a bias would
+/// absorb the missing effect. A single source is not tested here, since the extension as a whole is
+/// judged by it. `progress`: the share done; false gives up. Refusals as calibrate().
 [[nodiscard]] Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell,
                                              const std::vector<std::string>& own,
                                              const std::vector<std::string>& found,
@@ -39,7 +39,7 @@ struct Supported {
                                              const MeasurementBatch& judges,
                                              const std::function<bool(double share)>& progress);
 
-/// Asked of `found`: what all but one of them leave of the same poses.
+/// The question for `found`: the residuals of the same poses with all but one of them.
 struct SupportQuestion {
   std::vector<std::string> found;
   std::function<Result<Eigen::Matrix3Xd>(const std::vector<std::string>& some)>
@@ -47,11 +47,11 @@ struct SupportQuestion {
   std::function<bool(const std::string& source)> may_be_dropped;
   std::function<bool(double share)> progress;  ///< false gives up
 };
-/// supported_by() of any poses. Refuses what left_by refuses of all of them.
+/// supported_by() for any poses. Refuses the same as left_by does for all sources.
 [[nodiscard]] Result<Supported> supported_by(const SupportQuestion& question);
 
-/// `encoder_eccentricity:6 is left out: the poses held out do as well without it (z -0.40)`; empty
-/// for none.
+/// `encoder_eccentricity:6 is left out: the poses held out do as well without it (z -0.40)`. Empty
+/// if no source is left out.
 [[nodiscard]] std::string to_string(const std::vector<Unsupported>& left_out);
 
 }  // namespace trammel

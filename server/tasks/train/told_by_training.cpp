@@ -13,7 +13,7 @@ namespace trammel {
 
 namespace {
 
-/// The jump in the middle of the batch, beside all that the model has.
+/// The jump in the middle of the batch that remains beside everything in the model.
 std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatch& batch) {
   auto cell = std::make_shared<Cell>(*model.parts().physics.cell);
   cell->model.error_sources.clear();

@@ -13,16 +13,16 @@
 namespace trammel {
 
 /// The notes of a training beside those of its model. The command line, the library and Python
-/// tell it in the same words.
+/// report them in the same words.
 struct ToldByTraining {
   std::optional<Jump> jump;    ///< in a batch that somebody has looked at and learns from anyhow
   std::vector<Unlike> unlike;  ///< in what the robot is unlike its twins; empty without twins
   std::string
-      unread;  ///< unread_columns() of the batch, which a terminal tells as it reads the file
+      unread;  ///< unread_columns() of the batch; a terminal reports them when it reads the file
 
   /// `changed_within_batch` and `unlike_twins`, warnings.
   [[nodiscard]] std::vector<Note> notes() const;
-  /// Together with those of the model and `columns_not_read`, the gravest first.
+  /// Together with the notes of the model and `columns_not_read`, the gravest first.
   [[nodiscard]] std::vector<Note> beside(std::vector<Note> of_model) const;
 };
 
@@ -32,9 +32,8 @@ struct ToldByTraining {
                                               const CheckedBatch& batch,
                                               const TrainOptions& options);
 
-/// The prior that robots of the cell's type have in common, where the cell file says `prior: fleet`
-/// or somebody names twins; empty where neither is so. Refuses a cell that asks for twins where
-/// nobody names one.
+/// The prior shared by robots of the cell's type, if the cell file says `prior: fleet` or the
+/// caller names twins; otherwise empty. Refuses a cell that needs twins if none are named.
 [[nodiscard]] Result<std::optional<FleetPrior>> prior_of_twins(
     const Cell& cell, const std::vector<FleetMember>& twins);
 

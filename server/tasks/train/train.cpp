@@ -57,10 +57,10 @@ Result<Asked> asked_of(const Cell& cell, const TrainOptions& options) {
   return asked;
 }
 
-/// Says what is being done; false: give up.
+/// Reports the current step. Returns false to give up.
 using Report = std::function<bool(const std::string& stage, double share)>;
 
-/// The share of a training after which each of its parts is done, by the time that they take.
+/// The share of a training after which each of its parts is done, by their times.
 struct PartsDone {
   double choice, physics, bias;
 };
@@ -84,7 +84,7 @@ Result<std::vector<std::string>> sources_of(const std::shared_ptr<const Cell>& c
   return std::move(chosen.sources);
 }
 
-/// The shares of a training from nothing but the measurements.
+/// The shares of a training that starts from the measurements alone.
 PartsDone parts_done(const Cell& cell, const TrainOptions& options) {
   const Result<Asked> asked = asked_of(cell, options);
   return asked && asked->chosen_by_data ? kPhysicsChosen : kPhysicsKnown;
@@ -103,7 +103,8 @@ void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& 
   parts.temperature_stddev = std::sqrt((t - t.mean()).square().mean());
 }
 
-/// Where the model was trained: the joints' ranges, and what else a promise is about.
+/// Records where the model was trained: the ranges of the joints, and the other limits of its
+/// stated accuracy.
 void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
   parts.measured = what_was_measured(parts.physics, trained);
   parts.q_min = parts.q_max = trained.measurements.front().context.q;
@@ -113,8 +114,8 @@ void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& train
   }
 }
 
-/// When it was trained, and from how new measurements: those of the model that it starts from
-/// count, too.
+/// Records when the model was trained, and the age of its newest measurement, including those of
+/// the model that it started from.
 void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch,
                   const TrainOptions& options) {
   parts.provenance.trained_at = options.trained_at;
@@ -122,8 +123,8 @@ void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch,
   parts.provenance.program_version = kProgramVersion;
 }
 
-/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held
-/// out.
+/// Records the place and the data of the training: `trained` are the rows of `batch` that were not
+/// held out.
 void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch,
                      const MeasurementBatch& trained, const TrainOptions& options) {
   record_domain(parts, trained);
@@ -237,7 +238,7 @@ CompensatedModel::Parts calibrated_parts(CalibrationResult calibration, const Le
   return parts;
 }
 
-/// The physics by all rows of `batch`, and what changed between its sessions.
+/// The physics by all rows of `batch`, and the changes between its sessions.
 Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
                                          const std::shared_ptr<const Cell>& cell,
                                          const std::vector<std::string>& sources,
@@ -255,8 +256,8 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
   });
 }
 
-/// `plain` identified anew without rows that fit none of the arms on which the others agree. They
-/// leave `batch`, and are suspects.
+/// `plain` identified anew without the rows that fit no arm on which the others agree. They leave
+/// `batch` and become suspects.
 Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
                                               MeasurementBatch& batch,
                                               const std::shared_ptr<const Cell>& cell,
@@ -289,7 +290,7 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
   return found;
 }
 
-/// train() from nothing but the measurements.
+/// train() from the measurements alone.
 Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
                                     const CheckedBatch& batch, BatchSplit split,
                                     const TrainOptions& options, const Report& report) {
@@ -313,8 +314,8 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
   return validated(std::move(parts), split, report);
 }
 
-/// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of
-/// the position, three numbers a pose; several set-ups; what twins have in common.
+/// Refuses features that do not work with gauges: a bias, since a kernel learns position errors of
+/// three numbers per pose; several set-ups; and the prior from twins.
 Status check_gauges(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
   if (!has_gauges(batch)) return {};
   if (has_sessions(batch))
@@ -375,7 +376,8 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Ch
   const InWorld here = TRY(in_world_of(calibrated, batch.rows()));
   const MeasurementBatch& rows = here.batch;
   CompensatedModel::Parts parts = calibrated.parts();
-  if (calibrated.provenance().batch_hash != batch.hash()) parts.suspects.clear();  // of other poses
+  // Suspects of other poses
+  if (calibrated.provenance().batch_hash != batch.hash()) parts.suspects.clear();
   CalibrationResult as_it_is;
   as_it_is.model = parts.physics;
   as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());

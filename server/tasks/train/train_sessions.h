@@ -8,8 +8,8 @@
 /// Training from several sessions of one arm.
 namespace trammel {
 
-/// Takes the sessions out of `split` whose training rows do not tell where their instrument stood;
-/// returns them.
+/// Removes the sessions from `split` whose training rows do not determine the place of their
+/// instrument; returns them.
 [[nodiscard]] std::vector<LeftOutSession> leave_out_unplaced(BatchSplit& split);
 
 }  // namespace trammel
