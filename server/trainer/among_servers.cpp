@@ -1,5 +1,5 @@
-// The work of a trainer where several servers share its store: it follows what others change, keeps
-// its claims, and says that it is there.
+// The part of a trainer that shares its store with other servers: it follows their changes, keeps
+// its claims, and announces itself.
 #include <pthread.h>
 
 #include <chrono>
@@ -12,14 +12,14 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kFollowTick{2};  // where no word came of a change
+constexpr std::chrono::seconds kFollowTick{2};  // if no notification of a change came
 
 }  // namespace
 
 void Trainer::follow(std::int64_t followed, const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "follower");
   while (!stop.stop_requested()) {
-    keep_claim();  // whoever cancels it elsewhere is heard at once
+    keep_claim();  // so that a cancellation on another server takes effect at once
     if (const auto now = store_.counts()) {
       agree(now->descriptions);
       followed = follow_models(followed, now->changes);
@@ -48,8 +48,8 @@ std::int64_t Trainer::follow_models(std::int64_t followed, std::int64_t made) {
 }
 
 void Trainer::follow_jobs() {
-  // Before the lock: whoever submits does not wait for it. What is made meanwhile is looked at the
-  // next time.
+  // Called before the lock, so that submitting clients do not wait for it. Later jobs are seen at
+  // the next look.
   const auto to_take = store_.jobs_to_take();
   if (!to_take) return;
   const MutexLock lock(submit_mutex_);
@@ -67,7 +67,7 @@ void Trainer::follow_jobs() {
   auto jobs = store_.jobs(wanted);
   if (!jobs) return;
   const auto came = store_.came_with_batches(ready);
-  std::vector<std::string> notices;  // the start of a server says them
+  std::vector<std::string> notices;  // the start of a server reports them
   for (StoredJob& job : *jobs) {
     if (elsewhere.contains(job.id)) follow_job(job);
     if (!ready.contains(job.id) || is_over(job) || !can_take_up(job, notices).value_or(false))
@@ -91,7 +91,7 @@ void Trainer::agree(std::int64_t descriptions) {
   const auto mine = presence_.descriptions();
   auto disputes = store_.agree_on_cells(mine, descriptions_ < 0, agreed_);
   if (!disputes) return;
-  descriptions_ = descriptions;  // what was told since then is compared by the next look
+  descriptions_ = descriptions;  // later descriptions are compared at the next look
   std::map<std::string, ApartCell> apart;
   for (auto& [cell, why] : *disputes) apart[cell] = {std::move(why), agreed_.contains(cell)};
   for (const auto& [cell, files] : mine) {
@@ -103,7 +103,7 @@ void Trainer::agree(std::int64_t descriptions) {
   }
   const auto running = book_.find(runner_.claimed());
   if (!running || cells_.find(running->cell)) return;
-  runner_.lose_claim(running->job);  // it is computed from the wrong files
+  runner_.lose_claim(running->job);  // it is being computed from the wrong files
   static_cast<void>(queue_.cancel(running->job));
 }
 
@@ -171,7 +171,7 @@ void Trainer::keep_claim() {
   const std::int64_t job = runner_.claimed();
   if (job == 0) return;
   const auto claim = store_.renew_claim(job);
-  if (!claim) return;  // a record that is away lets nobody else claim it, either
+  if (!claim) return;  // while the record is away, nobody else can claim it either
   if (!claim->is_held) runner_.lose_claim(job);
   if (!claim->is_held || claim->cancelled_by)
     static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
@@ -179,7 +179,8 @@ void Trainer::keep_claim() {
 
 Status Trainer::cancel_in_record(const StoredJob& job, const ChangeId& by) {
   const JobOutcome outcome = cancelled_outcome(by.who);
-  // Before it is told here: whoever takes the job up if this server dies now ends it, too.
+  // The store learns of the cancellation before this server does. If this server dies now, its
+  // successor also ends the job.
   const auto cancelled = TRY(store_.cancel_job(job.id, outcome, by));
   if (cancelled == CancelledJob::kEnded || runner_.claimed() == job.id)
     static_cast<void>(queue_.cancel(job.id, by.who));

@@ -14,7 +14,7 @@
 
 namespace trammel {
 
-/// A cell whose files the record does not go by.
+/// A cell with files that the record does not use.
 struct ApartCell {
   std::string why;
   bool answers =
@@ -22,24 +22,25 @@ struct ApartCell {
   bool operator==(const ApartCell&) const = default;
 };
 
-/// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Some
-/// may be set apart: this server knows them and may change nothing of them now, nor answer for
-/// most. Thread-safe; whoever reads waits for moments only.
+/// The served cells. Cells are added while requests and jobs are under way; none is removed. Some
+/// may be set apart: this server knows them, but must not change them now, and mostly must not
+/// answer for them. Thread-safe; readers wait only for moments.
 class CellBook {
  public:
   explicit CellBook(ServedCells cells) { keep(std::move(cells)); }
 
-  /// Stays as it is as long as the book is there; the next call may give more cells.
+  /// The returned cells stay unchanged as long as the book exists. The next call may return more
+  /// cells.
   [[nodiscard]] const ServedCells& now() const { return *now_.load(); }
 
-  /// A cell that this server may change; else kNotFound, or kConflict with the reason.
+  /// A cell that this server may change; otherwise kNotFound, or kConflict with the reason.
   [[nodiscard]] Result<std::shared_ptr<const Cell>> find(const std::string& name) const {
     if (const auto one = find_apart(name))
       return failure(ErrorCode::kConflict, "{}", one->why).of("cell").with_text(name);
     return find_cell(now(), name);
   }
 
-  /// From now on these are set apart, and no others.
+  /// Sets exactly these cells apart.
   void set_apart(std::map<std::string, ApartCell> cells) {
     const MutexLock lock(apart_mutex_);
     any_apart_ = !cells.empty();
@@ -83,7 +84,7 @@ class CellBook {
 
   Mutex mutex_;  // one at a time adds
   std::vector<std::unique_ptr<const ServedCells>>
-      kept_;  // somebody may read one: pointers to cells, one map an add()
+      kept_;  // readers may hold pointers to cells; one map per add()
   std::atomic<const ServedCells*> now_ = nullptr;
   mutable Mutex apart_mutex_;  // taken last
   std::map<std::string, ApartCell> apart_ TRAMMEL_GUARDED_BY(apart_mutex_);

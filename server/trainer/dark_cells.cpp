@@ -26,7 +26,7 @@ Result<CellAtStart> look_at(const ServedModels& models, const std::string& name,
     } else if (one.why.empty()) {
       one.why = sentence(good.error());
     }
-    return good || fits_not;  // of a model that does not fit, no other version takes the place
+    return good || fits_not;  // if a model does not fit, no other version replaces it
   }));
   if (one.version == 0) one.state = State::kUntrained;  // nothing was ever in force
   return one;

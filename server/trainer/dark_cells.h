@@ -12,9 +12,9 @@ namespace trammel {
 struct CellAtStart {
   enum class State {
     kServed,
-    kCopyServed,   ///< with the one in force, from its copy beside the store: the text in the store
-                   ///< is bad
-    kOlderServed,  ///< with another version than the one in force
+    kCopyServed,  ///< served with the version in force, from its copy beside the store: the text in
+                  ///< the store is bad
+    kOlderServed,  ///< served with a version other than the one in force
     kUntrained,    ///< nothing was ever in force
     kDark          ///< something was in force, and this program would serve nothing
   };
@@ -25,8 +25,8 @@ struct CellAtStart {
 };
 
 /// Every cell, by name, from the store at `path` and the copies beside it, which are only read,
-/// also while a service runs on them: whether this program can read the model in force, and whether
-/// it fits the cell as its file is now.
+/// even while a service uses them. For each cell: whether this program can read the model in force,
+/// and whether it fits the present cell file.
 [[nodiscard]] Result<std::vector<CellAtStart>> cells_at_start(const std::string& path,
                                                               const ServedCells& cells);
 

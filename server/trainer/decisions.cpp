@@ -24,8 +24,7 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
     return wanted ? history_.activate(cell, version, decided, verdict) : wanted;
   };
   if (!store_.is_shared()) return as_judged(id);
-  // It is judged beside what the record has in force, and again where somebody changed that
-  // meanwhile.
+  // Attempts to judge against the version in force, which others may change meanwhile.
   constexpr int kMostAttempts = 8;
   for (int attempt = 1;; ++attempt) {
     static_cast<void>(history_.follow(cell));
@@ -70,8 +69,8 @@ Status Trainer::check_not_worse(const std::string& cell, int version,
       (has_figures && *figures.after <= options_.accept_ratio * *figures.before))
     return {};
   const auto made_here = TRY(store_.was_made_by_job(cell, version));
-  // The job that made it has said already that it could not be judged: whoever asks for it knows.
-  // A version that few judges find worse by far is so all the same.
+  // The job that made the version has already reported that it could not be judged, so the caller
+  // knows. A version that few judging rows find far worse is refused anyway.
   const bool far_worse = has_figures && is_far_worse(*figures.before, *figures.after);
   if (made_here && !far_worse && (verdict.undecided || !has_figures)) return {};
   const char* how = has_figures ? "worse than" : "not known to be as good as";

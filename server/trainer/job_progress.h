@@ -14,7 +14,7 @@ namespace trammel {
 
 enum class JobStage { kQueued, kTraining, kStoring, kDone, kFailed };
 
-/// JobProgress::what of a job (kStoring) while its model is held against others.
+/// JobProgress::what of a job (kStoring) while its model is compared with others.
 inline constexpr const char* kJudging = "judging";
 
 /// The view that a watcher has of one job.
@@ -26,10 +26,10 @@ struct JobProgress {
   double share = 0;       ///< [0, 1]
   int model_version = 0;  ///< once done
   bool in_force = false;
-  JobOutcome outcome = {};  ///< of a job that is over
+  JobOutcome outcome = {};  ///< for a job that has ended
 };
 
-/// As the store has it; `in_force` is left false.
+/// The progress as stored; `in_force` is left false.
 [[nodiscard]] JobProgress progress_of(const StoredJob& job);
 
 /// The outcome of a job that somebody ended.

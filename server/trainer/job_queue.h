@@ -12,26 +12,27 @@
 
 namespace trammel {
 
-/// A job that waits. The store has all of it.
+/// A waiting job. The store has all of its data.
 struct WaitingJob {
   std::int64_t id = 0;
   std::string cell;
-  bool asked_for = false;  ///< by a person; else it came with a batch
+  bool asked_for = false;  ///< by a person; otherwise it came with a batch
 };
 
-/// A job whose turn has come, and how it learns that it is to end.
+/// A job whose turn has come, and the signals for its end.
 struct TakenJob {
   WaitingJob job;
   std::stop_token cancelled;
 };
 
-/// The jobs that wait, those of a cell in their order, the cells in turn: many jobs of one cell
-/// hold up each other, and another cell's by one at most. Without a limit of its own: what came
-/// with a batch is accepted, and an id is small. Thread-safe; one thread takes.
+/// The waiting jobs. Jobs of a cell stay in order, and the cells take turns. Many jobs of one cell
+/// delay each other, and those of another cell by at most one. The queue has no limit of its own,
+/// since jobs of accepted batches must be kept and an id is small. Thread-safe; one thread takes
+/// jobs.
 class JobQueue {
  public:
   void push(WaitingJob job);
-  /// Puts a job back where it was taken from: it is the next one of its cell.
+  /// Returns a job to its place: it is the next one of its cell.
   void push_front(WaitingJob job);
   /// From now on the jobs wait, or do so no longer; one that is taken goes on.
   void hold(bool held);
@@ -41,20 +42,20 @@ class JobQueue {
   void put_down();
 
   enum class Cancelled {
-    kRemoved,   ///< it waited, and does not any more
-    kStopping,  ///< its turn has come: its token was told
+    kRemoved,   ///< it waited, and is removed
+    kStopping,  ///< its turn has come, and its token has the stop request
     kUnknown    ///< it is not here
   };
-  /// `who` asks for it, as the audit trail names people; empty: nobody knows.
+  /// `who` requests it, as named in the audit trail; empty: unknown.
   [[nodiscard]] Cancelled cancel(std::int64_t id, const std::string& who = {});
-  /// Who asked that the job which is taken ends; empty: nobody did, or nobody knows who.
+  /// The person who requested the end of the taken job; empty: nobody, or unknown.
   [[nodiscard]] std::string cancelled_by() const;
-  /// Takes a job that waits out of the queue; false: it does not wait here.
+  /// Removes a waiting job from the queue. Returns false if the job does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
   /// Takes all jobs of a cell that wait here out of the queue.
   void remove_cell(const std::string& cell);
 
-  /// Those that wait here, and the one whose turn has come.
+  /// The jobs that wait here, and the one whose turn has come.
   [[nodiscard]] std::set<std::int64_t> jobs() const;
   [[nodiscard]] std::size_t size() const;
   /// The number of the cell's jobs that were asked for.
@@ -69,9 +70,9 @@ class JobQueue {
   std::map<std::string, std::deque<WaitingJob>> waiting_
       TRAMMEL_GUARDED_BY(mutex_);  // by cell; none is empty
   bool held_ TRAMMEL_GUARDED_BY(mutex_) = false;
-  std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);  // whose turn it was
+  std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);  // the cell of the last turn
   std::optional<std::int64_t> taken_ TRAMMEL_GUARDED_BY(mutex_);
-  std::stop_source cancelling_ TRAMMEL_GUARDED_BY(mutex_);  // of the one taken
+  std::stop_source cancelling_ TRAMMEL_GUARDED_BY(mutex_);  // for the taken job
   std::string cancelled_by_ TRAMMEL_GUARDED_BY(mutex_);     // likewise
 };
 

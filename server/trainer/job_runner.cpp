@@ -120,7 +120,8 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   const auto job = store_.job(id);
   if (!job) return failed(job.error());
   if (const auto cell = cells_.find(job->cell); !cell) {
-    const bool elsewhere = cell.error().code == ErrorCode::kConflict;  // others answer for it
+    // Other servers answer for it
+    const bool elsewhere = cell.error().code == ErrorCode::kConflict;
     return tl::make_unexpected(
         Failed{cell.error(), verdict_of(cell.error()), false, {}, elsewhere});
   }
@@ -190,15 +191,15 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job) const {
 Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch) const {
   if (job.kind() != JobKind::kTrain) return true;
   if (came_with_batch) return false;
-  // Somebody asked: for what he released, with all that the cell knows; else for the batches that
-  // he named.
+  // The job was requested: for batches that the requester released, with all knowledge of the cell;
+  // otherwise for the batches that the requester named.
   const auto releases = store_.may_release(job.id);
   if (!releases) return releases;
   return !*releases;
 }
 
-/// From the models in force of other cells with robots of its type; empty where the cell does not
-/// want it, or where they are too few.
+/// The prior from the models in force of other cells with robots of the type. Empty if the cell
+/// does not want it, or if there are too few.
 std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
   const Cell& cell = *cells_.now().at(job.cell);
   const auto rules = rules_of(cell);
@@ -294,7 +295,8 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   job.id = id;
   if (const auto known = book_.find(id)) job.cell = known->cell;
   if (failed.elsewhere || lost_ == id) {
-    // Where this server may not work for the cell, others need not wait for the end of its lease.
+    // If this server may not work for the cell, it returns the job, so that others need not wait
+    // for the end of its lease.
     if (claimed_ == id && !cells_.find(job.cell)) static_cast<void>(store_.set_job_queued(id));
     return End::kElsewhere;
   }
@@ -302,8 +304,8 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   const bool cancelled = stop.job.stop_requested();
   if (stop.service.stop_requested() && !cancelled) return put_back(job, job.message, false, stop);
   const std::string why = sentence(failed.error);
-  // A record that was away or locked for a moment ends no job. If its result was taken all the
-  // same, the next attempt finds that it is over.
+  // A record that was away or locked for a moment does not end a job. If its result was stored
+  // after all, the next attempt finds the job finished.
   if (store_.is_shared() && failed.error.code == ErrorCode::kBusy && !cancelled)
     return put_back(job, fmt::format("{}; it is tried again", why), false, stop);
   if (!cancelled && failed.again && job.attempts < kMaxAttempts)
@@ -322,9 +324,9 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   });
   if (ended) {
     book_.report(progress);
-  } else if (ended.error().code !=
-             ErrorCode::kNotFound) {  // else its model is stored, or it is another server's
-    // The store has it as unfinished still: the next start takes it up.
+  } else if (ended.error().code != ErrorCode::kNotFound) {  // otherwise its model is stored, or the
+                                                            // job is another server's
+    // The store still has the job as unfinished: the next start takes it up.
     progress.stage = JobStage::kQueued;
     progress.what += "; the store does not take that: " + sentence(ended.error());
     book_.report(progress);
@@ -334,7 +336,7 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
 
 JobRunner::End JobRunner::put_back(const StoredJob& job, const std::string& why,
                                    bool attempt_counts, const StopRequests& stop) {
-  // Should the store refuse, the job counts as interrupted and is taken up all the same.
+  // If the store refuses, the job counts as interrupted and is taken up anyway.
   static_cast<void>(once_the_disk_lets(
       job.id, stop, [&] { return store_.set_job_queued(job.id, attempt_counts); }));
   JobProgress progress = progress_at(job, JobStage::kQueued);

@@ -17,11 +17,11 @@
 
 namespace trammel {
 
-constexpr int kMaxAttempts = 3;  // of one job whose computing, or the process, breaks off
+constexpr int kMaxAttempts = 3;  // of a job with a computation or process that breaks off
 
-/// The work for one job: it is taken from the store, computed (in a process of its own), and
-/// the outcome is stored and reported. What the disk does not let be stored now waits for it:
-/// nothing is reported as over that the store does not have so. Of the queue's thread.
+/// Does one job: takes it from the store, computes it (in a process of its own), stores the outcome
+/// and reports it. An outcome that the disk does not accept now waits: a job is reported as
+/// finished only if the store has it so. For the queue's thread.
 class JobRunner {
  public:
   /// The references outlive it.
@@ -31,15 +31,15 @@ class JobRunner {
   using CancelledBy = std::function<std::string()>;
   enum class End {
     kOver,      ///< it has an outcome
-    kAgain,     ///< it is queued again: its computing broke off, or the service stops
+    kAgain,     ///< it is queued again: its computation broke off, or the service stops
     kElsewhere  ///< another server works on it, or on another job of its cell
   };
-  /// `cancelled_by` says who asked for it to end, where somebody did.
+  /// `cancelled_by` names the person who requested its end, if any.
   [[nodiscard]] End run(std::int64_t job, const StopRequests& stop,
                         const CancelledBy& cancelled_by);
   /// The job that is this server's now, until it is over; 0: none. Thread-safe.
   [[nodiscard]] std::int64_t claimed() const { return claimed_; }
-  /// That job is not this server's any more: its attempt here leaves no trace. Thread-safe.
+  /// That job no longer belongs to this server: its attempt here leaves no trace. Thread-safe.
   void lose_claim(std::int64_t job) { lost_ = job; }
 
  private:
@@ -47,7 +47,7 @@ class JobRunner {
   struct Failed {
     Error error;
     JobVerdict verdict = JobVerdict::kRefused;
-    bool again = false;  ///< what broke off may do so once only
+    bool again = false;  ///< a broken-off job is repeated only once
     ComputeCost cost = {};
     bool elsewhere = false;  ///< it was not begun
   };
@@ -58,10 +58,9 @@ class JobRunner {
   /// The task from which the job is computed, but its batches.
   [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job) const;
   [[nodiscard]] std::optional<FleetPrior> fleet_prior_of(const StoredJob& job) const;
-  /// True if the job came with its batch: somebody else's training was asked for, knowing the
-  /// batch.
+  /// True if the job came with its batch; otherwise a person requested it, knowing the batch.
   [[nodiscard]] Result<bool> came_with_batch(const StoredJob& job) const;
-  /// True if it learns from the batches of the job alone: somebody named them.
+  /// True if the job learns only from its own batches, because somebody named them.
   [[nodiscard]] Result<bool> learns_alone(const StoredJob& job, bool came_with_batch) const;
   [[nodiscard]] Status give_batches(Computing& computing, const StoredJob& job,
                                     const std::vector<std::string>& earlier) const;
@@ -79,8 +78,8 @@ class JobRunner {
                              const StopRequests& stop);
   [[nodiscard]] Failed failed_by(const Computing& computing, const Error& error) const;
 
-  /// Asks the store for something until it does it or refuses it; while its disk does not let it,
-  /// waits for that. An error of the disk comes back only once the job is to end.
+  /// Repeats a call to the store until the store does it or refuses it, and waits while the disk
+  /// does not allow it. An error of the disk is returned only if the job must end.
   template <typename Work>
   [[nodiscard]] auto once_the_disk_lets(std::int64_t job, const StopRequests& stop,
                                         const Work& work) -> decltype(work());

@@ -11,10 +11,12 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostAttempts = 8;  // where others change what is in force meanwhile
+constexpr int kMostAttempts = 8;  // attempts, since others may change the version in force
+                                  // meanwhile
 constexpr std::size_t kMostServedBefore =
     4;  // versions that a new one is held against besides the one in force
-constexpr std::size_t kMostReadBefore = 8;  // of which some may not load
+constexpr std::size_t kMostReadBefore = 8;  // earlier versions that are read, since some may not
+                                            // load
 
 JobOutcome outcome_of(const GateVerdict& verdict) {
   JobOutcome outcome;
@@ -88,8 +90,8 @@ Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
       set_trouble(cell, CellTrouble{CellTrouble::Kind::kOfAnotherRobot, sentence(fits.error())});
       return tl::make_unexpected(fits.error());
     }
-    // A version that lost its copy gets a new one; where the store cannot give it, it was made from
-    // its copy.
+    // A version that lost its copy gets a new one. If the store cannot provide its text, it was
+    // loaded from its copy.
     static_cast<void>(store_.copy_model_in_force(cell));
     std::optional<CellTrouble> trouble;
     if (!read->damage.empty()) trouble = {CellTrouble::Kind::kCopyServed, read->damage};
@@ -155,15 +157,15 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
 
 Status ModelHistory::follow(const std::string& cell) {
   const MutexLock lock(
-      changes_of(cell));  // what this server decides meanwhile is published before it is compared
+      changes_of(cell));  // the lock delays this server's decisions until the comparison is done
   const auto decided = TRY(store_.version_in_force(cell));
   if (!decided || *decided == registry_.version_in_force(cell)) return {};
   auto model = registry_.version(cell, *decided);
   if (!model) {
-    // A model by files that the record goes by now may not fit those of before: this server goes on
-    // with what it has.
+    // A model made for the record's present files may not fit the earlier ones: this server keeps
+    // its model.
     if (cells_.find_apart(cell) && model.error().code != ErrorCode::kBusy) return {};
-    registry_.announce(cell, *decided);  // whoever asks for it hears why it is not served
+    registry_.announce(cell, *decided);  // requests get the reason why it is not served
     if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());
     return {};
   }
@@ -185,7 +187,7 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(
     auto model = registry_.version(cell, before[i]);
     if (model) return std::pair(static_cast<int>(i) + 1, std::move(*model));
     if (model.error().code == ErrorCode::kBusy)
-      return tl::make_unexpected(model.error());  // it is there, and not now
+      return tl::make_unexpected(model.error());  // it exists, but cannot be loaded now
     if (!why_not) why_not = model.error();
   }
   return tl::make_unexpected(*why_not);
@@ -196,7 +198,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const auto made = TRY(store_.outcome_of(id));
     if (made) return made->version;
-    // Loading takes a while: nobody waits for it.
+    // Loading takes a while, so it happens without the lock.
     const auto way = TRY(way_back(cell));
     auto found = TRY(load_first(cell, way.before));
     const MutexLock lock(changes_of(cell));
@@ -208,7 +210,8 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
         !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
     if (changed_elsewhere) continue;
     if (!restored) return restored;
-    // Where others went away from this version and back meanwhile, the way back is another one.
+    // If others left this version and came back meanwhile, the target of the rollback is another
+    // one.
     if (found.second->version == *restored) {
       put_in_force(std::move(found.second));
     } else if (auto other = registry_.version(cell, *restored)) {
@@ -291,13 +294,14 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
-    // The version of the record, since what it has in force may be a version that cannot be loaded
-    // here.
+    // The version of the record, since the registry may have a replacement for a version that
+    // cannot be loaded here.
     const auto recorded = TRY(store_.version_in_force(cell));
     if (store_.is_shared())
-      static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
-    // Judging takes a while: nobody waits for it. Where somebody changed what is in force
-    // meanwhile, it is done again.
+      static_cast<void>(follow(cell));  // otherwise the store refuses a verdict that was made
+                                        // against another version
+    // Judging takes a while, so it happens without the lock. It is repeated if somebody changed the
+    // version in force meanwhile.
     const auto present = registry_.in_force(cell);
     const int version = present ? present->version : 0;
     auto found = TRY(judged(candidate, judging, present.get()));
@@ -311,8 +315,8 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const auto recorded = TRY(store_.version_in_force(cell));
   auto found = TRY(judged(candidate, judging, registry_.in_force(cell).get()));
   auto kept = store(candidate, std::move(found), recorded.value_or(0));
-  // The lock holds up this server's decisions only. What others decide all the time is no fault of
-  // the model.
+  // The lock holds up this server's decisions only. If others change the version all the time, that
+  // is not a fault of the model.
   if (!kept && kept.error().code == ErrorCode::kConflict && store_.is_shared())
     return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell)
         .next("try again later");
@@ -322,7 +326,7 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int expected) {
   const std::string& cell = candidate.job.cell;
   ChangeId decided;
-  // In a store with one server the cell's lock says the same.
+  // With a single server, the cell's lock guarantees the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
   const auto version = TRY(store_.add_model(cell, {candidate.model, candidate.text},
                                             candidate.job.id, judged.put_in_force, judged.message,
@@ -378,7 +382,7 @@ Result<std::optional<RecordInForce>> ModelHistory::record_not_loaded(
   const auto models = TRY(store_.models(cell));
   const auto marked =
       std::find_if(models.begin(), models.end(), [](const StoredModel& m) { return m.in_force; });
-  // One that can be loaded was set aside for its robot or tools: its figures say nothing about
+  // A version that loads was set aside for its robot or tools, so its figures do not compare with
   // others.
   if (marked == models.end() || store_.model(cell, marked->version)) return std::nullopt;
   return RecordInForce{marked->version, marked->validation_rms};

@@ -19,7 +19,7 @@
 
 namespace trammel {
 
-/// A model that a job made, and what it is judged by.
+/// A model from a job, and the sessions that judge it.
 struct Candidate {
   const CompensatedModel& model;
   StoredJob job;
@@ -43,64 +43,64 @@ struct Kept {
 /// The trouble with the model that a cell is served with, or why it is served with none.
 struct CellTrouble {
   enum class Kind {
-    kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
+    kOfAnotherRobot,  ///< not served: its robot or its tools differ from the model's
     kUnreadable,      ///< not served: no version in force can be read
     kSetApart,        ///< not served here: another server has other files of the cell
-    kFormerFiles,  ///< served as long as this server is not started again: the record went over to
-                   ///< other files
-    kOlderServed,  ///< served with an older version
-    kCopyServed    ///< served with the right one, which only its copy still has
+    kFormerFiles,     ///< served until this server restarts: the record has changed to other files
+    kOlderServed,     ///< served with an older version
+    kCopyServed       ///< served with the right one, which only its copy still has
   } kind = Kind::kUnreadable;
   std::string what;  ///< one sentence
 };
 
-/// The models of all cells: which versions there are, which one is in force, and what takes its
-/// place by itself.
+/// The models of all cells: their versions, the one in force, and its automatic successors.
 ///
-/// Thread-safe, set_listener() excepted. One change of what is in force at a time, cell by cell: a
+/// Thread-safe, except set_listener(). The version in force changes one at a time for each cell; a
 /// cell never waits for another one. Models are judged before the lock of their cell is taken, so
-/// that nobody waits for that either.
+/// nobody waits for the judging.
 class ModelHistory {
  public:
-  /// A model was stored (in_force: and put in force). Called in the order of the changes of its
-  /// cell, while no other of that cell can happen: it must not call back into what changes models.
+  /// Called when a model was stored, with in_force true if it was also put in force. Calls come in
+  /// the order of the changes of the cell, while other changes of the cell wait. So it must not
+  /// call functions that change models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
-  /// The arguments outlive it. The registry's models come from it.
+  /// The arguments outlive it. The registry loads its models from it.
   ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry);
   ~ModelHistory();
   ModelHistory(const ModelHistory&) = delete;
   ModelHistory& operator=(const ModelHistory&) = delete;
 
   void set_listener(Listener listener) { listener_ = std::move(listener); }
-  /// Announces the version that the store has in force, if any: it is loaded when it is asked for.
-  /// Where it cannot be loaded, the last one that served before it is, and troubles() says so. One
-  /// that does not fit the cell is not served, and nothing in its place.
+  /// Announces the version in force of the store, if any; it is loaded at the first request. If it
+  /// cannot be loaded, the last version that served before it takes its place, and troubles()
+  /// reports that. A version that does not fit the cell is not served, and not replaced.
   [[nodiscard]] Status announce_from_store(const std::string& cell);
-  /// Announces the versions of all cells; returns what is wrong, one sentence each.
+  /// Announces the versions of all cells; returns the troubles, one sentence each.
   [[nodiscard]] std::vector<std::string> announce_all();
-  /// Cells that are not served with the model they should be served with, one sentence each.
+  /// One sentence for each cell that is served with another model than intended, or with none.
   [[nodiscard]] std::vector<std::string> troubles() const;
   /// The troubles by cell.
   [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
 
-  /// The poses that the cells were lately asked for: a candidate that moves one of these poses by
-  /// more than the cell's step limit is put in force by a person only.
+  /// The recently requested poses of the cells. If a candidate moves one of these by more than the
+  /// cell's step limit, only a person can put it in force.
   [[nodiscard]] RecentPoses& recent_poses() { return recent_poses_; }
 
   /// The model of a cell that is served here; refused when its robot or its tools are not the
   /// cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell,
                                                           int version) const;
-  /// Puts a stored version in force and publishes it. A version that is served already is not
-  /// published again. `judged`: how it did beside the one in force.
+  /// Puts a stored version in force and publishes it. A version that is already served is not
+  /// published again. `judged`: the comparison with the one in force.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& id = {},
                                 const std::optional<GateVerdict>& judged = {});
-  /// Back to the version in force before, or the last one before it that can be served; returns it.
-  /// Refuses (kBusy) where others change what is in force all the time.
+  /// Returns to the version in force before, or to the last earlier one that can be served; returns
+  /// its number. Refuses (kBusy) if others keep changing the version in force.
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeId& id = {});
-  /// Takes a model file from elsewhere into the history, not in force; returns its version, the
-  /// present one when the same model is there already. Refuses one of another cell, robot or tool.
+  /// Adds a model file from elsewhere to the history without putting it in force. Returns its
+  /// version, or the present version if the same model is there already. Refuses a model of another
+  /// cell, robot or tool.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text,
                                          const ChangeId& id = {});
 
@@ -108,11 +108,11 @@ class ModelHistory {
   /// there. An error: that is not known, or it cannot be read now.
   Status follow(const std::string& cell);
 
-  /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may
-  /// release leaves quarantine where the model goes in force, and where too few poses can judge it.
-  /// It is judged without its cell's lock, again where something else went in force meanwhile;
-  /// after a few times with the lock. Refuses (kBusy) once `stop` was requested, and where other
-  /// servers change what is in force all the time.
+  /// Stores the model, ends its job and, if `judging` says so, puts it in force. Batches that the
+  /// job may release leave quarantine if the model goes in force, or if too few poses can judge it.
+  /// The model is judged without its cell's lock, and again if another version went in force
+  /// meanwhile; after a few times with the lock. Refuses (kBusy) after `stop` was requested, and if
+  /// other servers keep changing the version in force.
   [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging,
                                   const std::stop_token& stop = {});
 
@@ -124,21 +124,21 @@ class ModelHistory {
   [[nodiscard]] Mutex& changes_of(const std::string& cell);
   /// Publishes a model that the store has put in force; the cell's lock is held.
   void put_in_force(ServedModelPtr model);
-  /// The model that the cell is to be served with.
+  /// The model to serve the cell with.
   [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
   /// Empty: there is none any more.
   void set_trouble(const std::string& cell, const std::optional<CellTrouble>& trouble);
-  /// Where a rollback leads.
+  /// The target of a rollback.
   struct WayBack {
     int version_now = 0;
     std::vector<int> before;  ///< Store::previous_in_force()
     bool operator==(const WayBack&) const = default;
   };
   [[nodiscard]] Result<WayBack> way_back(const std::string& cell) const;
-  /// The first of `before` that can be served: how many steps back it is, and the model.
+  /// The first of `before` that can be served: the number of steps back, and the model.
   [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(
       const std::string& cell, const std::vector<int>& before) const;
-  /// The decision about a candidate that was judged: what is to be said and stored of it.
+  /// The decision about a judged candidate: the message and the stored record.
   struct Judged {
     bool put_in_force = false, release = false;
     std::string message;
@@ -158,8 +158,7 @@ class ModelHistory {
   [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(
       const std::string& cell) const;
 
-  /// The verdict, unless the model would move what was lately asked for by more than the cell
-  /// allows.
+  /// The verdict, unless the model moves a recently requested pose by more than the cell allows.
   [[nodiscard]] GateVerdict within_step_limit(GateVerdict verdict, const Candidate& candidate,
                                               const ServedModel* present) const;
 

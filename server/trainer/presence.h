@@ -16,10 +16,10 @@
 
 namespace trammel {
 
-/// The news that a server among others has to tell them, and what it heard of them. Thread-safe.
+/// The news from this server to the others, and from them to it. Thread-safe.
 class Presence {
  public:
-  /// From now on it has these cells, too.
+  /// Adds these cells to the announced ones.
   void describe(const ServedCells& cells) {
     std::map<std::string, CellDescription> more;
     for (const auto& [name, cell] : cells) more[name] = description_of(*cell);
@@ -32,7 +32,7 @@ class Presence {
     return descriptions_;
   }
 
-  /// So many changes of the record are taken up.
+  /// Records the number of changes of the record that are taken up.
   void has_followed(std::int64_t changes) {
     const MutexLock lock(mutex_);
     has_news_ = has_news_ || changes != followed_;

@@ -12,7 +12,7 @@
 
 namespace trammel {
 
-/// Poses that a cell was lately asked for, the newest 200: where a change of models would be felt.
+/// The newest 200 requested poses of a cell, where users would notice a change of models.
 /// Thread-safe. Kept in memory only.
 class RecentPoses {
  public:
@@ -26,8 +26,8 @@ class RecentPoses {
   std::map<std::string, std::deque<PoseContext>> poses_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// m, the farthest that the predictions of the two are apart at one of these poses; empty where
-/// there is none that both know.
+/// m, the largest distance between the two predictions at one of these poses; empty if there is no
+/// pose that both know.
 [[nodiscard]] std::optional<double> farthest_step(const CompensatedModel& before,
                                                   const CompensatedModel& after,
                                                   const std::vector<PoseContext>& poses);

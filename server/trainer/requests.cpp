@@ -223,7 +223,7 @@ Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
   if (found == JobQueue::Cancelled::kUnknown) return over();
   const JobOutcome outcome = cancelled_outcome(by.who);
   if (auto ended = store_.set_job_failed(id, outcome.why, outcome, by); !ended) {
-    queue_.push_front({id, job.cell, asked_for});  // as if it had not been asked
+    queue_.push_front({id, job.cell, asked_for});  // restores the state before the request
     return ended;
   }
   JobProgress progress = progress_of(job);

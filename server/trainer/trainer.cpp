@@ -14,9 +14,9 @@
 namespace trammel {
 namespace {
 
-constexpr int kJobsListed = 20;  // of those done and of those failed, the last ones
+constexpr int kJobsListed = 20;  // the last finished and the last failed jobs
 constexpr std::chrono::seconds kLoadingAtStart{
-    1};  // of models, before the service says that it is ready
+    1};  // time for models, before the service reports that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
 constexpr int kKeeperNiceness = 5;  // answering comes before loading
 
@@ -50,18 +50,18 @@ Result<std::vector<std::string>> Trainer::take_up() {
   if (store_.is_shared()) {
     presence_.describe(cells());
     is_present_ =
-        store_.tell_presence(self()).has_value();  // the others know of it before it compares
+        store_.tell_presence(self()).has_value();  // announced to the others before it compares
     if (const auto now = store_.counts()) agree(now->descriptions);
   }
   const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
   const ServedCells& served = cells();
   for (auto cell = served.begin(); cell != served.end() && std::chrono::steady_clock::now() < until;
        ++cell)
-    static_cast<void>(registry_.in_force(cell->first));  // what fails is among the troubles
+    static_cast<void>(registry_.in_force(cell->first));  // a failure appears among the troubles
   for (const std::string& trouble : troubles()) notices.push_back(trouble);
   queue_.hold(!options_.trains);
   auto unfinished = store_.unfinished_jobs();
-  // The models are served all the same.
+  // The models are served nevertheless.
   if (!unfinished) notices.push_back("the jobs cannot be read: " + sentence(unfinished.error()));
   std::vector<StoredJob> jobs;
   for (StoredJob& job : unfinished.value_or(std::vector<StoredJob>())) {
@@ -85,7 +85,7 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
     notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
     return false;
   }
-  if (!cells_.find(job.cell)) return false;  // it is set apart: that is said already
+  if (!cells_.find(job.cell)) return false;  // the cell is set apart, which is reported already
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
   if (store_.is_shared() && !store_.set_job_running(job.id))
     return false;  // another server works on it
@@ -115,10 +115,12 @@ Result<std::vector<std::string>> Trainer::start() {
                                              [this] { return queue_.cancelled_by(); });
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
       if (end == JobRunner::End::kOver) prune(taken->job.cell, stop);
-      // Another one works for the cell. What else waits of it is looked for when that is over.
+      // Another server works for the cell. After its job, the other waiting jobs of the cell
+      // follow.
       if (end == JobRunner::End::kElsewhere) queue_.remove_cell(taken->job.cell);
       queue_.put_down();
-      // Asked for while its attempt ended: it waits again, and nobody told it.
+      // Its end was requested while its attempt ended: it waits again, and this request must be
+      // passed on.
       if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested())
         static_cast<void>(cancel(taken->job.id, {"", "", queue_.cancelled_by()}));
     }
@@ -158,11 +160,11 @@ void Trainer::prune(const std::string& cell, const std::stop_token& stop) {
 void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "keeper");
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()),
-                kKeeperNiceness);  // of this thread alone
+                kKeeperNiceness);  // this thread alone
   while (!stop.stop_requested()) {
     registry_.load_for(stop, kKeeperTick);
     const bool was_readable = store_.state().readable;
-    static_cast<void>(store_.try_again());  // what comes of it is the store's state
+    static_cast<void>(store_.try_again());  // the store's state has the result
     if (!was_readable && store_.state().readable) take_up_late();
     tell_troubles(told);
   }
@@ -172,7 +174,7 @@ void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop
 std::vector<std::string> Trainer::add_cells(const ServedCells& more) {
   const MutexLock lock(submit_mutex_);
   const ServedCells& before = cells();
-  // Looked at before they are served: none of these jobs can end meanwhile.
+  // Read before the cells are served: none of these jobs can end meanwhile.
   std::vector<StoredJob> jobs = store_.unfinished_jobs().value_or(std::vector<StoredJob>());
   std::erase_if(jobs, [&](const StoredJob& job) {
     return before.contains(job.cell) || !more.contains(job.cell);
@@ -203,7 +205,7 @@ void Trainer::take_up_late() {
       registry_.announce(name, versions.front());
   }
   const MutexLock lock(submit_mutex_);
-  std::vector<std::string> notices;  // the next start says them again
+  std::vector<std::string> notices;  // the next start reports them again
   take_up_jobs(store_.unfinished_jobs().value_or(std::vector<StoredJob>()), notices);
 }
 

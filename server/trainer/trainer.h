@@ -24,16 +24,16 @@
 
 namespace trammel {
 
-/// The queue of trainings and diagnoses and the one thread that works on it: JobRunner does one
-/// job, ModelHistory keeps what it makes. Everything accepted is in the store before it is
-/// acknowledged; what a crash interrupts is taken up again at the next start, at most three times.
-/// Thread-safe, take_up(), start() and stop() excepted.
+/// The queue of trainings and diagnoses, and the one thread that works on it: JobRunner does one
+/// job, ModelHistory keeps its models. Every accepted batch or job is in the store before it is
+/// acknowledged. A job that a crash interrupts is taken up at the next start, at most three times.
+/// Thread-safe, except take_up(), start() and stop().
 ///
-/// Which rows are held out is drawn batch by batch: a row held out once is held out in every
-/// training of that batch, so that the model in force and its successor are compared on poses of
-/// all stored batches that neither was trained on (judge()). A batch that covers much less of the
-/// joint ranges than the model in force, or fewer of its tools, teaches base and tool only; the
-/// rest of that model stays.
+/// The held-out rows are drawn batch by batch: a row that is held out once is held out in every
+/// training of that batch. So the model in force and its successor are compared on poses of all
+/// stored batches that neither was trained on (judge()). A batch that covers much less of the joint
+/// ranges than the model in force, or fewer of its tools, updates base and tool only; the rest of
+/// that model stays.
 class Trainer {
  public:
   /// Called by whichever thread changes the job; for one job never by two at a time.
@@ -49,11 +49,11 @@ class Trainer {
   /// Set before start().
   void set_listeners(ProgressListener progress, ModelListener model,
                      TroubleListener trouble = nullptr);
-  /// Announces the models in force of the store, loads as many as a second allows (the rest when
-  /// they are asked for, or in the background), and queues unfinished jobs. Returns what could not
-  /// be taken up, for the log: a model that does not load or was trained for another robot or tool,
-  /// a job of a cell not served here, a job that was interrupted too often and is now failed.
-  /// Requests may come as soon as it returns.
+  /// Announces the models in force of the store, loads as many as a second allows (the others at
+  /// their first request, or in the background), and queues unfinished jobs. Returns problems for
+  /// the log: a model that does not load or was trained for another robot or tool, a job of a cell
+  /// that is not served here, a job that was interrupted too often and is now failed. Requests may
+  /// come as soon as it returns.
   [[nodiscard]] Result<std::vector<std::string>> take_up();
   /// Reports the jobs taken up and starts the threads. Does take_up() itself where that has not
   /// been done.
@@ -65,8 +65,8 @@ class Trainer {
   [[nodiscard]] bool trains() const { return options_.trains; }
   /// Stays as it is until the end; the next call may give more cells.
   [[nodiscard]] const ServedCells& cells() const { return cells_.now(); }
-  /// From now on these cells are served too, with what the store has of them: the model in force,
-  /// and the jobs that wait. Returns what could not be taken up, for the log. Thread-safe.
+  /// Adds cells to the served ones, with their models in force and waiting jobs from the store.
+  /// Returns problems for the log. Thread-safe.
   [[nodiscard]] std::vector<std::string> add_cells(const ServedCells& more);
   /// From now on TrainerOptions::queue_capacity and TrainerOptions::keep are these. Thread-safe.
   void set_limits(int queue_capacity, const KeepRule& keep);
@@ -74,53 +74,54 @@ class Trainer {
   /// each. Never waits.
   [[nodiscard]] std::vector<std::string> troubles() const;
 
-  /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it
-  /// is held against the model in force (triage()): what must not be learned from goes into
-  /// quarantine with the reason, and its job fails. Returns the job id; the same batch again
-  /// returns the same, whoever sends it. Refuses what the batch reader and the cell refuse, an
-  /// unknown cell (kNotFound), an id that the cell has with other content (kConflict) and too many
-  /// poses (kTooLarge). However many jobs wait, a batch is taken.
+  /// Checks the batch against its cell, stores it with its job, and queues the job. When its turn
+  /// comes, the batch is tested against the model in force (triage()): a batch that must not be
+  /// learned from goes into quarantine with the reason, and its job fails. Returns the job id; the
+  /// same batch again, from any client, returns the same id. Refuses errors of the batch reader and
+  /// the cell, an unknown cell (kNotFound), an id that the cell has with other content (kConflict)
+  /// and too many poses (kTooLarge). A batch is accepted however many jobs wait.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id,
                                             const std::string& who = {});
-  /// Tells whether batches of a training that is asked for leave quarantine. They do when its model
-  /// is put in force, by itself or by a person, or when there are too few poses to judge it by; not
-  /// where it is judged and found not better.
+  /// Selects whether batches of a requested training leave quarantine. Released ones leave when the
+  /// model goes in force, automatically or by a person, or when there are too few poses to judge
+  /// it. They stay if it is judged and found not better.
   enum class Quarantine { kStays, kReleased };
-  /// Trains again from stored batches, together; none named = the newest one. Level and bias empty:
-  /// as the cell says, and what the model in force has besides. Refuses batches that stay in
-  /// quarantine and, where as many jobs that were asked for wait for this cell as may, everything
-  /// (kBusy). Refuses, with the limit, what no training may ask for: more than max_poses, 1000
-  /// batches, 500 error sources, a bias of more than 32 kernels.
+  /// Trains again from stored batches, together; none named = the newest one. Empty level and bias:
+  /// the cell's, with the additions of the model in force. Refuses batches that stay in quarantine.
+  /// Refuses (kBusy) when the cell has as many requested jobs waiting as it may. Refuses requests
+  /// beyond the limits of a training: max_poses, 1000 batches, 500 error sources, a bias of 32
+  /// kernels.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell,
                                              const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
                                              Quarantine quarantine = Quarantine::kStays,
                                              const ChangeId& id = {});
-  /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of
-  /// the model in force (of the cell, where there is none) do not explain. With `apply` trains the
-  /// causes found beside them and puts the model in force only if it is better on the rows held out
-  /// beyond chance. Returns the job; its findings are diagnosis(). Refuses as submit() and
-  /// retrain() do, but takes a batch in quarantine.
+  /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: finds the errors that the
+  /// error sources of the model in force (or of the cell) do not explain. With `apply` it trains
+  /// with the found causes added, and puts the model in force only if it is better beyond chance on
+  /// the held-out rows. Returns the job; diagnosis() has its findings. Refuses the same as submit()
+  /// and retrain(), but accepts a quarantined batch.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply,
                                               const ChangeId& id = {});
-  /// Holds a few poses against the model in force: whether the robot still is as that has it
-  /// (check_health()). `tolerance_mm`: empty as the cell file says. Returns the job; what it found
-  /// is diagnosis(). Refuses as diagnose(), and a cell without a model in force (kNotFound).
+  /// Tests with a few poses whether the robot is still as the model in force has it
+  /// (check_health()). `tolerance_mm`: empty means the cell file's. Returns the job; diagnosis()
+  /// has its findings. Refuses the same as diagnose(), and a cell without a model in force
+  /// (kNotFound).
   [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id,
                                            const std::string& csv,
                                            std::optional<double> tolerance_mm,
                                            const ChangeId& id = {});
-  /// The findings of a job whose diagnosis or check is found; kBusy while it is not.
+  /// The findings of a job after its diagnosis or check; kBusy before.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
-  /// Ends a job that waits or runs, here or on another server of the same store: its outcome is
-  /// kCancelled, and nothing of it is stored but the findings that a diagnosis already had. The
-  /// batch that came with it stays, to be trained from when somebody asks. Returns once a waiting
-  /// job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound)
-  /// and one that is over (kConflict).
+  /// Ends a job that waits or runs, here or on another server of the same store. Its outcome is
+  /// kCancelled, and nothing of it is stored except findings that a diagnosis already had. The
+  /// batch that came with it stays, and can be trained from on request. Returns when a waiting job
+  /// is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and
+  /// a finished one (kConflict).
   [[nodiscard]] Status cancel(std::int64_t job, const ChangeId& by = {});
-  /// Lets trainings take a batch that was kept out because it did not fit the model in force.
+  /// Lets trainings use a batch that was quarantined because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id,
                                const ChangeId& id = {});
   /// Nothing takes the batch any more.
@@ -128,14 +129,13 @@ class Trainer {
                                const ChangeId& id = {});
   /// All batches, without their text, of one cell or (empty) of all, oldest first.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
-  /// Those that are kept out.
+  /// The batches in quarantine.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
-  /// See ModelHistory.
-  /// Tell it what the cells are asked for.
+  /// See ModelHistory. Report requested poses to it.
   [[nodiscard]] RecentPoses& recent_poses() { return history_.recent_poses(); }
-  /// See ModelHistory. Any version is judged first, as a new one would be: where it is worse on the
-  /// same poses than the one in force it is refused with the figures, unless `force` says that it
-  /// is wanted. So is an imported one that cannot be judged.
+  /// See ModelHistory. Any version is judged first, like a new one. If it is worse than the one in
+  /// force on the same poses, it is refused with the figures, unless `force` is set. The same holds
+  /// for an imported version that cannot be judged.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& id = {},
                                 bool force = false);
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeId& id = {}) {
@@ -152,15 +152,15 @@ class Trainer {
 
   /// The progress of an unfinished job as it goes on, of a finished one from the store.
   [[nodiscard]] Result<JobProgress> progress(std::int64_t job) const;
-  /// A job with what was asked for and when.
+  /// A job with its request and its times.
   struct DatedJob {
     StoredJob asked;
     JobProgress progress;
   };
-  /// The jobs of one cell or (empty) of all, oldest first: those that wait or run, and the last
-  /// ones that ended.
+  /// The jobs of one cell or (empty) of all, oldest first: waiting and running ones, and the last
+  /// ended ones.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell) const;
-  /// Those that wait or run, oldest first, as they go on. From memory.
+  /// The waiting and running jobs with their progress, oldest first. From memory.
   [[nodiscard]] std::vector<JobProgress> unfinished_jobs() const { return book_.unfinished(); }
   /// The troubles with the models that cells are served with; see ModelHistory.
   [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
@@ -170,10 +170,10 @@ class Trainer {
   }
   /// This server's description of itself.
   [[nodiscard]] ServerSelf self() const;
-  /// The servers of the record, this one among them, as they were heard of last, without what they
+  /// The servers of the record, this one included, as last heard of, without the models that they
   /// serve. From memory.
   [[nodiscard]] std::vector<ServerInRecord> servers_seen() const;
-  /// The servers of the record with what they serve, as the record has it now.
+  /// The servers of the record with the models that they serve, as the record has them now.
   [[nodiscard]] Result<std::vector<ServerInRecord>> servers() const;
   /// Waiting, without the one being trained.
   [[nodiscard]] int queued_jobs() const;
@@ -182,67 +182,68 @@ class Trainer {
   /// Checks the batch (its text, and when it was accepted first), stores it with its job, queues
   /// it.
   [[nodiscard]] Result<std::int64_t> take_in(StoredBatch batch);
-  /// Loads models in the background, tries a store again that cannot be written, and tells of other
-  /// troubles than `told`.
+  /// Loads models in the background, retries a store that cannot be written, and reports troubles
+  /// other than those in `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
-  /// Prunes what the rule lets go of, one small change after the other.
+  /// Prunes data that the rule does not keep, in small changes.
   void prune(const std::string& cell, const std::stop_token& stop);
   /// Takes up a store that can be read only now.
   void take_up_late();
-  /// Where several servers share the store: takes up what others changed, and keeps the claim on
-  /// the job that runs.
+  /// With several servers on one store: takes up the others' changes, and keeps the claim on the
+  /// running job.
   void follow(std::int64_t followed, const std::stop_token& stop);
-  /// Takes up what is in force since `followed` changes, of so many that were `made`; returns how
-  /// many it has taken up.
+  /// Takes up the versions put in force since change number `followed`, of `made` changes; returns
+  /// the number of changes taken up.
   [[nodiscard]] std::int64_t follow_models(std::int64_t followed, std::int64_t made);
   /// Which jobs wait, run elsewhere or are over.
   void follow_jobs();
-  /// Tells of a job that is known here what became of it elsewhere.
+  /// Reports the outcome of a known job that another server has.
   void follow_job(const StoredJob& job);
-  /// Compares the files of its cells with the record where either may have changed, and sets those
-  /// apart that differ. `descriptions`: how many there ever were.
+  /// Compares the files of its cells with the record if either may have changed, and sets the
+  /// differing cells apart. `descriptions`: the number of descriptions ever made.
   void agree(std::int64_t descriptions) TRAMMEL_EXCLUDES(agree_mutex_);
-  /// Tells the others that it is there, and keeps the claim on the job that runs. Waits for nobody
-  /// else's work.
+  /// Announces this server to the others, and keeps the claim on the running job. Waits for no
+  /// other work.
   void beat(const std::stop_token& stop);
-  /// As it sees itself: nobody else has its store.
+  /// This server by its own view, for a store that no other server has.
   [[nodiscard]] ServerInRecord alone() const;
   [[nodiscard]] Status cancel_in_record(const StoredJob& job, const ChangeId& by);
-  /// Ends the computing of a job that is no longer this server's, or that somebody cancelled on
-  /// another one.
+  /// Ends the computation of a job that this server has lost, or that was cancelled on another
+  /// server.
   void keep_claim();
-  /// Those of cells that are served, as far as they do not wait here already.
+  /// Takes up jobs of served cells that do not wait here already.
   void take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>& notices)
       TRAMMEL_REQUIRES(submit_mutex_);
   void tell_troubles(std::vector<std::string>& told);
-  /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
+  /// Refuses (kBusy) if as many requested jobs of this cell wait as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
   /// The progress of a job as the store has it.
   [[nodiscard]] JobProgress stored_progress(const StoredJob& job) const;
   /// The job that was queued under this id before; empty: none.
   [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
   void enqueue(const StoredJob& job, bool asked_for);
-  /// True if somebody asked for the job; else it came with its batch.
+  /// True if the job was requested; otherwise it came with its batch.
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
-  /// True if an unfinished job of the store is to be worked on; else a notice says why not.
+  /// True if an unfinished job of the store is to be worked on; otherwise a notice gives the
+  /// reason.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
-  /// A version held against the one in force on what the cell measured; empty: there is nothing to
-  /// hold it against.
+  /// The verdict on a version against the one in force, on the cell's measurements; empty if there
+  /// is nothing to compare with.
   [[nodiscard]] Result<std::optional<GateVerdict>> judged_beside_present(const std::string& cell,
                                                                          int version) const;
-  /// Refuses what the verdict finds worse, or not to be told.
+  /// Refuses a version that the verdict finds worse, or cannot judge.
   [[nodiscard]] Status check_not_worse(const std::string& cell, int version,
                                        const GateVerdict& verdict) const;
   /// Checks that the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored,
                                       const std::vector<std::string>& batch_ids,
                                       bool release) const;
-  /// Queues a job that looks at one batch and learns nothing from it, unless it is to `apply` what
-  /// it finds.
+  /// Queues a job that examines one batch and learns nothing from it, unless it is to `apply` its
+  /// findings.
   [[nodiscard]] Result<std::int64_t> look_at(StoredJob job, const std::string& batch_id,
                                              const std::string& csv, const ChangeId& id);
-  /// The id of a stored batch, of the newest where none is named; refused in quarantine where what
-  /// is found in it is to be applied.
+  /// The id of a stored batch, the newest if none is named. Refuses a quarantined batch if the
+  /// findings are to be applied.
   [[nodiscard]] Result<std::string> batch_to_diagnose(const std::string& cell,
                                                       const std::string& batch_id,
                                                       bool apply) const;
@@ -260,15 +261,14 @@ class Trainer {
   JobRunner runner_;
   JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
-  Mutex
-      submit_mutex_;  // one at a time between the look at what is there and the push: who may push
+  Mutex submit_mutex_;  // one caller at a time between the check of the store and the push
   Presence presence_;
-  std::atomic<bool> is_present_ = false;  // the others know of it
+  std::atomic<bool> is_present_ = false;  // the others know of this server
   Mutex agree_mutex_;
   std::int64_t descriptions_ TRAMMEL_GUARDED_BY(agree_mutex_) =
-      -1;  // those that it has compared with
+      -1;  // the descriptions already compared
   std::set<std::string> agreed_
-      TRAMMEL_GUARDED_BY(agree_mutex_);  // cells whose files were the record's since it began
+      TRAMMEL_GUARDED_BY(agree_mutex_);  // cells with the record's files since this server began
   const std::int64_t began_at_;
   std::jthread worker_, keeper_, follower_, heartbeat_, reclaimer_;
 };

@@ -31,8 +31,8 @@ Failure failed(const char* what, int error) {
                  std::strerror(error));
 }
 
-/// Above the standard streams and the channel, which are set up one after the other: none may be
-/// overwritten first.
+/// Moves a descriptor above the standard streams and the channel. Those are set up one after the
+/// other, and none may overwrite a descriptor that is still needed.
 int out_of_the_way(int descriptor) {
   if (descriptor < 0 || descriptor > ChildProcess::kChannel) return descriptor;
   const int moved = ::fcntl(descriptor, F_DUPFD_CLOEXEC, ChildProcess::kChannel + 1);
@@ -60,7 +60,7 @@ Result<Pair> pipe_of_words() {
   return pair;
 }
 
-/// The plan of what the child gets and what it does not.
+/// The descriptors and settings that the child gets, and those that it loses.
 class SpawnPlan {
  public:
   SpawnPlan(int channel, int words) {
@@ -99,8 +99,8 @@ class SpawnPlan {
   }
 
  private:
-  /// Ours, and one thread for linear algebra: OpenBLAS starts one for each processor otherwise, as
-  /// soon as it is loaded.
+  /// This process's environment, with one thread for linear algebra: otherwise OpenBLAS starts one
+  /// per processor when it is loaded.
   static std::vector<char*> environment_of_child() {
     static std::string one_thread = "OPENBLAS_NUM_THREADS=1";
     std::vector<char*> all = {one_thread.data()};
@@ -188,11 +188,11 @@ bool ChildProcess::reap() {
   const pid_t reaped = ::wait4(pid_, &status, WNOHANG, &used);
   if (reaped == 0) return false;
   status_ =
-      reaped == pid_ ? status : 0;  // else somebody else has reaped it, and its status is lost
+      reaped == pid_ ? status : 0;  // otherwise another thread reaped it, and its status is lost
   if (reaped != pid_) return true;
   usage_.processor_time = seconds(used.ru_utime) + seconds(used.ru_stime);
-  // Not used.ru_maxrss: that counts the memory of this process, which the child shared until it was
-  // another program.
+  // used.ru_maxrss is not usable: it includes the memory of this process, which the child shared
+  // until its exec.
   return true;
 }
 

@@ -31,11 +31,11 @@ class Descriptor {
   int number_ = -1;
 };
 
-/// A program that was started to compute, and nothing else: it inherits no descriptor but a socket
-/// to talk by and its standard streams (nothing to read; what it writes comes to words()), no
-/// blocked or ignored signal, and has a process group of its own: a terminal's signals do not reach
-/// it. It ends with this object. Not of a fork: the memory of a process with many threads and
-/// gigabytes is not copied.
+/// A program that was started to compute. It inherits only a socket to talk by and its standard
+/// streams (nothing to read; its output goes to words()). It has no blocked or ignored signals, and
+/// a process group of its own, which a terminal's signals do not reach. It ends with this object.
+/// It does not come from a plain fork, which would copy the memory of a process with many threads
+/// and gigabytes.
 class ChildProcess {
  public:
   static constexpr int kChannel = 3;  ///< the descriptor of its end of the socket
@@ -50,14 +50,15 @@ class ChildProcess {
   [[nodiscard]] int channel() const { return channel_.get(); }  ///< does not block
   [[nodiscard]] int words() const {
     return words_.get();
-  }  ///< does not block; -1: it says nothing any more
+  }  ///< does not block; -1: it sends no more
   void close_words() { words_.close(); }
   [[nodiscard]] int end() const { return pidfd_.get(); }  ///< can be read once it has ended
   [[nodiscard]] pid_t pid() const { return pid_; }
 
-  /// SIGKILL, and until it is gone; a second at most, should the kernel not let go of it.
+  /// Sends SIGKILL and waits until the process is gone; at most a second, in case the kernel does
+  /// not release it.
   void kill();
-  /// The way in which it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty
+  /// The ending of the process, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty
   /// while it runs.
   [[nodiscard]] std::optional<std::string> ending();
 
@@ -67,8 +68,7 @@ class ChildProcess {
     std::int64_t peak_memory = 0;  ///< bytes, resident
   };
   [[nodiscard]] Usage usage();
-  /// The state of the process: it wants the processor, or waits for the disk; else it does nothing
-  /// by itself.
+  /// The state of the process: it wants the processor, waits for the disk, or does nothing.
   enum class State { kRuns, kWaitsForDisk, kStands };
   [[nodiscard]] State state() const;
 
@@ -79,7 +79,7 @@ class ChildProcess {
 
   pid_t pid_ = -1;
   Descriptor channel_, words_, pidfd_;
-  std::optional<int> status_;  // of waitpid, once it has ended
+  std::optional<int> status_;  // of waitpid, after it has ended
   Usage usage_;
 };
 

@@ -25,7 +25,7 @@ namespace trammel {
 namespace {
 
 constexpr int kNiceness =
-    10;  // a tenth of an equal share beside the service, all of it where nobody wants it
+    10;  // a tenth of an equal share beside the service, all of an idle processor
 constexpr rlim_t kTimeBeyond =
     60;  // s after the limit of processor time: the service ends it before that
 constexpr std::chrono::milliseconds kReportInterval{50};
@@ -38,7 +38,7 @@ void write_to(const char* path, std::string_view text) {
   ::close(file);
 }
 
-/// As much as the host allows: what it refuses makes this process no worse than others.
+/// Lowers the priorities as far as the host allows; a refusal leaves this process equal to others.
 void step_back() {
   const sched_param batch{};
   ::sched_setscheduler(0, SCHED_BATCH, &batch);
@@ -170,7 +170,7 @@ class Answers {
   message::TaskTexts texts_;
   std::optional<Workbench> bench_;
   std::optional<Error> refused_;  // why the task cannot be begun
-  Opponents opponents_;           // as far as they were told
+  Opponents opponents_;           // as far as they have arrived
   std::chrono::steady_clock::time_point reported_;
 };
 

@@ -24,8 +24,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTick{100};
-constexpr int kTicksStill = 10;  // without processor time, of a process that does not ask for any
-constexpr int kTicksForDisk = 300;   // of one that waits for the disk
+constexpr int kTicksStill = 10;  // ticks without processor time, for a process that does not want
+                                 // any
+constexpr int kTicksForDisk = 300;   // ticks for a process that waits for the disk
 constexpr double kAnyTime = 0.5e-3;  // s, of the processor in a tick: less is none
 constexpr std::size_t kWordsKept = 600;
 constexpr std::int64_t kLeastMemory = std::int64_t{256}
@@ -36,7 +37,7 @@ std::int64_t memory_mb_of(const ComputeOptions& options) {
   return std::max(memory_of_host() / 2, kLeastMemory) >> 20;
 }
 
-/// The last line of what a program wrote, for a message: without control characters.
+/// The last line of a program's output, for a message: without control characters.
 std::string last_words(const std::string& words) {
   const std::size_t end = words.find_last_not_of("\r\n ");
   if (end == std::string::npos) return "";
@@ -50,7 +51,7 @@ std::string last_words(const std::string& words) {
 
 }  // namespace
 
-/// Wakes the thread that waits for the process when it is to stop.
+/// Wakes the thread that waits for the process when a stop is requested.
 class ComputeProcess::Wake {
  public:
   explicit Wake(const StopRequests& stop)
@@ -193,7 +194,7 @@ Status ComputeProcess::heard(const Frame& frame, const ComputeWatch& watch) {
 
 Status ComputeProcess::wait(short events) {
   if (Clock::now() >
-      next_tick_ + kTick) {  // the caller took its time, and the process may have waited for it
+      next_tick_ + kTick) {  // the caller was late, and the process may have waited for it
     next_tick_ = Clock::now() + kTick;
     ticks_still_ = 0;
     time_at_last_tick_ = -1;

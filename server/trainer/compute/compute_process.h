@@ -13,18 +13,18 @@
 
 namespace trammel {
 
-/// The ways by which a job learns that it is to end.
+/// The signals by which a job learns that it must end.
 struct StopRequests {
   std::stop_token service;  ///< the service stops: the job goes on after the next start
   std::stop_token job;      ///< the job is cancelled
   [[nodiscard]] bool any() const { return service.stop_requested() || job.stop_requested(); }
 };
 
-/// The computing of a job in a process of its own, where it can hurt nobody: ended at once where it
-/// is to stop, within two seconds where it crashes or stands still, and where it takes more than a
-/// job may. It stands still when it neither gets on nor wants to: no processor time used for a
-/// second though it is neither ready to run nor waiting for the disk. One that computes for ever is
-/// ended by the limit of processor time.
+/// Computes a job in a process of its own, so that it cannot harm others. The process is ended at
+/// once on a stop, within two seconds when it crashes or stands still, and when it exceeds the
+/// limits of a job. It stands still when it neither progresses nor wants to: it used no processor
+/// time for a second, and is neither ready to run nor waiting for the disk. An endless computation
+/// is ended by the limit of processor time.
 class ComputeProcess : public Computing {
  public:
   /// Refuses (kInternal) where no process can be started.
@@ -45,7 +45,7 @@ class ComputeProcess : public Computing {
                  const StopRequests& stop);
 
   [[nodiscard]] Status send(const Frame& frame);
-  /// The next message that is an answer; those before it go to `watch`.
+  /// The next message that is an answer; earlier messages go to `watch`.
   [[nodiscard]] Result<Frame> answer(const ComputeWatch& watch);
   /// Handles a message on the way.
   [[nodiscard]] Status heard(const Frame& frame, const ComputeWatch& watch);
@@ -55,7 +55,7 @@ class ComputeProcess : public Computing {
   [[nodiscard]] Status look_after();
   void read_words();
   [[nodiscard]] Status receive();
-  /// Ends the process, for that reason.
+  /// Ends the process for this reason.
   [[nodiscard]] Failure broken(Breakdown::Kind kind, Failure why);
   [[nodiscard]] Failure crashed();
 
@@ -70,7 +70,8 @@ class ComputeProcess : public Computing {
   double time_at_last_tick_ = 0;  // s, of the processor
 };
 
-/// Starts to compute: here where `options` names no program, else in a process of its own.
+/// Starts to compute: in this process if `options` names no program, otherwise in a process of its
+/// own.
 [[nodiscard]] Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options,
                                                                  ComputeTask task,
                                                                  const StopRequests& stop);

@@ -8,8 +8,7 @@
 
 #include "server/base/result.h"
 
-/// The talk between the service and the process that computes for it: frames over a pair of
-/// sockets.
+/// The protocol between the service and its computing process: frames over a pair of sockets.
 namespace trammel {
 
 /// A small JSON object, and up to one long text: a batch, a model, a page.
@@ -34,8 +33,8 @@ class FrameReader {
   explicit FrameReader(FrameLimits limits = {}) : limits_(limits) {}
 
   void feed(std::string_view bytes) { buffer_.append(bytes); }
-  /// The next whole frame; empty while there is none. Refuses sizes beyond the limits and a head
-  /// that is no JSON object; what comes after that means nothing.
+  /// The next whole frame; empty if there is none yet. Refuses sizes beyond the limits and a head
+  /// that is not a JSON object; later data are then meaningless.
   [[nodiscard]] Result<std::optional<Frame>> next();
 
  private:

@@ -88,7 +88,7 @@ Result<JobBatches::SessionsOfDiagnosis> JobBatches::sessions_of_diagnosis() {
       });
   const auto place = static_cast<std::size_t>(own - sessions.begin());
   if (own == sessions.end()) {
-    // It came with the question and is not stored, or is older than those that judge.
+    // It came with the request and is not stored, or is older than the judging batches.
     sessions.push_back(judging_session(batch));
     judge_once(sessions);
   }

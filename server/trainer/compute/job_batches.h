@@ -12,40 +12,39 @@
 
 namespace trammel {
 
-/// The rows that a diagnosis does not look at: those held out to judge what it finds, where that is
-/// to be applied, else what the batch says itself.
+/// The rows that a diagnosis leaves out. If its findings are to be applied, these are the rows that
+/// judge them; otherwise the batch's own choice.
 [[nodiscard]] HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed,
                                             bool apply);
 
-/// A text that was received as a batch of the cell. Refuses what the batch reader and the cell
-/// refuse. One without an id gets it from its content.
+/// A received text as a batch of the cell. Refuses errors of the batch reader and of the cell. A
+/// batch without an id gets one from its content.
 [[nodiscard]] Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell,
                                                   const HoldOut& hold_out,
                                                   const BatchReads& reads = {});
 
-/// The batches that one job works on, and those that judge what it makes. Each of them is parsed,
-/// checked and split once.
+/// The batches of one job, and those that judge its model. Each is parsed, checked and split once.
 class JobBatches {
  public:
-  /// `own`: the ids of those to work on; none: the one without an id. `earlier`: those to learn
-  /// from as well. The cell outlives it.
+  /// `own`: the ids of the batches to work on; empty: the one without an id. `earlier`: further
+  /// ones to learn from. The cell outlives it.
   JobBatches(const Cell& cell, HoldOut hold_out, BatchReads reads, std::vector<std::string> own,
              std::vector<std::string> earlier = {});
 
-  /// `judges`: it is one of those that judge, which come oldest first. One of these that does not
-  /// fit the cell, which has changed since, does not count.
+  /// `judges`: it is a judging batch; these come oldest first. A judging batch that no longer fits
+  /// the changed cell does not count.
   void add(const BatchText& text, bool judges);
 
-  /// The first of those to work on.
+  /// The first of the batches to work on.
   [[nodiscard]] Result<CheckedBatch> first() const;
   /// first() without copies of rows that judge in older batches.
   [[nodiscard]] Result<CheckedBatch> first_without_older_judges();
   /// All to work on together, and the earlier ones that still fit the cell, without such copies:
   /// sessions of one arm.
   [[nodiscard]] Result<CheckedBatch> to_learn_from();
-  /// Those whose rows may judge what the job makes, oldest first.
+  /// The sessions whose rows may judge the job's model, oldest first.
   [[nodiscard]] const std::vector<JudgingSession>& judging_sessions();
-  /// Those sessions with that of first() among them, at `own`.
+  /// The judging sessions, with that of first() among them at `own`.
   struct SessionsOfDiagnosis {
     std::vector<JudgingSession> sessions;
     std::size_t own = 0;

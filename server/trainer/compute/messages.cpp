@@ -17,7 +17,7 @@ Frame frame(const char* kind, Json head = Json::object(), std::string text = {})
   return {std::move(head), std::move(text)};
 }
 
-/// JSON has no number for what is not finite.
+/// JSON has no representation of numbers that are not finite.
 void put(Json& json, const char* key, const std::optional<double>& value) {
   if (value && std::isfinite(*value)) json[key] = *value;
 }

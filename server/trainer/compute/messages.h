@@ -3,10 +3,10 @@
 #include "server/trainer/compute/frames.h"
 #include "server/trainer/compute/task.h"
 
-/// The messages between the service and the process that computes for it. The service sends the
-/// texts of a task, the task, its batches and `make`; then, as often as it likes, the texts of
-/// opponents and `judge`. Each of these two is answered by `made`, `verdict` or `error`; before
-/// that come `progress` and `found`.
+/// The messages between the service and its computing process. The service sends the texts of a
+/// task, the task, its batches and `make`; then, as often as it likes, the texts of opponents and
+/// `judge`. Each of these two is answered by `made`, `verdict` or `error`; before that come
+/// `progress` and `found`.
 namespace trammel::message {
 
 /// The kind of a message: the member `is`.
@@ -26,7 +26,7 @@ namespace trammel::message {
 /// `over_memory`: it is not the data's fault.
 [[nodiscard]] Frame of_error(const Error& error, bool over_memory);
 
-// These throw nlohmann::json::exception where a message is not what it says it is.
+// These functions throw nlohmann::json::exception if a message does not have its stated form.
 
 /// The task of the texts `cell`, `robot` and `in_force` and the frame that ends them. Refuses a
 /// cell that cannot be read.

@@ -13,7 +13,7 @@
 #include "server/store/store.h"
 #include "server/tasks/accept/verdict.h"
 
-/// The input of one job and what comes of it, as values that another process can be told.
+/// The input and the result of one job, as values that can be sent to another process.
 namespace trammel {
 
 /// A batch as it was received.
@@ -30,12 +30,12 @@ struct ComputeTask {
       batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
   std::vector<std::string> earlier_ids =
       {};  ///< sessions of the same arm to learn from as well, oldest first
-  std::vector<DriftSeen> earlier_checks = {};  ///< of a check: what those before it saw
+  std::vector<DriftSeen> earlier_checks = {};  ///< for a check: the drift by earlier checks
   bool hold_against_in_force =
       false;  ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
   std::optional<FleetPrior>
-      fleet;  ///< where the cell file says `prior: fleet`, and there are twins
+      fleet;  ///< set if the cell file says `prior: fleet` and there are twins
   std::uint64_t seed = 1;
   double validation_share = kUsualJudgingShare;
   double accept_ratio = GateOptions::kUsualAcceptRatio;
@@ -45,13 +45,13 @@ struct ComputeTask {
 /// The product of a job.
 struct Made {
   std::optional<CompensatedModel> model;
-  std::string remarks;     ///< to go with the model's outcome: `; ` before each
+  std::string remarks;     ///< additions to the model's outcome: `; ` before each
   std::string quarantine;  ///< why nothing must be learned from the batch; empty: something was
   /// The message of a diagnosis that makes no model.
   std::string message = {};
   JobOutcome outcome = {};
-  /// The text that serialize() made of the model in another process that computed it; empty: it was
-  /// this one.
+  /// The output of serialize() for the model, if another process computed it; empty: this process
+  /// did.
   std::string model_text = {};
 };
 
@@ -69,8 +69,8 @@ struct Breakdown {
     kCrashed,     ///< by a signal or with an exit code
     kHung,        ///< it stood still
     kOverMemory,  ///< it asked for more than a job may have
-    kOverTime,    ///< it took more processor time than a job may take
-    kStopped      ///< it was told to: the job is cancelled, or the service stops
+    kOverTime,    ///< it took more processor time than a job may
+    kStopped      ///< it was asked to stop: the job is cancelled, or the service stops
   };
   Kind kind = Kind::kCrashed;
   Error error;
@@ -81,17 +81,17 @@ struct ComputeCost {
   std::optional<double> processor_time;     ///< s
 };
 
-/// The computing of one job: its batches are given to it one by one, it makes what the job asks
-/// for, and judges it as often as it is asked. Of one thread.
+/// Computes one job: it takes the batches one by one, makes the requested result, and judges it as
+/// often as requested. For one thread.
 class Computing {
  public:
   virtual ~Computing() = default;
-  /// `judges`: the batch is one of those that judge what the job makes; these come oldest first.
+  /// `judges`: the batch judges the job's model; judging batches come oldest first.
   [[nodiscard]] virtual Status take(const BatchText& batch, bool judges) = 0;
   [[nodiscard]] virtual Result<Made> make(const ComputeWatch& watch) = 0;
   /// After make() has made a model.
   [[nodiscard]] virtual Result<GateVerdict> judge(const Opponents& opponents) = 0;
-  /// After an error: whether it is one of the process and not of the data.
+  /// After an error: whether the process caused it, not the data.
   [[nodiscard]] virtual std::optional<Breakdown> breakdown() const { return std::nullopt; }
   /// Until now.
   [[nodiscard]] virtual ComputeCost cost() const { return {}; }

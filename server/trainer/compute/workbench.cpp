@@ -53,8 +53,7 @@ bool has_unknown_tools(const CompensatedModel& model, const MeasurementBatch& ba
   return known_rows(model, batch).measurements.size() < batch.measurements.size();
 }
 
-/// True if `after` is better than `before` beyond chance, on those judges of the sessions that both
-/// know.
+/// True if `after` is better than `before` beyond chance, on the judging rows that both know.
 bool is_better_on(const std::vector<JudgingSession>& sessions, const CompensatedModel& before,
                   const CompensatedModel& after) {
   std::vector<Vector3> errors_before, errors_after;
@@ -77,7 +76,7 @@ bool is_better_on(const std::vector<JudgingSession>& sessions, const Compensated
       .beyond_chance();
 }
 
-/// `; ` before each that says something.
+/// Adds `; ` before each text that is not empty.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
   for (const std::string& part : parts) {
@@ -199,11 +198,11 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
 }
 
 Result<Made> Workbench::diagnosed(const AskedDiagnosis& asked, const ComputeWatch& watch) {
-  // Rows that are to judge an extended model must not have been looked at.
+  // The diagnosis must not see rows that judge an extended model.
   const auto batch = TRY(asked.apply ? batches_.first_without_older_judges() : batches_.first());
   const auto present = TRY(in_force());
   if (asked.apply && task_.batch_ids.empty() && present) {
-    // A batch that was sent with the question goes through the same door as one that is submitted.
+    // A batch that was sent with the request is examined like a submitted one.
     const Triage triaged = triage(present->model, batch);
     if (!triaged.learn) return nothing_applied(triaged.sentence, *present);
   }
@@ -273,7 +272,7 @@ TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWa
   options.seed = task_.seed;
   options.trained_at = task_.now;
   options.looked_at =
-      true;  // by this job, or by whoever asked for a training from batches that he knows
+      true;  // by this job, or by the person who requested a training from known batches
   options.progress = watch.progress;
   return options;
 }
@@ -285,7 +284,7 @@ Made Workbench::made(CompensatedModel model, std::string remarks,
   std::vector<std::string> texts;
   for (const Note& note : warnings_of(model, model.parts().validation))
     if (note.code != kNotConfirmed)
-      texts.push_back(note.text);  // of every model of the cell; its page says it
+      texts.push_back(note.text);  // applies to every model of the cell; the cell's page says it
   remarks += joined_by_semicolons(texts);
   return {std::move(model), std::move(remarks), ""};
 }
@@ -298,7 +297,8 @@ Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
     auto model = TRY(loaded(*opponents.in_force));
     present = std::make_shared<const ServedModel>(std::move(model));
   }
-  // The first model of its cell is held against the same without what was found, as on files.
+  // The first model of its cell is compared with the same model without the findings, as with
+  // files.
   if (!opponents.in_force && !opponents.record) present = without_;
   std::vector<ServedModel> before;
   for (const ModelText& text : opponents.served_before) {

@@ -28,22 +28,22 @@ class Workbench : public Computing {
  private:
   [[nodiscard]] Result<Made> trained(const AskedTraining& asked, const ComputeWatch& watch);
   [[nodiscard]] Result<Made> checked(const AskedCheck& asked, const ComputeWatch& watch);
-  /// Puts a model of the own batch alone in place of one of all sessions: where the arm has
-  /// `changed` and this one is better beyond chance on the batch's judges; and where the batch
-  /// brings a tool that the model in force does not know and all sessions together are no better
-  /// for the others.
+  /// Replaces a model of all sessions by one of the own batch alone in two cases: the arm has
+  /// `changed` and that model is better beyond chance on the batch's judging rows; or the batch
+  /// brings a tool that the model in force lacks, and the model of all sessions is no better for
+  /// the other tools.
   [[nodiscard]] Status choose_alone(Successor& together, bool changed, const ComputeWatch& watch);
   [[nodiscard]] Result<Made> diagnosed(const AskedDiagnosis& asked, const ComputeWatch& watch);
-  /// With what the diagnosis of `batch` beside the sources `own` found.
+  /// An extended model with the findings of the diagnosis of `batch`, beside the sources `own`.
   [[nodiscard]] Result<Made> extended(const CheckedBatch& batch,
                                       const std::vector<std::string>& own,
                                       const Diagnosis& diagnosis, const ComputeWatch& watch);
-  /// extended() where no model is in force: extend(), as on files. Batches of models that were
-  /// never in force do not judge it.
+  /// extended() for a cell without a model in force: extend(), as with files. Batches of models
+  /// that were never in force do not judge it.
   [[nodiscard]] Result<Made> first_extended(const CheckedBatch& batch, const Diagnosis& diagnosis,
                                             const TrainOptions& options);
-  /// The options that the job asks for: level and bias, and where it asks for nothing special what
-  /// the model in force has besides.
+  /// The options of the job: its level and bias. If it states none, the additions of the model in
+  /// force are used.
   [[nodiscard]] TrainOptions train_options(const CheckedBatch& batch,
                                            const ComputeWatch& watch) const;
   [[nodiscard]] Made made(CompensatedModel model, std::string remarks,
@@ -56,9 +56,9 @@ class Workbench : public Computing {
   JobBatches batches_;
   std::shared_ptr<const ServedModel> in_force_;  // once it was asked for
   std::optional<CompensatedModel> candidate_;    // once it is made
-  std::shared_ptr<const ServedModel>
-      without_;  // beside an extended one, where none is in force: the same without
-  std::vector<JudgingSession> sessions_;  // that judge it, oldest first
+  std::shared_ptr<const ServedModel> without_;   // beside an extended one without a model in force:
+                                                 // the same model without the findings
+  std::vector<JudgingSession> sessions_;         // judging sessions, oldest first
 };
 
 }  // namespace trammel
