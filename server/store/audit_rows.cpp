@@ -35,7 +35,7 @@ AuditRow row_of(Rows& row) {
 
 namespace {
 
-/// The row before is looked at in the same statement: of a store that was moved services know only
+/// The previous row is checked in the same statement, since services learn of a moved store only
 /// when they connect.
 constexpr const char* kAppend =
     "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, "
@@ -43,9 +43,8 @@ constexpr const char* kAppend =
     "$8, $9, $10, $11, $12, $13 WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE "
     "number = $1 - 1 AND what = 'moved')";
 
-/// False: the store was moved elsewhere. Where everybody waits for the end of the trail, one
-/// statement does it all, and tells the others; however often a transaction tells them, they hear
-/// it once.
+/// Adds a row; false: the store was moved elsewhere. Everybody waits for the end of the trail, so
+/// one statement adds the row and notifies the others. They get one notification per transaction.
 bool is_added(Database& database, const AuditRow& row) {
   const auto with_row = [&](const auto& run) {
     return run(row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after,

@@ -9,7 +9,7 @@
 /// The audit trail, for the transactions that change something.
 namespace trammel {
 
-/// Where a shared database tells that the trail has grown.
+/// The channel on which a shared database announces new rows of the trail.
 constexpr const char* kChangesChannel = "trammel_changes";
 
 /// The effect of a change, as the trail records it.
@@ -18,11 +18,11 @@ struct AuditEntry {
   std::string why = {};
 };
 
-/// Appends it to the trail at the end of the transaction that is open. `by`: who asked for it, and
-/// under which id.
+/// Appends the entry to the trail at the end of the open transaction. `by`: the client and the id
+/// of its request.
 void record_audit(Database& database, const AuditEntry& entry, const ChangeId& by = {});
 
-/// Makes the trail where there is none, and records how it began.
+/// Creates the trail if there is none, and records its beginning.
 void prepare_audit(Database& database, bool is_new, std::int64_t schema_before);
 
 /// True if the rows say which server made the change: a file of before does not.
@@ -37,8 +37,8 @@ void name_servers_in_trail(Database& database);
 /// The number of rows of the trail.
 [[nodiscard]] std::int64_t audit_rows(Database& database);
 
-/// Takes the next rows into the chain and, as far as they are asked for, into the trail; false:
-/// there are no more.
+/// Reads the next rows into the chain, and those that match the query into the trail; false: there
+/// are no more.
 [[nodiscard]] bool read_more(Database& database, const AuditQuery& query, AuditChain& chain,
                              AuditTrail& trail);
 

@@ -1,4 +1,4 @@
-// The trail as it is read: of an open store, and of one that services use.
+// Reads the trail of an open store, and of a store that services use.
 #include "server/store/audit.h"
 #include "server/store/audit_rows.h"
 #include "server/store/connection.h"

@@ -48,7 +48,7 @@ Result<StoreCopy> checked(Database& database, const std::string& path) {
   copy.batches = integer_of(database, "SELECT COUNT(*) FROM batches");
   std::error_code error;
   copy.bytes = static_cast<std::int64_t>(fs::file_size(path, error));
-  if (!database.has_table("audit")) return copy;  // of before there was one
+  if (!database.has_table("audit")) return copy;  // a store from before the trail
   const auto trail = check_trail(database);
   if (!trail) return Failure(trail.error()).in(path);
   copy.audit_rows = trail->rows;
@@ -56,7 +56,7 @@ Result<StoreCopy> checked(Database& database, const std::string& path) {
   return copy;
 }
 
-/// Copies one moment of it: what is read is held for as long as the transaction is open.
+/// Copies the state of one moment: the read transaction holds it while it is open.
 Status copy_pages(const std::string& from, const std::string& to,
                   const std::function<void(double)>& progress) {
   SqliteDatabase source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI,

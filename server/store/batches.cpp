@@ -60,14 +60,14 @@ Result<StoredBatch> read_record(Database& database, const std::string& cell,
   return record_of(cell, row);
 }
 
-/// As the audit trail calls it.
+/// The word for the audit trail.
 std::string spoken(const std::string& quarantine) {
   return quarantine.empty() ? "free" : "in quarantine: " + quarantine;
 }
 
-/// The job, the batch and what the job takes, or the job and the hash of a batch that was there
-/// before. In a database to which each statement is a way and back, this is one. The cell is
-/// locked: nobody else adds the batch meanwhile.
+/// Returns the new job with the batch and its inputs; or the job and the hash of a batch that was
+/// there before. In a database where each statement costs a round trip, this is one statement. The
+/// cell is locked, so nobody else adds the batch meanwhile.
 constexpr const char* kAddAtOnce =
     "WITH present AS (SELECT hash, job FROM batches WHERE cell = $1 AND id = $2), made AS (INSERT "
     "INTO jobs (cell, level, bias, state, message, created_at, kind) SELECT $1, $3, $4, 'queued', "
@@ -81,7 +81,7 @@ constexpr const char* kAddAtOnce =
 struct KeptBatch {
   std::int64_t job = 0;
   bool was_there = false;
-  std::string hash = {};  ///< of the one that was there
+  std::string hash = {};  ///< of the existing batch
 };
 
 KeptBatch keep_at_once(Database& database, const StoredBatch& batch, const StoredJob& job) {

@@ -6,7 +6,8 @@
 #include "server/store/server_rows.h"
 #include "server/store/store.h"
 
-// Compares what the servers of a record mean by a cell: its files lie on each host.
+// Compares the descriptions of a cell by the servers of a record, each of which has the cell's
+// files on its own host.
 
 namespace trammel {
 namespace {
@@ -32,7 +33,8 @@ bool describes_so(const ServerInRecord& server, const std::string& cell,
   return server.self.cells.at(cell).files == files;
 }
 
-/// `was_so`: its files were those of the record since it began.
+/// The reason why the server does not answer for the cell, or changes nothing of it. `was_so`: its
+/// files were the record's since it began.
 std::string why_not(const std::string& cell, const std::string& me, const DescribedCell& known,
                     const CellDescription& mine, const std::vector<const ServerInRecord*>& having,
                     bool was_so) {
@@ -55,7 +57,7 @@ std::string why_not(const std::string& cell, const std::string& me, const Descri
       me);
 }
 
-/// Compares what this server says of cells with what the record goes by.
+/// Compares this server's descriptions of cells with the record's.
 class Comparison {
  public:
   Comparison(Database& database, const Worker& worker, bool starts,
@@ -70,8 +72,8 @@ class Comparison {
     lock_cell(database_, cell);
     const auto known = cell_description(database_, cell);
     if (known && known->files == mine) return;
-    const bool was_so =
-        agreed_.contains(cell);  // what was given up since is not wanted back by who has it still
+    const bool was_so = agreed_.contains(cell);  // servers that still have an abandoned description
+                                                 // do not bring it back
     if (known && (was_so || !may_change(cell, *known, mine))) {
       disputes_[cell] = why_not(cell, worker_.server, *known, mine, who_has(others_, cell), was_so);
       return;

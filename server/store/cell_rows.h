@@ -8,13 +8,13 @@
 /// Cells as rows, for the transactions of batches, jobs and models.
 namespace trammel {
 
-/// Nobody else changes anything of the cell until the transaction ends. It comes before every other
-/// lock: the order is cells, jobs, the rest, the end of the audit trail.
+/// Locks the cell until the transaction ends, so that nobody else changes it. Call it before every
+/// other lock; the order is cells, jobs, the rest, the end of the audit trail.
 void lock_cell(Database& database, const std::string& cell);
 
 /// The number of the cell's next version, one model's for ever.
 [[nodiscard]] Result<int> next_version(Database& database, const std::string& cell);
-/// No model that is made later has this number or a lower one.
+/// Ensures that later models have higher numbers.
 void count_version(Database& database, const std::string& cell, int version);
 
 }  // namespace trammel

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kChangesKept = 100'000;
 
-/// Who put in force what is in force, and when, as a clause; empty: not recorded.
+/// Who put the model in force, and when, as a clause; empty: not recorded.
 std::string who_decided(Database& database, const std::string& cell) {
   auto row = prepare(database,
                      "SELECT who, at FROM audit WHERE cell = $1 AND subject = 'in force' ORDER BY "
@@ -24,8 +24,7 @@ std::string who_decided(Database& database, const std::string& cell) {
 }  // namespace
 
 Result<std::optional<ChangeOutcome>> find_change(Database& database, const ChangeId& change_id) {
-  // A row that is locked is a row that is kept: what is only read may be gone with the host that
-  // said it.
+  // A locked row is durable. A row that is only read may be lost with the host that wrote it.
   const std::string sql =
       locked(database, "SELECT asked, version, job, made_at FROM changes WHERE id = $1");
   auto row = prepare(database, sql.c_str(), change_id.id);

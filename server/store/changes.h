@@ -7,19 +7,18 @@
 /// Changes that happen once, for the transactions of batches, jobs and models.
 namespace trammel {
 
-/// The outcome that was recorded under the id, if anything. kConflict: for something else than is
-/// asked for.
+/// The outcome recorded under the id, if any. kConflict: the id belongs to another request.
 [[nodiscard]] Result<std::optional<ChangeOutcome>> find_change(Database& database,
                                                                const ChangeId& change_id);
-/// Records what was made, in the transaction that is open.
+/// Records the outcome of a change in the open transaction.
 void record_change(Database& database, const ChangeId& change_id, const ChangeOutcome& outcome);
 
 /// Refuses (kConflict) where another version of the cell is in force than the change expects.
 [[nodiscard]] Status check_expected_version(Database& database, const std::string& cell,
                                             const ChangeId& change_id);
 
-/// Locks the cell, and runs `work`, which returns a Result<ChangeOutcome>, unless that was done
-/// before under this id; then what came of it.
+/// Locks the cell and runs `work`, which returns a Result<ChangeOutcome>. If this id was done
+/// before, it returns the earlier outcome instead.
 template <typename Work>
 [[nodiscard]] Result<ChangeOutcome> once(Database& database, const std::string& cell,
                                          const ChangeId& change_id, const Work& work) {

@@ -7,26 +7,27 @@
 #include "server/store/database/database.h"
 #include "server/store/servers.h"
 
-/// Who works on a job, for the transactions of jobs and models.
+/// The claims on jobs, for the transactions of jobs and models.
 namespace trammel {
 
-/// For so long a server is believed to live that has not been heard of: what it works on is taken
-/// up by another one within 20 s of its end.
+/// A server that was not heard of counts as alive for this long. After its end, another one takes
+/// up its work within 20 s.
 constexpr std::chrono::seconds kLease = kGoneAfter;
 
-/// Whoever works on jobs through one connection.
+/// A server that works on jobs through one connection.
 struct Worker {
-  std::string server;  ///< as people know it
-  std::string token;   ///< of this start of it: what a start before claimed is not its own
+  std::string server;  ///< its name for people
+  std::string token;   ///< of this start of the server: claims of an earlier start are not its own
 };
 
-/// Times of claims and servers are the database's: servers have clocks of their own. Unix time, s.
-/// As an expression, where it is to be of the statement itself.
+/// The expression for the present time in the database's clock, which dates claims and servers,
+/// since each server has its own clock. Unix time, s. It is an expression because the time must be
+/// that of the statement itself.
 [[nodiscard]] const char* now_in(const Database& database);
 [[nodiscard]] std::int64_t now_of(Database& database);
 
-/// For the RETURNING of what is written again soon: the commit then waits neither for the disk nor
-/// for a standby.
+/// For the RETURNING clause of data that are soon written again: the commit then waits neither for
+/// the disk nor for a standby.
 [[nodiscard]] const char* unwaited_for(const Database& database);
 
 /// Servers hear at the end of the transaction that there may be something to do: at once, and not
@@ -36,11 +37,12 @@ void tell_others(Database& database);
 /// Has a token of its own, and no name.
 [[nodiscard]] Worker new_worker();
 
-/// Sets the job running, claims it for the worker and counts an attempt. Refuses (kNotFound) one
-/// that is over, (kConflict) one of a cell that another server works for.
+/// Sets the job running, claims it for the worker and counts an attempt. Refuses (kNotFound) a
+/// finished job, and (kConflict) a job of a cell on which another server works.
 [[nodiscard]] Status claim_job(Database& database, const Worker& worker, std::int64_t job);
-/// Refuses (kNotFound) a running job that another worker has claimed, also where that one is dead.
-/// `also_waiting`: for results, which only the last worker has: one that put the job back, too.
+/// Refuses (kNotFound) a running job that another worker has claimed, even if that worker is dead.
+/// `also_waiting`: for results, also accepts a waiting job that this worker, its last one, put
+/// back.
 [[nodiscard]] Status check_held(Database& database, const Worker& worker, std::int64_t job,
                                 bool also_waiting = false);
 

@@ -10,7 +10,7 @@
 #include "server/store/statements.h"
 #include "server/store/store.h"
 
-// Claims say which server works on a job, and until when it is believed to live.
+// A claim states which server works on a job, and until when others believe that this server lives.
 
 namespace trammel {
 namespace {
@@ -36,8 +36,7 @@ Failure held_elsewhere(ErrorCode code, std::int64_t job, const std::string& serv
   return failure(code, "job {} is worked on by {}", job, server).of("job").with_value(job);
 }
 
-/// Refuses where another server that is believed to live works on the job, or on another one of its
-/// cell.
+/// Refuses if another live server works on the job, or on another job of its cell.
 Status check_free(Database& database, const Worker& worker, const std::string& cell) {
   if (!database.is_shared()) return {};
   const std::string others = fmt::format(
@@ -75,7 +74,7 @@ Worker new_worker() {
 }
 
 Status check_held(Database& database, const Worker& worker, std::int64_t job, bool also_waiting) {
-  if (!database.is_shared()) return {};  // whoever else held a job of this file is gone
+  if (!database.is_shared()) return {};  // no other process can hold a job of this file
   lock_job(database, job);
   const auto claim = claim_of(database, job);
   if (!claim || claim->token == worker.token) return {};
@@ -144,7 +143,7 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
             : change(database,
                      "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND lease_until > $3",
                      by.who, job, now_of(database));
-    // Nobody works on it, or nobody who lives.
+    // No live worker has the job.
     if (heard == 0) static_cast<void>(fail_job(database, job, outcome.why, outcome, by));
     tell_others(database);
     return ChangeOutcome{0, job};
@@ -161,7 +160,7 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
 Result<std::map<std::int64_t, std::string>> Store::jobs_to_take() const {
   return connection_->exclusively(
       [&](Database& database) -> Result<std::map<std::int64_t, std::string>> {
-        // The few that are worked on are looked for once, and not for each that waits.
+        // The few jobs in work are looked up once, and not for each waiting job.
         const std::string to_take = fmt::format(
             "WITH alive AS (SELECT id, cell, token FROM jobs JOIN job_claims ON job = id WHERE "
             "state = 'running' AND lease_until > {}) SELECT id, cell FROM jobs WHERE state IN "

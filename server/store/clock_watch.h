@@ -6,12 +6,11 @@
 
 namespace trammel {
 
-/// Notices that this host's clock was set, by a clock that nobody sets. What is stored is dated by
-/// the former.
+/// Notices changes of this host's clock, which dates the stored data, by a monotonic clock.
 class ClockWatch {
  public:
   static constexpr std::chrono::seconds kNoticed{
-      2};  ///< a smaller step does not matter to what is dated in seconds
+      2};  ///< dates have seconds, so a smaller step does not matter
   struct Time {
     std::chrono::milliseconds unix_time, since_boot;
   };
@@ -19,9 +18,9 @@ class ClockWatch {
 
   explicit ClockWatch(Time begin) : begin_(shift(begin)), last_(begin_) {}
 
-  /// By how much it was set since the last look; empty: it was not.
+  /// The change of the clock since the last look; empty: none.
   [[nodiscard]] std::optional<std::chrono::seconds> look(Time now);
-  /// By how much it was set in all.
+  /// The total change of the clock.
   [[nodiscard]] std::chrono::seconds off() const { return whole(last_ - begin_); }
 
  private:

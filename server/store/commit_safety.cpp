@@ -29,8 +29,8 @@ std::string listed(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// For how many standbys a commit waits: `FIRST 2 (a, b)`, `ANY 2 (a, b)`, `2 (a, b)`, or the first
-/// of a list.
+/// The number of standbys for which a commit waits: `FIRST 2 (a, b)`, `ANY 2 (a, b)`, `2 (a, b)`,
+/// or the first of a list.
 int waits_for(const std::string& standby_names) {
   const std::size_t bracket = standby_names.find('(');
   if (bracket == std::string::npos) return 1;

@@ -5,8 +5,8 @@
 
 #include "server/store/database/database.h"
 
-/// The safety of a change that PostgreSQL has committed: what it survives, by its settings and the
-/// standbys that are there.
+/// The failures that a committed change in PostgreSQL survives, given its settings and the present
+/// standbys.
 namespace trammel {
 
 struct CommitSettings {
@@ -14,20 +14,20 @@ struct CommitSettings {
   std::string synchronous_commit = "on";
   std::string standby_names;            ///< synchronous_standby_names
   bool standbys_are_seen = true;        ///< false: this role may not see them
-  int standbys = 0;                     ///< that stream
-  std::vector<std::string> waited_for;  ///< those of them that a commit waits for, or may
+  int standbys = 0;                     ///< the streaming ones
+  std::vector<std::string> waited_for;  ///< the standbys for which a commit waits, or may wait
 };
 
 struct CommitSafety {
   std::string survives;  ///< ends the sentence `an acknowledged change survives ...`
-  std::string worry;     ///< what is not as it should be, and what to do about it; empty: nothing
+  std::string worry;     ///< the defect and its repair; empty: none
 };
 
 [[nodiscard]] CommitSafety safety_of(const CommitSettings& settings);
-/// By this connection's settings. Throws DatabaseError.
+/// The settings of this connection. Throws DatabaseError.
 [[nodiscard]] CommitSettings commit_settings(Database& database);
 
-/// Where Patroni runs on this host, and no watchdog would stop it if it hung: what to do about it.
+/// The advice if Patroni runs on this host without a watchdog that would stop it when it hangs.
 /// Else empty.
 [[nodiscard]] std::string missing_watchdog(const std::string& proc = "/proc",
                                            const std::string& sys = "/sys");

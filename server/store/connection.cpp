@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kMostDamages = 100;  // that are told
+constexpr std::size_t kMostDamages = 100;  // the most that are reported
 
 }  // namespace
 
@@ -40,7 +40,7 @@ void StoreConnection::note_written() {
 
 void StoreConnection::note_damage(const std::string& what) {
   const MutexLock guard(state_mutex);
-  if (is_shared() && !state_now.readable) return;  // it is away, and that is said already
+  if (is_shared() && !state_now.readable) return;  // it is away, which is reported already
   auto& damages = state_now.damages;
   if (damages.size() < kMostDamages &&
       std::find(damages.begin(), damages.end(), what) == damages.end())

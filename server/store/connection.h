@@ -20,7 +20,7 @@
 
 namespace trammel {
 
-/// The way in which a store reaches its database, and what is known of it. Thread-safe.
+/// The access of a store to its database, and the known state of the database. Thread-safe.
 class StoreConnection {
  public:
   StoreConnection(std::string place, std::unique_ptr<ServedCopies> kept)
@@ -29,47 +29,47 @@ class StoreConnection {
   StoreConnection(const StoreConnection&) = delete;
   StoreConnection& operator=(const StoreConnection&) = delete;
 
-  /// Runs `work(database)`, which reads, on one moment of it. An exception of the database becomes
+  /// Runs `work(database)`, which reads one consistent state. An exception of the database becomes
   /// an error.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> exclusively(const Work& work) {
     return through([this](const Job& job) { return read(job); }, work);
   }
-  /// Runs `work(database)` in one transaction, committed only if `work` succeeds. Where several
-  /// servers write, `work` may run more than once: only its last run counts.
+  /// Runs `work(database)` in one transaction, committed only if `work` succeeds. If several
+  /// servers write, `work` may run more than once, and only its last run counts.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> in_transaction(const Work& work) {
     return through([this](const Job& job) { return write(job); }, work);
   }
 
-  /// in_transaction() for what must not wait for others of this server that wait: a heartbeat.
+  /// in_transaction() for work that must not queue behind other work of this server: a heartbeat.
   template <typename Work>
   std::invoke_result_t<const Work&, Database&> urgently(const Work& work) {
     return through([this](const Job& job) { return write_urgently(job); }, work);
   }
 
-  /// Several servers write it: what it says goes, whatever the copies remember.
+  /// True if several servers write it. Then the database decides, whatever the copies have.
   [[nodiscard]] virtual bool is_shared() const = 0;
-  /// Where it could not be written, or is not as it was left: whether it can be written now.
+  /// If the database could not be written or has changed, tests whether it can be written now.
   [[nodiscard]] virtual Status try_again() = 0;
   /// Returns when another server may have changed something, after `limit` at the latest, or when
   /// `stop` is requested. For one thread.
   virtual void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) = 0;
 
   [[nodiscard]] StoreState state() const;
-  /// Tells those who wait that the state has changed.
+  /// Records the trouble, and wakes the threads that wait for a change of the state.
   void note_trouble(const Error& why, bool unreadable);
   void note_written();
-  /// Something that was found damaged; said once.
+  /// Damage that was found. It is reported once.
   void note_damage(const std::string& what);
-  /// By how much the host's clock was set since this was called last; empty: it was not.
+  /// The change of the host's clock since the last call; empty: none.
   [[nodiscard]] std::optional<std::chrono::seconds> note_clock();
 
-  const std::string path;  ///< a file, or a URL as it is told to people
+  const std::string path;  ///< a file, or a URL in its form for people
   const std::unique_ptr<ServedCopies> copies;
   Worker worker = new_worker();  ///< its name is set before there are jobs
-  std::string told_cells;  ///< what the last heartbeat said of them; of the one thread that has it
-  bool has_told = false;   ///< that it is there; likewise
+  std::string told_cells;  ///< the cells in the last heartbeat; only the heartbeat's thread uses it
+  bool has_told = false;   ///< a heartbeat was sent; only the heartbeat's thread uses it
   mutable Mutex state_mutex;  // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);

@@ -9,7 +9,8 @@
 namespace trammel {
 namespace {
 
-constexpr std::chrono::seconds kBetweenTries{1};  // to open a file that cannot be written
+constexpr std::chrono::seconds kBetweenTries{1};  // between attempts to open a file that cannot be
+                                                  // written
 
 }  // namespace
 
@@ -55,7 +56,7 @@ Result<std::unique_ptr<StoreConnection>> FileConnection::open(const std::string&
   TRY(file.hold());
   auto opened = TRY(open_database(path, *copies));
   if (auto held = file.hold(); !held)
-    return tl::make_unexpected(held.error());  // where it was not there before
+    return tl::make_unexpected(held.error());  // there was no file before
   return std::make_unique<FileConnection>(std::move(lock), std::move(file), path, std::move(opened),
                                           std::move(copies));
 }
@@ -107,7 +108,7 @@ Status FileConnection::transacted(const Job& job, bool* changed) {
 Status FileConnection::try_again() {
   if (is_in_order()) return {};
   return write([](Database& database) -> Status {
-    // SQLite writes nothing for an update that changes nothing.
+    // SQLite writes nothing for an update without changes.
     change(database, "INSERT INTO store_identity (id) VALUES ('')");
     change(database, "DELETE FROM store_identity WHERE id = ''");
     return {};
@@ -137,7 +138,7 @@ Status FileConnection::open_anew() {
   const Status as_left = was_written_ ? check_as_left() : Status();
   Status opened = as_left ? opened_anew() : as_left;
   if (!opened) {
-    // Whoever asked a service that was well asks again; see failure_of().
+    // The service was well before, so callers try again; see failure_of().
     if (was_written_)
       opened = tl::make_unexpected(Failure(opened.error()).as(ErrorCode::kBusy).value());
     note_trouble(opened.error(), database_ == nullptr);
@@ -172,7 +173,7 @@ Status FileConnection::check_as_left() {
       leave_no_journal();
       break;
     case StoreFile::Finding::kTouched:
-      database_.reset();  // what it remembers of the file is no longer so
+      database_.reset();  // its cached view of the file is out of date
   }
   return check_state(path, mark_);
 }
@@ -192,7 +193,7 @@ void FileConnection::leave_no_journal() {
   if (!database_) return;
   try {
     database_->execute("PRAGMA wal_checkpoint(TRUNCATE)");
-  } catch (const DatabaseError&) {  // it has none that it may write
+  } catch (const DatabaseError&) {  // it may not write any
   }
 }
 

@@ -13,13 +13,13 @@
 
 namespace trammel {
 
-/// An SQLite file: one connection behind one lock. Where the file cannot be written it is read, or
-/// not even that; it is tried again by whoever wants to write, once a second at most. Nothing is
-/// acknowledged but what is in the file that the path leads to: a file that was removed, replaced
-/// or written by another program is read at most, until it is back as it was.
+/// An SQLite file: one connection behind one lock. If the file cannot be written, it is read if
+/// possible. Each call that wants to write tries again, at most once a second. A change is
+/// acknowledged only if it is in the file at the path. A file that was removed, replaced or written
+/// by another program is at most read until it is back in its former state.
 class FileConnection final : public StoreConnection {
  public:
-  /// Refuses what Store::open() refuses.
+  /// Refuses the same as Store::open().
   [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& path);
   FileConnection(WriterLock writer, StoreFile held, std::string name, OpenedDatabase opened,
                  std::unique_ptr<ServedCopies> kept);
@@ -34,20 +34,19 @@ class FileConnection final : public StoreConnection {
   [[nodiscard]] Status read(const Job& job) override;
   [[nodiscard]] Status write(const Job& job) override;
   [[nodiscard]] Status transacted(const Job& job, bool* changed) TRAMMEL_REQUIRES(mutex_);
-  /// True if the file is as this process left it, and can be written as far as is known.
+  /// True if the file is as this process left it, and no write has failed.
   [[nodiscard]] bool is_in_order();
-  /// Opens a file again that could not be written when it was opened, or that is not as it was
-  /// left.
+  /// Reopens a file that could not be written when it was opened, or that has changed since.
   [[nodiscard]] Status be_sure_of_file() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] Status opened_anew() TRAMMEL_REQUIRES(mutex_);
-  /// Checks that the file at the path now is the store as it was left. Closes the database if that
-  /// was written by others.
+  /// Checks that the file at the path is the store in its last known state. Closes the database if
+  /// others wrote the file.
   [[nodiscard]] Status check_as_left() TRAMMEL_REQUIRES(mutex_);
-  /// Checks that what was just committed is in the file that the path leads to.
+  /// Checks that the last commit is in the file at the path.
   [[nodiscard]] Status check_in_place() TRAMMEL_REQUIRES(mutex_);
-  /// The journal of a file that is no longer at the path would be taken for that of the next one
-  /// there.
+  /// Removes the journal of a file that is no longer at the path. The next file there would take it
+  /// for its own.
   void leave_no_journal() TRAMMEL_REQUIRES(mutex_);
   void note_opened() TRAMMEL_REQUIRES(mutex_);
 
@@ -57,7 +56,7 @@ class FileConnection final : public StoreConnection {
   std::unique_ptr<SqliteDatabase> database_ TRAMMEL_GUARDED_BY(mutex_);  // null: cannot be read
   bool must_be_opened_anew_ TRAMMEL_GUARDED_BY(mutex_) = false;
   bool was_written_ TRAMMEL_GUARDED_BY(mutex_) =
-      false;  // by this process: no other state is taken again
+      false;  // by this process: no other state is accepted later
   std::optional<StoreMark> mark_
       TRAMMEL_GUARDED_BY(mutex_) = {};  // of that state; empty: it could not be read
   std::chrono::steady_clock::time_point tried_last_ TRAMMEL_GUARDED_BY(mutex_) = {};

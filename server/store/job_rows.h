@@ -17,8 +17,8 @@ namespace trammel {
 
 /// Empty for another kind of job.
 [[nodiscard]] AskedTraining training_of(const StoredJob& job);
-/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in
-/// health_checks, too.
+/// The kind in the table of jobs. Its CHECK dates from before health checks, so these are also
+/// listed in health_checks.
 [[nodiscard]] const char* stored_kind(JobKind kind);
 
 /// Queues the job; its batches are not written yet.
@@ -31,7 +31,7 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
 [[nodiscard]] Status changed_one(int changes, std::int64_t job);
 /// kConflict.
 [[nodiscard]] Failure discarded_failure(const std::string& cell, const std::string& id);
-/// Empty: there is no such job.
+/// Empty if the job does not exist.
 [[nodiscard]] std::string cell_of_job(Database& database, std::int64_t job);
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);

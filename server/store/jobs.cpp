@@ -92,7 +92,7 @@ StoredJob job_of(Rows& row) {
   return job;
 }
 
-/// By one statement for all of them.
+/// Adds the batch ids of all jobs by one statement.
 void add_batch_ids(Database& database, std::vector<StoredJob>& jobs) {
   std::map<std::int64_t, StoredJob*> by_id;
   std::set<std::int64_t> ids;
@@ -223,7 +223,7 @@ Status end_job(Database& database, const Worker& worker, std::int64_t id, const 
 
 namespace {
 
-/// One job, where the others can be read even if it cannot.
+/// One job, so that the others can be read even if this one cannot.
 Result<StoredJob> read_alone(Database& database, std::int64_t id, const std::string& place) {
   try {
     return read_job(database, id);
@@ -277,7 +277,7 @@ std::string details_of(const AskedJob& asked) {
   return fmt::format(", tolerance {:g} mm", to_mm(*check->tolerance));
 }
 
-/// Queues the job that `insert` makes, or returns the one that was queued under this id before.
+/// Queues the job that `insert` makes, or returns the job that was queued under this id before.
 template <typename Insert>
 Result<StoredJob> queue_once(Database& database, const StoredJob& job, const ChangeId& change_id,
                              const Insert& insert) {
@@ -432,7 +432,7 @@ Status Store::set_job_running(std::int64_t id) {
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](Database& database) -> Status {
     TRY(check_held(database, connection_->worker, id));
-    // A job that was not begun gets no attempt back: it would be another server's.
+    // A waiting job gets no attempt back, since its attempts may be another server's.
     const int changes = change(
         database,
         "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 AND state "

@@ -12,12 +12,12 @@
 #include "server/store/pruned.h"
 #include "server/store/store.h"
 
-// Models, and the history of which was in force.
+// Models, and the history of the versions in force.
 
 namespace trammel {
 namespace {
 
-constexpr std::size_t kMostToServe = 100;  // versions that are looked at to serve a cell with
+constexpr std::size_t kMostToServe = 100;  // versions that are tried to serve a cell
 constexpr std::size_t kWholeWay = 1'000'000;
 
 /// A row of the cell's history of models in force.
@@ -41,8 +41,8 @@ std::optional<Activation> present_activation(Database& database, const std::stri
       cell));
 }
 
-/// Adds what is in force and where rollbacks lead from there, the next one first. What comes before
-/// a damage is added.
+/// Adds the version in force and the targets of rollbacks from there, the next one first. The
+/// versions before a damaged row are still added.
 void add_way_back(Database& database, const std::string& cell, std::size_t most,
                   std::vector<Activation>& way) {
   Rows rows = prepare(
@@ -88,7 +88,7 @@ void insert_activation(Database& database, const std::string& cell, int version,
          cell, version, back, unix_now(), *number);
 }
 
-/// Releases from quarantine the batches that the job of this version may release.
+/// Releases the batches from quarantine that the job of this version may release.
 void release_batches_of(Database& database, const std::string& cell, int version,
                         const ChangeId& by) {
   auto rows = prepare(
@@ -119,7 +119,8 @@ void record_figures(Database& database, std::int64_t activation, const JobOutcom
          activation, judged.before, judged.after, judged.limit, judged.why);
 }
 
-/// Adds how the version that this activation put in force was judged: then, or when a job made it.
+/// Adds the verdict on the version of this activation: from the activation, or from the job that
+/// made it.
 void add_judgement(Database& database, const std::string& cell, const Activation& activation,
                    InForceRecord& record) {
   constexpr const char* kFigures =
@@ -143,8 +144,8 @@ std::string reason_of(const ChangeId& by, const std::optional<JobOutcome>& judge
   return by.reason.empty() ? judged->why : by.reason + "; " + judged->why;
 }
 
-/// Puts `version` in force. The new activation remembers the present one. `what`: as the audit
-/// trail calls it.
+/// Puts `version` in force. The new activation remembers the present one. `what`: the kind of the
+/// change in the audit trail.
 void activate_on_top(Database& database, const std::string& cell, int version, const char* what,
                      const std::string& why, const ChangeId& by) {
   const auto present = present_activation(database, cell);
@@ -422,7 +423,7 @@ std::vector<int> Store::versions_to_serve(const std::string& cell) const {
   const auto copies = connection_->copies->of(cell);
   std::vector<Activation> known;
   const Status read = connection_->exclusively([&](Database& database) -> Status {
-    known.clear();  // it may be asked again
+    known.clear();  // the source may be asked again
     add_way_back(database, cell, kMostToServe, known);
     return {};
   });

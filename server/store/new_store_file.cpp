@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kElsewhere = "name a file that you may write, in a folder with room";
 
-/// Removes the file in which a copy is made; one that is whole has another name by then.
+/// Removes the file in which a copy is being made; a complete copy has another name by then.
 class Unfinished {
  public:
   explicit Unfinished(std::string path) : path_(std::move(path)) {}

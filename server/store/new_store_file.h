@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// Has `make` write the file `part` beside `path`, and gives it that name only once it is whole and
-/// on the disk. Refuses a `path` that is there already.
+/// Makes `make` write the file `part` beside `path`, and renames it when it is complete and on
+/// disk. Refuses an existing `path`.
 [[nodiscard]] Status make_store_file(const std::string& path,
                                      const std::function<Status(const std::string& part)>& make);
 

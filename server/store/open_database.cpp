@@ -35,8 +35,8 @@ Attempt attempt(const std::string& path, const Open& open) {
   }
 }
 
-/// A file that is gone, empty or no file at all is damaged where models were served from it, and
-/// else a new beginning.
+/// Judges a file that is missing, empty or not a file. It is damaged if models were served from it;
+/// otherwise it is a new store.
 Status check_there(const std::string& path, const ServedCopies& copies) {
   std::error_code error;
   const bool exists = fs::exists(path, error);
@@ -50,7 +50,7 @@ Status check_there(const std::string& path, const ServedCopies& copies) {
                    : "put the store back, or move the copies away to begin anew");
 }
 
-/// Gives the copies the store's id. Refuses a store that is not the one whose models were served
+/// Gives the copies the store's id. Refuses a store other than the one whose models were served
 /// here.
 Status check_identity(Database& database, const std::string& path, ServedCopies& copies) {
   const auto known = copies.stores();
@@ -64,7 +64,7 @@ Status check_identity(Database& database, const std::string& path, ServedCopies&
         .next("put the right one back, or move the copies away if it is meant to be another");
   }
   static_cast<void>(
-      copies.belong_to(id, true));  // without the folder there are no copies: the store goes on
+      copies.belong_to(id, true));  // without the folder there are no copies, but the store works
   return {};
 }
 
@@ -79,7 +79,8 @@ Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
   });
 }
 
-/// With its journal where that can be had, with one in memory, or without what the journal holds.
+/// Opens with its journal if possible, otherwise with a journal in memory, otherwise without the
+/// journal's content.
 Attempt open_for_reading(const std::string& path, ServedCopies& copies) {
   using Open = std::pair<std::string, int>;
   const std::array<Open, 3> ways = {

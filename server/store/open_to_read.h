@@ -9,13 +9,13 @@
 
 namespace trammel {
 
-/// A store that is only looked at, also while services use it: a file, or a database by its URL.
-/// Leaves nothing behind. Refuses what is no store. Throws DatabaseError.
+/// Opens a store for reading, even while services use it: a file, or a database by its URL. Leaves
+/// no traces. Refuses a place that is not a store. Throws DatabaseError.
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_read(const std::string& place);
-/// A store to change in what the services know nothing of: a file, of which the caller holds the
-/// lock of who writes it, or a database by its URL. Refuses and throws as open_to_read().
+/// Opens a store for changes that services do not make: a file whose writer lock the caller holds,
+/// or a database by its URL. Refuses and throws as open_to_read().
 [[nodiscard]] Result<std::unique_ptr<Database>> open_to_write(const std::string& place);
-/// The failure of a store that is looked at, with whoever holds it locked. `place` may hold a
+/// The failure to read a store, with the session that holds it locked. `place` may contain a
 /// password.
 [[nodiscard]] Failure failure_at(const DatabaseError& error, const std::string& place);
 

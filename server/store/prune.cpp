@@ -1,6 +1,5 @@
-// Pruning takes texts, never rows: what was there, when, with which hash and figures stays known,
-// ids stay used, and the audit trail says what went. One text a transaction, so that nobody waits
-// for long.
+// Pruning removes texts, never rows: dates, hashes and figures stay, ids stay used, and the audit
+// trail lists the removed texts. Each transaction removes one text, so that nobody waits for long.
 #include <set>
 #include <utility>
 
@@ -16,7 +15,7 @@ namespace {
 using Versions = std::set<int>;
 using Ids = std::set<std::string>;
 
-/// The version in force and those that rollbacks return to.
+/// The version in force and the targets of rollbacks.
 Versions versions_needed(Database& database, const std::string& cell) {
   auto rows =
       prepare(database,
@@ -40,7 +39,7 @@ void add_parts(const std::string& joined, Ids& ids) {
   }
 }
 
-/// The batches that those versions were trained on, and those that unfinished jobs take.
+/// The training batches of those versions, and the batches of unfinished jobs.
 Ids batches_needed(Database& database, const std::string& cell) {
   const Versions versions = versions_needed(database, cell);
   Ids needed;
@@ -65,8 +64,8 @@ struct Text {
   std::string hash;
 };
 
-/// The oldest of `rows` (oldest first) that is not needed, unless at most `keep` are left; `keep`
-/// 0: none goes.
+/// The oldest of `rows` (oldest first) that is not needed. Empty if at most `keep` are left; `keep`
+/// 0 keeps all.
 template <typename Needed>
 std::optional<Text> oldest_beyond(Rows rows, int keep, const Needed& needed) {
   std::optional<Text> oldest;

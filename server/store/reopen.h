@@ -6,8 +6,8 @@
 
 namespace trammel {
 
-/// A store that was moved is taken up again, since the other one is given up. Refuses one that was
-/// not moved.
+/// Opens a moved store again after the other store has been given up. Refuses a store that was not
+/// moved.
 [[nodiscard]] Status reopen_store(const std::string& place);
 
 }  // namespace trammel

@@ -11,17 +11,17 @@
 namespace trammel {
 namespace {
 
-/// The models whose times are not recorded: found from the keys alone, for the rest is large.
+/// The models without recorded times. The query reads only the keys, because the rest is large.
 constexpr const char* kModelsWithoutTimes =
     "SELECT cell, version FROM models EXCEPT SELECT cell, version FROM model_times";
 
-/// Also what programs of before have made since, which count none.
+/// Also counts versions that older programs added. Those programs do not count them.
 constexpr const char* kCountVersions =
     "INSERT INTO cells (cell, last_version) SELECT cell, MAX({1}) FROM {0} WHERE true GROUP BY "
     "cell ON CONFLICT (cell) DO UPDATE SET last_version = excluded.last_version WHERE "
     "excluded.last_version > cells.last_version";
 
-/// Damage is an error of what reads the damaged row, and not of all.
+/// Only a read of damaged data must fail, not every read.
 void execute_unless_damaged(Database& database, const std::string& statements) {
   try {
     database.execute(statements);
@@ -30,14 +30,14 @@ void execute_unless_damaged(Database& database, const std::string& statements) {
   }
 }
 
-/// Numbers that a server gave which this one followed stay given.
+/// A version number stays taken if another server gave it while this server followed that one.
 void count_versions(Database& database) {
   execute_unless_damaged(database, fmt::format(kCountVersions, "models", "version"));
   if (database.has_table("versions_elsewhere"))
     execute_unless_damaged(database, fmt::format(kCountVersions, "versions_elsewhere", "newest"));
 }
 
-/// Their times, as far as they can be read.
+/// Adds the training times of stored models, as far as the models can be read.
 void fill_in_times(Database& database) {
   std::vector<std::pair<std::string, int>> without;
   Rows rows = prepare(database, kModelsWithoutTimes);
@@ -51,8 +51,8 @@ void fill_in_times(Database& database) {
   }
 }
 
-/// In stores of before, the cell of a release is not in the key of its row: there SQLite 3.40 takes
-/// it for missing where it checks a copy.
+/// In older stores the cell of a release is not in the key of its row, and SQLite 3.40 then reports
+/// it as missing when it checks a copy.
 void put_cells_of_releases_into_their_key(Database& database) {
   constexpr const char* kOutside =
       "SELECT COUNT(*) FROM pragma_table_info('job_releases') WHERE name = 'cell' AND pk = 0";

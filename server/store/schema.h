@@ -8,22 +8,23 @@
 
 namespace trammel {
 
-inline constexpr const char* kSchemaField = "schema";  // what the error of a newer schema is of
+inline constexpr const char* kSchemaField = "schema";  // the field that the error of a newer schema
+                                                       // names
 
-/// Makes an open file a store of today's schema: an empty one gets its tables, an older one what it
-/// lacks. Refuses (kRefused) a file of another program or of a newer schema. Does not look for
-/// damage: that shows where it is read.
+/// Brings an open file to the present schema: an empty one gets its tables, an older one its
+/// missing tables. Refuses (kRefused) a file of another program or of a newer schema. Does not look
+/// for damage, which shows when a row is read.
 [[nodiscard]] Status prepare_file(Database& database, const std::string& path);
-/// For a file that is only read: refuses (kRefused) what prepare_file() refuses and what it would
-/// have to change.
+/// For a file that is only read: refuses (kRefused) in the cases of prepare_file(), and a file that
+/// it would have to change.
 [[nodiscard]] Status check_readable(Database& database, const std::string& path);
-/// The identity that tells this store from any other one. A store of before it was recorded gets
-/// `otherwise`, or a new one.
+/// The identity that distinguishes this store from all others. A store without a recorded identity
+/// gets `otherwise`, or a new one.
 [[nodiscard]] Result<std::string> identity_of(Database& database, const std::string& otherwise);
-/// Tells a state of a store from what it was before and from other stores.
+/// Distinguishes a state of a store from its earlier states and from other stores.
 struct StoreMark {
   std::string identity;
-  std::string counts;  ///< of all that was ever added, and of jobs that are not finished
+  std::string counts;  ///< of all rows ever added, and of unfinished jobs
 };
 /// Empty: it cannot be read.
 [[nodiscard]] std::optional<StoreMark> mark_of(Database& database);

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kVersionsKept = 3;
 constexpr std::size_t kCellDigits =
-    32;  // of the hash of its name: a name may hold what a file's may not
+    32;  // of the hash of its name, since a name may have characters that a file name must not
 constexpr const char* kEnding = ".json";
 constexpr const char* kPart = ".part";  // of a copy that is being written
 
@@ -35,7 +35,7 @@ std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   return entries;
 }
 
-/// Removes the parts of a server that was killed; nobody else writes copies there.
+/// Removes the part files of a server that was killed; nobody else writes copies there.
 void remove_parts(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : entries_of(folder)) {
@@ -55,7 +55,7 @@ bool read_number(std::string_view& text, Number* number) {
   return true;
 }
 
-/// The copy that a file's name tells; empty: it is none.
+/// The copy that a file name stands for; empty: the name is not that of a copy.
 std::optional<ServedCopies::Copy> copy_at(const fs::path& file) {
   const std::string name = file.filename().string();
   if (!name.ends_with(kEnding)) return std::nullopt;

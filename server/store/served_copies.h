@@ -10,14 +10,13 @@
 
 namespace trammel {
 
-/// The last models in force of each cell as plain files: what is served where the store cannot be
-/// read. They lie in
-/// `<root>/<id of the store>/<hash of the cell's name>/`, one file a version, the newest three.
-/// Beside a file the root is
-/// `<store>.models`. Thread-safe; one thread at a time keeps copies of a cell.
+/// The last models in force of each cell as plain files, which are served when the store cannot be
+/// read. They are in `<root>/<id of the store>/<hash of the cell's name>/`, one file per version,
+/// the newest three. For a file store the root is `<store>.models`. Thread-safe; one thread at a
+/// time writes the copies of a cell.
 class ServedCopies {
  public:
-  /// Without a root none are kept.
+  /// Without a root there are no copies.
   explicit ServedCopies(std::string root) : root_(std::move(root)) {}
 
   struct Copy {
@@ -26,21 +25,21 @@ class ServedCopies {
     int version = 0;
     std::string file;
   };
-  /// The stores that copies were made of, the one written to last first.
+  /// The stores from which copies were made. The most recently written one comes first.
   [[nodiscard]] std::vector<std::string> stores() const;
-  /// From now on copies are those of this store. A store that is `served` from gets a folder even
-  /// before its first copy.
+  /// Assigns the copies to this store from now on. If it is `served`, it gets a folder even before
+  /// its first copy.
   [[nodiscard]] Status belong_to(const std::string& store, bool served);
   /// Newest first; none where they cannot be read.
   [[nodiscard]] std::vector<Copy> of(const std::string& cell) const;
   [[nodiscard]] std::vector<std::string> files_of(const std::string& cell, int version) const;
-  /// On disk when it returns. Takes the place of an older copy of the same version.
+  /// On disk when it returns. Replaces an older copy of the same version.
   [[nodiscard]] Status keep(const std::string& cell, std::int64_t activation, int version,
                             const std::string& content) const;
-  /// Takes copies away that were put in force later: of a history that is no more.
+  /// Removes copies that were put in force later, since that part of the history no longer exists.
   void forget_after(const std::string& cell, std::int64_t activation) const;
   [[nodiscard]] const std::string& root() const { return root_; }
-  /// Whose copies they are; empty: not known yet.
+  /// The id of the store of these copies; empty: not known yet.
   [[nodiscard]] std::string store() const;
 
  private:

@@ -14,28 +14,28 @@ struct ModelOnDisk {
   std::string cell;
   int version = 0;
   Result<std::string> text;         ///< in the store
-  std::string hash;                 ///< that the store knows it by
+  std::string hash;                 ///< the hash in the store's record
   std::vector<std::string> copies;  ///< files beside the store
 };
-/// A model, and why it was not read from the store but from a copy: one sentence, or empty. Also
-/// where only the hash that the store has of it is bad.
+/// A model, and, if it was read from a copy instead of the store, the reason: one sentence, or
+/// empty. A bad hash in the store is also such a reason.
 struct ReadModel {
   CompensatedModel model;
   std::string damage = {};
 };
-/// From the store or, where its text is bad or that of another model, from a copy. `where`: for
-/// what is wrong.
+/// Reads a model from the store. If its text is bad or belongs to another model, reads a copy.
+/// `where`: the place in error messages.
 [[nodiscard]] Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& where);
 
-/// The versions that a cell would be served with, the one in force first, then those before it. The
-/// visitor says whether one is good, and ends it. False: none was.
+/// The versions with which a cell could be served, the one in force first, then earlier ones. The
+/// visitor returns true for a good one, which ends the visit. False: none was good.
 using ModelVisitor = std::function<bool(const ModelOnDisk&)>;
 
 /// A store, a file or a database by its URL, read without changing it, also while services write
 /// it. A file may be of an older schema.
 class ServedModels {
  public:
-  /// Refuses (kRefused) what is no store. A file that is not there has no models.
+  /// Refuses (kRefused) a place that is not a store. A missing file has no models.
   [[nodiscard]] static Result<ServedModels> open(const std::string& place);
 
   /// A version that was in force and is not in the store has an error (kNotFound) as its text.

@@ -27,7 +27,7 @@ std::string spelled(const std::map<std::string, CellAtServer>& cells) {
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-/// The cells as a server spelled them; entries that another program wrote otherwise are left out.
+/// The cells in a server's text; entries in another program's form are left out.
 std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
   std::map<std::string, CellAtServer> cells;
   const auto json = nlohmann::json::parse(text, nullptr, false);
@@ -44,9 +44,8 @@ std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
   return cells;
 }
 
-/// Ends the leases of starts before this one on the same host: they are no more, and their jobs
-/// wait for nobody. Should one live all the same, it stores nothing of a job that another one has
-/// taken meanwhile.
+/// Ends the leases of earlier starts on the same host: they are dead, and their jobs should not
+/// wait. If one is alive after all, it can store nothing of a job that another server has taken.
 void end_leases_of_starts_before(Database& database, const std::string& token,
                                  const ServerSelf& self) {
   const int ended = change(database,
@@ -57,7 +56,7 @@ void end_leases_of_starts_before(Database& database, const std::string& token,
   if (ended > 0) tell_others(database);
 }
 
-/// The row as a whole. A start before this one on the same host is no more.
+/// Writes the whole row, and removes the row of an earlier start on the same host.
 void write_row(Database& database, const std::string& token, const ServerSelf& self,
                const std::string& cells) {
   const std::int64_t now = now_of(database);

@@ -11,15 +11,15 @@
 /// Servers, and descriptions of cells, as rows.
 namespace trammel {
 
-/// All that are there and those that went without a word, by name. `but`: the token of one that is
-/// left out.
+/// The present servers, and those that disappeared without notice, by name. `but`: the token of a
+/// server to leave out.
 [[nodiscard]] std::vector<ServerInRecord> server_rows(Database& database, bool with_cells,
                                                       const std::string& but = {});
 
-/// The description of a cell that the record goes by.
+/// The description of a cell that the record uses.
 struct DescribedCell {
   CellDescription files;
-  std::string server;   ///< whose it was
+  std::string server;   ///< the server of the description
   std::int64_t at = 0;  ///< Unix time, s, by the database's clock
 };
 [[nodiscard]] std::map<std::string, DescribedCell> cell_descriptions(Database& database);
@@ -27,7 +27,7 @@ struct DescribedCell {
                                                             const std::string& cell);
 void add_cell_description(Database& database, const std::string& cell, const CellDescription& files,
                           const std::string& server);
-/// As the audit trail tells it.
+/// The description in the words of the audit trail.
 [[nodiscard]] std::string spoken(const CellDescription& files, const std::string& server);
 
 }  // namespace trammel

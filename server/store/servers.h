@@ -8,22 +8,21 @@
 
 #include "server/robot/cell_description.h"
 
-/// The servers of a record: who is there, and what each of them does.
+/// The servers of a record, and the work of each.
 namespace trammel {
 
-/// The period in which a server says that it is there. One that was not heard of for three periods
-/// is gone.
+/// The period of a server's heartbeat. A server without one for three periods is gone.
 constexpr std::chrono::seconds kHeartbeat{5};
 constexpr std::chrono::seconds kGoneAfter = 3 * kHeartbeat;
 
 /// A server's state of one cell.
 struct CellAtServer {
-  int version = 0;  ///< that it answers with; 0: none
+  int version = 0;  ///< the version that it serves; 0: none
   CellDescription files;
-  std::string why_not = {};  ///< why it does not answer for the cell, or how otherwise than the
-                             ///< record has it; one sentence; empty: it does, or has no model
-  bool is_apart = false;     ///< it does not answer, since the record went by other files when it
-                             ///< began, and still does
+  std::string why_not = {};  ///< why it does not answer for the cell, or how its files differ from
+                             ///< the record; one sentence; empty: it answers, or has no model
+  bool is_apart = false;  ///< it does not answer, since the record used other files when it began,
+                          ///< and still does
   bool operator==(const CellAtServer&) const = default;
 };
 
@@ -35,7 +34,7 @@ struct ServerSelf {
   std::string program;  ///< its version
   bool serves = true, trains = true;
   std::map<std::string, CellAtServer> cells = {};
-  std::int64_t followed = 0;  ///< so many changes of the record it has taken up
+  std::int64_t followed = 0;  ///< the number of changes of the record that it has taken up
 
   /// The description of this process.
   [[nodiscard]] static ServerSelf here(std::string program, bool serves, bool trains);
@@ -53,9 +52,9 @@ struct ServerInRecord {
   ServerSelf self;
   std::int64_t since = 0;     ///< when it began
   std::int64_t heard_at = 0;  ///< when it was heard of last
-  std::int64_t silent_s = 0;  ///< for so long it has not been heard of
-  bool is_gone = false;       ///< it was not heard of for three heartbeats
-  std::int64_t behind = 0;    ///< so many changes it has not taken up
+  std::int64_t silent_s = 0;  ///< the time since its last heartbeat
+  bool is_gone = false;       ///< three heartbeats are missing
+  std::int64_t behind = 0;    ///< the number of changes that it has not taken up
   std::vector<JobAtServer> works_on = {};
 };
 

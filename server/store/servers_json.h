@@ -8,10 +8,10 @@
 
 namespace trammel {
 
-/// The servers of a record for programs: of each its name, host, what it is and does, whether it is
-/// gone and since when, by how many changes it is behind, and what it serves.
+/// The servers of a record for programs: for each its name, host, role and work, whether it is gone
+/// and since when, the number of changes it is behind, and the models that it serves.
 [[nodiscard]] nlohmann::ordered_json servers_json(const std::vector<ServerInRecord>& servers);
-/// Where the record is, and whether it is reachable or since when not.
+/// The place of the record, and whether it is reachable or since when it is not.
 [[nodiscard]] nlohmann::ordered_json record_json(const RecordState& record);
 
 }  // namespace trammel

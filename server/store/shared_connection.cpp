@@ -18,7 +18,8 @@ constexpr std::size_t kMostWithHeartbeat = kMostConnections + 1;
 constexpr std::chrono::seconds kPatience{1};  // for a connection that others use, and for locks
 constexpr int kMostTries = 5;
 
-/// Longer each time, and not the same for all who were in each other's way.
+/// The pause grows with each try and has a random part, so that those who collided do not collide
+/// again.
 std::chrono::milliseconds pause_after(int tries) {
   thread_local std::mt19937 random(std::random_device{}());
   return std::chrono::milliseconds(std::uniform_int_distribution<int>(1, 20 * tries)(random));
@@ -105,13 +106,13 @@ void SharedConnection::give_back(Connected connected) {
   {
     const MutexLock guard(mutex_);
     if (lent_ > 0) --lent_;
-    if (connected && connected->is_lost()) {  // what killed one has killed all
+    if (connected && connected->is_lost()) {  // the failure of one connection affects all
       idle_.clear();
       listener_may_be_lost_ = true;  // a host that is frozen does not say so
     }
     if (connected && !connected->is_lost()) idle_.push_back(std::move(connected));
   }
-  given_back_.notify_all();  // not all who wait need as few to be in use
+  given_back_.notify_all();  // wakes all, since the waiting calls have different limits
 }
 
 Status SharedConnection::read(const Job& job) {
@@ -165,7 +166,7 @@ Status SharedConnection::run(const Job& job, Transaction::For what, std::size_t 
     if (gives_up && !(is_away && lost && tries == 1)) {
       Failure said = failure_of(*failed, path);
       if (!who.empty()) said.value().message += "; " + who;
-      // What cannot even be read is away for all, until try_again() sees that it is there.
+      // A store that cannot even be read is away for all threads, until try_again() sees it again.
       const bool unreadable = in_the_way && what == Transaction::For::kReading;
       if (is_away || unreadable) note_trouble(said.value(), lost || unreadable);
       return said;
@@ -175,7 +176,7 @@ Status SharedConnection::run(const Job& job, Transaction::For what, std::size_t 
 }
 
 bool SharedConnection::hears_of_change(const std::stop_token& stop, Clock::time_point until) {
-  constexpr std::chrono::milliseconds kSlice{200};  // until it is seen that it is to stop
+  constexpr std::chrono::milliseconds kSlice{200};  // longest delay until a stop is noticed
   try {
     if (listener_may_be_lost_.exchange(false)) listener_.reset();
     if (!listener_) {

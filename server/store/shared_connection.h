@@ -11,11 +11,11 @@
 
 namespace trammel {
 
-/// A database that several servers share. While it is away everything is refused at once; it is
-/// tried again by try_again() alone. What is served meanwhile are the copies.
+/// A database that several servers share. While it is away, every call is refused at once, and only
+/// try_again() connects again. Meanwhile the copies are served.
 class SharedConnection final : public StoreConnection {
  public:
-  /// A database that does not answer is away. Refuses what Store::open() refuses.
+  /// A database that does not answer counts as away. Refuses the same as Store::open().
   [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& url,
                                                                      const std::string& cache);
 
@@ -31,19 +31,19 @@ class SharedConnection final : public StoreConnection {
   [[nodiscard]] Status read(const Job& job) override;
   [[nodiscard]] Status write(const Job& job) override;
   [[nodiscard]] Status write_urgently(const Job& job) override;
-  /// In one transaction, again where others were in the way. `most`: connections that may be in use
-  /// with this one.
+  /// Runs the job in one transaction, and repeats it if others interfered. `most`: connections that
+  /// may be in use together with this one.
   [[nodiscard]] Status run(const Job& job, Transaction::For what, std::size_t most);
 
-  /// Checks that the database is the store that served here before, of a schema that this program
-  /// knows.
+  /// Checks that the database is the store that was served here before, with a schema that this
+  /// program knows.
   [[nodiscard]] Status admit(Database& database);
   [[nodiscard]] Result<Connected> connect();
   /// One that nobody uses, or a new one.
   [[nodiscard]] Result<Connected> borrow(std::size_t most);
   void give_back(Connected connected);
-  /// True if the word of a change came. Connects where needed: what changed before that is not
-  /// told.
+  /// True if a notification of a change came. Connects if needed; changes before that are not
+  /// reported.
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
 
   const std::string url_;  // may hold a password
@@ -52,7 +52,7 @@ class SharedConnection final : public StoreConnection {
   std::string identity_ TRAMMEL_GUARDED_BY(mutex_);  // of the store; empty: not known yet
   std::vector<Connected> idle_ TRAMMEL_GUARDED_BY(mutex_);
   std::size_t lent_ TRAMMEL_GUARDED_BY(mutex_) = 0;
-  Connected listener_;  // of the one thread that waits for changes
+  Connected listener_;  // for the one thread that waits for changes
   std::atomic<bool> listener_may_be_lost_ = false;
 };
 

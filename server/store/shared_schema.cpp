@@ -14,7 +14,7 @@ namespace {
 /// released stays as it is.
 struct Migration {
   std::string statements;
-  int works_from;  ///< the oldest schema whose programs work on this one, too
+  int works_from;  ///< the oldest schema whose programs also work on this one
 };
 
 std::vector<Migration> all_migrations() {
@@ -136,7 +136,7 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
     change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1,
            step.works_from);
   }
-  // New tables are for those who had the others.
+  // Roles with access to the old tables get access to the new ones.
   if (schema.version > 0 && schema.version < newest()) {
     for (const std::string& role : roles_let_in(database)) grant(database, role);
   }
@@ -150,8 +150,8 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
 
 namespace {
 
-/// So that a service can say what a change survives. Only some owners may give that; without it,
-/// the service says so.
+/// Lets a service see the standbys, so that it can say which failures a change survives. Only some
+/// owners can grant this; without the grant, the service says so.
 void let_see_standbys(Database& database, const std::string& role) {
   Rows quoted = prepare(database, "SELECT quote_ident($1)", role);
   if (!quoted.next()) return;

@@ -26,8 +26,8 @@ StoreState Store::state() const { return connection_->state(); }
 
 namespace {
 
-/// A clock that was set stands in the trail, between what was dated by it before and after. Where
-/// that cannot be written, the state says so all the same.
+/// Records a change of the clock in the trail, between the rows dated before and after it. If that
+/// cannot be written, the state still reports it.
 void look_at_clock(StoreConnection& connection) {
   const auto step = connection.note_clock();
   if (!step) return;

@@ -48,7 +48,7 @@ Status check_folder(const fs::path& path) {
   return {};
 }
 
-/// Checks the header of a file that exists and is not empty. Does not see what is still in the
+/// Checks the header of a file that exists and is not empty. Ignores changes that are only in the
 /// journal.
 Status check_header(const fs::path& path) {
   std::string header(kHeader, '\0');
@@ -98,8 +98,8 @@ Status check_file_is_here(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error) || fs::file_size(path, error) == 0) return {};
   try {
-    // Without its journal, of which a look at it would leave traces: a store is moved when nobody
-    // serves it.
+    // Opens without its journal, since a look at the journal would leave traces. A store is moved
+    // only while nobody serves it.
     SqliteDatabase file(immutable_uri(path.string()), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
                         kBusyTimeout);
     return check_not_moved(file, path.string());

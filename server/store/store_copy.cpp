@@ -60,7 +60,7 @@ Result<StoreContent> content_of(Database& database, const std::string& place) {
   return content;
 }
 
-/// A store that has only begun: what it holds is taken out.
+/// Removes the initial content of a new store.
 Status make_room(Database& database, const std::string& place) {
   for (const char* table : {"jobs", "batches", "models"}) {
     if (rows_of(database, table) == 0) continue;
@@ -124,7 +124,7 @@ Result<StoreContent> copy_to_file(Database& source, const std::string& from, con
     {
       SqliteDatabase target(part, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
       TRY(prepare_file(target, part));
-      // One file, and nothing beside it.
+      // The copy is one file, without a journal.
       target.execute("PRAGMA journal_mode = DELETE");
       content = fill(source, from, target, to, progress);
     }
@@ -150,8 +150,8 @@ Result<StoreContent> copy_to(Database& source, const std::string& from, const st
                              : copy_to_file(source, from, to, progress);
 }
 
-/// Nothing of it changes until the open transaction ends: who changes something is told who holds
-/// it locked.
+/// Locks the content until the open transaction ends; another process that tries to change it
+/// learns who holds the lock.
 void keep_as_it_is(Database& database) {
   if (database.is_shared()) database.execute("LOCK TABLE jobs, audit_end IN EXCLUSIVE MODE");
 }

@@ -13,7 +13,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kSqliteHeader =
-    100;  // bytes that an SQLite file begins with: sizes, counters, whose it is
+    100;  // length of the header of an SQLite file: sizes, counters, application id
 
 bool is_same_file(const struct stat& a, const struct stat& b) {
   return a.st_dev == b.st_dev && a.st_ino == b.st_ino;
@@ -24,7 +24,7 @@ bool is_untouched(const struct stat& a, const struct stat& b) {
          a.st_ctim.tv_nsec == b.st_ctim.tv_nsec;
 }
 
-/// For writing, so that a file system that copies what is written to has done so.
+/// Opens for writing: a copy-on-write file system then makes the copy now.
 int open_file(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
   return descriptor >= 0 ? descriptor : ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
@@ -47,7 +47,7 @@ Status StoreFile::hold() {
   if (::stat(path_.c_str(), &there) != 0 || !S_ISREG(there.st_mode)) return {};
   if (descriptor_ >= 0 && ::fstat(descriptor_, &held) == 0 && is_same_file(there, held)) return {};
   const int descriptor = open_file(path_);
-  if (descriptor < 0) return {};  // what opens it next says why
+  if (descriptor < 0) return {};  // the next program that opens it reports the reason
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     ::close(descriptor);
     return failure(ErrorCode::kConflict, "another process is writing it, by this name or another")

@@ -9,10 +9,11 @@
 
 namespace trammel {
 
-/// The file under a store's name, which other programs can remove, replace or write: which one it
-/// is, how this process left it, and that no other process writes it. Opens no file that SQLite has
-/// open, for closing that would give SQLite's locks up: it holds one descriptor from before SQLite
-/// opens the file until after SQLite has closed it.
+/// The file under a store's name, which other programs can remove, replace or write. It records the
+/// file's identity and the state in which this process left it, and makes sure that no other
+/// process writes it. It never opens a file that SQLite has open, since closing that would release
+/// SQLite's locks. Instead it holds one descriptor from before SQLite opens the file until after
+/// SQLite has closed it.
 class StoreFile {
  public:
   explicit StoreFile(std::string path) : path_(std::move(path)) {}
@@ -20,9 +21,8 @@ class StoreFile {
   StoreFile(StoreFile&& other) noexcept;
   StoreFile& operator=(StoreFile&&) = delete;
 
-  /// Locks the file that is at the path now, by whatever names it can be reached. Nothing to do
-  /// where there is none, or none that can be opened. Refuses (kConflict) one that another process
-  /// writes.
+  /// Locks the file that is now at the path, under all of its names. Does nothing if there is no
+  /// file, or none that can be opened. Refuses (kConflict) a file that another process writes.
   [[nodiscard]] Status hold();
   /// Remembers the state of the file that is held: SQLite has just written it, or has just opened
   /// it.
@@ -30,13 +30,13 @@ class StoreFile {
 
   enum class Finding {
     kAsLeft,   ///< the same, untouched
-    kTouched,  ///< the same, but another program wrote it, or only gave it another mode or name; or
-               ///< its journal is gone
+    kTouched,  ///< the same store, but another program wrote it, or only changed its mode or name;
+               ///< or its journal is missing
     kGone,     ///< nothing is at the path
     kAnother   ///< another one
   };
   [[nodiscard]] Finding look() const;
-  /// A command that brings back a file that is gone, for people; empty: there is none.
+  /// A command that restores a missing file, for people; empty: there is none.
   [[nodiscard]] std::string how_to_bring_back() const;
 
  private:

@@ -6,10 +6,10 @@
 
 namespace trammel {
 
-/// Makes the empty database at `url` a store, or brings one of an older schema up to today's. The
-/// role that does it owns the store; `role`, if any, is let in to use it: it may add to the audit
-/// trail, and neither change nor delete it. Refuses what is no URL, a database of another program
-/// and a newer schema.
+/// Makes the empty database at `url` a store, or upgrades an older schema. The calling role owns
+/// the store; `role`, if given, gets access: it may add to the audit trail, but neither change nor
+/// delete rows. Refuses a place that is not a URL, a database of another program and a newer
+/// schema.
 [[nodiscard]] Status init_store(const std::string& url, const std::string& role = "");
 
 }  // namespace trammel

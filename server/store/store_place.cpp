@@ -13,7 +13,7 @@ std::string value_of(const PostgresSettings& settings, std::string_view key) {
   return found == settings.end() ? std::string() : found->second;
 }
 
-/// A host with its port; empty: a socket, whose folder is no name.
+/// A host with its port; empty for a socket, since its folder is no name.
 std::string host_of(const PostgresSettings& settings) {
   std::string host = value_of(settings, "host");
   if (host.empty()) host = value_of(settings, "hostaddr");
@@ -33,7 +33,7 @@ std::string spoken_place(const std::string& place) {
   if (!is_postgres_url(place)) return place;
   const auto each = settings_of(place);
   if (!each) return "postgresql://...";
-  // A user with a '?' is what was meant to be an option.
+  // The part of a user name from a '?' on was meant as an option.
   std::string user = value_of(each->front(), "user");
   user.erase(std::min(user.find('?'), user.size()));
   std::string hosts;

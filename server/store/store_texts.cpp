@@ -48,7 +48,7 @@ Status check_batch(const StoredRow& batch, const std::string& place) {
       place);
 }
 
-/// By its own hashes and by that beside it.
+/// Checks a model by its own hashes and by the one in the store.
 Status check_model(const StoredRow& model, const std::string& place) {
   if (text(model, 3).empty()) return {};
   const std::string name =

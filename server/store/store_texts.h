@@ -9,8 +9,8 @@
 /// The parts of a store that can be verified by its own hashes.
 namespace trammel {
 
-/// Every batch is what was accepted, and every model what was stored. Those that were pruned have
-/// no text. Refuses (kInternal) the first that is not.
+/// Checks that every batch has the accepted text, and every model the stored one. Pruned ones have
+/// no text. Refuses (kInternal) the first that differs.
 [[nodiscard]] Status check_texts(Database& database, const std::string& place);
 
 struct TrailEnd {

@@ -121,8 +121,7 @@ std::string list_of(const StoreTable& table, std::size_t count, bool placeholder
   return list;
 }
 
-/// As list_of(); a column that a file of before lacks is as it will be once that is brought up to
-/// date.
+/// As list_of(); a column that an older file lacks has its value after an upgrade.
 std::string selected_columns(Database& database, const StoreTable& table) {
   if (database.is_shared()) return list_of(table, table.columns.size(), false);
   std::set<std::string> there;

@@ -20,15 +20,15 @@ struct StoreColumn {
 
 struct StoreTable {
   const char* name;
-  int keys;  ///< so many of the first columns tell its rows apart
+  int keys;  ///< the number of leading columns that identify a row
   std::vector<StoreColumn> columns;
 };
 
-/// The tables with which a store is moved, those that others refer to first. Not who is there and
-/// works on what, not how cells are described, and not the end of the audit trail.
+/// The tables that are moved with a store, referenced ones first. Excluded are the present servers
+/// and their claims, the descriptions of cells, and the end of the audit trail.
 [[nodiscard]] const std::vector<StoreTable>& store_tables();
 
-/// NULL, or what the column holds.
+/// NULL, or the value of the column.
 using StoredValue = std::variant<std::nullptr_t, std::int64_t, double, std::string>;
 using StoredRow = std::vector<StoredValue>;
 
@@ -37,8 +37,8 @@ void each_row(Database& database, const StoreTable& table,
               const std::function<bool(const StoredRow&)>& visit);
 void insert_row(Database& database, const StoreTable& table, const StoredRow& row);
 
-/// So many rows, and a SHA-256 that any change of any row changes. The order of the rows does not
-/// matter: databases sort texts otherwise.
+/// The number of rows, and a SHA-256 that any change of any row changes. The order of the rows does
+/// not matter, since databases sort texts differently.
 struct TableDigest {
   std::string table;
   std::int64_t rows = 0;

@@ -65,7 +65,7 @@ Result<WriterLock> WriterLock::take(const std::string& file) {
     }
     return held(file, descriptor, path);
   }
-  // Who holds it is for people; on a full disk it is not known.
+  // The holder's id is for people; on a full disk it is missing.
   const std::string pid = std::to_string(::getpid()) + "\n";
   if (writable)
     static_cast<void>(::ftruncate(descriptor, 0) == 0 &&

@@ -12,11 +12,11 @@ namespace trammel {
 /// file itself stays.
 class WriterLock {
  public:
-  /// Refuses (kConflict) when any process, this one included, has it already. Links and relative
-  /// paths to the same file share one lock.
+  /// Refuses (kConflict) if any process, including this one, already has the lock. Links and
+  /// relative paths to the same file share one lock.
   [[nodiscard]] static Result<WriterLock> take(const std::string& file);
-  /// Refuses (kConflict) when any process has it, or has the file itself by another name. Takes no
-  /// lock and leaves no file. Not for a process that has the file open.
+  /// Refuses (kConflict) if any process holds the lock, or the file itself by another name. Takes
+  /// no lock and leaves no file. Do not call it in a process that has the file open.
   [[nodiscard]] static Status look(const std::string& file);
   WriterLock(WriterLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   WriterLock& operator=(WriterLock&&) = delete;

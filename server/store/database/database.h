@@ -16,20 +16,21 @@
 
 #include "server/base/result.h"
 
-/// The services that the store asks of a database: one text of SQL for SQLite and for PostgreSQL,
-/// values bound to $1, $2..., rows, transactions, errors. Where the two differ it is said here and
-/// nowhere else: is_shared() and schema_text.h.
+/// The operations that the store needs from a database: one text of SQL for SQLite and for
+/// PostgreSQL, values bound to $1, $2..., rows, transactions, errors. Their differences are only
+/// here: in is_shared() and schema_text.h.
 namespace trammel {
 
-/// A statement that failed. The text holds no bound value. It does not leave this room:
-/// failure_of() makes an Error.
+/// A failed statement. The text has no bound values. It does not leave this room: failure_of()
+/// makes an Error.
 class DatabaseError : public std::runtime_error {
  public:
   enum class Kind {
-    kAway,     ///< the database cannot be reached, or cannot be written now; it is tried again
-    kAgain,    ///< others changed the same at the same time, or hold it locked: nothing was changed
-    kUnknown,  ///< the connection was lost during a commit: whether it was made is not known
-    kRefused,  ///< this database is not for us: no rights, a wrong password, no such database
+    kAway,   ///< the database cannot be reached, or cannot be written now; a later try may succeed
+    kAgain,  ///< others changed the same at the same time, or hold it locked: nothing was changed
+             ///< here
+    kUnknown,   ///< the connection was lost during a commit: the outcome is unknown
+    kRefused,   ///< no access: no rights, a wrong password, no such database
     kBadValue,  ///< a value that the database does not take
     kOther
   };
@@ -44,8 +45,8 @@ class DatabaseError : public std::runtime_error {
   std::string code_;
 };
 
-/// The failure for a caller. kBusy: nothing was changed, or that is not known, and it may work
-/// later.
+/// The failure for a caller. kBusy: either nothing was changed or the outcome is unknown, and a
+/// later try may succeed.
 [[nodiscard]] Failure failure_of(const DatabaseError& error, const std::string& place);
 
 /// A value that is bound. Texts are not copied: they live until the statement is made.
@@ -90,14 +91,14 @@ class Rows {
   }
   [[nodiscard]] bool truth(int column) const { return source_->integer64(column) != 0; }
   [[nodiscard]] double number(int column) const { return source_->number(column); }
-  /// Bytes as they are; a number as it is written.
+  /// Bytes unchanged; a number in its written form.
   [[nodiscard]] std::string text(int column) const { return source_->text(column); }
 
  private:
   std::unique_ptr<Source> source_;
 };
 
-/// One connection, for one thread at a time. All of it throws DatabaseError.
+/// One connection, for one thread at a time. All functions throw DatabaseError.
 class Database {
  public:
   using Values = std::span<const SqlValue>;
@@ -105,7 +106,7 @@ class Database {
 
   /// Statements without values, one after the other.
   virtual void execute(const std::string& statements) = 0;
-  /// A statement that has rows, also one that changes something and returns rows: that is made with
+  /// Runs a statement with rows. A statement that changes data and returns rows makes the change at
   /// the first next().
   [[nodiscard]] virtual Rows run(const char* sql, Values values) = 0;
   [[nodiscard]] Rows run(const char* sql, std::initializer_list<SqlValue> values) {
@@ -117,8 +118,8 @@ class Database {
     return change(sql, Values(values.begin(), values.size()));
   }
   [[nodiscard]] virtual bool has_table(const std::string& name) = 0;
-  /// Several processes write it at a time: what a decision rests on is locked row by row, and there
-  /// are roles.
+  /// True if several processes write it at a time. Then the rows behind a decision are locked one
+  /// by one, and there are roles.
   [[nodiscard]] virtual bool is_shared() const = 0;
   /// The open transaction is of a size of its own (a whole store is read or written): it may take
   /// its time, also between two statements.
@@ -129,8 +130,8 @@ class Database {
   void written_by(std::string server) { writer_ = std::move(server); }
   [[nodiscard]] const std::string& writer() const { return writer_; }
 
-  /// Work that the open transaction does as its last, just before it is committed: what everybody
-  /// waits for is locked for as short as can be, and always in the same order.
+  /// Work that the open transaction does last, just before it is committed. It locks rows for which
+  /// everybody waits, so the locks are short and always in the same order.
   void at_end(std::function<void(Database&)> work) { last_.push_back(std::move(work)); }
 
  private:
@@ -143,7 +144,7 @@ class Database {
   std::string writer_;
 };
 
-/// Everything until commit(), or nothing. What it reads is of one moment if it only reads.
+/// All changes until commit(), or none. A transaction that only reads sees one moment.
 class Transaction {
  public:
   enum class For { kReading, kWriting };
@@ -152,7 +153,7 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  /// Does what is to be done last; commit() does it where nobody has.
+  /// Does the postponed work; commit() calls it otherwise.
   void do_last();
   void commit();
 

@@ -27,7 +27,7 @@ bool is_address(const std::string& host) {
          ::inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1;
 }
 
-/// A program whose output is read, and that ends with this value.
+/// A child program: its output is read, and the destructor ends it.
 class Asked {
  public:
   explicit Asked(const std::string& host) {
@@ -54,7 +54,7 @@ class Asked {
   Asked& operator=(const Asked&) = delete;
 
   [[nodiscard]] bool is_there() const { return child_ >= 0; }
-  /// All that it says; empty: it has not ended by then.
+  /// Its complete output; empty: it did not end in time.
   [[nodiscard]] std::optional<std::string> answer(Clock::time_point deadline) const {
     std::string text;
     std::array<char, 4096> buffer{};

@@ -18,9 +18,9 @@ namespace {
 using std::chrono::milliseconds;
 using Kind = DatabaseError::Kind;
 
-constexpr milliseconds kPerHost{1000};  // to connect to one
+constexpr milliseconds kPerHost{1000};  // for one connection attempt
 constexpr milliseconds kAnswer{6000};   // longer than the server's own limit below
-constexpr milliseconds kCommit{10000};  // it may wait for a standby
+constexpr milliseconds kCommit{10000};  // which may include waiting for a standby
 constexpr milliseconds kLongWork{600000};
 constexpr int kOldestServer = 130000;  // gen_random_uuid()
 constexpr const char* kLimits =
@@ -174,8 +174,8 @@ std::string why_not_connected(PGconn* connection) {
   return "";
 }
 
-/// Certificates and keys do not mend themselves. Of a line that breaks during the handshake none of
-/// this is said.
+/// True for errors of certificates and keys, which do not go away by themselves. A line that breaks
+/// during the handshake gives none of these messages.
 bool is_of_certificates(const std::string& told) {
   constexpr std::array kWords = {"certificate", "private key", "alert unknown ca",
                                  "does not support SSL"};
@@ -183,9 +183,9 @@ bool is_of_certificates(const std::string& told) {
                      [&](const char* word) { return told.find(word) != std::string::npos; });
 }
 
-/// A server that answered and lets nobody in now will do so later; any other refusal is for good.
-/// Without a connection libpq has no SQLSTATE, so these are the server's own words,
-/// and libpq's.
+/// True for a refusal that is permanent. A server that answers but rejects all logins now may
+/// accept them later. Without a connection libpq has no SQLSTATE, so this compares the words of the
+/// server, and of libpq.
 bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
   const std::size_t at = told.find("FATAL:");
@@ -193,14 +193,14 @@ bool is_refused_for_good(PGconn* connection, const std::string& told) {
   const auto says = [answer = told.substr(at)](const char* text) {
     return answer.find(text) != std::string::npos;
   };
-  // The last four are a pooler's, whose server is away.
+  // The last four are messages of a pooler without its server.
   constexpr std::array kForNow = {
       "starting up", "not yet accepting", "shutting down",      "recovery",       "too many",
       "slots",       "server login",      "query_wait_timeout", "cannot connect", "connect failed"};
   return std::none_of(kForNow.begin(), kForNow.end(), says);
 }
 
-/// As the server told when it was connected; a pooler may leave that out.
+/// The server's state at connection time; a pooler may leave it out.
 bool is_read_only(PGconn* connection, Database& database) {
   const char* standby = ::PQparameterStatus(connection, "in_hot_standby");
   if (standby == nullptr) return integer_of(database, "SELECT pg_is_in_recovery()") != 0;
@@ -378,7 +378,7 @@ bool PostgresDatabase::has_table(const std::string& name) {
 void PostgresDatabase::begin(bool writes) {
   takes_long_ = false;
   static_cast<void>(
-      take_words());  // of a session that listened before a pooler gave it to this one
+      take_words());  // left from a session that listened before a pooler passed the connection on
   execute(fmt::format("BEGIN ISOLATION LEVEL {}; {}",
                       writes ? "READ COMMITTED READ WRITE" : "REPEATABLE READ READ ONLY", kLimits));
 }
@@ -392,12 +392,13 @@ void PostgresDatabase::commit() {
     if (std::strcmp(::PQcmdStatus(made.get()), "COMMIT") != 0)
       throw DatabaseError(Kind::kAgain, "the transaction was rolled back");
   } catch (const DatabaseError& error) {
-    // Nobody knows whether the server had made it by then, or goes on to make it.
+    // It is unknown whether the server made the commit, or will still make it.
     if (error.kind() == Kind::kAway)
       throw DatabaseError(Kind::kUnknown, error.what(), error.code());
     throw;
   }
-  // It is a success for the server, and on this host alone: the wait for the standby was ended.
+  // The server reports success, but the change is on this host alone, since the wait for the
+  // standby was cancelled.
   if (warned_)
     throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
 }

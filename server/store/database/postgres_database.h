@@ -10,16 +10,16 @@
 
 namespace trammel {
 
-/// A connection to PostgreSQL. Every call has a deadline of its own: a server that is stopped and
-/// not dead answers no other timeout. Statements are unnamed and settings are those of a
-/// transaction, so that a pooler may stand between.
+/// A connection to PostgreSQL. Every call has a deadline of its own, since no other timeout works
+/// for a server that is suspended but not dead. Statements are unnamed, and settings last one
+/// transaction, so a pooler may be in between.
 class PostgresDatabase final : public Database {
  public:
   enum class Session { kMayBeReadOnly, kWrites };
 
-  /// Asks the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if none
-  /// answers, (kRefused) if one lets nobody in, or if all that answer are read-only and `session`
-  /// is to write.
+  /// Tries the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if
+  /// none answers. Refuses (kRefused) if one rejects the login, or if all that answer are read-only
+  /// although `session` must write.
   [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url,
                                                                          Session session);
 
@@ -32,10 +32,11 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] bool is_shared() const override { return true; }
   void take_long() override;
 
-  /// True if a word came, within `limit`, of a channel that it listens to.
+  /// True if a notification of a subscribed channel arrived within `limit`.
   [[nodiscard]] bool hears(std::chrono::milliseconds limit);
 
-  /// The connection is lost, or an answer did not come in time: nothing more comes through it.
+  /// The connection is lost, or an answer did not come in time, so the connection is no longer
+  /// usable.
   [[nodiscard]] bool is_lost() const { return lost_; }
 
  private:
@@ -53,11 +54,11 @@ class PostgresDatabase final : public Database {
   void roll_back() noexcept override;
 
   [[nodiscard]] Answer ask(const char* sql, Values values);
-  /// The last answer to what was sent.
+  /// The last answer to the query.
   [[nodiscard]] Answer answer(Deadline deadline);
   [[nodiscard]] Deadline by_when(std::chrono::milliseconds limit) const;
   void wait(short events, Deadline deadline);
-  /// Forgets the words that came; whether there were any.
+  /// Drops the received messages; returns whether there were any.
   bool take_words();
   [[noreturn]] void lose(const std::string& why);
   void check_sent(int sent);
@@ -68,8 +69,8 @@ class PostgresDatabase final : public Database {
   bool takes_long_ = false;  // of the open transaction
 };
 
-/// Whoever else holds rows or tables of the store locked, longest first, for people; empty: nobody,
-/// or it is not known.
+/// The sessions that hold rows or tables of the store locked, longest first, for people. Empty if
+/// there are none, or if they are not known.
 enum class Locked { kRows, kForReaders };
 [[nodiscard]] std::string who_holds(Database& database, Locked what);
 

@@ -11,7 +11,7 @@
 namespace trammel {
 namespace {
 
-/// The settings of a connection where the URL says nothing else: a line that is dead is noticed.
+/// The default settings of a connection, which detect a dead line; the URL may override them.
 constexpr std::array<std::pair<const char*, const char*>, 6> kDefaults = {
     {{"application_name", "trammel"},
      {"client_encoding", "UTF8"},
@@ -30,7 +30,7 @@ std::vector<std::string> parts_of(const std::string& list) {
   return parts;
 }
 
-/// A password with an '@' or a '/' that is not written as %XX, of which libpq makes other parts.
+/// A password with an '@' or a '/' that is not written as %XX. libpq would split the URL there.
 bool holds_a_password(const std::string& key, const std::string& value) {
   if (key == "port") return value.find_first_not_of("0123456789,") != value.npos;
   return (key == "dbname" && value.find('@') != value.npos) ||
@@ -68,7 +68,8 @@ Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
       addresses = option->val;
     } else if (key == "port") {
       ports = option->val;
-    } else if (key != "target_session_attrs") {  // whether it can be written is looked at by us
+    } else if (key != "target_session_attrs") {  // this class tests itself whether a host can be
+                                                 // written
       common.emplace_back(key, option->val);
     }
   }

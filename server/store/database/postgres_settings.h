@@ -9,11 +9,11 @@
 
 namespace trammel {
 
-/// The settings that libpq is told for one host: its keywords and values.
+/// libpq's settings for one host: keywords and values.
 using PostgresSettings = std::vector<std::pair<std::string, std::string>>;
 
 /// One for each host that the URL names, in their order; the password stays where libpq looks for
-/// it. Refuses what libpq cannot read, without repeating it: it may hold a password.
+/// it. Refuses a URL that libpq cannot read, without quoting it, since it may hold a password.
 [[nodiscard]] Result<std::vector<PostgresSettings>> settings_of(const std::string& url);
 
 /// The settings for each address of the host, so that libpq looks up no name; sockets stay as they

@@ -46,8 +46,8 @@ class SqliteRows final : public Rows::Source {
   SQLite::Statement statement_;
 };
 
-/// SQLite numbers `$1` as it comes to it, and takes its name for what it is; so values go by their
-/// names.
+/// SQLite treats `$1` as a name and numbers it by its first occurrence, so values are bound by
+/// name.
 void bind(SQLite::Statement& statement, int number, const SqlValue& value) {
   const std::string name = "$" + std::to_string(number);
   if (const auto* integer = std::get_if<std::int64_t>(&value))

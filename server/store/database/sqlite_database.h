@@ -24,7 +24,7 @@ class SqliteDatabase final : public Database {
 
   /// Rows changed since it was opened.
   [[nodiscard]] int total_changes() const { return file_.getTotalChanges(); }
-  /// For what only SQLite has: copies page by page.
+  /// For operations that only SQLite has: copies page by page.
   [[nodiscard]] SQLite::Database& file() { return file_; }
 
  private:
@@ -36,7 +36,7 @@ class SqliteDatabase final : public Database {
   SQLite::Database file_;
 };
 
-/// The error of SQLite for whoever knows no SQLite.
+/// Translates an error of SQLite for callers that know no SQLite.
 [[nodiscard]] DatabaseError error_of(const SQLite::Exception& error);
 
 /// Runs `work`; an exception of SQLite becomes a DatabaseError.
