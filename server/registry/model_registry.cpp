@@ -15,7 +15,7 @@ constexpr std::size_t kRest = 256 * 1024;      // bytes of a model that do not g
 constexpr std::size_t kOfAPose = 2 * 1024;     // bytes of one pose besides the variances
 constexpr std::size_t kMostOfAnExpert = 1200;  // poses
 
-/// The most bytes that a bias at the flange takes: one matrix of all its numbers.
+/// The largest memory of a bias at the flange: one matrix of all its numbers.
 std::size_t bytes_at_flange(std::size_t poses) {
   const std::size_t numbers = std::min(3 * poses, static_cast<std::size_t>(kMostFlangeNumbers));
   return numbers * numbers * sizeof(double);
@@ -77,7 +77,7 @@ ServedModelPtr ModelRegistry::in_force(const std::string& cell) const {
       key = {cell, *version};
       if (auto model = held(key)) return model;
     }
-    // If it fails, nothing or something else is in force now.
+    // If it fails, the cell has another model in force by now, or none.
     if (const auto loaded = load(key); loaded && *loaded) return *loaded;
   }
 }
@@ -266,7 +266,7 @@ void ModelRegistry::load_for(const std::stop_token& stop, std::chrono::milliseco
         return key.has_value();
       });
     }
-    // The result stands in the registry; whoever asks finds it there.
+    // The result goes to the registry, where the requesters find it.
     if (key) static_cast<void>(load(*key));
   }
 }

@@ -18,10 +18,10 @@
 
 namespace trammel {
 
-/// Memory of what predicts, bytes, as far as it grows with the training poses.
+/// The memory of a model's predictor, bytes, as far as it grows with the training poses.
 [[nodiscard]] std::size_t bytes_of(const CompensatedModel& model);
 
-/// Where the models are that are not in memory. Called without a lock, for one version by one
+/// The source of models that are not in memory. Called without a lock, for one version by one
 /// thread at a time.
 struct ModelSource {
   /// The model to serve the cell with: where the one in force cannot be loaded, another version.
@@ -35,9 +35,9 @@ struct ModelSource {
 /// model or the previous one, never a mixture, and keeps it while it holds the pointer. Readers
 /// never wait for training.
 ///
-/// Models are loaded when they are first asked for, each by one thread however many ask, and leave
-/// the memory when it is over `budget` and they were not used for longest. Whoever may not wait
-/// asks ready().
+/// Loads models at their first request, each by one thread however many ask. A model leaves the
+/// memory when it is over `budget` and that model has been unused for longest. Callers that must
+/// not wait use ready().
 class ModelRegistry {
  public:
   static constexpr std::size_t kNoLimit = SIZE_MAX;
@@ -47,32 +47,32 @@ class ModelRegistry {
   [[nodiscard]] ServedModelPtr in_force(const std::string& cell) const;
   /// The version in force, loaded or not; 0: none.
   [[nodiscard]] int version_in_force(const std::string& cell) const;
-  /// Any version of the cell. Waits while it is loaded; refuses what its source refuses.
+  /// Any version of the cell. Waits while it is loaded; passes on refusals of its source.
   [[nodiscard]] Result<ServedModelPtr> version(const std::string& cell, int version) const;
   /// The model that in_force() gives, without waiting.
   struct Ready {
     ServedModelPtr model;
-    bool comes = false;  ///< it is not in memory, and will be
+    bool comes = false;  ///< it is not in memory, and will be loaded
   };
   [[nodiscard]] Ready ready(const std::string& cell) const;
 
   /// Replaces the model of its cell. Readers that hold the previous one keep it.
   void publish(ServedModelPtr model);
-  /// publish() of a model that is loaded when it is asked for.
+  /// As publish(), for a model that the first request loads.
   void announce(const std::string& cell, int version);
-  /// A model that whoever holds it last does not free itself.
+  /// A model that its last holder does not free itself.
   [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const {
     return reclaimer_->watch(std::move(model));
   }
   /// The models in force that are in memory, ordered by cell name.
   [[nodiscard]] std::vector<ServedModelPtr> all() const;
-  /// Where the model in force of a cell is.
+  /// The location of a cell's model in force.
   struct Place {
     int version = 0;
     enum class Where {
       kInMemory,
-      kComes,  ///< it was never loaded, and will be without being asked for
-      kOnDisk  ///< it is loaded when it is asked for
+      kComes,  ///< it was never loaded, and is loaded without a request
+      kOnDisk  ///< it is loaded at its first request
     } where = Where::kOnDisk;
   };
   /// The place of every cell that has a model in force.
@@ -81,11 +81,12 @@ class ModelRegistry {
   [[nodiscard]] std::size_t cells_served() const;
   [[nodiscard]] std::size_t bytes() const;
 
-  /// Set before it is used by others; the last one set is emptied before what it calls goes.
+  /// Call it before others use the registry. The last source is emptied before the things that it
+  /// calls are destroyed.
   void set_source(ModelSource source);
-  /// Loads what ready() was asked for; where nothing is, models in force that were never loaded, as
-  /// long as there is room. Returns after `tick` at the latest, or when `stop` is requested. While
-  /// one thread calls this again and again, ready() does not wait.
+  /// Loads the models that ready() asked for. If there are none, it loads models in force that were
+  /// never loaded, while there is room. Returns after `tick` at the latest, or when `stop` is
+  /// requested. While one thread calls this repeatedly, ready() does not wait.
   void load_for(const std::stop_token& stop, std::chrono::milliseconds tick);
   /// No thread calls load_for() any longer.
   void stop_loading();
@@ -101,17 +102,18 @@ class ModelRegistry {
   };
   /// The model if it is in memory; counts as a use.
   [[nodiscard]] ServedModelPtr held(const Key& key) const TRAMMEL_REQUIRES(mutex_);
-  /// Puts it into memory. What has to leave goes to `left`, to be freed without the lock.
+  /// Puts the model into memory. Models that must leave go to `left`, to be freed outside the lock.
   void hold(ServedModelPtr model, std::vector<ServedModelPtr>* left) const TRAMMEL_REQUIRES(mutex_);
   /// The version of the model in force of the cell; null: none.
   [[nodiscard]] const int* place_of(const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
-  /// Loads one, once it is sure that nobody else does; empty: somebody did meanwhile.
+  /// Loads a model after making sure that no other thread does. Empty: another thread has loaded it
+  /// meanwhile.
   [[nodiscard]] Result<ServedModelPtr> load(const Key& key) const TRAMMEL_EXCLUDES(mutex_);
   [[nodiscard]] Result<ServedModelPtr> from_source(const Key& key, bool in_force) const;
   void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const
       TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
-  /// True if models are loaded that nobody has asked for.
+  /// True if there is room for models that nobody has requested yet.
   [[nodiscard]] bool has_room() const TRAMMEL_REQUIRES(mutex_) {
     return bytes_ < budget_ - budget_ / 8;
   }
@@ -119,14 +121,15 @@ class ModelRegistry {
   const std::size_t budget_;
   const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ =
       std::make_shared<Reclaimer<ServedModel>>();
-  // Everything is a memory of what the source has: asking changes it.
+  // The members are a cache of the source, so const functions change them.
   mutable Mutex mutex_;
   mutable Condition changed_;
   ModelSource source_ TRAMMEL_GUARDED_BY(mutex_);
   mutable std::map<std::string, int> in_force_ TRAMMEL_GUARDED_BY(mutex_);
   mutable std::map<Key, Held> held_ TRAMMEL_GUARDED_BY(mutex_);
   mutable std::set<Key> loading_ TRAMMEL_GUARDED_BY(mutex_);
-  mutable std::deque<Key> wanted_ TRAMMEL_GUARDED_BY(mutex_);  // asked for by those who do not wait
+  mutable std::deque<Key> wanted_ TRAMMEL_GUARDED_BY(mutex_);  // requests of callers that do not
+                                                               // wait
   mutable std::set<std::string> never_loaded_
       TRAMMEL_GUARDED_BY(mutex_);  // cells whose model was only announced
   mutable std::size_t bytes_ TRAMMEL_GUARDED_BY(mutex_) = 0;

@@ -9,8 +9,8 @@
 
 namespace trammel {
 
-/// Frees values in a thread of its own: whoever drops the last pointer to a large value must not
-/// pay for it. Without that thread the last one frees it. Thread-safe.
+/// Frees values in a thread of its own, so that the owner of the last pointer to a large value does
+/// not pay for freeing it. Without that thread the last owner frees it. Thread-safe.
 template <typename Value>
 class Reclaimer : public std::enable_shared_from_this<Reclaimer<Value>> {
  public:
@@ -20,7 +20,7 @@ class Reclaimer : public std::enable_shared_from_this<Reclaimer<Value>> {
               self->bury(std::unique_ptr<const Value>(last));
             }};
   }
-  /// Frees what is left until `stop` is requested.
+  /// Frees the released values until `stop` is requested.
   void run(const std::stop_token& stop) {
     {
       const MutexLock lock(mutex_);
