@@ -7,9 +7,9 @@
 
 namespace trammel {
 
-/// `"since"` of a diagnosis: the `model` before, the error beyond frames before and now, what
-/// became of each line that was to be put right (`lines`: before, moved, now with U, `helped`),
-/// what moved line by line (`moved`, a budget), and the same in words (`sentences`).
+/// `"since"` of a diagnosis: the `model` before, the error beyond frames before and now, the
+/// outcome of each line to be repaired (`lines`: before, moved, now with U, `helped`), the changes
+/// line by line (`moved`, a budget), and the same in words (`sentences`).
 [[nodiscard]] nlohmann::ordered_json after_repair_json(const AfterRepair& repair);
 
 /// The outcome of a repair as a section of a page.

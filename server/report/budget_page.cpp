@@ -33,8 +33,8 @@ std::string in_percent(double share) {
 
 double share_of(const BudgetLine& line) { return std::isfinite(line.share) ? line.share : 0; }
 
-/// The steps from the drawing (nothing explained) to the whole error, each where the one before it
-/// ended.
+/// The steps from the drawing (nothing explained) to the whole error, each starting at the end of
+/// the previous one.
 class Waterfall {
  public:
   explicit Waterfall(const std::vector<BudgetLine>& lines) {
@@ -79,7 +79,7 @@ HtmlRow row_of(const BudgetLine& line, Waterfall& waterfall,
           line.action.empty() ? "" : "stands_out"};
 }
 
-/// Lines whose bars are not seen, in one row, so that the steps lead to the whole.
+/// One row for all lines whose bars are too small to see, so that the bars add up to the whole.
 HtmlRow row_of_small(int count, double share, Waterfall& waterfall) {
   return {{fmt::format("{} lines of less than {:g} % each", count, 100 * kWorthARow), "",
            waterfall.step(share), in_percent(share), "", "", "", ""}};

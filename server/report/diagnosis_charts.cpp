@@ -12,11 +12,10 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr Eigen::Index kMostPoints =
-    500;                             // of one periodogram: more than a screen has pixels for it
+constexpr Eigen::Index kMostPoints = 500;  // of one periodogram: more than the pixels of a screen
 constexpr double kLeastLever = 0.2;  // of a joint's longest: shorter ones turn noise into angles
-constexpr double kScaleQuantile = 0.98;  // of the errors before: the colour scale's end, so that
-                                         // one outlier does not make all the others look alike
+constexpr double kScaleQuantile = 0.98;  // of the errors before: the end of the colour scale, so
+                                         // that one outlier does not make all others look alike
 
 constexpr int kPhaseStep = 5;  // degrees
 
@@ -49,7 +48,8 @@ class Arm {
   [[nodiscard]] Vector3 lever_B(Eigen::Index pose, int joint) const {
     return cell_.robot.gear_jacobian(context(pose).q, p_FT(pose)).col(joint).head<3>();
   }
-  /// The poses at which the joint moves the tool far enough, and by how much in which direction.
+  /// The poses at which the joint moves the tool far enough, with size and direction of that
+  /// motion.
   struct Levers {
     std::vector<Eigen::Index> poses;
     std::vector<Vector3> unit_B;
@@ -158,8 +158,8 @@ ordered_json cycle_of(const Wave& wave) {
   return {{"phase_deg", phase}, {"urad", urad}};
 }
 
-/// The joint's error against the phase of its gear's oscillation: with that alone, all that is left
-/// besides with it, and without it.
+/// The joint's error against the phase of its gear's oscillation: without it, with it alone, and
+/// with all other findings.
 ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, const Wave& wave) {
   ordered_json phase = ordered_json::array(), alone = ordered_json::array(),
                after = ordered_json::array();
@@ -244,7 +244,7 @@ ordered_json by_direction(const Diagnosis& diagnosis, const Arm& arm, const Cell
   return joints;
 }
 
-/// Residual away from the robot's base against temperature: what growing links do.
+/// Residual away from the robot's base against temperature: the effect of growing links.
 ordered_json by_temperature(const Diagnosis& diagnosis, const Arm& arm) {
   ordered_json at = ordered_json::array(), before = ordered_json::array(),
                after = ordered_json::array();

@@ -6,8 +6,8 @@
 
 namespace trammel {
 
-/// The data from which the charts of a diagnosis page are drawn, in the units they are read in: um,
-/// deg, s, degrees Celsius. A key is there only if there is something to draw.
+/// The data for the charts of a diagnosis page, in people's units: um, deg, s, degrees Celsius. A
+/// key exists only if there is something to draw.
 [[nodiscard]] nlohmann::ordered_json diagnosis_charts(const Diagnosis& diagnosis, const Cell& cell);
 
 }  // namespace trammel

@@ -8,8 +8,8 @@
 namespace trammel {
 
 /// A diagnosis for programs, with the keys of DESIGN section 4 and more. mm; joints of `next_poses`
-/// in degrees (rails mm), joints counted from 1; `joint` is null where a cause concerns the whole
-/// arm. `notes`: what a user of the cell should know.
+/// in degrees (rails mm), joints counted from 1; `joint` is null for a cause of the whole arm.
+/// `notes`: for users of the cell.
 [[nodiscard]] nlohmann::ordered_json diagnosis_json(const Diagnosis& diagnosis,
                                                     const std::vector<Note>& notes = {});
 

@@ -122,7 +122,7 @@ HtmlRow finding_row(const Finding& finding) {
           .kind = "found"};
 }
 
-/// The row that says what to do about it, below its figures.
+/// The row with the action, below the figures.
 HtmlRow action_row(const Finding& finding) {
   return {.cells = {"", "", html_text(as_sentence(finding.action) + beginning_of(finding))},
           .kind = "action",
@@ -183,7 +183,7 @@ std::string figures_table(const Diagnosis& diagnosis) {
 std::string unexplained_text(const Diagnosis& diagnosis) {
   const Unexplained& left = diagnosis.unexplained;
   if (!left.present) return "";
-  // A p-value is of what was tested: where nothing was found to depend on, it is that of the noise.
+  // The p-value of the test: without a dependence it is that of the noise.
   const std::string p = fmt::format(" (p{})", p_value_after_p(left.p_value));
   const bool depends = !left.depends_on.empty();
   const std::string changes = html_text(what_it_changes_with(left.depends_on)) + (depends ? p : "");
@@ -256,7 +256,7 @@ std::string limits_list(const std::vector<std::string>& limits) {
   return html + "</ul>\n";
 }
 
-/// One row for all joints of which the same is to be said.
+/// One row for all joints with the same need.
 struct Need {
   const Unseen* one = nullptr;
   std::string joints;

@@ -6,10 +6,10 @@
 
 namespace trammel {
 
-/// A diagnosis as a page that people look at: the verdict, every finding with its evidence, what
-/// could not be told and where to measure next. HTML with everything inside; opens without a
-/// network. `cell` is the one diagnosed: its name, its kinds of joints, and how far each joint's
-/// axis is from the tool. `after_repair`: a section that stands before the budget.
+/// A diagnosis as a page for people: the verdict, every finding with its evidence, the open
+/// questions, and the next poses to measure. HTML with everything inside; opens without a network.
+/// `cell` is the diagnosed one: its name, its kinds of joints, and the distance of each joint's
+/// axis from the tool. `after_repair`: a section before the budget.
 [[nodiscard]] std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell,
                                          const std::string& after_repair = "");
 

@@ -29,7 +29,7 @@ ordered_json unlike_json(const Unlike& one) {
           {"sentence", to_string(one)}};
 }
 
-/// The comparison with its twins; null where they are too few.
+/// The comparison with its twins; null if they are too few.
 ordered_json unlike_of(const std::vector<FleetEntry>& cells, std::size_t which) {
   const ModelParts& parts = cells[which].model->parts();
   const auto prior = learn_fleet_prior(parts.physics.cell->robot, members_but(cells, which));
@@ -39,7 +39,7 @@ ordered_json unlike_of(const std::vector<FleetEntry>& cells, std::size_t which) 
   return all;
 }
 
-constexpr std::size_t kShownLines = 6;  // for people, of those that differ
+constexpr std::size_t kShownLines = 6;  // lines that differ, as shown to people
 
 /// The budgets of its sisters that are of one drawing; a sister without one is left out.
 std::vector<const ErrorBudget*> sisters_of(const std::vector<FleetEntry>& cells,
@@ -55,7 +55,7 @@ std::vector<const ErrorBudget*> sisters_of(const std::vector<FleetEntry>& cells,
   return sisters;
 }
 
-/// In which line it differs from its sisters; null where it has no budget or they are too few.
+/// The lines in which it differs from its sisters; null if it has no budget or they are too few.
 ordered_json lines_of(const std::vector<FleetEntry>& cells, std::size_t which) {
   const auto& budget = cells[which].model->parts().budget;
   const std::vector<const ErrorBudget*> sisters = sisters_of(cells, which);

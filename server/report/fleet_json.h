@@ -9,18 +9,18 @@
 
 namespace trammel {
 
-/// A cell as it is listed among others.
+/// A cell in a list of several cells.
 struct FleetEntry {
   std::string cell;
   int version = 0;                        ///< in force; 0: a file
   std::optional<CompensatedModel> model;  ///< empty: none in force, or not in memory
-  std::string last_check = {};            ///< as health_json() has it; empty: none
+  std::string last_check = {};            ///< in the form of health_json(); empty: none
 };
 
-/// Cells, what was last said of their health, and what is unusual about each among robots of its
-/// type; what was learned of each type.
+/// Cells with their last health verdicts and their unusual values among robots of their type, and
+/// the learned values of each type.
 [[nodiscard]] nlohmann::ordered_json fleet_json(const std::vector<FleetEntry>& cells);
-/// For people, of what fleet_json() made.
+/// The output of fleet_json() for people.
 [[nodiscard]] std::string fleet_text(const nlohmann::ordered_json& fleet);
 
 }  // namespace trammel

@@ -42,7 +42,7 @@ std::string twins_of(const ordered_json& cell) {
   return "unlike its twins:<ul>" + list + "</ul>";
 }
 
-/// In which lines of its error budget it differs from robots of its type.
+/// The lines of its error budget that differ from those of robots of its type.
 std::string lines_of(const ordered_json& cell) {
   const ordered_json& lines = member(cell, "lines_among_sisters");
   if (!lines.is_array()) return "–";

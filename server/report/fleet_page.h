@@ -6,9 +6,9 @@
 
 namespace trammel {
 
-/// The result of fleet_json() as a page: each cell's model, health, next check, and what its twins
-/// say of it. `fleet` may come from outside: what it lacks is left out. `at`: of when it is, Unix
-/// time, s.
+/// The result of fleet_json() as a page: each cell's model, health, next check, and comparison with
+/// its twins. `fleet` may come from outside: missing members are left out. `at`: the time of the
+/// page, Unix time, s.
 [[nodiscard]] std::string fleet_page(const nlohmann::ordered_json& fleet, std::int64_t at);
 
 }  // namespace trammel

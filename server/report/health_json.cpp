@@ -20,8 +20,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kShownSizes = 5;    // for people: those that are hardest to see
-constexpr std::size_t kShownChanges = 6;  // for people: of what changed
+constexpr std::size_t kShownSizes = 5;    // for people: the sizes that are hardest to see
+constexpr std::size_t kShownChanges = 6;  // for people: of the changes
 
 /// The measurements of a check and the model that they were held against.
 struct CheckedWith {
@@ -60,8 +60,8 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
 
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
-/// A line of a budget as far as a check knows it: how often it is usual and what would be left
-/// without it is not known.
+/// A line of a budget with the values that a check knows. It lacks the ratio to the usual size and
+/// the error that would remain.
 BudgetLine change_line(std::string line, LineKind kind, int joint, std::string name) {
   BudgetLine change;
   change.line = std::move(line);
@@ -74,7 +74,8 @@ BudgetLine change_line(std::string line, LineKind kind, int joint, std::string n
   return change;
 }
 
-/// `zero:4`, `length:6`, `twist:2`, `compliance:3`; else the cause, and its joint where it has one.
+/// `zero:4`, `length:6`, `twist:2`, `compliance:3`; otherwise the cause, and its joint if it has
+/// one.
 BudgetLine line_of(const SingleCause& cause) {
   const CauseRecord& record = *cause.record;
   const std::string name = in_words(cause);
@@ -101,10 +102,11 @@ BudgetLine line_of(const SingleCause& cause) {
   return line;
 }
 
-/// The lines of a check, with the m rms that they are put in order by.
+/// The lines of a check, each with its size (m rms) for the order.
 using SizedLines = std::vector<std::pair<double, BudgetLine>>;
 
-/// A line for each zero. What each of several does alone is known at the poses of the check.
+/// Adds a line for each zero. With several zeros, the effect of each alone is known at the poses of
+/// the check.
 void add_zero_lines(const SeenChange& change, const CheckedWith* with, SizedLines& lines) {
   for (const LostZero& zero : change.zeros) {
     const std::string n = std::to_string(zero.joint + 1);
@@ -132,8 +134,8 @@ void add_line(const SeenChange& change, SizedLines& lines) {
   lines.emplace_back(change.effect_rms, std::move(line));
 }
 
-/// The change since the model was made, in the shape of a budget: from what is off now to what a
-/// healthy robot leaves. A check finds the base anew, so that all of it is beyond the base's frame.
+/// The change since the model was made, in the form of a budget: from the present error to that of
+/// a healthy robot. A check locates the base anew, so all of it is beyond the base's frame.
 ordered_json change_budget_json(const HealthCheck& check, const CheckedWith* with) {
   SizedLines sized;
   for (const SeenChange& change : check.changed) {

@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// Where a check's batch begins: what changed, changed before it.
+/// The start of a check's batch: changes happened before it.
 struct CheckedSince {
   std::string session_id, pose_id;
 };
@@ -16,13 +16,14 @@ struct CheckedSince {
 /// A health check for programs, as the contract spells it; lengths in mm, joints from 1.
 [[nodiscard]] nlohmann::ordered_json health_json(const HealthCheck& check,
                                                  const CheckedSince& since);
-/// health_json() of a check of `batch`, with the `notes` of the model that it rests on: what every
-/// door tells.
+/// health_json() of a check of `batch`, with the `notes` of the model behind it. The command line,
+/// the library, Python and the service all return this.
 [[nodiscard]] nlohmann::ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch,
                                                 const CompensatedModel& model);
 /// The evidence about the arm's drift in a check that health_json() wrote; empty: none.
 [[nodiscard]] std::optional<DriftSeen> drift_of(const std::string& check);
-/// For people: the verdict, what changed, what would have been seen, when the next check is due.
+/// For people: the verdict, the changes, the smallest visible changes, and the date of the next
+/// check.
 [[nodiscard]] std::string health_text(const HealthCheck& check);
 
 }  // namespace trammel

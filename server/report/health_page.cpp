@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kShownSizes = 8;  // those that are hardest to see
+constexpr std::size_t kShownSizes = 8;  // the sizes that are hardest to see
 
 std::string text_in(const json& object, const char* key) {
   return object.is_object() && object.contains(key) && object[key].is_string()
@@ -40,7 +40,7 @@ std::string cause_of(const json& one) {
   return in_words(spelling) + (parameter.empty() ? "" : ", " + parameter);
 }
 
-/// `link geometry, d6`; of zeros which, and by how much.
+/// `link geometry, d6`; for zeros, the joints and the sizes.
 std::string change_of(const json& one) {
   std::vector<std::string> zeros;
   for (const json& zero : list_in(one, "zeros")) {

@@ -8,11 +8,11 @@
 namespace trammel {
 
 /// The findings of a health check (report/README.md), for people, as sections of a page.
-/// `findings`: its JSON as it is stored, perhaps by an earlier version of the program: what it does
-/// not have is left out. `links`: HTML below the verdict.
+/// `findings`: the stored JSON, perhaps from an earlier version of the program; missing members are
+/// left out. `links`: HTML below the verdict.
 [[nodiscard]] std::string health_sections(const std::string& findings, const std::string& links);
 
-/// The facts for a health check's page that stands for itself.
+/// The facts for a page that shows one health check alone.
 struct HealthPageOf {
   std::string cell, batch;
   std::int64_t at = 0;  ///< when it was checked, Unix time, s

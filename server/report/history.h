@@ -12,13 +12,13 @@
 
 namespace trammel {
 
-/// A parameter as a version has it, in the unit it is read in.
+/// A parameter in one version, in people's units.
 struct ParameterOnRecord {
   std::string cause;  ///< for people: `joint zeros and link lengths`
   std::string name, unit;
   double value = 0, u95 = 0;  ///< U(k = 2)
   bool identified = false;    ///< by the measurements, and not by the prior alone
-  bool of_set_up = false;     ///< where the instrument stood, which says nothing of the arm
+  bool of_set_up = false;     ///< the place of the instrument, which does not describe the arm
 };
 
 /// A version of a cell's model.
@@ -29,9 +29,9 @@ struct VersionOnRecord {
   int poses = 0;
   std::optional<double> validation_rms = {};  ///< m
   bool in_force = false;
-  std::vector<ParameterOnRecord> parameters = {};  ///< none where its file is not there any more
-  std::vector<Note> notes = {};  ///< what it knows to have changed, and what its user should know
-  CellPapers papers = {};        ///< of its cell file
+  std::vector<ParameterOnRecord> parameters = {};  ///< empty if its file no longer exists
+  std::vector<Note> notes = {};                    ///< the known changes, and notes for its user
+  CellPapers papers = {};                          ///< of its cell file
 };
 /// Its parameters, notes and papers, from the model itself.
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
@@ -40,10 +40,10 @@ void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
 struct TrainingOnRecord {
   std::int64_t at = 0;  ///< Unix time, s, of its end
   std::string batches, verdict, why;
-  std::optional<double> before, after;  ///< m rms, of what was in force and of the new model
+  std::optional<double> before, after;  ///< m rms, of the model in force and of the new one
 };
 
-/// Something that somebody did, or that the service did by itself.
+/// An action of a person, or of the service by itself.
 struct EventOnRecord {
   std::int64_t at = 0;  ///< Unix time, s
   std::string what, subject, why, who;
@@ -55,12 +55,12 @@ struct CellHistory {
   std::vector<VersionOnRecord> versions = {};
   std::vector<TrainingOnRecord> trainings = {};
   std::vector<EventOnRecord> events = {};
-  bool of_files = false;  ///< model files, which do not say what is in force
+  bool of_files = false;  ///< the versions are model files, which do not state what is in force
 };
 
-/// A parameter of the arm that moved by more than both uncertainties between two versions of which
-/// the later one was put on record next. Versions share measurements, so that the difference is
-/// better known than this: what is told has moved.
+/// A parameter of the arm that moved, between two consecutive versions on record, by more than both
+/// uncertainties. Versions share measurements, so the difference is better known than these
+/// uncertainties suggest: a listed parameter has really moved.
 struct Moved {
   std::string cause, parameter, unit;
   int from_version = 0, to_version = 0;

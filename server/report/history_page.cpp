@@ -17,10 +17,10 @@ namespace trammel {
 
 namespace {
 
-/// Where things stand in a drawing, px.
+/// The layout of a drawing, px.
 struct Frame {
   double width = 0, height = 0, margin = 0;
-  double low = 0, high = 0;  // of what is drawn
+  double low = 0, high = 0;  // of the drawn values
   std::size_t places = 1;    // from left to right
   [[nodiscard]] double x(std::size_t place) const {
     const double step =
@@ -79,7 +79,7 @@ struct Tracked {
   Track track;
 };
 
-/// In the order of the newest version, then those that only older ones have.
+/// In the order of the newest version, then parameters that only older versions have.
 std::vector<Tracked> tracked(const CellHistory& history) {
   std::vector<Tracked> all;
   for (auto version = history.versions.rbegin(); version != history.versions.rend(); ++version) {
@@ -108,8 +108,8 @@ std::string value_in(const Track& track, int version, const Reading& reading) {
   return fmt::format("{} ± {}", value.value, value.expanded);
 }
 
-/// The version in force; of files, or where that has no parameters on record, the newest that has;
-/// nullptr: none has.
+/// The version in force. For files, or if that version has no parameters on record, the newest with
+/// parameters; nullptr: none.
 const VersionOnRecord* shown_version(const CellHistory& history) {
   const VersionOnRecord* newest = nullptr;
   for (const VersionOnRecord& one : history.versions) {

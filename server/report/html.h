@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// Text that shows as it stands, whatever it holds; what controls a terminal is spelled out
+/// Text that is shown literally, whatever it holds; terminal control characters are spelled out
 /// (plain_text.h).
 [[nodiscard]] std::string html_text(std::string_view text);
 
@@ -21,9 +21,9 @@ struct HtmlRow {
 };
 [[nodiscard]] std::string html_rows(const std::vector<HtmlRow>& rows);
 
-/// With `stacks` in its kind each cell stands on a line of its own on narrow screens, behind the
-/// name of its column; with `flows` they follow each other like words. A table of another kind
-/// stays one.
+/// A table. With `stacks` in its kind, each cell has a line of its own on narrow screens, behind
+/// the name of its column; with `flows` the cells follow each other like words. Other kinds stay
+/// tables.
 struct HtmlTable {
   std::string kind = {};          ///< classes for the style sheet; empty: none
   std::vector<std::string> head;  ///< empty: no row of names
@@ -35,7 +35,7 @@ struct HtmlTable {
 /// A link; `text` is shown as it stands.
 [[nodiscard]] std::string html_link(std::string_view address, std::string_view text);
 
-/// JSON inside a script of a page: no text in it can end the script.
+/// JSON for a script in a page: no text in it can end the script.
 [[nodiscard]] std::string script_json(const nlohmann::ordered_json& data);
 
 /// `page` with every `{{name}}` replaced, once. A name without content is a bug.

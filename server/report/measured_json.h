@@ -8,9 +8,8 @@
 
 namespace trammel {
 
-/// `"measured"` of every result that rests on a model: what its training poses were, as far as a
-/// promise is about it. Of a model that has it not on record the sentence says so, and nothing else
-/// stands beside it.
+/// `"measured"` of every result that rests on a model: its training poses, as far as they limit its
+/// stated accuracy. For a model without such a record, it has only a sentence that says so.
 [[nodiscard]] inline nlohmann::ordered_json measured_json(const CompensatedModel& model) {
   const std::optional<WhatWasMeasured>& measured = model.parts().measured;
   nlohmann::ordered_json json = {{"sentence", in_words(measured, model.cell())}};

@@ -31,7 +31,7 @@ using nlohmann::ordered_json;
 /// The models and batches that the page compares the model with.
 struct Compared {
   Evaluation evaluation;
-  std::string text;  ///< of which poses
+  std::string text;  ///< the poses that it is about
 };
 
 /// Rows that were compared, with a position or without.
@@ -64,7 +64,7 @@ std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evalu
            {"compensated", &evaluation.compensated}}};
 }
 
-/// A gain that is none is not shown as one.
+/// A gain that is doubtful is not shown as a gain.
 bool is_doubtful(const Evaluation& evaluation) { return doubt_of_bias(evaluation).has_value(); }
 
 /// The tiles of distances and touches: their values, where no position was measured.
@@ -235,7 +235,7 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
          html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
-/// The causes that the measurements chose, where they did.
+/// The section on causes that the measurements chose; empty if none were chosen.
 std::string chosen_causes(const CompensatedModel::Parts& parts) {
   if (!parts.cause_choice) return "";
   std::vector<HtmlRow> rows;
@@ -263,7 +263,7 @@ std::string chosen_causes(const CompensatedModel::Parts& parts) {
          others;
 }
 
-/// The data that the charts are drawn from.
+/// The data of the charts.
 ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluation,
                         const ShownPoses& shown, const std::optional<LearningCurve>& curve) {
   ordered_json data;
@@ -296,7 +296,7 @@ std::string bias_note(const CompensatedModel::Parts& parts) {
   return " No bias is learned, so calibrated and compensated are the same: " + why + ".";
 }
 
-/// Explains the three levels, and why their errors are larger than what is promised.
+/// Explains the three levels, and why their errors exceed the stated accuracy.
 std::string reading_note(const CompensatedModel& model) {
   return fmt::format(
       " Nominal: the robot as drawn; calibrated: with the parameters that were identified; "

@@ -35,7 +35,8 @@ std::optional<double> nominal_of_link(const Chain& robot, const std::string& nam
   return symbol == "beta" ? std::optional(link.beta) : std::nullopt;
 }
 
-/// The value of the drawing or the cell file where the parameter is an offset from it; SI.
+/// The value in the drawing or the cell file from which the parameter is an offset, if there is
+/// one; SI.
 std::optional<double> stated(const CompensatedModel& model, const ErrorSource& source,
                              const std::string& name) {
   const causes::ActsOn on = source.cause().acts.on;

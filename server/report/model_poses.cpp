@@ -20,7 +20,7 @@ constexpr double kLeastShown = 1e-3;         // mm: a smaller error stands in th
 constexpr std::size_t kFewestToJudge = 8;    // poses
 constexpr Eigen::Index kFewestToLearn = 40;  // poses of a learning curve
 constexpr Eigen::Index kMostToLearn = 600;
-constexpr Eigen::Index kMostCoupled = 250;  // of a bias whose axes are learned together
+constexpr Eigen::Index kMostCoupled = 250;  // poses of a bias whose axes are learned together
 constexpr double kWorthIt = 0.1;            // relative gain
 
 ShownPoses poses_of(const CompensatedModel& model, const MeasurementBatch& batch) {
@@ -36,7 +36,7 @@ ShownPoses poses_of(const CompensatedModel& model, const MeasurementBatch& batch
   return shown;
 }
 
-/// With which tool and payload observation `i` was measured, if the file says it.
+/// The tool and payload of observation `i`, if the file has them.
 std::optional<PoseContext> context_of(const ModelParts& parts, std::size_t i,
                                       const JointVector& q) {
   PoseContext context;
@@ -100,7 +100,7 @@ std::vector<int> counted(const std::vector<Vector3>& errors, int first, int last
   return counts;
 }
 
-/// rms at the poses that a bias of every `step`-th pose, or of all but these, does not know.
+/// rms at left-out poses under the bias of the other poses. `poses`: the number of these others.
 struct LeftOut {
   int poses = 0;
   double rms = 0;

@@ -17,7 +17,7 @@ struct ShownPose {
       context;  ///< with tool and payload; empty where a model file does not say them
   std::optional<Vector3> nominal;  ///< measured - nominal; empty where the context is not known
   Vector3 calibrated = Vector3::Zero(), compensated = Vector3::Zero();
-  Vector3 stddev = Vector3::Zero();  ///< of compensated, as the model states it for a measurement
+  Vector3 stddev = Vector3::Zero();  ///< of compensated, as the model states it for one measurement
   bool in_domain = true;
 };
 
@@ -26,8 +26,8 @@ struct ShownPoses {
   std::vector<ShownPose> poses;
 };
 
-/// Those of `batch`; else those that the bias learned from, each predicted from all the others;
-/// else none.
+/// The poses of `batch`; otherwise those that the bias learned from, each predicted from all the
+/// others; otherwise none.
 [[nodiscard]] ShownPoses poses_to_show(const CompensatedModel& model,
                                        const std::optional<MeasurementBatch>& batch);
 
@@ -47,9 +47,9 @@ struct LearningCurve {
   std::vector<int> poses = {};     ///< rising
   std::vector<double> error = {};  ///< m
 };
-/// The curve of a bias: the error at the poses left out, with a part of the poses and with all but
-/// one. Of a model without: the promise (PositionAccuracy) if the parameters' covariance shrinks as
-/// poses are added. Empty where there are too few poses, or so many that it would take long.
+/// The curve of a bias: the error at left-out poses, with a part of the poses and with all but one.
+/// For a model without a bias: the stated accuracy (PositionAccuracy) if the parameters' covariance
+/// shrinks as poses are added. Empty with too few poses, or with so many that it would take long.
 [[nodiscard]] std::optional<LearningCurve> learning_curve(const CompensatedModel& model);
 
 }  // namespace trammel

@@ -21,16 +21,16 @@ namespace trammel {
 namespace {
 
 constexpr int kFewestToPromise =
-    10;  // fresh poses: with fewer the promise says by how many it was tested
-/// Degrees of freedom of the residuals: with fewer their rms may be wrong by half and more (1 /
-/// sqrt(2 k) is 22 % of it at 10), and nothing else says how far the model is off.
+    10;  // fresh poses: with fewer, the statement gives the number of test poses
+/// Degrees of freedom of the residuals. With fewer, their rms may be wrong by half or more (1 /
+/// sqrt(2 k) is 22 % of it at 10), and nothing else shows the model's error.
 constexpr double kFewestFreedom = 10;
 constexpr std::int64_t kDay = 86400;
-/// The time for which a model is taken for good where no check has told its drift, days.
+/// The validity of a model in days if no check has measured its drift.
 constexpr std::int64_t kFirstCheck = 30;
 constexpr int kFewestRepeats = 6;  // degrees of freedom
-/// RP of ISO 9283 is the mean distance from the barycentre and three of its standard
-/// deviations: 3.615 standard deviations of an axis, where the three axes are alike and normal.
+/// RP of ISO 9283 is the mean distance from the barycentre plus three of its standard deviations.
+/// That is 3.615 standard deviations of an axis if the three axes are equal and normal.
 constexpr double kRepeatability = 3.615;
 
 std::int64_t newest_measurement(const ModelProvenance& provenance) {
@@ -45,7 +45,7 @@ std::string check_by(const ModelProvenance& provenance) {
                      unix_now() > due ? ", a day that has passed" : "");
 }
 
-/// Where the day of the next check has passed.
+/// The sentence for a check that is overdue; empty if it is not.
 std::string overdue(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance), now = unix_now();
   if (from <= 0 || now <= from + kFirstCheck * kDay) return "";
@@ -111,7 +111,7 @@ std::string papers_table(const CompensatedModel& model,
   add("tool", tools(model.parts()));
   add("instrument", measured.instrument);
   add("operator", or_not_told(papers.operator_name));
-  // A batch that says no time has the date of its file, which the model does not tell from a time.
+  // A batch without times has the date of its file, and the model does not distinguish the two.
   add("measured", made.measured_at
                       ? shown_day(*made.measured_at) + " (by time_s, else the date of the file)"
                       : std::string("not recorded"));
@@ -155,13 +155,13 @@ std::string iso_table(const CompensatedModel& model, const PositionAccuracy& acc
   return html_table({"iso", {"as ISO 9283 names it", "value", "of what"}, rows});
 }
 
-/// Says if a tolerance is held: yes and no only where the whole interval of the promise says so.
+/// Says whether a tolerance is met; yes or no only if the whole interval of the accuracy agrees.
 std::string held(const PositionAccuracy& accuracy, double tolerance) {
   if (accuracy.most() <= tolerance) return "yes";
   return accuracy.least() <= tolerance ? "cannot tell" : "no";
 }
 
-/// Rounded down, and never all of them: nobody knows that.
+/// Rounded down, and never 100 %, since nobody knows that.
 std::string share_text(double share) {
   const double percent = 100 * std::floor(1000 * share) / 1000;
   return percent > 99.9 ? "over 99.9 %" : fmt::format("{:.1f} %", percent);
@@ -196,7 +196,7 @@ std::string tolerance_sentence(const PositionAccuracy& accuracy,
       rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()));
 }
 
-/// Says what the promise stands on, where that is little; it follows "in this volume".
+/// States the basis of the accuracy if it is weak; the text follows "in this volume".
 std::string hardly_judged(const PositionAccuracy& accuracy) {
   if (accuracy.judged_by() >= kFewestToPromise) return "";
   if (accuracy.judged_by() == 0) return ", by its training poses alone";
@@ -204,7 +204,8 @@ std::string hardly_judged(const PositionAccuracy& accuracy) {
                      accuracy.judged_by() == 1 ? "" : "s");
 }
 
-/// From which side poses must come, where they were measured from one; it follows "in this volume".
+/// States the side from which poses must come, if all were measured from one; the text follows "in
+/// this volume".
 std::string from_that_side(const ModelParts& parts) {
   const std::string side = one_sided(parts.measured);
   return side.empty() ? "" : ", for poses that the arm comes to " + side;
@@ -219,8 +220,9 @@ double determined(const ModelParts& parts) {
   return sum;
 }
 
-/// Coordinates of positions (and distances) that were trained on, less their share of what was
-/// determined from them and from orientations; three more for every pose that was not trained on.
+/// Degrees of freedom: the coordinates of the training positions (and distances), less their share
+/// of the parameters that they and the orientations determined; plus three for every pose that was
+/// not trained on.
 double freedom_left(const CompensatedModel& model, const PositionAccuracy& accuracy) {
   const ModelParts& parts = model.parts();
   const double gauges = parts.training.gauges ? parts.training.gauges->rows : 0;

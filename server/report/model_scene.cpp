@@ -14,7 +14,7 @@ using nlohmann::ordered_json;
 
 constexpr int kRings = 10;
 constexpr int kSectors = 36;
-constexpr int kShellPoses = 4000;        // in range, that the shell is drawn from
+constexpr int kShellPoses = 4000;        // poses in range from which the shell is drawn
 constexpr std::size_t kMostPoses = 300;  // with their arms
 constexpr int kUnmeasured = 120;         // poses of the domain, where none is known
 
@@ -50,7 +50,7 @@ ordered_json arm(const CompensatedModel& model, const PoseContext& context) {
   return corners;
 }
 
-/// Where the tool is farthest from the first axis, by height and by direction; m.
+/// The farthest tool places from the first axis, by height and by direction; m.
 struct Shell {
   double low = 0, high = 0;
   std::vector<std::vector<double>> radius = std::vector(kRings, std::vector<double>(kSectors, 0));

@@ -6,7 +6,7 @@
 
 namespace trammel {
 
-/// The style that all pages share; it stands alone in a `<style>` of its own.
+/// The style that all pages share; it has a `<style>` element of its own.
 [[nodiscard]] std::string_view page_style();
 /// JavaScript: `view3d()` draws points and lines in space in a canvas, turned and zoomed by the
 /// pointer.
@@ -15,7 +15,7 @@ namespace trammel {
 /// `2026-11-22`, UTC; a dash where no time is known (0 or less).
 [[nodiscard]] std::string shown_day(std::int64_t unix_s);
 
-/// Text that was written for terminals, with µm where it says um.
+/// Text for terminals, with um replaced by µm.
 [[nodiscard]] std::string with_micro(std::string text);
 
 }  // namespace trammel

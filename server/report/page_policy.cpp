@@ -12,7 +12,7 @@
 namespace trammel {
 namespace {
 
-/// The texts of the elements of this kind whose first tag is `<name>`, without attributes.
+/// The contents of all elements with the tag `<name>`, without attributes.
 std::vector<std::string> texts_of(std::string_view page, std::string_view name) {
   const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
   std::vector<std::string> texts;
@@ -26,7 +26,7 @@ std::vector<std::string> texts_of(std::string_view page, std::string_view name) 
   return texts;
 }
 
-/// The text in the place of `{{name}}`, for texts that are the same on every page.
+/// The text for `{{name}}`, for texts that are equal on all pages.
 std::string shared_text(std::string_view text) {
   if (text == "{{chart_js}}") return std::string(embedded::chart_js);
   if (text == "{{view3d_js}}") return std::string(embedded::view3d_js);

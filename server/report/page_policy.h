@@ -12,7 +12,7 @@ struct PageInserts {
   std::vector<std::string> scripts, styles;
 };
 [[nodiscard]] PageInserts inserts_of(std::string_view page);
-/// Those of all pages of this program, before anything that comes from outside is filled in.
+/// The inserts of all pages of this program, before values from outside are filled in.
 [[nodiscard]] PageInserts inserts_of_our_pages();
 
 /// A Content-Security-Policy that lets exactly these run and apply, and nothing be loaded, sent or

@@ -89,8 +89,8 @@ std::vector<FoundMark> marks_in(const fs::path& folder, const std::string& but) 
   return marks;
 }
 
-/// `./file` with everything spelled as bytes that an address may not have, so that no name is read
-/// as one.
+/// `./file` with percent encoding of bytes that a URL must not have, so that no file name is read
+/// as a URL.
 std::string address_of(const std::string& file) {
   std::string address = "./";
   for (const char c : file) {

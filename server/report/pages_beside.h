@@ -5,7 +5,7 @@
 
 namespace trammel {
 
-/// The subject of a page; it stands in its head, so that other pages find it.
+/// The subject of a page; it is in the page's head, where other pages find it.
 struct PageMark {
   std::string_view
       kind;          ///< model, diagnosis, program, health, remedies, comparison, history or fleet
@@ -14,10 +14,9 @@ struct PageMark {
 };
 [[nodiscard]] std::string page_mark(const PageMark& mark);
 
-/// `page` with links to the pages that stand beside `path`, where it is going to be written, and
-/// are of the same cell or of several: whoever has the folder finds from one to the other. Nothing
-/// of them but their marks and file names gets into the page. A page that is written later is not
-/// known to this one. `-`: no links.
+/// `page` with links to the pages beside `path`, its future place, that are of the same cell or of
+/// several cells. So readers of the folder find their way between them. Only the marks and file
+/// names of these pages enter the page. Pages that are written later are missing. `-`: no links.
 [[nodiscard]] std::string with_pages_beside(std::string page, const std::string& path);
 
 }  // namespace trammel

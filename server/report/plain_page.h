@@ -15,7 +15,8 @@ struct PlainPage {
 };
 [[nodiscard]] std::string plain_page(const PlainPage& page);
 
-/// ` · serial number 66-40 · measured with AT960 by I. Newton`, as far as the cell file says it.
+/// ` · serial number 66-40 · measured with AT960 by I. Newton`, as far as the cell file has these
+/// data.
 [[nodiscard]] std::string papers_text(const CellPapers& papers);
 
 }  // namespace trammel

@@ -16,7 +16,7 @@ double share_of_tried(int count, const PutIn& size) {
   return static_cast<double>(count) / static_cast<double>(std::max(1, size.tried));
 }
 
-/// Shares by size: sizes by their logarithm, from the smallest tried to the largest.
+/// Plots shares against sizes. The sizes are logarithmic, from the smallest tried to the largest.
 class Plot {
  public:
   explicit Plot(const ProvedCause& proved) : proved_(proved) {
@@ -57,7 +57,7 @@ class Plot {
                           y(share_of_tried(size.*count, size)));
     return fmt::format(R"(<path class="{}" d="{}"/>)", kind, path);
   }
-  /// Nothing where the size lies beyond all that were tried.
+  /// Empty if the size is beyond all tried sizes.
   [[nodiscard]] std::string mark(const char* kind, const std::optional<double>& size) const {
     if (!size || *size < proved_.sizes.front().effect_rms ||
         *size > proved_.sizes.back().effect_rms)
@@ -90,7 +90,7 @@ PutIn all_of(const ProvedCause& proved) {
   return all;
 }
 
-/// The share of its largest effects that were found, but in doubt.
+/// The share of its largest effects that were found only in doubt.
 std::string found_in_doubt(const ProvedCause& proved) {
   const PutIn& largest = proved.sizes.back();
   if (largest.found == 0) return "";

@@ -6,9 +6,9 @@
 
 namespace trammel {
 
-/// A proof in the batch's own residuals, as a section of a page: for each cause the size
-/// from which it is named, beside the one that was predicted, and a plot of how often it was named
-/// rightly and wrongly. A cause that no size names says so.
+/// A proof in the batch's own residuals, as a section of a page. For each cause it has the measured
+/// size from which it is named, the predicted size, and a plot of the shares named correctly and
+/// wrongly. If no size is named, it says so.
 [[nodiscard]] std::string proof_section(const Proof& proof);
 
 }  // namespace trammel

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// The repairs that a shop can make, where, and what each step leaves, as a page for the wall.
-/// `where`: of which poses.
+/// The repairs that a shop can make, their places, and the error left after each, as a page for the
+/// wall. `where`: the poses of the figures.
 [[nodiscard]] std::string remedies_page(const CompensatedModel& model, const ErrorBudget& budget,
                                         const std::string& where);
 

@@ -8,9 +8,9 @@
 
 namespace trammel {
 
-/// The changes between sessions, for programs: cause and joint (from 1), since which session and
-/// pose, sizes with U(k=2) in the unit that stands beside them, what else it could be, and whether
-/// it rests on the order of the sessions.
+/// The changes between sessions, for programs: cause and joint (from 1), the first session and
+/// pose, sizes with U(k=2) and their unit, possible alternatives, and whether the change rests on
+/// the order of the sessions.
 [[nodiscard]] nlohmann::ordered_json session_changes_json(
     const std::vector<SessionChange>& changes);
 /// The changes between sessions as a table of a page; empty where nothing changed.
